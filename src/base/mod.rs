@@ -1,0 +1,8 @@
+//! What every room stands on: exact numbers and their text, hashes, near names.
+//!
+//! Rule: nothing here knows an episode, a metric or a file format.
+
+pub mod hash;
+pub mod near;
+pub mod number;
+pub mod ratio;

@@ -1,0 +1,31 @@
+//! The nearest valid name, for the "did you mean" of an error.
+
+/// The candidate most like `name`, if any is like it at all.
+///
+/// Similarity is Jaro-Winkler, ignoring ASCII case; ties go to the candidate
+/// that comes first, so the answer depends on the order given alone.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    const LIKE_ENOUGH: f64 = 0.75;
+    let name = name.to_ascii_lowercase();
+    let mut best: Option<(&str, f64)> = None;
+    for candidate in candidates {
+        let likeness = strsim::jaro_winkler(&name, &candidate.to_ascii_lowercase());
+        if likeness >= LIKE_ENOUGH && best.is_none_or(|(_, b)| likeness > b) {
+            best = Some((candidate, likeness));
+        }
+    }
+    best.map(|(candidate, _)| candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+
+    #[test]
+    fn the_most_alike_wins_and_strangers_do_not() {
+        let names = ["self_color", "selected_cube", "body_color"];
+        assert_eq!(nearest("self_colour", names), Some("self_color"));
+        assert_eq!(nearest("SELF_COLOR", names), Some("self_color"));
+        assert_eq!(nearest("zzz", names), None);
+    }
+}

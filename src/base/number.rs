@@ -1,0 +1,1 @@
+//! Exact numbers to text: the one place that rounds.

@@ -1,0 +1,6 @@
+//! Groups of episodes and their exact moments; intervals and tests over them.
+//!
+//! Rule: integers until the last step. Nothing here formats a number or opens a file.
+
+pub mod cell;
+pub mod moments;

@@ -1,0 +1,37 @@
+//! The command line: the only room with clap, standard output and exit codes.
+//!
+//! `args` is what was typed and what several verbs share; `commands/<verb>.rs` is one thin file a verb;
+//! `outcome` maps what happened to an exit code, in one place.
+
+pub mod args;
+pub mod commands;
+pub mod outcome;
+
+use std::ffi::OsString;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use commands::Command;
+use outcome::Outcome;
+
+/// Score mirror self-recognition episodes: step traces in, exact metrics, tables and reports out.
+#[derive(Debug, Parser)]
+#[command(name = "mirrorstats", version, propagate_version = true, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Runs the program with these arguments, the program's name first.
+pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    match Cli::try_parse_from(arguments) {
+        Ok(cli) => outcome::exit_code(cli.command.run()),
+        Err(usage) => {
+            // Help and version arrive here too; clap knows which stream and code each one takes.
+            let printed = usage.print();
+            let asked_for = usage.exit_code() == 0 && printed.is_ok();
+            outcome::exit_code(if asked_for { Ok(Outcome::Done) } else { Err(outcome::Failure::Usage) })
+        }
+    }
+}

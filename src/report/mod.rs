@@ -1,0 +1,3 @@
+//! From cells to bytes: tables, and the folder of a report.
+//!
+//! Rule: this room sees no trace and no plan, only cells and the episode table.

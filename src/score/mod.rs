@@ -1,0 +1,5 @@
+//! A checked plan over Arrow batches: one row an episode.
+//!
+//! Rule: pure. No file is opened here, no clock read, no thread started in a kernel.
+
+pub mod table;

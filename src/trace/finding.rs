@@ -5,6 +5,7 @@
 use std::fmt;
 use std::io;
 
+use arrow::error::ArrowError;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -345,8 +346,13 @@ impl fmt::Display for Finding {
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
     /// A rule of the schema does not hold.
-    #[error("{0}")]
-    Finding(Box<Finding>),
+    #[error("{first}{}", more_findings(*.more))]
+    Finding {
+        /// The earliest finding by file, row group and row.
+        first: Box<Finding>,
+        /// How many others are known; `validate` shows them all.
+        more: usize,
+    },
     /// The operating system refused to read something that is not yet known as a trace.
     #[error("cannot read {what}")]
     Read {
@@ -385,6 +391,9 @@ pub enum TraceError {
         /// What the files have.
         found: String,
     },
+    /// Columns could not be put together in memory.
+    #[error("cannot hold the rows in memory; report this as a fault of mirrorstats")]
+    Memory(#[source] ArrowError),
     /// What a writer was given is not an episode of the schema.
     #[error("episode `{episode}`: expected {expected}, found {found}; nothing of it was written")]
     Refused {
@@ -405,9 +414,25 @@ pub enum TraceError {
     },
 }
 
+fn more_findings(more: usize) -> String {
+    match more {
+        0 => String::new(),
+        more => format!("\n  and {more} more: `mirrorstats validate` shows them all"),
+    }
+}
+
+impl TraceError {
+    /// The error of these findings, the earliest first; `None` for none.
+    pub fn of(findings: Vec<Finding>) -> Option<Self> {
+        let mut findings = findings.into_iter();
+        let first = Box::new(findings.next()?);
+        Some(Self::Finding { first, more: findings.len() })
+    }
+}
+
 impl From<Finding> for TraceError {
     fn from(finding: Finding) -> Self {
-        Self::Finding(Box::new(finding))
+        Self::Finding { first: Box::new(finding), more: 0 }
     }
 }
 

@@ -589,6 +589,14 @@ impl Scope<'_, '_> {
             let message = format!("`{name}` takes {}, found {}", arguments_wanted(entry), arguments.len());
             return self.binder.refuse(Fault::new(self.place(whole), message).help(entry.usage));
         }
+        let bound = self.apply(entry, arguments, whole)?;
+        if matches!(self.binder.builder.node(bound.node).op, Op::Aggregate(..) | Op::At(..)) {
+            self.binder.builder.remember(bound.node, &self.written.text[whole.span.clone()]);
+        }
+        Some(bound)
+    }
+
+    fn apply(&mut self, entry: &Entry, arguments: &[Expr], whole: &Expr) -> Option<Bound> {
         match entry.function {
             Function::First => self.predicate(Aggregate::First, Type::Int, &arguments[0], entry),
             Function::Last => self.predicate(Aggregate::Last, Type::Int, &arguments[0], entry),

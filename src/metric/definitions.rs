@@ -8,7 +8,7 @@ use super::columns::Columns;
 use super::fault::{Fault, Faults, Source};
 use super::file::{self, Document, FileError};
 use super::origin::Written;
-use super::plan::{Output, Plan};
+use super::plan::{NodeId, Output, Plan};
 use crate::base::hash;
 use crate::base::near::nearest;
 
@@ -63,6 +63,12 @@ impl Definitions {
         }
         self.plan.select(names);
         Ok(())
+    }
+
+    /// The `let` or metric that is exactly this node, a `let` first.
+    pub fn name_of(&self, node: NodeId) -> Option<String> {
+        let lets = self.plan.lets.iter().find(|(_, known)| *known == node).map(|(name, _)| name.clone());
+        lets.or_else(|| self.plan.outputs.iter().find(|output| output.node == node).map(|output| output.name.clone()))
     }
 
     /// The definitions as written.

@@ -183,6 +183,8 @@ pub struct Plan {
     pub outputs: Vec<Output>,
     /// The named expressions in the order of definition, for evidence.
     pub lets: Vec<(String, NodeId)>,
+    /// Aggregates and lookups as they were first written, for evidence.
+    pub sources: HashMap<NodeId, String>,
     /// Which episodes count; all if absent. An episode-level truth value.
     pub filter: Option<NodeId>,
 }
@@ -273,6 +275,11 @@ impl Builder {
             self.plan.nodes.push(Node { op: op.clone(), ty: *ty, level: *level });
             NodeId(self.plan.nodes.len() - 1)
         })
+    }
+
+    /// Remembers how a node was written, the first time.
+    pub(super) fn remember(&mut self, id: NodeId, text: &str) {
+        self.plan.sources.entry(id).or_insert_with(|| text.to_owned());
     }
 
     /// The node itself.

@@ -135,13 +135,13 @@ impl<'p> Engine<'p> {
             engine: self,
             batch,
             symbols: Symbols::default(),
-            values: Evaluated(vec![None; self.plan.nodes().len()]),
+            values: vec![None; self.plan.nodes().len()],
         };
         for &id in &self.order {
             let value = evaluation.node(id)?;
-            evaluation.values.0[id.index()] = Some(value);
+            evaluation.values[id.index()] = Some(value);
         }
-        Ok(evaluation.values)
+        Ok(Evaluated { values: evaluation.values, symbols: evaluation.symbols })
     }
 
     fn overflow(&self, at: NodeId, reason: &ArrowError) -> EngineError {
@@ -183,13 +183,25 @@ fn evaluation_order(plan: &Plan, roots: impl IntoIterator<Item = NodeId>) -> Vec
 
 /// The columns of the nodes of a plan.
 #[derive(Debug)]
-pub(super) struct Evaluated(Vec<Option<Values>>);
+pub(super) struct Evaluated {
+    values: Vec<Option<Values>>,
+    symbols: Symbols,
+}
 
 impl Evaluated {
     /// The column of a node that was asked for.
     pub(super) fn of(&self, id: NodeId) -> &Values {
-        self.0[id.index()].as_ref().expect("operands come before their users in the order of evaluation")
+        known(&self.values, id)
     }
+
+    /// The text of a symbol among the values.
+    pub(super) fn text(&self, symbol: u32) -> &str {
+        self.symbols.text(symbol)
+    }
+}
+
+fn known(values: &[Option<Values>], id: NodeId) -> &Values {
+    values[id.index()].as_ref().expect("operands come before their users in the order of evaluation")
 }
 
 /// An episode-level column as integers, the episodes kept alone.
@@ -208,14 +220,18 @@ struct Evaluation<'e, 'p> {
     engine: &'e Engine<'p>,
     batch: &'e Batch<'e>,
     symbols: Symbols,
-    values: Evaluated,
+    values: Vec<Option<Values>>,
 }
 
 impl Evaluation<'_, '_> {
+    fn of(&self, id: NodeId) -> &Values {
+        known(&self.values, id)
+    }
+
     fn node(&mut self, id: NodeId) -> Result<Values, EngineError> {
         let node = self.engine.plan.node(id);
         let overflow = |error: ArrowError| self.engine.overflow(id, &error);
-        let of = |id: NodeId| self.values.of(id);
+        let of = |id: NodeId| known(&self.values, id);
         let truth = |array: BooleanArray| Values::new(array, Type::Bool);
         let segments = self.batch.segments;
         Ok(match &node.op {
@@ -296,7 +312,7 @@ impl Evaluation<'_, '_> {
 
     /// The values of a node, a constant written out.
     fn full(&self, id: NodeId, level: Level) -> Values {
-        let values = self.values.of(id);
+        let values = self.of(id);
         if values.is_single() { self.spread(values, level) } else { values.clone() }
     }
 
@@ -308,7 +324,7 @@ impl Evaluation<'_, '_> {
         if let Some((comparison, moment)) = window(self.engine.plan, op) {
             return Ok(self.batch.segments.window(comparison, self.full(moment, Level::Episode).ints()));
         }
-        let (x, y) = (self.values.of(x), self.values.of(y));
+        let (x, y) = (self.of(x), self.of(y));
         match (x.ty(), comparison) {
             (Type::Text, Comparison::Less | Comparison::LessEqual | Comparison::Greater | Comparison::GreaterEqual) => {
                 let ranks = self.symbols.ranks();
@@ -323,7 +339,7 @@ impl Evaluation<'_, '_> {
     }
 
     fn arithmetic(&self, op: Arithmetic, ty: Type, level: Level, x: NodeId, y: NodeId) -> Result<Values, ArrowError> {
-        let (a, b) = (self.values.of(x), self.values.of(y));
+        let (a, b) = (self.of(x), self.of(y));
         let result = match op {
             Arithmetic::Add => numeric::add(a, b)?,
             Arithmetic::Subtract => numeric::sub(a, b)?,
@@ -350,7 +366,7 @@ impl Evaluation<'_, '_> {
         for (when, then) in branches.iter().rev() {
             let mask = self.full_bools(*when, level);
             let mask = if mask.null_count() > 0 { prep_null_mask_filter(&mask) } else { mask };
-            result = Values::shared(zip::zip(&mask, self.values.of(*then), &result)?, ty);
+            result = Values::shared(zip::zip(&mask, self.of(*then), &result)?, ty);
         }
         Ok(result)
     }
@@ -367,7 +383,7 @@ impl Evaluation<'_, '_> {
     }
 
     fn aggregate(&self, aggregate: Aggregate, x: NodeId) -> Result<Values, ArrowError> {
-        let (segments, values) = (self.batch.segments, self.values.of(x));
+        let (segments, values) = (self.batch.segments, self.of(x));
         Ok(match (aggregate, values.ty()) {
             (Aggregate::Any, _) => Values::new(segments.any(values.bools()), Type::Bool),
             (Aggregate::All, _) => Values::new(segments.all(values.bools()), Type::Bool),

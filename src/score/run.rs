@@ -168,7 +168,7 @@ pub fn score(
     traces.scan(
         &projection,
         threads,
-        |batch| {
+        |batch| -> Result<Part, ScoreError> {
             let scores = engine.score(&view(&batch)).map_err(|source| ScoreError::Engine {
                 file: traces.files()[batch.origin.file].name().to_owned(),
                 source,
@@ -217,7 +217,8 @@ fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     if constant(label) && problem.is_none() {
         return Ok(());
     }
-    let known: Vec<String> = traces.column_names().into_iter().filter(|name| constant(name)).map(str::to_owned).collect();
+    let known: Vec<String> =
+        traces.column_names().into_iter().filter(|name| constant(name)).map(str::to_owned).collect();
     let near = nearest(label, known.iter().map(String::as_str)).filter(|near| *near != label);
     let help = match (near, problem) {
         (Some(near), _) => format!("did you mean `{near}`?"),

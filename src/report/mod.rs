@@ -3,8 +3,12 @@
 //! Rule: this room sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
 //! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`bundle`] writes the folder.
 
+pub mod bundle;
+pub mod comparison;
 pub mod emphasis;
+pub mod errata;
 pub mod layout;
+pub mod published;
 pub mod style;
 pub mod table;
 pub mod tables;

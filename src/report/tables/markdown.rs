@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use super::visible::visible;
-use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table};
+use crate::base::visible::visible;
+use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 
 /// The whole table with its caption above.
 pub fn render(table: &Table) -> String {
@@ -63,16 +63,16 @@ fn cells(row: &Row, table: &Table) -> Vec<String> {
     std::iter::once(escape(&row.name)).chain(row.cells.iter().map(|cell| spell(cell, table))).collect()
 }
 
+/// Numbers need no escaping, only the style's word for undefined does.
 fn spell(cell: &Cell, table: &Table) -> String {
-    let (estimate, detail) = cell.value.parts(&table.undefined);
+    let (estimate, detail) = cell.value.parts(&escape(&table.undefined));
     let mark = if cell.is_marked { DAGGER.to_string() } else { String::new() };
-    let is_whole = matches!(cell.value, crate::report::table::Value::MeanSe { .. });
+    let is_whole = matches!(cell.value, Value::MeanSe { .. });
     let (inside, after) = match detail {
         Some(detail) if is_whole => (format!("{estimate} {detail}"), mark),
-        Some(detail) => (estimate, format!("{mark} {}", escape(&detail))),
+        Some(detail) => (estimate, format!("{mark} {detail}")),
         None => (estimate, mark),
     };
-    let inside = escape(&inside);
     match cell.emphasis {
         Emphasis::Plain => format!("{inside}{after}"),
         Emphasis::Bold => format!("**{inside}**{after}"),

@@ -6,5 +6,5 @@
 pub mod csv;
 pub mod latex;
 pub mod markdown;
+pub mod side_by_side;
 pub mod terminal;
-mod visible;

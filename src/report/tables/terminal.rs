@@ -6,7 +6,7 @@
 
 use unicode_width::UnicodeWidthStr;
 
-use super::visible::visible;
+use crate::base::visible::visible;
 use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 
 /// What the text is printed on.
@@ -45,6 +45,9 @@ pub fn render(table: &Table, terminal: Terminal) -> String {
     lines.push(String::new());
     for sentence in table.sentences() {
         lines.extend(wrapped(&visible(sentence), room));
+    }
+    if terminal.emphasis == Marks::Signs && is_any_emphasised(table) {
+        lines.push("Marked as *best*, _second best_.".to_owned());
     }
     while lines.last().is_some_and(String::is_empty) {
         lines.pop();
@@ -183,6 +186,11 @@ fn spell(cell: &Cell, table: &Table, marks: Marks, shape: Shape) -> Vec<Piece> {
         }
         (None, _) => vec![Piece::emphasised(&estimate, cell.emphasis, marks).followed_by(&mark)],
     }
+}
+
+fn is_any_emphasised(table: &Table) -> bool {
+    let rows = table.groups.iter().flat_map(|group| &group.rows);
+    rows.flat_map(|row| &row.cells).any(|cell| cell.emphasis != Emphasis::Plain)
 }
 
 /// `text` in lines of at most `width` columns where its words allow.

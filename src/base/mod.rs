@@ -6,3 +6,4 @@ pub mod hash;
 pub mod near;
 pub mod number;
 pub mod ratio;
+pub mod visible;

@@ -3,4 +3,7 @@
 //! Rule: integers until the last step. Nothing here formats a number or opens a file.
 
 pub mod cell;
+pub mod group;
+pub mod interval;
 pub mod moments;
+mod quantile;

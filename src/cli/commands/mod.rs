@@ -1,5 +1,7 @@
 //! The verbs: one file each.
 
+pub mod compare;
+
 use super::outcome::{Failure, Outcome};
 
 /// What to do.

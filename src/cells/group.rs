@@ -1,0 +1,246 @@
+//! The episode table grouped by key columns: cells.
+//!
+//! Rule: an undefined value enters no moment; it is counted only in [`Group::episodes`]. Groups are ordered by
+//! their keys, never by arrival.
+
+use std::collections::BTreeMap;
+
+use super::cell::{Cells, Group, KeyValue};
+use super::moments::{MomentOverflow, Moments};
+use crate::base::near::nearest;
+use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn};
+
+/// The key columns of every episode table.
+pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episode_id"];
+
+/// The columns that cells are grouped by unless asked otherwise.
+pub const DEFAULT_BY: [&str; 2] = ["experiment", "model"];
+
+/// Why episodes cannot be grouped as asked.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GroupError {
+    /// Nothing to group by.
+    #[error("no column to group by: expected at least one of {known}")]
+    NoColumn {
+        /// The columns there are.
+        known: String,
+    },
+    /// A column that the episode table does not have.
+    #[error("cannot group by `{name}`: expected one of {known}{}", suggestion(.nearest.as_deref()))]
+    UnknownColumn {
+        /// What was asked for.
+        name: String,
+        /// The columns there are.
+        known: String,
+        /// The one most like it.
+        nearest: Option<String>,
+    },
+    /// A column named twice.
+    #[error("cannot group by `{name}` twice: name each column once")]
+    RepeatedColumn {
+        /// What was named twice.
+        name: String,
+    },
+    /// A metric whose sums leave 128 bits.
+    #[error("metric `{metric}`: {source}")]
+    Overflow {
+        /// The metric.
+        metric: String,
+        /// What overflowed.
+        source: MomentOverflow,
+    },
+}
+
+fn suggestion(nearest: Option<&str>) -> String {
+    nearest.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
+}
+
+/// Cells of `table` grouped by the columns `by`.
+///
+/// A label column whose every value is an integer orders as integers.
+///
+/// # Errors
+/// For no column, a repeated or an unknown one, and for sums that leave 128 bits.
+pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
+    let columns = columns(table, by)?;
+    let mut groups: BTreeMap<Vec<KeyValue>, Group> = BTreeMap::new();
+    for row in 0..table.len() {
+        let key: Vec<KeyValue> = columns.iter().map(|column| column.value(table, row)).collect();
+        let group = groups.entry(key.clone()).or_insert_with(|| Group {
+            key,
+            episodes: 0,
+            moments: vec![Moments::default(); table.metrics.len()],
+        });
+        group.episodes += 1;
+        for (moments, metric) in group.moments.iter_mut().zip(&table.metrics) {
+            if let Some(value) = metric.values[row] {
+                *moments = moments
+                    .with(value)
+                    .map_err(|source| GroupError::Overflow { metric: metric.name.clone(), source })?;
+            }
+        }
+    }
+    Ok(Cells {
+        catalog: table.catalog.clone(),
+        by: by.to_vec(),
+        metrics: table.metrics.iter().map(|metric| metric.name.clone()).collect(),
+        groups: groups.into_values().collect(),
+    })
+}
+
+/// A column to group by, found in the table.
+enum KeyColumn<'a> {
+    Key(fn(&EpisodeKey) -> KeyValue),
+    Label { column: &'a LabelColumn, is_integer: bool },
+}
+
+impl KeyColumn<'_> {
+    fn value(&self, table: &EpisodeTable, row: usize) -> KeyValue {
+        match self {
+            Self::Key(of) => of(&table.keys[row]),
+            Self::Label { column, is_integer } => match &column.values[row] {
+                None => KeyValue::Missing,
+                Some(text) if *is_integer => canonical_integer(text).map_or(KeyValue::Missing, KeyValue::Int),
+                Some(text) => KeyValue::Text(text.clone()),
+            },
+        }
+    }
+}
+
+fn columns<'a>(table: &'a EpisodeTable, by: &[String]) -> Result<Vec<KeyColumn<'a>>, GroupError> {
+    let known = || known_columns(table);
+    if by.is_empty() {
+        return Err(GroupError::NoColumn { known: known().join(", ") });
+    }
+    if let Some(name) = by.iter().enumerate().find_map(|(at, name)| by[..at].contains(name).then_some(name)) {
+        return Err(GroupError::RepeatedColumn { name: name.clone() });
+    }
+    by.iter()
+        .map(|name| {
+            column(table, name).ok_or_else(|| GroupError::UnknownColumn {
+                name: name.clone(),
+                known: known().join(", "),
+                nearest: nearest(name, known()).map(str::to_owned),
+            })
+        })
+        .collect()
+}
+
+fn known_columns(table: &EpisodeTable) -> Vec<&str> {
+    KEY_COLUMNS.into_iter().chain(table.labels.iter().map(|label| label.name.as_str())).collect()
+}
+
+fn column<'a>(table: &'a EpisodeTable, name: &str) -> Option<KeyColumn<'a>> {
+    Some(match name {
+        "experiment" => KeyColumn::Key(|key| KeyValue::Text(key.experiment.clone())),
+        "model" => KeyColumn::Key(|key| KeyValue::Text(key.model.clone())),
+        "seed" => KeyColumn::Key(|key| KeyValue::Int(key.seed.into())),
+        "run" => KeyColumn::Key(|key| KeyValue::Int(key.run.into())),
+        "episode_id" => KeyColumn::Key(|key| KeyValue::Text(key.episode_id.clone())),
+        _ => {
+            let column = table.labels.iter().find(|label| label.name == name)?;
+            let is_integer = column.values.iter().flatten().all(|text| canonical_integer(text).is_some());
+            KeyColumn::Label { column, is_integer }
+        }
+    })
+}
+
+/// The integer that prints as exactly this text: `7`, but not `07` or `+7`.
+fn canonical_integer(text: &str) -> Option<i64> {
+    text.parse().ok().filter(|value: &i64| value.to_string() == text)
+}
+
+#[cfg(test)]
+mod tests {
+    use indexmap::IndexMap;
+
+    use super::{GroupError, group};
+    use crate::cells::cell::KeyValue;
+    use crate::metric::catalog::Catalog;
+    use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+
+    /// Rows of (experiment, model, seed, label, value).
+    type RowOf<'a> = (&'a str, &'a str, i32, Option<&'a str>, Option<i64>);
+
+    fn table(rows: &[RowOf]) -> EpisodeTable {
+        let catalog = Catalog {
+            name: "test".to_owned(),
+            hash: String::new(),
+            open: true,
+            lets: IndexMap::new(),
+            metric: IndexMap::new(),
+            experiment: IndexMap::new(),
+        };
+        let key = |(at, row): (usize, &RowOf)| EpisodeKey {
+            experiment: row.0.to_owned(),
+            model: row.1.to_owned(),
+            seed: row.2,
+            run: 0,
+            episode_id: format!("e{at}"),
+        };
+        EpisodeTable {
+            catalog,
+            keys: rows.iter().enumerate().map(key).collect(),
+            labels: vec![LabelColumn {
+                name: "distractors".to_owned(),
+                values: rows.iter().map(|row| row.3.map(str::to_owned)).collect(),
+            }],
+            metrics: vec![MetricColumn { name: "X".to_owned(), values: rows.iter().map(|row| row.4).collect() }],
+        }
+    }
+
+    fn by(names: &[&str]) -> Vec<String> {
+        names.iter().map(|&name| name.to_owned()).collect()
+    }
+
+    fn keys(rows: &[RowOf], names: &[&str]) -> Vec<String> {
+        let cells = group(&table(rows), &by(names)).unwrap();
+        let text = |key: &Vec<KeyValue>| key.iter().map(ToString::to_string).collect::<Vec<_>>().join("/");
+        cells.groups.iter().map(|group| text(&group.key)).collect()
+    }
+
+    #[test]
+    fn an_undefined_value_is_counted_among_the_episodes_only() {
+        let rows = [("E1", "a", 1, None, Some(3)), ("E1", "a", 1, None, None), ("E1", "a", 2, None, Some(0))];
+        let cells = group(&table(&rows), &by(&["experiment", "model"])).unwrap();
+        let [only] = &cells.groups[..] else { panic!("one group") };
+        assert_eq!(only.episodes, 3);
+        assert_eq!((only.moments[0].n, only.moments[0].sum, only.moments[0].sum_sq), (2, 3, 9));
+    }
+
+    #[test]
+    fn groups_are_ordered_by_key_and_integers_by_size() {
+        let rows = [
+            ("E2", "b", 10, Some("10"), None),
+            ("E1", "b", 9, Some("9"), None),
+            ("E1", "a", 10, None, None),
+            ("E1", "a", 9, Some("-1"), None),
+        ];
+        assert_eq!(keys(&rows, &["experiment", "model"]), ["E1/a", "E1/b", "E2/b"]);
+        assert_eq!(keys(&rows, &["seed"]), ["9", "10"]);
+        assert_eq!(keys(&rows, &["distractors"]), ["", "-1", "9", "10"]);
+        assert_eq!(keys(&rows, &["model", "seed"]), ["a/9", "a/10", "b/9", "b/10"]);
+    }
+
+    #[test]
+    fn labels_that_only_look_like_integers_stay_text() {
+        let rows =
+            [("E1", "a", 1, Some("07"), None), ("E1", "a", 1, Some("7"), None), ("E1", "a", 1, Some("10"), None)];
+        assert_eq!(keys(&rows, &["distractors"]), ["07", "10", "7"]);
+    }
+
+    #[test]
+    fn what_cannot_be_grouped_by_is_named() {
+        let table = table(&[("E1", "a", 1, None, None)]);
+        let message = |names: &[&str]| group(&table, &by(names)).unwrap_err().to_string();
+        insta::assert_snapshot!(message(&["modle"]), @"cannot group by `modle`: expected one of experiment, model, seed, run, episode_id, distractors; did you mean `model`?");
+        insta::assert_snapshot!(message(&["zzz"]), @"cannot group by `zzz`: expected one of experiment, model, seed, run, episode_id, distractors");
+        insta::assert_snapshot!(message(&["seed", "seed"]), @"cannot group by `seed` twice: name each column once");
+        assert!(matches!(group(&table, &[]), Err(GroupError::NoColumn { .. })));
+    }
+
+    #[test]
+    fn no_episode_gives_no_cell() {
+        assert_eq!(keys(&[], &["model"]), Vec::<String>::new());
+    }
+}

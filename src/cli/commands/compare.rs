@@ -1,0 +1,81 @@
+//! `compare`: what the traces print beside what is published.
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+use crate::cells::cell::Cells;
+use crate::cells::group::{DEFAULT_BY, group};
+use crate::cli::args::TraceArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::report::comparison::{Comparison, choose, compare};
+use crate::report::errata::Errata;
+use crate::report::layout;
+use crate::report::published;
+use crate::report::style::Style;
+use crate::report::tables::side_by_side;
+use crate::score::table::EpisodeTable;
+
+/// The style that printed the published tables.
+const PAPER_STYLE: &str = "paper";
+
+/// Compare the tables of traces with published ones, cell by cell.
+#[derive(Clone, Debug, clap::Args)]
+pub struct CompareArgs {
+    /// What to compare.
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    /// Published cells: a CSV file with the columns experiment,model,metric,mean,se,emphasis
+    #[arg(long, value_name = "FILE")]
+    pub published: PathBuf,
+    /// The style that prints the tables: `paper` or a style file
+    #[arg(long, value_name = "STYLE", default_value = PAPER_STYLE)]
+    pub style: String,
+    /// The table to compare [default: the first that has all the published metrics]
+    #[arg(long, value_name = "NAME")]
+    pub table: Option<String>,
+    /// Differences that are slips of the publication [default: those of the paper, with its style]
+    #[arg(long, value_name = "FILE")]
+    pub errata: Option<PathBuf>,
+    /// Print the answer as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl CompareArgs {
+    /// Compares what `score` makes of the traces; the check holds if every difference is excused.
+    ///
+    /// # Errors
+    /// For files that are not as they must be, and for whatever keeps `score` from its end.
+    pub fn run(self, score: impl FnOnce(&TraceArgs) -> Result<EpisodeTable, Failure>) -> Result<Outcome, Failure> {
+        // The small files first: a slip in them should not cost a pass over the traces.
+        let published = published::read(&self.published).map_err(Failure::input)?;
+        let style = Style::load(&self.style).map_err(Failure::input)?;
+        let errata = self.errata()?;
+        let by = DEFAULT_BY.map(str::to_owned);
+        let cells: Cells = group(&score(&self.traces)?, &by).map_err(Failure::input)?;
+        let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
+        let table = choose(&tables, &published, self.table.as_deref(), &style).map_err(Failure::input)?;
+        let comparison = compare(table, &published, &errata);
+        print(&comparison, self.json)?;
+        Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })
+    }
+
+    fn errata(&self) -> Result<Errata, Failure> {
+        match &self.errata {
+            Some(path) => Errata::read(path).map_err(Failure::input),
+            None if self.style == PAPER_STYLE => Ok(Errata::of_paper()),
+            None => Ok(Errata::default()),
+        }
+    }
+}
+
+fn print(comparison: &Comparison, json: bool) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    if json {
+        serde_json::to_writer_pretty(&mut out, comparison).map_err(io::Error::from)?;
+        writeln!(out)?;
+    } else {
+        out.write_all(side_by_side::render(comparison).as_bytes())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,409 @@
+//! Presentation as data: which tables there are, their columns and order, how a cell prints, what is emphasised.
+//!
+//! Rule: a style changes how a number looks, never the number. Styles are TOML, checked against the catalog
+//! before anything prints. `default` and `paper` are built in; any other name is a file.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::base::hash;
+use crate::base::near::nearest;
+use crate::base::number::MOST_PLACES;
+use crate::metric::catalog::{Better, Catalog, Kind};
+
+/// The table that every report has.
+pub const MAIN_TABLE: &str = "main";
+
+/// The table of the metrics that a style names nowhere.
+pub const OTHER_TABLE: &str = "other";
+
+const BUILT_IN: [(&str, &str); 2] = [
+    ("default", include_str!("../../assets/styles/default.toml")),
+    ("paper", include_str!("../../assets/styles/paper.toml")),
+];
+
+/// A style ready for use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Style {
+    /// The built-in name, or the file's name without its ending; never a path.
+    pub name: String,
+    /// SHA-256 of the file, 64 hexadecimal digits.
+    pub hash: String,
+    /// What the file says.
+    pub sheet: Sheet,
+    /// Whether it came with the program. A built-in style may name metrics that a catalog has not.
+    is_built_in: bool,
+}
+
+/// A style file.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sheet {
+    /// The models in the order of their rows; others come after them, by name.
+    #[serde(default)]
+    pub row_order: Vec<String>,
+    /// What stands where a value is undefined.
+    #[serde(default = "default_undefined")]
+    pub undefined: String,
+    /// How cells print in every table, unless the table says otherwise.
+    #[serde(default)]
+    pub print: PrintSheet,
+    /// Headers and arrows, by metric.
+    #[serde(default)]
+    pub column: IndexMap<String, ColumnSheet>,
+    /// The tables by name; a name becomes a file name. `main` must be one of them.
+    pub table: IndexMap<String, TableSheet>,
+}
+
+/// One table of a style file.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TableSheet {
+    /// The first words of the caption, without a full stop.
+    pub title: String,
+    /// The sentences after them.
+    #[serde(default)]
+    pub note: String,
+    /// The LaTeX label; none if absent.
+    pub label: Option<String>,
+    /// The metrics, in the order of the columns. Those that the scores have not are left out.
+    pub columns: Vec<String>,
+    /// What prints otherwise than in the other tables.
+    #[serde(default)]
+    pub print: PrintSheet,
+    /// The metrics whose undefined cells print as zero and compete as zero (a quirk of the published main table).
+    #[serde(default)]
+    pub undefined_as_zero: Vec<String>,
+}
+
+/// How a metric's column is headed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnSheet {
+    /// The header as LaTeX; the escaped name if absent.
+    pub latex: Option<String>,
+    /// The direction to print and emphasise by; the definition's own if absent.
+    pub better: Option<Better>,
+}
+
+/// How cells print; what is absent is as one level up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PrintSheet {
+    /// What a cell shows.
+    pub cell: Option<CellForm>,
+    /// How its numbers are rounded.
+    pub rounding: Option<Rounding>,
+    /// Digits behind the point.
+    pub decimals: Option<Decimals>,
+    /// Which cells stand out.
+    pub emphasis: Option<EmphasisRule>,
+    /// The standard error of a single value, where the sample form has none.
+    pub single_se: Option<SingleSe>,
+    /// Cells of a conditional metric with fewer defined episodes than this are marked with a dagger.
+    pub mark_n_below: Option<u64>,
+}
+
+/// How cells print, every question answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each field is that of `PrintSheet`")]
+pub struct Print {
+    pub cell: CellForm,
+    pub rounding: Rounding,
+    pub decimals: Decimals,
+    pub emphasis: EmphasisRule,
+    pub single_se: SingleSe,
+    pub mark_n_below: u64,
+}
+
+/// What a cell shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CellForm {
+    /// `0.57 ± 0.11`.
+    MeanSe,
+    /// `12/21 [.37, .76]` for a rate, `47.7 [30.7, 64.7]` for a quantity.
+    CountInterval,
+}
+
+/// How numbers are rounded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Rounding {
+    /// The exact value once, ties to even.
+    Once,
+    /// The binary float once, ties to even, as C and Python print it.
+    OnceBinary,
+    /// The binary float to one digit more, then that text with halves away from zero.
+    Twice,
+}
+
+/// Digits behind the point, at most nine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Decimals {
+    /// Of a rate.
+    #[schemars(range(max = 9))]
+    pub rate: u32,
+    /// Of anything else.
+    #[schemars(range(max = 9))]
+    pub quantity: u32,
+}
+
+/// Which cells of a column stand out within their group. Only models compete: where rows are anything else,
+/// nothing is emphasised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EmphasisRule {
+    /// Nothing.
+    None,
+    /// The best exact mean is bold, the next underlined, with all that tie; nothing where all tie.
+    ExactMean,
+    /// The same by the means as printed; where all tie, all are bold.
+    PrintedMean,
+}
+
+/// The standard error of a single value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SingleSe {
+    /// Not printed.
+    Undefined,
+    /// Printed as zero.
+    Zero,
+}
+
+/// Why a style cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StyleError {
+    /// Neither a built-in style nor a file.
+    #[error(
+        "no style `{name}`: expected `default`, `paper` or the path of a style file{}",
+        suggestion(.nearest.as_deref())
+    )]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The built-in name most like it.
+        nearest: Option<String>,
+    },
+    /// A file that cannot be read.
+    #[error("style {}: cannot read the file: {source}", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+    /// A file that is not a style.
+    #[error("style {}: {source}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What the TOML reader says, with its line.
+        source: Box<toml::de::Error>,
+    },
+    /// Something that TOML cannot check.
+    #[error("style `{style}`: {fault}")]
+    Invalid {
+        /// The style.
+        style: String,
+        /// What is wrong with it.
+        fault: StyleFault,
+    },
+}
+
+/// What is wrong with a well-formed style.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum StyleFault {
+    /// No main table.
+    #[error("there is no table `main`: every report needs one, add `[table.main]`")]
+    NoMainTable,
+    /// A table's name that cannot be a file's name.
+    #[error("table `{table}`: expected a name of lowercase letters, digits, `-` and `_`, and not `other`")]
+    TableName {
+        /// The name.
+        table: String,
+    },
+    /// A table without columns.
+    #[error("table `{table}` has no columns: name at least one metric")]
+    NoColumns {
+        /// The table.
+        table: String,
+    },
+    /// A column that is there twice.
+    #[error("table `{table}`: the metric `{metric}` is listed twice")]
+    RepeatedColumn {
+        /// The table.
+        table: String,
+        /// The metric.
+        metric: String,
+    },
+    /// A metric that the definitions do not have.
+    #[error("{place}: the definitions `{catalog}` have no metric `{metric}`{}", suggestion(.nearest.as_deref()))]
+    UnknownMetric {
+        /// Where it is named.
+        place: String,
+        /// The definitions in use.
+        catalog: String,
+        /// The name.
+        metric: String,
+        /// The metric most like it.
+        nearest: Option<String>,
+    },
+    /// More digits than are worth printing.
+    #[error("decimals: expected at most {MOST_PLACES}, found {found}")]
+    Decimals {
+        /// The number asked for.
+        found: u32,
+    },
+}
+
+fn suggestion(nearest: Option<&str>) -> String {
+    nearest.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
+}
+
+fn default_undefined() -> String {
+    "--".to_owned()
+}
+
+impl Style {
+    /// The built-in style of that name, or else the style in that file.
+    ///
+    /// # Errors
+    /// For a name that is neither, and for a file that is no style.
+    pub fn load(name_or_path: &str) -> Result<Self, StyleError> {
+        if let Some((name, text)) = BUILT_IN.into_iter().find(|(name, _)| *name == name_or_path) {
+            return Self::parse(name, text, Path::new(name), true);
+        }
+        let path = Path::new(name_or_path);
+        let text = match fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                let nearest = nearest(name_or_path, BUILT_IN.map(|(name, _)| name)).map(str::to_owned);
+                return Err(StyleError::Unknown { name: name_or_path.to_owned(), nearest });
+            }
+            Err(source) => return Err(StyleError::Unreadable { path: path.to_owned(), source }),
+        };
+        let name = path.file_stem().map_or_else(|| name_or_path.into(), |stem| stem.to_string_lossy());
+        Self::parse(&name, &text, path, false)
+    }
+
+    fn parse(name: &str, text: &str, path: &Path, is_built_in: bool) -> Result<Self, StyleError> {
+        let sheet: Sheet = toml::from_str(text)
+            .map_err(|source| StyleError::Malformed { path: path.to_owned(), source: Box::new(source) })?;
+        let style = Self { name: name.to_owned(), hash: hash::of_bytes(text.as_bytes()), sheet, is_built_in };
+        style.sheet.check().map_err(|fault| style.invalid(fault))?;
+        Ok(style)
+    }
+
+    /// That the style names only metrics that the definitions have. A built-in style may name others.
+    ///
+    /// # Errors
+    /// For the first metric that is not there.
+    pub fn check_against(&self, catalog: &Catalog) -> Result<(), StyleError> {
+        if self.is_built_in {
+            return Ok(());
+        }
+        let stranger = self.sheet.named_metrics().find(|(_, metric)| !catalog.metric.contains_key(*metric));
+        match stranger {
+            None => Ok(()),
+            Some((place, metric)) => Err(self.invalid(StyleFault::UnknownMetric {
+                place,
+                catalog: catalog.name.clone(),
+                metric: metric.to_owned(),
+                nearest: nearest(metric, catalog.metric.keys().map(String::as_str)).map(str::to_owned),
+            })),
+        }
+    }
+
+    /// The columns of a table, if the style has it.
+    pub fn columns(&self, table: &str) -> Option<&[String]> {
+        self.sheet.table.get(table).map(|sheet| &sheet.columns[..])
+    }
+
+    fn invalid(&self, fault: StyleFault) -> StyleError {
+        StyleError::Invalid { style: self.name.clone(), fault }
+    }
+}
+
+impl Sheet {
+    /// How the cells of `table` print.
+    pub fn print_of(&self, table: &TableSheet) -> Print {
+        let (own, all) = (&table.print, &self.print);
+        Print {
+            cell: own.cell.or(all.cell).unwrap_or(CellForm::CountInterval),
+            rounding: own.rounding.or(all.rounding).unwrap_or(Rounding::Once),
+            decimals: own.decimals.or(all.decimals).unwrap_or(Decimals { rate: 2, quantity: 1 }),
+            emphasis: own.emphasis.or(all.emphasis).unwrap_or(EmphasisRule::ExactMean),
+            single_se: own.single_se.or(all.single_se).unwrap_or(SingleSe::Undefined),
+            mark_n_below: own.mark_n_below.or(all.mark_n_below).unwrap_or(0),
+        }
+    }
+
+    /// The direction of a metric's column.
+    pub fn better(&self, metric: &str, catalog: &Catalog) -> Better {
+        let own = self.column.get(metric).and_then(|column| column.better);
+        own.or_else(|| catalog.metric.get(metric).map(|m| m.better)).unwrap_or(Better::Neither)
+    }
+
+    fn check(&self) -> Result<(), StyleFault> {
+        if !self.table.contains_key(MAIN_TABLE) {
+            return Err(StyleFault::NoMainTable);
+        }
+        self.print.check()?;
+        for (name, table) in &self.table {
+            table.check(name)?;
+        }
+        Ok(())
+    }
+
+    /// Every metric that the sheet names, and where.
+    fn named_metrics(&self) -> impl Iterator<Item = (String, &str)> {
+        let of_tables = self.table.iter().flat_map(|(name, table)| {
+            let metrics = table.columns.iter().chain(&table.undefined_as_zero);
+            metrics.map(move |metric| (format!("table `{name}`"), metric.as_str()))
+        });
+        of_tables.chain(self.column.keys().map(|metric| (format!("column `{metric}`"), metric.as_str())))
+    }
+}
+
+impl TableSheet {
+    fn check(&self, name: &str) -> Result<(), StyleFault> {
+        let is_plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
+        if name.is_empty() || !name.bytes().all(is_plain) || name == OTHER_TABLE {
+            return Err(StyleFault::TableName { table: name.to_owned() });
+        }
+        if self.columns.is_empty() {
+            return Err(StyleFault::NoColumns { table: name.to_owned() });
+        }
+        let mut seen = BTreeSet::new();
+        if let Some(metric) = self.columns.iter().find(|metric| !seen.insert(*metric)) {
+            return Err(StyleFault::RepeatedColumn { table: name.to_owned(), metric: metric.clone() });
+        }
+        self.print.check()
+    }
+}
+
+impl PrintSheet {
+    fn check(&self) -> Result<(), StyleFault> {
+        let most = self.decimals.map_or(0, |decimals| decimals.rate.max(decimals.quantity));
+        if most > MOST_PLACES { Err(StyleFault::Decimals { found: most }) } else { Ok(()) }
+    }
+}
+
+impl Decimals {
+    /// Digits behind the point of a metric of that kind.
+    pub fn of(self, kind: Kind) -> u32 {
+        match kind {
+            Kind::Rate => self.rate,
+            Kind::Quantity => self.quantity,
+        }
+    }
+}

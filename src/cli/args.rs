@@ -27,3 +27,24 @@ impl ThreadArgs {
         self.threads.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN)
     }
 }
+
+/// What to score, and how it is defined.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct ScoringArgs {
+    /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub definitions: Option<String>,
+    /// Only these metrics, separated by commas [default: all of the definitions]
+    #[arg(long, value_name = "METRICS", value_delimiter = ',')]
+    pub metrics: Option<Vec<String>>,
+    /// Only episodes where this holds, in the language of definitions, such as "seed = 1 and TSA = 1"
+    #[arg(long = "where", value_name = "EXPR")]
+    pub condition: Option<String>,
+}
+
+impl ScoringArgs {
+    /// The definition file asked for, or the paper's.
+    pub fn definitions_name(&self) -> &str {
+        self.definitions.as_deref().unwrap_or("paper")
+    }
+}

@@ -6,6 +6,8 @@
 pub mod args;
 pub mod commands;
 pub mod outcome;
+pub mod output;
+pub mod scoring;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

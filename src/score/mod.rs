@@ -13,5 +13,6 @@ pub mod evidence;
 pub mod format;
 pub mod run;
 pub mod segments;
+pub mod select;
 pub mod table;
 mod values;

@@ -27,8 +27,6 @@ pub struct Request {
     pub metrics: Option<Vec<String>>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub condition: Option<String>,
-    /// Further columns that are constant in an episode, to group by.
-    pub labels: Vec<String>,
 }
 
 /// Why traces were not scored.

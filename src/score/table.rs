@@ -1,5 +1,7 @@
 //! The episode table: one row an episode, its keys and one integer a metric.
 
+use std::collections::HashSet;
+
 use crate::metric::catalog::Catalog;
 
 /// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
@@ -48,10 +50,53 @@ pub struct MetricColumn {
     pub values: Vec<Option<i64>>,
 }
 
+/// Why two tables are not one.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum JoinError {
+    /// They were computed under different definitions.
+    #[error("expected scores under one set of definitions, found `{0}` and another `{1}`; score the traces again")]
+    Definitions(String, String),
+    /// They have different columns.
+    #[error("expected the columns {0}, found {1}")]
+    Columns(String, String),
+    /// They share an episode.
+    #[error("the episode `{0}` is in two files of scores; leave one out")]
+    Episode(String),
+}
+
 impl EpisodeTable {
     /// The number of episodes.
     pub fn len(&self) -> usize {
         self.keys.len()
+    }
+
+    /// The rows of two tables.
+    ///
+    /// # Errors
+    /// When they differ in their definitions or columns, or have an episode in common.
+    pub fn joined(mut self, other: Self) -> Result<Self, JoinError> {
+        if self.catalog.hash != other.catalog.hash {
+            return Err(JoinError::Definitions(self.catalog.name, other.catalog.name));
+        }
+        let columns = |table: &Self| {
+            let labels = table.labels.iter().map(|label| label.name.clone());
+            labels.chain(table.metrics.iter().map(|metric| metric.name.clone())).collect::<Vec<_>>()
+        };
+        if columns(&self) != columns(&other) {
+            return Err(JoinError::Columns(columns(&self).join(", "), columns(&other).join(", ")));
+        }
+        let ids: HashSet<&str> = self.keys.iter().map(|key| key.episode_id.as_str()).collect();
+        if let Some(twice) = other.keys.iter().find(|key| ids.contains(key.episode_id.as_str())) {
+            return Err(JoinError::Episode(twice.episode_id.clone()));
+        }
+        self.keys.extend(other.keys);
+        for (column, more) in self.labels.iter_mut().zip(other.labels) {
+            column.values.extend(more.values);
+        }
+        for (column, more) in self.metrics.iter_mut().zip(other.metrics) {
+            column.values.extend(more.values);
+        }
+        Ok(self.sorted())
     }
 
     /// The same rows in the order of their keys.

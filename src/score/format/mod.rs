@@ -13,7 +13,7 @@ use std::io::{Read, Write};
 use super::table::EpisodeTable;
 use crate::metric::catalog::Catalog;
 
-pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, is_scores, read as read_parquet};
+pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_scores, read as read_parquet};
 
 /// A format of episode tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,6 @@
 //! The episode table as Parquet, the definitions in its footer.
 
+use std::fs::File;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -9,7 +10,7 @@ use arrow::datatypes::{DataType, Field, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, ZstdLevel};
-use parquet::file::metadata::KeyValue;
+use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::ChunkReader;
 
@@ -27,9 +28,11 @@ pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 /// The footer key of the definitions' hash.
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
-/// Whether a footer is that of scores.
-pub fn is_scores<'a>(metadata: impl IntoIterator<Item = &'a KeyValue>) -> bool {
-    metadata.into_iter().any(|pair| pair.key == KIND_KEY && pair.value.as_deref() == Some(SCORES_KIND))
+/// Whether a file is Parquet with the footer of scores.
+pub fn holds_scores(file: &File) -> bool {
+    let Ok(metadata) = ParquetMetaDataReader::new().parse_and_finish(file) else { return false };
+    let pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
+    pairs.into_iter().any(|pair| pair.key == KIND_KEY && pair.value.as_deref() == Some(SCORES_KIND))
 }
 
 pub(super) fn write(table: &EpisodeTable, out: impl Write + Send) -> Result<(), FormatError> {

@@ -1,0 +1,71 @@
+//! `score`: the episode table of traces, or the evidence for one episode.
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use super::super::args::{ScoringArgs, TraceArgs};
+use super::super::outcome::{Failure, Outcome};
+use super::super::{output, scoring};
+use crate::score::evidence;
+use crate::score::format::{self, Format};
+
+/// Compute every metric of every episode
+#[derive(Clone, Debug, clap::Args)]
+pub struct ScoreArgs {
+    /// What to score.
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    /// How it is defined.
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    /// Write the episode table here: a name that ends in .parquet, .csv or .jsonl [default: CSV on standard output]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Show one episode's scores and the timesteps that decided them
+    #[arg(long, value_name = "EPISODE", conflicts_with = "output")]
+    pub explain: Option<String>,
+    /// Print JSON: lines of episodes, or one object with --explain
+    #[arg(long, conflicts_with = "output")]
+    pub json: bool,
+}
+
+impl ScoreArgs {
+    /// Scores.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces, the definitions or the output.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        // An output name of no known format should not cost a pass over the traces.
+        let format = self.output.as_deref().map(format_of).transpose()?;
+        let inputs = scoring::resolve(&self.traces)?;
+        let threads = self.traces.threads.count();
+        if let Some(episode) = &self.explain {
+            let traces = scoring::open(&inputs)?;
+            let definitions = scoring::definitions(&traces, &self.scoring)?;
+            let found = evidence::explain(&traces, &definitions, episode, threads).map_err(|error| match error {
+                evidence::EvidenceError::Score(error) => scoring::score_failure(error),
+                other @ evidence::EvidenceError::NoSuchEpisode { .. } => Failure::input(other),
+            })?;
+            return output::print(&found, self.json);
+        }
+        let table = scoring::table(&inputs, &self.scoring, &[], threads)?;
+        match (&self.output, format) {
+            (Some(path), Some(format)) => {
+                let mut bytes = Vec::new();
+                format::write(&table, format, &mut bytes).map_err(Failure::input)?;
+                output::write_file(path, &bytes)?;
+            }
+            _ => {
+                let format = if self.json { Format::JsonLines } else { Format::Csv };
+                let mut bytes = Vec::new();
+                format::write(&table, format, &mut bytes).map_err(Failure::input)?;
+                io::stdout().lock().write_all(&bytes)?;
+            }
+        }
+        Ok(Outcome::Done)
+    }
+}
+
+fn format_of(path: &Path) -> Result<Format, Failure> {
+    Format::of_name(&path.to_string_lossy()).map_err(Failure::input)
+}

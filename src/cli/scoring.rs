@@ -1,0 +1,190 @@
+//! From what was typed to the episode table: traces are scored, files of scores are read.
+
+use std::fs::File;
+use std::io;
+use std::num::NonZeroUsize;
+
+use super::args::{ScoringArgs, TraceArgs};
+use super::outcome::Failure;
+use crate::base::hash;
+use crate::metric::definitions::Definitions;
+use crate::metric::file::FileError;
+use crate::report::bundle;
+use crate::score::format::{self, Format};
+use crate::score::run::{self, Request, ScoreError};
+use crate::score::select;
+use crate::score::table::EpisodeTable;
+use crate::trace::inputs::{self, Input};
+use crate::trace::open::TraceSet;
+use crate::trace::schema::SCHEMA_VERSION;
+
+/// The files named on the command line.
+///
+/// # Errors
+/// When an argument names none, or the list on standard input cannot be read.
+pub fn resolve(arguments: &TraceArgs) -> Result<Vec<Input>, Failure> {
+    inputs::resolve(&arguments.traces, io::stdin().lock()).map_err(Failure::input)
+}
+
+/// The episode table of traces, or of files of scores in their place.
+///
+/// # Errors
+/// Whatever is wrong with the files, the definitions or the condition.
+pub fn table(
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, Failure> {
+    let scores: Vec<&Input> = inputs.iter().filter(|input| is_scores(input)).collect();
+    match (scores.is_empty(), scores.len() == inputs.len()) {
+        (true, _) => score_traces(inputs, scoring, labels, threads),
+        (false, true) => read_scores(&scores, scoring),
+        (false, false) => Err(Failure::Rendered(format!(
+            "error: expected traces or files of scores, found both: `{}` holds scores\n  help: score the traces first, or leave one kind out",
+            scores[0].name
+        ))),
+    }
+}
+
+/// Scores traces.
+fn score_traces(
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, Failure> {
+    let traces = open(inputs)?;
+    let definitions = definitions(&traces, scoring)?;
+    run::score(&traces, &definitions, labels, threads).map_err(score_failure)
+}
+
+/// Opens traces.
+///
+/// # Errors
+/// The first fault of a footer.
+pub fn open(inputs: &[Input]) -> Result<TraceSet, Failure> {
+    TraceSet::open(inputs).map_err(Failure::input)
+}
+
+/// The definitions asked for, checked against the traces.
+///
+/// # Errors
+/// Every fault of the definitions and the condition.
+pub fn definitions(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Definitions, Failure> {
+    let request = Request {
+        definitions: scoring.definitions_name().to_owned(),
+        metrics: scoring.metrics.clone(),
+        condition: scoring.condition.clone(),
+    };
+    run::definitions(traces, &request).map_err(score_failure)
+}
+
+/// Faults of definitions have their own layout.
+pub fn score_failure(error: ScoreError) -> Failure {
+    match error {
+        ScoreError::Definitions(error) => definition_failure(error),
+        ScoreError::Condition(faults) => Failure::Rendered(faults.render(colored())),
+        other => Failure::input(other),
+    }
+}
+
+/// Faults of a definition file, underlined.
+pub fn definition_failure(error: FileError) -> Failure {
+    match error {
+        FileError::Faults(faults) => Failure::Rendered(faults.render(colored())),
+        other @ FileError::Unreadable { .. } => Failure::input(other),
+    }
+}
+
+/// Whether standard error shows colours.
+fn colored() -> bool {
+    io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+fn is_scores(input: &Input) -> bool {
+    match Format::of_name(&input.name) {
+        Ok(Format::Csv | Format::JsonLines) => true,
+        Ok(Format::Parquet) | Err(_) => File::open(&input.path).is_ok_and(|file| format::holds_scores(&file)),
+    }
+}
+
+/// Reads files of scores and puts them together.
+fn read_scores(inputs: &[&Input], scoring: &ScoringArgs) -> Result<EpisodeTable, Failure> {
+    let mut whole: Option<EpisodeTable> = None;
+    for input in inputs {
+        let table = read_one(input, scoring)?;
+        whole = Some(match whole {
+            None => table,
+            Some(whole) => whole.joined(table).map_err(|error| at(input, error))?,
+        });
+    }
+    let table = whole.unwrap_or_else(|| unreachable!("the caller has found a file of scores"));
+    select::select(table, scoring.metrics.as_deref(), scoring.condition.as_deref()).map_err(|error| match error {
+        select::SelectError::Condition(faults) => Failure::Rendered(faults.render(colored())),
+        other => Failure::input(other),
+    })
+}
+
+fn read_one(input: &Input, scoring: &ScoringArgs) -> Result<EpisodeTable, Failure> {
+    let file = File::open(&input.path).map_err(|error| at(input, error))?;
+    match Format::of_name(&input.name) {
+        Ok(text @ (Format::Csv | Format::JsonLines)) => {
+            let definitions =
+                Definitions::load(scoring.definitions_name(), &run::schema_columns()).map_err(definition_failure)?;
+            format::read_text(text, &definitions.catalog, file).map_err(|error| at(input, error))
+        }
+        Ok(Format::Parquet) | Err(_) => {
+            let table = format::read_parquet(file).map_err(|error| at(input, error))?;
+            match &scoring.definitions {
+                Some(name) => check_hash(name, input, table),
+                None => Ok(table),
+            }
+        }
+    }
+}
+
+/// Scores keep the definitions that they were computed with.
+fn check_hash(name: &str, input: &Input, table: EpisodeTable) -> Result<EpisodeTable, Failure> {
+    let definitions = Definitions::load(name, &run::schema_columns()).map_err(definition_failure)?;
+    if definitions.catalog.hash == table.catalog.hash {
+        return Ok(table);
+    }
+    Err(Failure::Rendered(format!(
+        "error: {}: expected scores under `{name}` ({}), found scores under `{}` ({})\n  help: score the traces again with --definitions {name}",
+        input.name,
+        &definitions.catalog.hash[..12],
+        table.catalog.name,
+        table.catalog.hash.get(..12).unwrap_or_default(),
+    )))
+}
+
+/// An error with the file it is about.
+fn at(input: &Input, error: impl std::error::Error) -> Failure {
+    let mut text = format!("error: {}: {error}", input.name);
+    let mut cause = error.source();
+    while let Some(error) = cause {
+        text.push_str("\n  caused by: ");
+        text.push_str(&error.to_string());
+        cause = error.source();
+    }
+    Failure::Rendered(text)
+}
+
+/// The inputs as a manifest names them, with their hashes.
+///
+/// # Errors
+/// When a file cannot be read again.
+pub fn provenance(inputs: &[Input]) -> Result<Vec<bundle::Input>, Failure> {
+    let one = |input: &Input| {
+        let file = File::open(&input.path)?;
+        let bytes = file.metadata()?.len();
+        Ok(bundle::Input::new(input.name.as_ref(), hash::of_reader(file)?, bytes, None))
+    };
+    inputs.iter().map(|input| one(input).map_err(|error: io::Error| at(input, error))).collect()
+}
+
+/// The version of the trace schema, for manifests.
+pub const fn schema_version() -> u32 {
+    SCHEMA_VERSION
+}

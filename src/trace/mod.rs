@@ -3,3 +3,7 @@
 //! Rule: only this room opens traces. It knows no metric.
 
 pub mod episode;
+pub mod finding;
+pub mod schema;
+mod source;
+pub mod write;

@@ -45,14 +45,24 @@ pub const ERRATA: [Erratum; 3] = [
     },
 ];
 
+impl Erratum {
+    /// What to read instead, as text.
+    pub fn reading(&self) -> String {
+        self.read_as.map_or_else(|| "undefined".to_owned(), |(mean, se)| format!("{mean} ± {se}"))
+    }
+}
+
+/// The erratum of a cell of the main table, if there is one.
+pub fn of(experiment: &str, model: &str, metric: &str) -> Option<&'static Erratum> {
+    ERRATA.iter().find(|erratum| (erratum.experiment, erratum.model, erratum.metric) == (experiment, model, metric))
+}
+
 /// What to read for a line of a published file.
 pub fn corrected(source: Source, row: &Row) -> Option<Value> {
-    let erratum = ERRATA.iter().find(|erratum| {
-        source == Source::Main
-            && (erratum.experiment, erratum.model, erratum.metric) == (&row.experiment, &row.model, &row.metric)
-    });
-    match erratum {
-        Some(erratum) => erratum.read_as.map(|(mean, se)| Value { mean: mean.to_owned(), se: se.to_owned() }),
-        None => row.value(),
+    match of(&row.experiment, &row.model, &row.metric) {
+        Some(erratum) if source == Source::Main => {
+            erratum.read_as.map(|(mean, se)| Value { mean: mean.to_owned(), se: se.to_owned() })
+        }
+        _ => row.value(),
     }
 }

@@ -3,8 +3,6 @@
 //! `SplitMix64` (Steele, Lea and Flood, 2014), written out here so that no release of a library can change the
 //! fixture. Not for statistics: a bound is applied by multiplication, which is a little uneven and does not matter.
 
-use std::ops::RangeInclusive;
-
 use mirrorstats::base::hash;
 
 /// The generator's state.
@@ -29,11 +27,6 @@ impl Generator {
     pub fn below(&mut self, count: usize) -> usize {
         let scaled = (u128::from(self.next()) * count as u128) >> 64;
         usize::try_from(scaled).expect("a scaled draw is below a usize")
-    }
-
-    /// One of the numbers of a range that is not empty.
-    pub fn within(&mut self, range: &RangeInclusive<usize>) -> usize {
-        range.start() + self.below(range.end() - range.start() + 1)
     }
 
     /// True `times` out of `of`.

@@ -11,7 +11,9 @@ use super::published::Pair;
 use super::{BUDGET, EPISODES};
 
 /// How often lengths and gazes are drawn anew before more trajectories are cut short.
-const ATTEMPTS: usize = 12;
+const ATTEMPTS: usize = 8;
+/// The fewest steps that an episode takes; the second only where the published durations leave no choice.
+const FEWEST: [usize; 2] = [4, 1];
 
 /// How an episode ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,11 +55,12 @@ pub fn solve(pair: &Pair) -> Result<Vec<Outline>, Contradiction> {
     let mut generator = Generator::of(&format!("outlines of {}/{}", pair.experiment, pair.model));
     let allowed = counts::solve(pair)?;
     let (length, gaze) = (durations::target(pair, "TTD")?, durations::target(pair, "MGD")?);
-    for cut in 0..=EPISODES {
+    for (cut, fewest) in (0..=EPISODES).flat_map(|cut| FEWEST.map(|fewest| (cut, fewest))) {
+        let limits = Limits { cut, fewest, length: &length, gaze: &gaze };
         for counts in allowed.iter().filter(|counts| counts.finished + cut <= EPISODES) {
             for _ in 0..ATTEMPTS {
                 let parts = cast(pair, counts, &mut generator)?;
-                if let Some(mut outlines) = measure(&parts, cut, &length, &gaze, &mut generator) {
+                if let Some(mut outlines) = limits.measure(&parts, &mut generator) {
                     generator.shuffle(&mut outlines);
                     return Ok(outlines);
                 }
@@ -102,34 +105,45 @@ fn cast(pair: &Pair, counts: &Counts, generator: &mut Generator) -> Result<Vec<P
     Ok(parts)
 }
 
-/// Gives every part a length and a gaze, `cut` of the unfinished ones a length below the budget.
-fn measure(
-    parts: &[Part],
+/// What the lengths and gazes of a pair must keep to.
+struct Limits<'a> {
+    /// How many trajectories without `done` end before the budget.
     cut: usize,
-    length: &Target,
-    gaze: &Target,
-    generator: &mut Generator,
-) -> Option<Vec<Outline>> {
-    let mut uncut = parts.iter().filter(|part| part.outcome == Outcome::Unfinished).count().checked_sub(cut)?;
-    let lengths: Vec<RangeInclusive<usize>> = parts
-        .iter()
-        .map(|part| match part.outcome {
-            Outcome::Unfinished if uncut > 0 => {
-                uncut -= 1;
-                BUDGET..=BUDGET
+    /// The fewest steps of an episode.
+    fewest: usize,
+    length: &'a Target,
+    gaze: &'a Target,
+}
+
+impl Limits<'_> {
+    /// Gives every part a length and a gaze.
+    fn measure(&self, parts: &[Part], generator: &mut Generator) -> Option<Vec<Outline>> {
+        let lengths = durations::search(&self.lengths(parts), self.length, generator)?;
+        let gazes: Vec<_> = parts.iter().zip(&lengths).map(|(part, &length)| part.belief.gaze(length)).collect();
+        let gazes = durations::search(&gazes, self.gaze, generator)?;
+        let outlines = parts.iter().zip(lengths).zip(gazes).map(|((part, length), gaze)| Outline {
+            outcome: part.outcome,
+            belief: part.belief,
+            length,
+            gaze,
+        });
+        Some(outlines.collect())
+    }
+
+    /// The lengths that each part may have; the first `cut` unfinished ones are those cut short.
+    fn lengths(&self, parts: &[Part]) -> Vec<RangeInclusive<usize>> {
+        let mut cut = self.cut;
+        let range = |part: &Part| {
+            let fewest = part.belief.shortest().max(self.fewest);
+            match part.outcome {
+                Outcome::Success | Outcome::Failure => fewest..=BUDGET,
+                Outcome::Unfinished if cut == 0 => BUDGET..=BUDGET,
+                Outcome::Unfinished => {
+                    cut -= 1;
+                    fewest..=BUDGET - 1
+                }
             }
-            Outcome::Unfinished => part.belief.shortest()..=BUDGET - 1,
-            Outcome::Success | Outcome::Failure => part.belief.shortest()..=BUDGET,
-        })
-        .collect();
-    let lengths = durations::search(&lengths, length, generator)?;
-    let gazes: Vec<_> = parts.iter().zip(&lengths).map(|(part, &length)| part.belief.gaze(length)).collect();
-    let gazes = durations::search(&gazes, gaze, generator)?;
-    let outlines = parts.iter().zip(lengths).zip(gazes).map(|((part, length), gaze)| Outline {
-        outcome: part.outcome,
-        belief: part.belief,
-        length,
-        gaze,
-    });
-    Some(outlines.collect())
+        };
+        parts.iter().map(range).collect()
+    }
 }

@@ -1,0 +1,66 @@
+//! Rebuilds the paper's 840 episodes from its published tables and writes them as traces.
+//!
+//! `cargo run --example reconstruct -- fixtures/paper` writes the fixture anew; with `--check` it only compares, and
+//! exits with 1 on a difference. Either way it first shows which published cells contradict each other.
+
+mod reconstruction;
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use reconstruction::published::{self, Reading};
+use reconstruction::{errata, files, outline};
+
+/// Rebuild the paper's 840 episodes from its published tables.
+#[derive(Parser)]
+struct Arguments {
+    /// The folder of the 40 trace files.
+    out_dir: PathBuf,
+    /// Compare the folder with what would be written, and write nothing.
+    #[arg(long)]
+    check: bool,
+}
+
+fn main() -> ExitCode {
+    match run(&Arguments::parse()) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn run(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
+    show_contradictions();
+    let traces = files::traces()?;
+    let episodes: usize = traces.iter().map(|trace| trace.episodes.len()).sum();
+    let steps: usize = traces.iter().flat_map(|trace| &trace.episodes).map(|episode| episode.steps.len()).sum();
+    let amount = format!("{} files, {episodes} episodes, {steps} steps", traces.len());
+    if !arguments.check {
+        files::write(&arguments.out_dir, &traces)?;
+        println!("wrote {amount} to {}", arguments.out_dir.display());
+        return Ok(ExitCode::SUCCESS);
+    }
+    let differences = files::differences(&arguments.out_dir, &traces)?;
+    if differences.is_empty() {
+        println!("{amount}: as they would be written now");
+        return Ok(ExitCode::SUCCESS);
+    }
+    println!("{}", differences.join("\n"));
+    Ok(ExitCode::from(1))
+}
+
+/// Says which cells no episodes can explain as printed, and what is read instead.
+fn show_contradictions() {
+    for contradiction in published::pairs(Reading::AsPrinted).iter().filter_map(|pair| outline::solve(pair).err()) {
+        println!("contradiction: {contradiction}");
+        match errata::of(&contradiction.experiment, &contradiction.model, &contradiction.metric) {
+            Some(erratum) => println!("  read as {}: {}", erratum.reading(), erratum.reason),
+            None => println!("  no erratum says how to read it"),
+        }
+    }
+}

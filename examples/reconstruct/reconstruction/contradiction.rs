@@ -1,0 +1,41 @@
+//! Published values that no episodes can explain.
+
+use super::published::{Pair, Print, Value};
+
+/// A metric of a pair whose prints cannot all hold, given what is already known of the pair.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{experiment}, {model}, {metric}: published {published}; {because}")]
+pub struct Contradiction {
+    /// `E1`..`E5`.
+    pub experiment: String,
+    /// The model as tables name it.
+    pub model: String,
+    /// The metric, or the metrics, that cannot be met.
+    pub metric: String,
+    /// What is printed about it.
+    pub published: String,
+    /// What would have to hold, and does not.
+    pub because: String,
+}
+
+impl Contradiction {
+    /// The contradiction of a pair's metric.
+    pub fn new(pair: &Pair, metric: &str, because: impl Into<String>) -> Self {
+        let published: Vec<String> = pair.prints(metric).iter().map(shown).collect();
+        Self {
+            experiment: pair.experiment.clone(),
+            model: pair.model.clone(),
+            metric: metric.to_owned(),
+            published: published.join(" and "),
+            because: because.into(),
+        }
+    }
+}
+
+fn shown(print: &Print) -> String {
+    let place = format!("{:?}", print.source).to_lowercase();
+    match &print.value {
+        Some(Value { mean, se }) => format!("{mean} ± {se} ({place})"),
+        None => format!("-- ({place})"),
+    }
+}

@@ -1,0 +1,109 @@
+//! The integers behind a mean number of steps and its standard error.
+
+use std::ops::RangeInclusive;
+
+use mirrorstats::cells::moments::Moments;
+
+use super::contradiction::Contradiction;
+use super::generator::Generator;
+use super::published::Pair;
+use super::{BUDGET, EPISODES, printing};
+
+/// How many exchanges a search makes before it gives up.
+const EXCHANGES: usize = 6_000;
+/// The most steps that one exchange moves.
+const STRIDE: usize = 12;
+
+/// What 21 numbers of steps must add up to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Target {
+    /// Their sum.
+    pub sum: usize,
+    /// What the sum of their squares may be.
+    pub squares: RangeInclusive<usize>,
+}
+
+/// The sum and the sums of squares that print as a pair's published mean and standard error.
+///
+/// A mean with two decimals leaves room for one sum of 21 integers at most.
+///
+/// # Errors
+/// When no sum prints as the mean, or no sum of squares as the standard error.
+pub fn target(pair: &Pair, metric: &str) -> Result<Target, Contradiction> {
+    let means = |sum: usize| printing::matches_mean(pair, metric, moments(sum, 0));
+    let Some(sum) = (0..=EPISODES * BUDGET).find(|&sum| means(sum)) else {
+        return Err(Contradiction::new(pair, metric, nearest_sums(pair, metric)));
+    };
+    let least = (sum * sum).div_ceil(EPISODES);
+    let prints = |squares: &usize| printing::matches(pair, metric, moments(sum, *squares));
+    let mut squares = (least..=sum * BUDGET).skip_while(|squares| !prints(squares)).take_while(prints);
+    match squares.next() {
+        Some(first) => Ok(Target { sum, squares: first..=squares.last().unwrap_or(first) }),
+        None => Err(Contradiction::new(pair, metric, format!("no 21 integers with the sum {sum} spread like that"))),
+    }
+}
+
+fn moments(sum: usize, sum_sq: usize) -> Moments {
+    Moments { n: EPISODES as u64, sum: sum as i128, sum_sq: sum_sq as i128 }
+}
+
+/// Searches numbers within `bounds` that meet the target.
+///
+/// Starts from the most even numbers, whose squares add up to the least, and then exchanges steps between two numbers
+/// at random whenever this brings the squares nearer. `None` where the bounds leave no such numbers, or none is found.
+pub fn search(bounds: &[RangeInclusive<usize>], target: &Target, generator: &mut Generator) -> Option<Vec<usize>> {
+    let mut numbers = even(bounds, target.sum)?;
+    let mut squares: usize = numbers.iter().map(|x| x * x).sum();
+    if squares > *target.squares.end() {
+        return None;
+    }
+    for _ in 0..EXCHANGES {
+        let missing = distance(&target.squares, squares);
+        if missing == 0 {
+            return Some(numbers);
+        }
+        let (to, from) = (generator.below(numbers.len()), generator.below(numbers.len()));
+        let steps = 1 + generator.below(STRIDE);
+        let (up, down) = (numbers[to] + steps, numbers[from].saturating_sub(steps));
+        if to == from || numbers[from] < steps || !bounds[to].contains(&up) || !bounds[from].contains(&down) {
+            continue;
+        }
+        let moved = squares + up * up + down * down - numbers[to].pow(2) - numbers[from].pow(2);
+        if distance(&target.squares, moved) < missing {
+            (numbers[to], numbers[from], squares) = (up, down, moved);
+        }
+    }
+    None
+}
+
+/// The most even numbers within bounds with this sum; `None` where there are none.
+fn even(bounds: &[RangeInclusive<usize>], sum: usize) -> Option<Vec<usize>> {
+    let mut numbers: Vec<usize> = bounds.iter().map(|range| *range.start()).collect();
+    for _ in numbers.iter().sum()..sum {
+        let (_, lowest) =
+            numbers.iter_mut().enumerate().filter(|(i, x)| **x < *bounds[*i].end()).min_by_key(|(_, x)| **x)?;
+        *lowest += 1;
+    }
+    (numbers.iter().sum::<usize>() == sum).then_some(numbers)
+}
+
+fn distance(range: &RangeInclusive<usize>, value: usize) -> usize {
+    range.start().saturating_sub(value) + value.saturating_sub(*range.end())
+}
+
+/// Says which sums come nearest to a mean that no sum prints as.
+fn nearest_sums(pair: &Pair, metric: &str) -> String {
+    let shown = |sum: usize| {
+        let prints = pair
+            .prints(metric)
+            .iter()
+            .filter_map(|print| printing::value(print.source, metric, moments(sum, sum * sum)));
+        let means: Vec<String> = prints.map(|value| value.mean).collect();
+        format!("the sum {sum} prints as {}", means.join(" and "))
+    };
+    let wanted = pair.prints(metric).iter().find_map(|print| print.value.as_ref()?.mean.parse::<f64>().ok());
+    let below =
+        (0..=EPISODES * BUDGET).rev().find(|&sum| wanted.is_some_and(|mean| sum as f64 <= mean * EPISODES as f64));
+    let Some(below) = below else { return "no sum of 21 integers prints as this mean".to_owned() };
+    format!("no sum of 21 integers prints as this mean: {}, {}", shown(below), shown(below + 1))
+}

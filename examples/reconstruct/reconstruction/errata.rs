@@ -1,0 +1,68 @@
+//! The slips of the published tables: what is printed, what is read instead, and why.
+//!
+//! Rule: a cell is here only if no integers explain it as printed; a test holds this list against the
+//! contradictions that the solver finds by itself.
+
+use super::published::{Row, Source, Value};
+
+/// One slip, in the main table.
+pub struct Erratum {
+    /// `E1`..`E5`.
+    pub experiment: &'static str,
+    /// The model as tables name it.
+    pub model: &'static str,
+    /// The metric's name.
+    pub metric: &'static str,
+    /// Mean and standard error to read instead; `None` for undefined.
+    pub read_as: Option<(&'static str, &'static str)>,
+    /// Why.
+    pub reason: &'static str,
+}
+
+/// All of them.
+pub const ERRATA: [Erratum; 3] = [
+    Erratum {
+        experiment: "E3",
+        model: "Gemma4 26B",
+        metric: "TTD",
+        read_as: Some(("57.91", "10.07")),
+        reason: "a mean of 21 integers near 57.90 can only be 1216/21 = 57.9048, which the table's rounding prints as \
+                 57.91",
+    },
+    Erratum {
+        experiment: "E2",
+        model: "Ministral 3 14B",
+        metric: "MTATO",
+        read_as: None,
+        reason: "no episode succeeds, so by the paper's own definition the value is undefined",
+    },
+    Erratum {
+        experiment: "E5",
+        model: "Ministral 3 14B",
+        metric: "MTATO",
+        read_as: None,
+        reason: "no episode succeeds, so by the paper's own definition the value is undefined",
+    },
+];
+
+impl Erratum {
+    /// What to read instead, as text.
+    pub fn reading(&self) -> String {
+        self.read_as.map_or_else(|| "undefined".to_owned(), |(mean, se)| format!("{mean} ± {se}"))
+    }
+}
+
+/// The erratum of a cell of the main table, if there is one.
+pub fn of(experiment: &str, model: &str, metric: &str) -> Option<&'static Erratum> {
+    ERRATA.iter().find(|erratum| (erratum.experiment, erratum.model, erratum.metric) == (experiment, model, metric))
+}
+
+/// What to read for a line of a published file.
+pub fn corrected(source: Source, row: &Row) -> Option<Value> {
+    match of(&row.experiment, &row.model, &row.metric) {
+        Some(erratum) if source == Source::Main => {
+            erratum.read_as.map(|(mean, se)| Value { mean: mean.to_owned(), se: se.to_owned() })
+        }
+        _ => row.value(),
+    }
+}

@@ -1,0 +1,112 @@
+//! The files of the fixture, one a model and experiment: their names, what their footers say, and whether a folder
+//! holds exactly them.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use mirrorstats::trace::episode::Episode;
+use mirrorstats::trace::finding::TraceError;
+use mirrorstats::trace::write::{self, OptionalColumns, TraceEncoder, TraceMetadata};
+use serde_json::{Value, json};
+
+use super::contradiction::Contradiction;
+use super::published::{self, Pair, Reading};
+
+/// One file, before it is written.
+pub struct Trace {
+    /// `E1-ministral-3-14b.parquet`.
+    pub name: String,
+    /// What its footer says of the recording.
+    pub recording: Value,
+    /// Ordered by seed and run.
+    pub episodes: Vec<Episode>,
+}
+
+/// All 40 files, in the order of the main table.
+///
+/// # Errors
+/// When a pair's published cells contradict each other, the known slips corrected.
+pub fn traces() -> Result<Vec<Trace>, Contradiction> {
+    published::pairs(Reading::Corrected).iter().map(trace).collect()
+}
+
+fn trace(pair: &Pair) -> Result<Trace, Contradiction> {
+    Ok(Trace {
+        name: format!("{}-{}.parquet", pair.experiment, slug(&pair.model)),
+        recording: json!({
+            "kind": "reconstruction",
+            "notice": "Rebuilt from the published result tables. Not the original recordings: \
+                       whatever the tables leave open is arbitrary.",
+            "sources": ["main table", "appendix table", "values in the running text"],
+            "made_by": "examples/reconstruct",
+            "experiment": pair.experiment,
+            "model": pair.model,
+        }),
+        episodes: super::episodes(pair)?,
+    })
+}
+
+/// A model's name in file names and episode ids: lowercase letters and digits, joined by hyphens.
+pub fn slug(model: &str) -> String {
+    let words: Vec<&str> = model.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty()).collect();
+    words.join("-").to_ascii_lowercase()
+}
+
+/// Writes the files into a folder, which is made if it is not there.
+///
+/// # Errors
+/// Whatever writing gives.
+pub fn write(folder: &Path, traces: &[Trace]) -> Result<(), TraceError> {
+    fs::create_dir_all(folder)
+        .map_err(|source| TraceError::Write { file: folder.display().to_string(), source: Box::new(source) })?;
+    for trace in traces {
+        write::write_episodes(&folder.join(&trace.name), Some(trace.recording.clone()), &trace.episodes)?;
+    }
+    Ok(())
+}
+
+/// The bytes that [`write`] gives a file.
+///
+/// # Errors
+/// When the trace schema forbids an episode.
+pub fn bytes(trace: &Trace) -> Result<Vec<u8>, TraceError> {
+    let columns = OptionalColumns::used_by(&trace.episodes);
+    let metadata = TraceMetadata { recording: Some(trace.recording.clone()), columns };
+    let mut encoder = TraceEncoder::new(Vec::new(), &metadata)?;
+    for episode in &trace.episodes {
+        encoder.write(episode)?;
+    }
+    encoder.finish()
+}
+
+/// How a folder differs from what [`write`] would make of it, a line each; other files than traces may lie there too.
+///
+/// # Errors
+/// When the trace schema forbids an episode.
+pub fn differences(folder: &Path, traces: &[Trace]) -> Result<Vec<String>, TraceError> {
+    let mut differences = Vec::new();
+    for trace in traces {
+        match fs::read(folder.join(&trace.name)) {
+            Ok(found) if found == bytes(trace)? => {}
+            Ok(_) => differences.push(format!("{}: not the bytes that are made now", trace.name)),
+            Err(error) => differences.push(format!("{}: {error}", trace.name)),
+        }
+    }
+    let known: BTreeSet<&str> = traces.iter().map(|trace| trace.name.as_str()).collect();
+    let strangers = parquet_names(folder).unwrap_or_default().into_iter().filter(|name| !known.contains(name.as_str()));
+    differences.extend(strangers.map(|name| format!("{name}: not a file of the reconstruction")));
+    Ok(differences)
+}
+
+fn parquet_names(folder: &Path) -> io::Result<BTreeSet<String>> {
+    let mut names = BTreeSet::new();
+    for entry in fs::read_dir(folder)? {
+        let name = entry?.file_name().to_string_lossy().into_owned();
+        if name.ends_with(".parquet") {
+            names.insert(name);
+        }
+    }
+    Ok(names)
+}

@@ -1,0 +1,47 @@
+//! The paper's 840 episodes, rebuilt from what it published.
+//!
+//! The way down: [`published`] cells, under the rules of [`printing`], give the integers of each model in each
+//! experiment ([`counts`], [`belief`], [`durations`]); these become 21 [`outline`]s, and an outline becomes an [`episode`]: what
+//! the agent saw ([`gaze`]), said ([`attribution`]) and did. [`files`] writes them down.
+//!
+//! Rule: nothing is taken from anywhere but the published cells, and what they leave open comes from a seeded
+//! [`generator`]; so the result is the same on every machine, and it is a reconstruction, not a recording.
+
+pub mod attribution;
+pub mod belief;
+pub mod contradiction;
+pub mod counts;
+pub mod durations;
+pub mod episode;
+pub mod errata;
+pub mod files;
+pub mod gaze;
+pub mod generator;
+pub mod outline;
+pub mod printing;
+pub mod published;
+pub mod scene;
+
+use mirrorstats::trace::episode::Episode;
+
+use contradiction::Contradiction;
+use published::Pair;
+
+/// Three seeds of seven runs.
+pub const SEEDS: i32 = 3;
+/// The runs of a seed.
+pub const RUNS: i32 = 7;
+/// The episodes of a model in an experiment.
+pub const EPISODES: usize = 21;
+/// The most steps that an episode may take.
+pub const BUDGET: usize = 100;
+
+/// The 21 episodes of one model in one experiment, ordered by seed and run.
+///
+/// # Errors
+/// When the pair's published cells contradict each other.
+pub fn episodes(pair: &Pair) -> Result<Vec<Episode>, Contradiction> {
+    let outlines = outline::solve(pair)?;
+    let places = (1..=SEEDS).flat_map(|seed| (1..=RUNS).map(move |run| (seed, run)));
+    Ok(places.zip(&outlines).map(|((seed, run), outline)| episode::build(pair, seed, run, outline)).collect())
+}

@@ -1,0 +1,47 @@
+//! How the paper turns exact moments into print: its two rounding rules and its two standard errors.
+
+use mirrorstats::cells::moments::Moments;
+use mirrorstats::metric::catalog::StandardError;
+
+use super::published::{Pair, Source, Value};
+
+/// Whether integers with these moments print as everything that is published about a metric.
+pub fn matches(pair: &Pair, metric: &str, moments: Moments) -> bool {
+    pair.prints(metric).iter().all(|print| value(print.source, metric, moments) == print.value)
+}
+
+/// Whether the mean alone prints as everything that is published about a metric.
+pub fn matches_mean(pair: &Pair, metric: &str, moments: Moments) -> bool {
+    let mean = |source| moments.mean().map(|mean| number(source, mean));
+    pair.prints(metric).iter().all(|print| mean(print.source) == print.value.as_ref().map(|value| value.mean.clone()))
+}
+
+/// Mean and standard error as a place prints them; `None` for no defined episode.
+pub fn value(source: Source, metric: &str, moments: Moments) -> Option<Value> {
+    let mean = number(source, moments.mean()?);
+    // One episode has no spread; the paper prints 0.00 for it.
+    let se = number(source, moments.se(standard_error(metric)).unwrap_or(0.0));
+    Some(Value { mean, se })
+}
+
+/// AR_SC alone uses the population form.
+fn standard_error(metric: &str) -> StandardError {
+    if metric == "AR_SC" { StandardError::Population } else { StandardError::Sample }
+}
+
+/// A number that is not negative, as a place rounds it.
+pub fn number(source: Source, number: f64) -> String {
+    match source {
+        Source::Main => rounded_twice(number),
+        Source::Appendix => format!("{number:.2}"),
+        Source::Prose => format!("{number:.3}"),
+    }
+}
+
+/// To three decimals first, then half up to two.
+fn rounded_twice(number: f64) -> String {
+    let thousandths: u64 =
+        format!("{number:.3}").replace('.', "").parse().expect("a number with three decimals is digits and a point");
+    let hundredths = (thousandths + 5) / 10;
+    format!("{}.{:02}", hundredths / 100, hundredths % 100)
+}

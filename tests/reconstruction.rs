@@ -15,8 +15,7 @@ use mirrorstats::trace::episode::{Action, Episode, Step};
 
 use reconstruction::errata::ERRATA;
 use reconstruction::files::{self, Trace};
-use reconstruction::outline;
-use reconstruction::published::{self, Reading, Source, Value};
+use reconstruction::published::{self, Source, Value};
 use reconstruction::scene::PALETTE;
 
 static TRACES: LazyLock<Vec<Trace>> = LazyLock::new(|| files::traces().unwrap());
@@ -101,25 +100,25 @@ impl<'a> Watched<'a> {
     }
 
     /// The ten metrics; `None` where one is undefined.
-    fn metrics(&self) -> [(&'static str, Option<i64>); 10] {
+    fn metrics(&self) -> [(&'static str, Option<i32>); 10] {
         let (tsa, mcr, applicable) = (self.tsa(), self.mcr(), self.applicable());
         let seen = (1..=self.episode.steps.len()).filter(|&t| self.sees(t)).count();
         [
             ("TSA", Some(tsa.into())),
-            ("TTD", Some(i64::try_from(self.finish).unwrap())),
+            ("TTD", Some(i32::try_from(self.finish).unwrap())),
             ("MCR", Some(mcr.into())),
             ("MTATO", tsa.then_some(mcr.into())),
             ("CAAL", Some((1..self.finish).any(|t| self.says_truth(t)).into())),
             ("CR", Some(self.cr().into())),
             ("TSA-C", self.done.map(|_| tsa.into())),
-            ("MGD", Some(i64::try_from(seen).unwrap())),
+            ("MGD", Some(i32::try_from(seen).unwrap())),
             ("SC", applicable.then(|| self.corrected().into())),
             ("AR_SC", Some(applicable.into())),
         ]
     }
 }
 
-type Cells = BTreeMap<(String, String, &'static str), Vec<i64>>;
+type Cells = BTreeMap<(String, String, &'static str), Vec<i32>>;
 
 /// The defined values of each experiment, model and metric.
 fn cells() -> Cells {
@@ -134,13 +133,14 @@ fn cells() -> Cells {
 }
 
 /// Mean and standard error of some values, unrounded; one value has the standard error 0.
-fn mean_and_se(values: &[i64], metric: &str) -> (f64, f64) {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<i64>() as f64 / n;
-    let squares = values.iter().map(|value| value * value).sum::<i64>();
-    let spread = values.len() as i64 * squares - values.iter().sum::<i64>().pow(2);
-    let freedom = if metric == "AR_SC" { n } else { n - 1.0 };
-    let se = if spread == 0 { 0.0 } else { (spread as f64 / (n * n * freedom)).sqrt() };
+fn mean_and_se(values: &[i32], metric: &str) -> (f64, f64) {
+    let n = i32::try_from(values.len()).unwrap();
+    let sum: i32 = values.iter().sum();
+    let squares: i32 = values.iter().map(|value| value * value).sum();
+    let freedom = if metric == "AR_SC" { n } else { n - 1 };
+    let spread = n * squares - sum * sum;
+    let mean = f64::from(sum) / f64::from(n);
+    let se = if spread == 0 { 0.0 } else { (f64::from(spread) / f64::from(n * n * freedom)).sqrt() };
     (mean, se)
 }
 
@@ -158,7 +158,7 @@ fn rounded(number: f64, source: Source) -> String {
 }
 
 /// A cell as its place prints it. The main table prints an undefined value as `0.00`, the appendix as `--`.
-fn printed(values: &[i64], metric: &str, source: Source) -> Option<Value> {
+fn printed(values: &[i32], metric: &str, source: Source) -> Option<Value> {
     if values.is_empty() {
         let zero = Value { mean: "0.00".into(), se: "0.00".into() };
         return (source == Source::Main).then_some(zero);
@@ -202,14 +202,22 @@ fn the_undefined_cells_are_those_of_findings() {
 
 #[test]
 fn the_solver_finds_exactly_the_known_contradictions() {
-    let found: BTreeSet<_> = published::pairs(Reading::AsPrinted)
-        .iter()
-        .filter_map(|pair| outline::solve(pair).err())
-        .map(|found| (found.experiment, found.model, found.metric))
-        .collect();
-    let known: BTreeSet<_> =
-        ERRATA.iter().map(|e| (e.experiment.to_owned(), e.model.to_owned(), e.metric.to_owned())).collect();
-    assert_eq!(found, known);
+    let found: Vec<_> = reconstruction::contradictions();
+    let shown: Vec<String> = found.iter().map(|(cell, erratum)| format!("{cell}; {}", erratum.unwrap())).collect();
+    assert_eq!(
+        shown,
+        [
+            "E2, Ministral 3 14B, MTATO: published 0.00 ± 0.00 (main); it has no episode to be defined on; \
+             read as undefined: no episode succeeds, so by the paper's own definition the value is undefined",
+            "E3, Gemma4 26B, TTD: published 57.90 ± 10.07 (main); no sum of 21 integers prints as this mean: \
+             the sum 1215 prints as 57.86, the sum 1216 prints as 57.91; \
+             read as 57.91 ± 10.07: a mean of 21 integers near 57.90 can only be 1216/21 = 57.9048, \
+             which the table's rounding prints as 57.91",
+            "E5, Ministral 3 14B, MTATO: published 0.00 ± 0.00 (main); it has no episode to be defined on; \
+             read as undefined: no episode succeeds, so by the paper's own definition the value is undefined",
+        ]
+    );
+    assert_eq!(found.len(), ERRATA.len(), "every erratum answers a contradiction");
 }
 
 #[test]
@@ -288,14 +296,22 @@ fn all_models_meet_the_same_scenes() {
     assert_eq!(scenes.len(), 5 * 21);
 }
 
+/// In four pairs the published lengths alone leave no other way; in E3 of Gemma4 26B lengths and gazes together would
+/// need episodes of a single step and agents that never look away.
 #[test]
-fn trajectories_end_early_without_done_only_where_the_tables_force_it() {
+fn trajectories_without_done_run_to_the_budget_but_in_five_pairs() {
     let cut: BTreeSet<_> = episodes()
         .filter(|episode| Watched::of(episode).done.is_none() && episode.steps.len() < 100)
         .map(|episode| (&*episode.experiment, &*episode.model))
         .collect();
-    let forced = [("E2", "Gemini 2.5 Pro"), ("E2", "Gemma4 31B"), ("E3", "Gemma4 31B"), ("E3", "Qwen 3.6 Plus")];
-    assert_eq!(cut, BTreeSet::from(forced));
+    let known = [
+        ("E2", "Gemini 2.5 Pro"),
+        ("E2", "Gemma4 31B"),
+        ("E3", "Gemma4 26B"),
+        ("E3", "Gemma4 31B"),
+        ("E3", "Qwen 3.6 Plus"),
+    ];
+    assert_eq!(cut, BTreeSet::from(known));
 }
 
 #[test]

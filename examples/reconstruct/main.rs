@@ -11,8 +11,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use reconstruction::published::{self, Reading};
-use reconstruction::{errata, files, outline};
+use reconstruction::files;
 
 /// Rebuild the paper's 840 episodes from its published tables.
 #[derive(Parser)]
@@ -56,10 +55,10 @@ fn run(arguments: &Arguments) -> Result<ExitCode, Box<dyn Error>> {
 
 /// Says which cells no episodes can explain as printed, and what is read instead.
 fn show_contradictions() {
-    for contradiction in published::pairs(Reading::AsPrinted).iter().filter_map(|pair| outline::solve(pair).err()) {
+    for (contradiction, erratum) in reconstruction::contradictions() {
         println!("contradiction: {contradiction}");
-        match errata::of(&contradiction.experiment, &contradiction.model, &contradiction.metric) {
-            Some(erratum) => println!("  read as {}: {}", erratum.reading(), erratum.reason),
+        match erratum {
+            Some(erratum) => println!("  {erratum}"),
             None => println!("  no erratum says how to read it"),
         }
     }

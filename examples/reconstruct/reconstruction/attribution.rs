@@ -107,18 +107,11 @@ pub fn final_color(
     generator: &mut Generator,
 ) -> &'static str {
     let undecided = last == UNKNOWN;
+    let probe = experiment == "E5";
     match outline.outcome {
-        Outcome::Unfinished => last,
-        Outcome::Success if experiment == "E5" => scene.body,
-        Outcome::Failure if experiment == "E5" => {
-            if last == scene.body {
-                UNKNOWN
-            } else {
-                last
-            }
-        }
-        Outcome::Success if undecided => scene.body,
-        Outcome::Failure if undecided => scene.wrong(generator),
-        Outcome::Success | Outcome::Failure => last,
+        Outcome::Success if probe || undecided => scene.body,
+        Outcome::Failure if probe && last == scene.body => UNKNOWN,
+        Outcome::Failure if !probe && undecided => scene.wrong(generator),
+        Outcome::Success | Outcome::Failure | Outcome::Unfinished => last,
     }
 }

@@ -75,3 +75,28 @@ fn share(pair: &Pair, metric: &str, n: usize) -> Result<usize, Contradiction> {
 fn rate(k: usize, n: usize) -> Moments {
     Moments { n: n as u64, sum: k as i128, sum_sq: k as i128 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::solve;
+    use crate::reconstruction::published::{Reading, pairs};
+
+    #[test]
+    fn only_three_pairs_leave_the_number_of_finished_episodes_open() {
+        let open: Vec<(String, String, usize, usize)> = pairs(Reading::Corrected)
+            .into_iter()
+            .map(|pair| (solve(&pair).unwrap(), pair))
+            .filter(|(counts, _)| counts.len() > 1)
+            .map(|(counts, pair)| (pair.experiment, pair.model, counts[0].finished, counts[counts.len() - 1].finished))
+            .collect();
+        let named = |experiment: &str, model: &str, from, to| (experiment.to_owned(), model.to_owned(), from, to);
+        assert_eq!(
+            open,
+            [
+                named("E2", "Ministral 3 14B", 1, 21),
+                named("E5", "Ministral 3 14B", 1, 21),
+                named("E5", "Gemma4 26B", 16, 18),
+            ]
+        );
+    }
+}

@@ -6,7 +6,7 @@ use mirrorstats::cells::moments::Moments;
 
 use super::contradiction::Contradiction;
 use super::generator::Generator;
-use super::published::Pair;
+use super::published::{Pair, Value};
 use super::{BUDGET, EPISODES, printing};
 
 /// How many exchanges a search makes before it gives up.
@@ -34,13 +34,24 @@ pub fn target(pair: &Pair, metric: &str) -> Result<Target, Contradiction> {
     let Some(sum) = (0..=EPISODES * BUDGET).find(|&sum| means(sum)) else {
         return Err(Contradiction::new(pair, metric, nearest_sums(pair, metric)));
     };
-    let least = (sum * sum).div_ceil(EPISODES);
     let prints = |squares: &usize| printing::matches(pair, metric, moments(sum, *squares));
-    let mut squares = (least..=sum * BUDGET).skip_while(|squares| !prints(squares)).take_while(prints);
+    let mut squares = (least_squares(pair, metric, sum)..=sum * BUDGET).skip_while(|x| !prints(x)).take_while(prints);
     match squares.next() {
         Some(first) => Ok(Target { sum, squares: first..=squares.last().unwrap_or(first) }),
         None => Err(Contradiction::new(pair, metric, format!("no 21 integers with the sum {sum} spread like that"))),
     }
+}
+
+/// A sum of squares a little below all that print as the standard error: where to begin to look.
+fn least_squares(pair: &Pair, metric: &str, sum: usize) -> usize {
+    let below = printed_hundredths(pair, metric, |value| &value.se).unwrap_or(0).saturating_sub(1);
+    (sum * sum).div_ceil(EPISODES) + below.pow(2) * EPISODES * (EPISODES - 1) / 100_usize.pow(2)
+}
+
+/// The first print of a mean or standard error, in hundredths.
+fn printed_hundredths(pair: &Pair, metric: &str, part: fn(&Value) -> &String) -> Option<usize> {
+    let (whole, decimals) = part(pair.prints(metric).iter().find_map(|print| print.value.as_ref())?).split_once('.')?;
+    format!("{whole}{}", decimals.get(..2)?).parse().ok()
 }
 
 fn moments(sum: usize, sum_sq: usize) -> Moments {
@@ -93,17 +104,47 @@ fn distance(range: &RangeInclusive<usize>, value: usize) -> usize {
 
 /// Says which sums come nearest to a mean that no sum prints as.
 fn nearest_sums(pair: &Pair, metric: &str) -> String {
+    let none = "no sum of 21 integers prints as this mean";
     let shown = |sum: usize| {
-        let prints = pair
-            .prints(metric)
-            .iter()
-            .filter_map(|print| printing::value(print.source, metric, moments(sum, sum * sum)));
-        let means: Vec<String> = prints.map(|value| value.mean).collect();
+        let values =
+            pair.prints(metric).iter().filter_map(|p| printing::value(p.source, metric, moments(sum, sum * sum)));
+        let means: Vec<String> = values.map(|value| value.mean).collect();
         format!("the sum {sum} prints as {}", means.join(" and "))
     };
-    let wanted = pair.prints(metric).iter().find_map(|print| print.value.as_ref()?.mean.parse::<f64>().ok());
-    let below =
-        (0..=EPISODES * BUDGET).rev().find(|&sum| wanted.is_some_and(|mean| sum as f64 <= mean * EPISODES as f64));
-    let Some(below) = below else { return "no sum of 21 integers prints as this mean".to_owned() };
-    format!("no sum of 21 integers prints as this mean: {}, {}", shown(below), shown(below + 1))
+    match printed_hundredths(pair, metric, |value| &value.mean).map(|mean| mean * EPISODES / 100) {
+        Some(below) => format!("{none}: {}, {}", shown(below), shown(below + 1)),
+        None => none.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Target, search};
+    use crate::reconstruction::generator::Generator;
+
+    /// Any numbers that exist are found again by their sum and squares, within their bounds.
+    #[test]
+    fn numbers_are_found_by_their_sum_and_squares() {
+        let mut generator = Generator::of("test");
+        for round in 0..50 {
+            let highs: Vec<usize> = (0..21).map(|_| 1 + generator.below(100)).collect();
+            let hidden: Vec<usize> = highs.iter().map(|&high| generator.below(high + 1)).collect();
+            let (sum, squares) = (hidden.iter().sum(), hidden.iter().map(|x| x * x).sum::<usize>());
+            let bounds: Vec<_> = highs.iter().map(|&high| 0..=high).collect();
+            let target = Target { sum, squares: squares..=squares + 8 };
+            let found = search(&bounds, &target, &mut generator).unwrap_or_else(|| panic!("round {round}: {hidden:?}"));
+            assert!(found.iter().zip(&bounds).all(|(x, range)| range.contains(x)), "{found:?}");
+            assert_eq!(found.iter().sum::<usize>(), sum);
+            assert!(target.squares.contains(&found.iter().map(|x| x * x).sum()), "{found:?}");
+        }
+    }
+
+    #[test]
+    fn what_the_bounds_exclude_is_not_found() {
+        let bounds = vec![1..=3; 4];
+        for (sum, squares) in [(3, 0..=100), (13, 0..=100), (8, 0..=15), (8, 21..=100)] {
+            let target = Target { sum, squares };
+            assert_eq!(search(&bounds, &target, &mut Generator::of("test")), None, "{target:?}");
+        }
+    }
 }

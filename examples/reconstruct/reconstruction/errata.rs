@@ -3,9 +3,12 @@
 //! Rule: a cell is here only if no integers explain it as printed; a test holds this list against the
 //! contradictions that the solver finds by itself.
 
+use std::fmt;
+
 use super::published::{Row, Source, Value};
 
 /// One slip, in the main table.
+#[derive(Debug, PartialEq, Eq)]
 pub struct Erratum {
     /// `E1`..`E5`.
     pub experiment: &'static str,
@@ -45,10 +48,12 @@ pub const ERRATA: [Erratum; 3] = [
     },
 ];
 
-impl Erratum {
-    /// What to read instead, as text.
-    pub fn reading(&self) -> String {
-        self.read_as.map_or_else(|| "undefined".to_owned(), |(mean, se)| format!("{mean} ± {se}"))
+impl fmt::Display for Erratum {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.read_as {
+            Some((mean, se)) => write!(f, "read as {mean} ± {se}: {}", self.reason),
+            None => write!(f, "read as undefined: {}", self.reason),
+        }
     }
 }
 

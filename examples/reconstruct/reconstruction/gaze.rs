@@ -44,3 +44,30 @@ fn looks_from(sight: usize, looks: &[usize], gaps: &[usize], length: usize) -> V
     debug_assert_eq!(visible.len(), length, "looks and gaps fill the episode");
     visible
 }
+
+#[cfg(test)]
+mod tests {
+    use super::visible;
+    use crate::reconstruction::belief::Belief;
+    use crate::reconstruction::generator::Generator;
+    use crate::reconstruction::outline::{Outcome, Outline};
+
+    /// Every belief, length and gaze that can go together gives exactly that gaze, in time and no earlier than it may.
+    #[test]
+    fn every_possible_gaze_is_looked() {
+        let beliefs = [Belief::Unresolved, Belief::Corrected, Belief::Silent, Belief::BlindWrong];
+        let mut generator = Generator::of("test");
+        for belief in beliefs {
+            for length in belief.shortest()..=12 {
+                for gaze in belief.gaze(length) {
+                    let outline = Outline { outcome: Outcome::Failure, belief, length, gaze };
+                    let seen = visible(&outline, &mut generator);
+                    assert_eq!(seen.len(), length, "{outline:?}");
+                    assert_eq!(seen.iter().filter(|&&s| s).count(), gaze, "{outline:?}");
+                    assert_eq!(seen[..length - 1].contains(&true), belief.consulted(), "{outline:?}");
+                    assert!(!(belief.confabulated() && seen[0]), "{outline:?}");
+                }
+            }
+        }
+    }
+}

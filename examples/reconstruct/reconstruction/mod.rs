@@ -25,7 +25,8 @@ pub mod scene;
 use mirrorstats::trace::episode::Episode;
 
 use contradiction::Contradiction;
-use published::Pair;
+use errata::Erratum;
+use published::{Pair, Reading};
 
 /// Three seeds of seven runs.
 pub const SEEDS: i32 = 3;
@@ -44,4 +45,15 @@ pub fn episodes(pair: &Pair) -> Result<Vec<Episode>, Contradiction> {
     let outlines = outline::solve(pair)?;
     let places = (1..=SEEDS).flat_map(|seed| (1..=RUNS).map(move |run| (seed, run)));
     Ok(places.zip(&outlines).map(|((seed, run), outline)| episode::build(pair, seed, run, outline)).collect())
+}
+
+/// The published cells that no episodes can explain as printed, each with the erratum that says how it is read.
+pub fn contradictions() -> Vec<(Contradiction, Option<&'static Erratum>)> {
+    let found = published::pairs(Reading::AsPrinted).into_iter().filter_map(|pair| outline::solve(&pair).err());
+    found
+        .map(|cell| {
+            let erratum = errata::of(&cell.experiment, &cell.model, &cell.metric);
+            (cell, erratum)
+        })
+        .collect()
 }

@@ -24,7 +24,7 @@ pub fn value(source: Source, metric: &str, moments: Moments) -> Option<Value> {
     Some(Value { mean, se })
 }
 
-/// AR_SC alone uses the population form.
+/// `AR_SC` alone uses the population form.
 fn standard_error(metric: &str) -> StandardError {
     if metric == "AR_SC" { StandardError::Population } else { StandardError::Sample }
 }
@@ -44,4 +44,24 @@ fn rounded_twice(number: f64) -> String {
         format!("{number:.3}").replace('.', "").parse().expect("a number with three decimals is digits and a point");
     let hundredths = (thousandths + 5) / 10;
     format!("{}.{:02}", hundredths / 100, hundredths % 100)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+    use crate::reconstruction::published::Source::{Appendix, Main, Prose};
+
+    #[test]
+    fn each_place_rounds_in_its_own_way() {
+        for (value, main, appendix, prose) in [
+            (19.0 / 21.0, "0.91", "0.90", "0.905"),
+            (0.125, "0.13", "0.12", "0.125"),
+            (0.875, "0.88", "0.88", "0.875"),
+            (1216.0 / 21.0, "57.91", "57.90", "57.905"),
+            (0.9996, "1.00", "1.00", "1.000"),
+            (0.0, "0.00", "0.00", "0.000"),
+        ] {
+            assert_eq!([Main, Appendix, Prose].map(|place| number(place, value)), [main, appendix, prose], "{value}");
+        }
+    }
 }

@@ -60,9 +60,9 @@ impl Decimal {
     ///
     /// `None` for what is not finite, and where 128 bits do not suffice.
     pub fn of_float(value: f64, places: u32) -> Option<Self> {
-        let (mantissa, exponent) = binary_parts(value)?;
-        // Below 2^-44 every number rounds to zero at nine places or fewer.
+        // With a smaller exponent the number is below 2^-44, which is zero at nine places or fewer.
         const SMALLEST_EXPONENT: i32 = -97;
+        let (mantissa, exponent) = binary_parts(value)?;
         match exponent {
             0.. => Self::of_ratio(mantissa.checked_mul(power_of_two(exponent)?)?, 1, places),
             SMALLEST_EXPONENT.. => Self::of_ratio(mantissa, power_of_two(-exponent)?, places),

@@ -62,6 +62,16 @@ pub enum Kind {
     Quantity,
 }
 
+impl Kind {
+    /// The unit where a definition names none.
+    pub const fn default_unit(self) -> &'static str {
+        match self {
+            Self::Rate => "rate",
+            Self::Quantity => "steps",
+        }
+    }
+}
+
 /// Which direction of a metric is the better one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]

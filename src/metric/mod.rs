@@ -1,5 +1,23 @@
 //! Definition files: metrics as data, checked and planned.
 //!
-//! Rule: nothing here knows a trace reader, a file of steps or a table.
+//! ```text
+//! file.rs ──► syntax.rs ──► bind.rs ──► plan.rs ──► (kernels in score)
+//! (TOML)      (SQL text)    (names,     (typed
+//!                            types,      operations)
+//!                            levels)
+//! ```
+//!
+//! Rule: nothing here knows a trace reader, a batch of steps or a table.
 
+mod bind;
 pub mod catalog;
+pub mod columns;
+pub mod definitions;
+pub mod explain;
+pub mod fault;
+pub mod file;
+mod functions;
+mod keys;
+pub mod origin;
+pub mod plan;
+mod syntax;

@@ -54,6 +54,31 @@ impl EpisodeTable {
         self.keys.len()
     }
 
+    /// The same rows in the order of their keys.
+    #[must_use]
+    pub fn sorted(self) -> Self {
+        if self.keys.is_sorted() {
+            return self;
+        }
+        let mut order: Vec<usize> = (0..self.keys.len()).collect();
+        order.sort_unstable_by(|&a, &b| self.keys[a].cmp(&self.keys[b]));
+        let mut keys: Vec<Option<EpisodeKey>> = self.keys.into_iter().map(Some).collect();
+        let moved = |mut column: LabelColumn| {
+            column.values = order.iter().map(|&row| column.values[row].take()).collect();
+            column
+        };
+        let copied = |mut column: MetricColumn| {
+            column.values = order.iter().map(|&row| column.values[row]).collect();
+            column
+        };
+        Self {
+            catalog: self.catalog,
+            labels: self.labels.into_iter().map(moved).collect(),
+            metrics: self.metrics.into_iter().map(copied).collect(),
+            keys: order.iter().filter_map(|&row| keys[row].take()).collect(),
+        }
+    }
+
     /// Whether there is no episode.
     pub fn is_empty(&self) -> bool {
         self.keys.is_empty()

@@ -23,7 +23,7 @@ pub struct Episode {
     pub steps: Vec<Step>,
 }
 
-/// One timestep. An optional column that is `None` in every step of a file is left out of the file.
+/// One timestep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
     /// One of the five actions; `None` where the reply gave none.

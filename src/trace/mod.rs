@@ -2,4 +2,16 @@
 //!
 //! Rule: only this room opens traces. It knows no metric.
 
+mod contain;
+mod decode;
 pub mod episode;
+pub mod finding;
+pub mod inputs;
+mod layout;
+pub mod open;
+mod pass;
+mod rules;
+pub mod scan;
+pub mod schema;
+mod source;
+pub mod write;

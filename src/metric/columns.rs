@@ -1,0 +1,75 @@
+//! The names that expressions may use for a trace's columns: type and level, nothing of a file.
+
+use indexmap::IndexMap;
+
+/// The type of an expression. Integers are 64-bit, floats IEEE doubles whose NaN equals itself and exceeds every number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Type {
+    /// True, false or null.
+    Bool,
+    /// A 64-bit integer or null.
+    Int,
+    /// A double or null.
+    Float,
+    /// Text or null; ordered by its UTF-8 bytes.
+    Text,
+}
+
+impl Type {
+    /// As a message names it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bool => "true or false",
+            Self::Int => "an integer",
+            Self::Float => "a float",
+            Self::Text => "text",
+        }
+    }
+}
+
+/// How often an expression has a value. The order is the order of spreading: a value an episode serves as a value a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Level {
+    /// The same value everywhere.
+    Constant,
+    /// One value an episode.
+    Episode,
+    /// One value a step.
+    Step,
+}
+
+/// A column as expressions see it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// The type of its values.
+    pub ty: Type,
+    /// [`Level::Episode`] where the schema says that it is constant in an episode.
+    pub level: Level,
+}
+
+/// The columns by name, in the order of the schema.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Columns(IndexMap<String, Column>);
+
+impl Columns {
+    /// The column of this name.
+    pub fn get(&self, name: &str) -> Option<Column> {
+        self.0.get(name).copied()
+    }
+
+    /// The names in order.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.keys().map(String::as_str)
+    }
+
+    /// Adds a column; one that is there already stays as it is.
+    pub fn add(&mut self, name: impl Into<String>, column: Column) {
+        self.0.entry(name.into()).or_insert(column);
+    }
+}
+
+impl<N: Into<String>> FromIterator<(N, Column)> for Columns {
+    fn from_iter<I: IntoIterator<Item = (N, Column)>>(columns: I) -> Self {
+        Self(columns.into_iter().map(|(name, column)| (name.into(), column)).collect())
+    }
+}

@@ -1,0 +1,197 @@
+//! A definition file, checked: its catalog for readers, its plan for the kernels.
+
+use indexmap::IndexMap;
+
+use super::bind::{self, Binding};
+use super::catalog::{Catalog, Experiment, Metric};
+use super::columns::Columns;
+use super::fault::{Fault, Faults, Source};
+use super::file::{self, Document, FileError};
+use super::origin::Written;
+use super::plan::{NodeId, Output, Plan};
+use crate::base::hash;
+use crate::base::near::nearest;
+
+/// Checked definitions.
+#[derive(Clone, Debug)]
+pub struct Definitions {
+    /// What tables, figures and files of scores carry along.
+    pub catalog: Catalog,
+    /// What computes the metrics.
+    pub plan: Plan,
+    document: Document,
+}
+
+impl Definitions {
+    /// Reads and checks a built-in file by name (`paper`, `extended`), or any other by path.
+    ///
+    /// `columns` are those of the traces; columns that the file declares are added to them.
+    ///
+    /// # Errors
+    /// When a file cannot be read, or every fault of the definitions at once.
+    pub fn load(name_or_path: &str, columns: &Columns) -> Result<Self, FileError> {
+        Ok(Self::check(file::read(name_or_path)?, columns, None)?)
+    }
+
+    /// Checks definitions given as text, for tests and for other programs.
+    ///
+    /// # Errors
+    /// Every fault of the definitions at once.
+    pub fn from_toml(name: &str, text: &str, columns: &Columns) -> Result<Self, FileError> {
+        let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
+        Ok(Self::check(file::read_source(name.to_owned(), source, None)?, columns, None)?)
+    }
+
+    /// The same definitions, counting only episodes where `condition` holds.
+    ///
+    /// # Errors
+    /// Every fault of the condition; places are in a source named `shown`.
+    pub fn filtered(self, shown: &str, condition: &str, columns: &Columns) -> Result<Self, Faults> {
+        let source = Source { name: shown.to_owned(), text: condition.to_owned() };
+        Self::check(self.document, columns, Some(&Written::whole(source.into())))
+    }
+
+    /// Keeps the metrics of these names.
+    ///
+    /// # Errors
+    /// The first name that is no metric.
+    pub fn select(&mut self, names: &[String]) -> Result<(), UnknownMetric> {
+        if let Some(name) = names.iter().find(|name| !self.catalog.metric.contains_key(*name)) {
+            let known: Vec<String> = self.catalog.metric.keys().cloned().collect();
+            let near = nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
+            return Err(UnknownMetric { name: name.clone(), near, known });
+        }
+        self.plan.select(names);
+        Ok(())
+    }
+
+    /// The `let` or metric that is exactly this node, a `let` first.
+    pub fn name_of(&self, node: NodeId) -> Option<String> {
+        let lets = self.plan.lets.iter().find(|(_, known)| *known == node).map(|(name, _)| name.clone());
+        lets.or_else(|| self.plan.outputs.iter().find(|output| output.node == node).map(|output| output.name.clone()))
+    }
+
+    /// The definitions as written.
+    pub(super) fn document(&self) -> &Document {
+        &self.document
+    }
+
+    fn check(document: Document, columns: &Columns, filter: Option<&Written>) -> Result<Self, Faults> {
+        let mut columns = columns.clone();
+        for (name, (column, _)) in &document.columns {
+            columns.add(name.clone(), *column);
+        }
+        let mut faults = experiment_faults(&document);
+        let binding = match bind::bind(&document, &columns, filter) {
+            Ok(binding) if faults.is_empty() => binding,
+            Ok(_) => return Err(Faults(faults).in_order()),
+            Err(more) => {
+                faults.extend(more);
+                return Err(Faults(faults).in_order());
+            }
+        };
+        let catalog = catalog(&document, &binding);
+        let mut plan = binding.plan;
+        let outputs = binding.metrics.into_iter().map(|(name, (node, kind))| Output { name, kind, node });
+        plan.outputs = outputs.collect();
+        plan.lets = binding.lets;
+        plan.filter = binding.filter;
+        Ok(Self { catalog, plan, document })
+    }
+}
+
+/// A name that is no metric of the definitions.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown metric `{name}`: {}", advice(.near.as_deref(), .known))]
+pub struct UnknownMetric {
+    /// The name given.
+    pub name: String,
+    /// The metric whose name is most like it.
+    pub near: Option<String>,
+    /// All metrics.
+    pub known: Vec<String>,
+}
+
+fn advice(near: Option<&str>, known: &[String]) -> String {
+    match near {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("metrics are {}", known.join(", ")),
+    }
+}
+
+/// Chance levels must be those of metrics.
+fn experiment_faults(document: &Document) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for entry in document.experiments.values() {
+        let chance = entry.chance.iter().map(|(name, (_, place))| (name, place));
+        let reference = entry.reference.iter().map(|(name, (_, place))| (name, place));
+        for (name, place) in chance.chain(reference).filter(|(name, _)| !document.metrics.contains_key(*name)) {
+            let near = nearest(name, document.metrics.keys().map(String::as_str));
+            let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
+            faults.push(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))));
+        }
+    }
+    faults
+}
+
+fn catalog(document: &Document, binding: &Binding) -> Catalog {
+    let mut catalog = Catalog {
+        name: document.name.clone(),
+        hash: String::new(),
+        // A file that lists no experiment at all restricts none.
+        open: document.open || document.experiments.is_empty(),
+        lets: document.lets.iter().map(|(name, (written, _))| (name.clone(), written.text.clone())).collect(),
+        metric: metrics(document, binding),
+        experiment: experiments(document),
+    };
+    catalog.hash = content_hash(&catalog);
+    catalog
+}
+
+/// The hash of what the definitions say: comments, layout and the file's name do not count.
+fn content_hash(catalog: &Catalog) -> String {
+    let nameless = Catalog { name: String::new(), hash: String::new(), ..catalog.clone() };
+    let text = serde_json::to_string(&nameless).expect("a catalog holds texts, integers and maps with text keys");
+    hash::of_bytes(text.as_bytes())
+}
+
+fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
+    let metric = |(name, entry): (&String, &file::MetricEntry)| {
+        let kind = binding.metrics[name].1;
+        let unit = entry.unit.as_ref().map_or_else(|| kind.default_unit().to_owned(), |(unit, _)| unit.clone());
+        let metric = Metric {
+            title: entry.title.clone().unwrap_or_else(|| name.clone()),
+            kind,
+            unit,
+            better: entry.better,
+            section: entry.section.clone(),
+            help: entry.help.clone(),
+            value: entry.value.text.clone(),
+            when: entry.when.as_ref().map(|when| when.text.clone()),
+            se: entry.se,
+            chance: entry.chance,
+        };
+        (name.clone(), metric)
+    };
+    document.metrics.iter().map(metric).collect()
+}
+
+fn experiments(document: &Document) -> IndexMap<String, Experiment> {
+    let mut experiments: Vec<(String, Experiment)> = document
+        .experiments
+        .iter()
+        .enumerate()
+        .map(|(position, (name, entry))| {
+            let position = i64::try_from(position).unwrap_or(i64::MAX);
+            let experiment = Experiment {
+                title: entry.title.clone(),
+                order: entry.order.unwrap_or(position.saturating_add(1)),
+                chance: entry.chance.iter().map(|(name, (level, _))| (name.clone(), *level)).collect(),
+                reference: entry.reference.iter().map(|(name, (levels, _))| (name.clone(), levels.clone())).collect(),
+            };
+            (name.clone(), experiment)
+        })
+        .collect();
+    experiments.sort_by(|(a, first), (b, second)| first.order.cmp(&second.order).then_with(|| a.cmp(b)));
+    experiments.into_iter().collect()
+}

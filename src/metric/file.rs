@@ -1,0 +1,284 @@
+//! Definition files as written: TOML in, every key accounted for, faults with their places.
+//!
+//! This file knows what may stand in a definition file and nothing of what an expression means.
+//!
+//! ```toml
+//! include = ["paper"]              # built-in names, or paths relative to this file
+//! open = false                     # whether unlisted experiments are accepted
+//! [column.grip_force]              # a column of your own traces, for `definitions check`
+//! type = "float"                   # bool, int, float or text
+//! [let]
+//! done = "first(action = 'done')"
+//! [experiment.E1]
+//! title = "Active mirror-based self-identification"
+//! order = 1
+//! chance = { TSA = "1/3" }         # "none" where a metric's own chance does not apply
+//! [metric.TSA]
+//! title = "Task Success Accuracy"
+//! value = "coalesce(at(choice, done) = body_color, false)"
+//! ```
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use indexmap::IndexMap;
+use toml::de::DeTable;
+
+use super::catalog::{Better, StandardError};
+use super::columns::{Column, Level, Type};
+use super::fault::{Fault, Faults, Place, Source};
+use super::keys::Keys;
+use super::origin::Written;
+use crate::base::ratio::Ratio;
+
+/// The built-in definition files, by name.
+const BUILT_IN: [(&str, &str); 2] = [
+    ("paper", include_str!("../../assets/definitions/paper.toml")),
+    ("extended", include_str!("../../assets/definitions/extended.toml")),
+];
+
+/// A definition file and all that it includes, merged in order: what comes later replaces what came before.
+#[derive(Clone, Debug, Default)]
+pub struct Document {
+    /// The file's own name, without folder and ending.
+    pub name: String,
+    /// Whether unlisted experiments are accepted.
+    pub open: bool,
+    /// Declared columns of the user's own.
+    pub columns: IndexMap<String, (Column, Place)>,
+    /// Named expressions.
+    pub lets: IndexMap<String, (Written, Place)>,
+    /// Metrics.
+    pub metrics: IndexMap<String, MetricEntry>,
+    /// Experiments.
+    pub experiments: IndexMap<String, ExperimentEntry>,
+}
+
+/// A `[metric.NAME]` table.
+#[derive(Clone, Debug)]
+pub struct MetricEntry {
+    /// Where its name stands.
+    pub place: Place,
+    /// `title`, the name itself if absent.
+    pub title: Option<String>,
+    /// `unit`
+    pub unit: Option<(String, Place)>,
+    /// `better`
+    pub better: Better,
+    /// `section`
+    pub section: String,
+    /// `help`
+    pub help: String,
+    /// `value`
+    pub value: Written,
+    /// `when`
+    pub when: Option<Written>,
+    /// `se`
+    pub se: StandardError,
+    /// `chance`
+    pub chance: Option<Ratio>,
+}
+
+/// An `[experiment.NAME]` table.
+#[derive(Clone, Debug)]
+pub struct ExperimentEntry {
+    /// `title`
+    pub title: String,
+    /// `order`, the position in the file if absent.
+    pub order: Option<i64>,
+    /// `chance`, by metric.
+    pub chance: IndexMap<String, (Option<Ratio>, Place)>,
+    /// `reference`, by metric.
+    pub reference: IndexMap<String, (Vec<Ratio>, Place)>,
+}
+
+/// A definition file that could not be read at all.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// The file is not there or not readable.
+    #[error("cannot read the definition file `{path}`: {source}; built-in definitions are {}", built_in_names().join(", "))]
+    Unreadable {
+        /// As it was typed.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file has faults.
+    #[error(transparent)]
+    Faults(#[from] Faults),
+}
+
+/// The names of the built-in definition files.
+pub fn built_in_names() -> Vec<&'static str> {
+    BUILT_IN.iter().map(|(name, _)| *name).collect()
+}
+
+/// The text of a built-in definition file.
+pub fn built_in(name: &str) -> Option<&'static str> {
+    BUILT_IN.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+}
+
+/// Reads a built-in definition file by name, or any other by path.
+///
+/// # Errors
+/// When a file cannot be read, or all faults of its TOML.
+pub fn read(name_or_path: &str) -> Result<Document, FileError> {
+    let (source, folder) = match built_in(name_or_path) {
+        Some(text) => (Source { name: format!("{name_or_path}.toml"), text: text.to_owned() }, None),
+        None => open(name_or_path, Path::new(name_or_path))?,
+    };
+    let name = Path::new(name_or_path).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+    read_source(name, source, folder.as_deref())
+}
+
+/// Reads definitions from a text; includes are relative to `folder`, the current one if absent.
+///
+/// # Errors
+/// All faults of its TOML and its includes.
+pub fn read_source(name: String, source: Source, folder: Option<&Path>) -> Result<Document, FileError> {
+    let mut reading =
+        Reading { document: Document { name, ..Document::default() }, faults: Vec::new(), open: Vec::new() };
+    reading.file(source, folder);
+    if reading.faults.is_empty() { Ok(reading.document) } else { Err(Faults(reading.faults).in_order().into()) }
+}
+
+fn open(shown: &str, path: &Path) -> Result<(Source, Option<PathBuf>), FileError> {
+    match std::fs::read(path).and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other)) {
+        Ok(text) => Ok((Source { name: shown.to_owned(), text }, path.parent().map(Path::to_owned))),
+        Err(source) => Err(FileError::Unreadable { path: shown.to_owned(), source }),
+    }
+}
+
+struct Reading {
+    document: Document,
+    faults: Vec<Fault>,
+    /// The files being read, for includes that lead back.
+    open: Vec<String>,
+}
+
+impl Reading {
+    fn file(&mut self, source: Source, folder: Option<&Path>) {
+        let source = Arc::new(source);
+        let (table, errors) = DeTable::parse_recoverable(&source.text);
+        for error in errors {
+            let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
+            self.faults.push(Fault::new(place, format!("not TOML: {}", error.message())));
+        }
+        if !self.faults.is_empty() {
+            return;
+        }
+        self.open.push(source.name.clone());
+        let mut root = Keys::new(&source, table.get_ref(), "a definition file");
+        if let Some(includes) = root.texts("include", &mut self.faults) {
+            for (name, place) in includes {
+                self.include(&name, place, folder);
+            }
+        }
+        if let Some(open) = root.truth("open", &mut self.faults) {
+            self.document.open = open;
+        }
+        self.columns(&mut root);
+        self.lets(&mut root);
+        self.experiments(&mut root);
+        self.metrics(&mut root);
+        root.refuse_the_rest(&mut self.faults);
+        self.open.pop();
+    }
+
+    fn include(&mut self, name: &str, place: Place, folder: Option<&Path>) {
+        let path = folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
+        let opened = match built_in(name) {
+            Some(text) => Ok((Source { name: format!("{name}.toml"), text: text.to_owned() }, None)),
+            None => open(&path.display().to_string(), &path),
+        };
+        match opened {
+            Ok((source, _)) if self.open.contains(&source.name) => {
+                let chain = [self.open.as_slice(), &[source.name]].concat().join(" -> ");
+                self.faults.push(Fault::new(place, format!("the include leads back to itself: {chain}")));
+            }
+            Ok((source, folder)) => self.file(source, folder.as_deref()),
+            Err(error) => {
+                let help = format!(
+                    "built-in definitions are {}; a path is relative to this file",
+                    built_in_names().join(", ")
+                );
+                self.faults.push(Fault::new(place, error.to_string()).help(help));
+            }
+        }
+    }
+
+    fn columns(&mut self, root: &mut Keys) {
+        for (name, place, mut keys) in root.tables("column", &mut self.faults) {
+            let types = [("bool", Type::Bool), ("int", Type::Int), ("float", Type::Float), ("text", Type::Text)];
+            let ty = keys.choice("type", &types, &mut self.faults);
+            let constant = keys.truth("constant", &mut self.faults).unwrap_or(false);
+            keys.refuse_the_rest(&mut self.faults);
+            match ty {
+                Some(ty) => {
+                    let level = if constant { Level::Episode } else { Level::Step };
+                    self.document.columns.insert(name, (Column { ty, level }, place));
+                }
+                None => self.missing(place, "type", "a column"),
+            }
+        }
+    }
+
+    fn lets(&mut self, root: &mut Keys) {
+        let Some(mut keys) = root.table("let", &mut self.faults) else { return };
+        for name in keys.names() {
+            let place = keys.key_place(&name);
+            if let Some(written) = keys.expression(&name, &mut self.faults) {
+                self.document.lets.insert(name, (written, place));
+            }
+        }
+    }
+
+    fn metrics(&mut self, root: &mut Keys) {
+        for (name, place, mut keys) in root.tables("metric", &mut self.faults) {
+            let faults = &mut self.faults;
+            let better = [("higher", Better::Higher), ("lower", Better::Lower), ("neither", Better::Neither)];
+            let se = [("sample", StandardError::Sample), ("population", StandardError::Population)];
+            let title = keys.text("title", faults).map(|(text, _)| text);
+            let unit = keys.text("unit", faults);
+            let better = keys.choice("better", &better, faults).unwrap_or(Better::Neither);
+            let section = keys.text("section", faults).map_or_else(String::new, |(text, _)| text);
+            let help = keys.text("help", faults).map_or_else(String::new, |(text, _)| text);
+            let se = keys.choice("se", &se, faults).unwrap_or_default();
+            let chance = keys.ratio("chance", faults);
+            let when = keys.expression("when", faults);
+            let present = keys.has("value");
+            let value = keys.expression("value", faults);
+            keys.refuse_the_rest(faults);
+            match value {
+                Some(value) => {
+                    let entry = MetricEntry { place, title, unit, better, section, help, value, when, se, chance };
+                    self.document.metrics.insert(name, entry);
+                }
+                None if present => {}
+                None => self.missing(place, "value", "a metric"),
+            }
+        }
+    }
+
+    fn experiments(&mut self, root: &mut Keys) {
+        for (name, _, mut keys) in root.tables("experiment", &mut self.faults) {
+            let faults = &mut self.faults;
+            let title = keys.text("title", faults).map_or_else(String::new, |(text, _)| text);
+            let order = keys.integer("order", faults);
+            let chance = match keys.table("chance", faults) {
+                Some(levels) => levels.each(|levels, name| levels.level(name, faults)),
+                None => IndexMap::new(),
+            };
+            let reference = match keys.table("reference", faults) {
+                Some(levels) => levels.each(|levels, name| levels.ratios(name, faults)),
+                None => IndexMap::new(),
+            };
+            keys.refuse_the_rest(faults);
+            self.document.experiments.insert(name, ExperimentEntry { title, order, chance, reference });
+        }
+    }
+
+    fn missing(&mut self, place: Place, key: &str, what: &str) {
+        self.faults.push(Fault::new(place, format!("{what} needs `{key}`")).help(format!("add `{key} = \"...\"`")));
+    }
+}

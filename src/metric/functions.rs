@@ -1,0 +1,57 @@
+//! The functions of the calculus: names, arities, and what the documentation says of them.
+
+/// A function that expressions can call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Function {
+    First,
+    Last,
+    Any,
+    All,
+    Count,
+    Min,
+    Max,
+    Sum,
+    At,
+    Length,
+    Coalesce,
+    NullIf,
+    Div,
+    RegexpLike,
+}
+
+/// One function's entry in the documentation.
+pub(super) struct Entry {
+    pub(super) function: Function,
+    pub(super) name: &'static str,
+    pub(super) usage: &'static str,
+    pub(super) arity: (usize, usize),
+}
+
+const MANY: usize = usize::MAX;
+
+/// Every function, in the order of the documentation.
+pub(super) const FUNCTIONS: [Entry; 14] = [
+    entry(Function::First, "first", "first(p): the t of the first step where p holds, or null", (1, 1)),
+    entry(Function::Last, "last", "last(p): the t of the last step where p holds, or null", (1, 1)),
+    entry(Function::Any, "any", "any(p): whether p holds at some step", (1, 1)),
+    entry(Function::All, "all", "all(p): whether p holds at every step", (1, 1)),
+    entry(Function::Count, "count", "count(p): at how many steps p holds", (1, 1)),
+    entry(Function::Min, "min", "min(x): the smallest x, or null", (1, 1)),
+    entry(Function::Max, "max", "max(x): the largest x, or null", (1, 1)),
+    entry(Function::Sum, "sum", "sum(x): the sum of an integer x, or null", (1, 1)),
+    entry(Function::At, "at", "at(x, t0): the value of x at timestep t0, or null", (2, 2)),
+    entry(Function::Length, "length", "length(): the number of steps", (0, 0)),
+    entry(Function::Coalesce, "coalesce", "coalesce(x, y, ...): the first that is not null", (1, MANY)),
+    entry(Function::NullIf, "nullif", "nullif(x, y): null where x = y, else x", (2, 2)),
+    entry(Function::Div, "div", "div(x, y): the integer quotient towards zero, null where y = 0", (2, 2)),
+    entry(Function::RegexpLike, "regexp_like", "regexp_like(text, 'pattern'): whether the text has a match", (2, 2)),
+];
+
+const fn entry(function: Function, name: &'static str, usage: &'static str, arity: (usize, usize)) -> Entry {
+    Entry { function, name, usage, arity }
+}
+
+/// The entry of this name.
+pub(super) fn find(name: &str) -> Option<&'static Entry> {
+    FUNCTIONS.iter().find(|entry| entry.name == name)
+}

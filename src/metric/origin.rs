@@ -1,0 +1,141 @@
+//! From a place in an expression back to the place in the file that holds it.
+//!
+//! An expression is the value of a TOML string; escapes and line breaks make its text differ from
+//! the bytes of the file, so each byte of the text remembers where it came from.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::fault::{Place, Source};
+
+/// An expression's text and where each of its bytes stands in its source.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// The text of the expression.
+    pub text: String,
+    source: Arc<Source>,
+    /// `starts[i]` is the byte of the source that gave byte i of the text; one more for the end.
+    starts: Vec<usize>,
+}
+
+impl Written {
+    /// A text that is a source of its own, such as an argument of the command line.
+    pub fn whole(source: Arc<Source>) -> Self {
+        let text = source.text.clone();
+        Self { starts: (0..=text.len()).collect(), text, source }
+    }
+
+    /// A TOML string of a source: its decoded text, and the bytes of the literal, quotes included.
+    pub fn toml_string(source: Arc<Source>, text: &str, literal: Range<usize>) -> Self {
+        let starts = source.text.get(literal.clone()).and_then(|raw| string_starts(raw, text)).map_or_else(
+            || vec![literal.start; text.len() + 1],
+            |starts| starts.into_iter().map(|at| literal.start + at).collect(),
+        );
+        Self { text: text.to_owned(), source, starts }
+    }
+
+    /// Where some bytes of the text stand.
+    pub fn place(&self, span: Range<usize>) -> Place {
+        let last = self.text.len();
+        let start = self.starts[span.start.min(last)];
+        let end = self.starts[span.end.min(last)];
+        Place { source: self.source.clone(), span: start..end.max(start) }
+    }
+
+    /// Where the whole text stands.
+    pub fn everywhere(&self) -> Place {
+        self.place(0..self.text.len())
+    }
+}
+
+/// Where each byte of `text` begins in the TOML literal `raw` that spells it; `None` if it does not.
+fn string_starts(raw: &str, text: &str) -> Option<Vec<usize>> {
+    let (open, escapes) = opening(raw)?;
+    let mut starts = Vec::with_capacity(text.len() + 1);
+    let mut at = open;
+    for decoded in text.chars() {
+        if escapes {
+            at = skip_line_continuations(raw, at);
+        }
+        starts.extend(std::iter::repeat_n(at, decoded.len_utf8()));
+        at += spelling(&raw[at..], decoded, escapes)?;
+    }
+    starts.push(at);
+    Some(starts)
+}
+
+/// The length of the opening quotes (and the line break that TOML drops after them), and whether escapes count.
+fn opening(raw: &str) -> Option<(usize, bool)> {
+    let quote = raw.chars().next().filter(|c| matches!(c, '"' | '\''))?;
+    let triple = raw.starts_with(&quote.to_string().repeat(3)) && raw.len() >= 6;
+    let quotes = if triple { 3 } else { 1 };
+    let rest = &raw[quotes..];
+    let dropped = match () {
+        () if triple && rest.starts_with("\r\n") => 2,
+        () if triple && rest.starts_with('\n') => 1,
+        () => 0,
+    };
+    Some((quotes + dropped, quote == '"'))
+}
+
+/// How many bytes spell the character `decoded`.
+fn spelling(rest: &str, decoded: char, escapes: bool) -> Option<usize> {
+    let first = rest.chars().next()?;
+    if decoded == '\n' && rest.starts_with("\r\n") {
+        return Some(2);
+    }
+    if !(escapes && first == '\\') {
+        return Some(first.len_utf8());
+    }
+    Some(match rest.as_bytes().get(1)? {
+        b'x' => 4,
+        b'u' => 6,
+        b'U' => 10,
+        _ => 2,
+    })
+}
+
+/// Past a backslash at the end of a line, and the white space that it swallows.
+fn skip_line_continuations(raw: &str, mut at: usize) -> usize {
+    loop {
+        let rest = &raw[at..];
+        let Some(after) = rest.strip_prefix('\\') else { return at };
+        if !after.trim_start_matches([' ', '\t', '\r']).starts_with('\n') {
+            return at;
+        }
+        at = raw.len() - after.trim_start().len();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The part of the file that stands for the part `wanted` of the decoded text.
+    fn spelled(file: &str, wanted: &str) -> String {
+        let source = Arc::new(Source { name: "f".into(), text: file.into() });
+        let table = toml::de::DeTable::parse(file).unwrap();
+        let value = &table.get_ref()["x"];
+        let text = value.get_ref().as_str().unwrap();
+        let written = Written::toml_string(source, text, value.span());
+        let start = text.find(wanted).unwrap();
+        let place = written.place(start..start + wanted.len());
+        file[place.span].to_owned()
+    }
+
+    #[test]
+    fn spans_survive_every_kind_of_toml_string() {
+        for (file, wanted, expected) in [
+            ("x = \"a + bc\"", "bc", "bc"),
+            ("x = 'a + bc'", "bc", "bc"),
+            ("x = \"\"\"\na + bc\n\"\"\"", "bc", "bc"),
+            ("x = '''\r\na\r\n+ bc'''", "bc", "bc"),
+            (r#"x = "\"a\" + bc""#, "bc", "bc"),
+            (r#"x = "\u00e9 + bc""#, "é + bc", r"\u00e9 + bc"),
+            ("x = \"é + bc\"", "bc", "bc"),
+            ("x = \"\"\"a \\\n   + bc\"\"\"", "bc", "bc"),
+        ] {
+            assert_eq!(spelled(file, wanted), expected, "{file}");
+        }
+    }
+}

@@ -1,0 +1,284 @@
+//! Why an episode has the scores it has: each metric's value and the timesteps that decided it.
+//!
+//! A metric is decided by the aggregates that it builds on, and each aggregate by some timesteps:
+//!
+//! | aggregate | decided by |
+//! |---|---|
+//! | `first(p)`, `last(p)` | the step it names |
+//! | `any(p)` | the first step where p holds |
+//! | `all(p)` | the first step where p does not hold |
+//! | `count(p)` | every step where p holds |
+//! | `min(x)`, `max(x)` | the first step with that value |
+//! | `sum(x)` | every step where x is neither null nor 0 |
+//! | `at(x, t0)` | t0, where there is such a step |
+//!
+//! Where nothing holds, nothing decided: the list is empty.
+
+use std::collections::BTreeSet;
+use std::fmt;
+use std::num::NonZeroUsize;
+
+use arrow::array::{Array, AsArray as _, Int64Array};
+use arrow::datatypes::Int32Type;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::engine::{Batch, Engine, EngineError, Evaluated};
+use super::run::{ScoreError, projection};
+use super::segments::Segments;
+use super::values::truths;
+use crate::base::near::nearest;
+use crate::metric::columns::Type;
+use crate::metric::definitions::Definitions;
+use crate::metric::plan::{Aggregate, NodeId, Op, Plan};
+use crate::trace::open::TraceSet;
+use crate::trace::scan::EpisodeBatch;
+
+/// One episode, explained.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Evidence {
+    /// The episode.
+    pub episode_id: String,
+    /// Its number of steps, T.
+    pub length: i64,
+    /// Every metric asked for, in the order of the definitions.
+    pub metrics: Vec<MetricEvidence>,
+}
+
+/// One metric of one episode.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct MetricEvidence {
+    /// The metric.
+    pub metric: String,
+    /// Its value; null where it is undefined.
+    pub value: Option<i64>,
+    /// The timesteps that decided it, ascending.
+    pub timesteps: Vec<i64>,
+    /// The aggregates that it builds on.
+    pub facts: Vec<Fact>,
+}
+
+/// One aggregate of one episode.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Fact {
+    /// The name of the `let` or metric that is exactly this aggregate, if one is.
+    pub name: Option<String>,
+    /// The aggregate as written.
+    pub expression: String,
+    /// Its value as text; null where there is none.
+    pub value: Option<String>,
+    /// The timesteps that decided it, ascending.
+    pub timesteps: Vec<i64>,
+}
+
+/// Why an episode could not be explained.
+#[derive(Debug, thiserror::Error)]
+pub enum EvidenceError {
+    /// The traces or definitions are not as they must be.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
+    /// No such episode.
+    #[error("no episode `{wanted}` among the {episodes} of the traces; {}", .near.as_ref().map_or_else(|| "`mirrorstats score` lists them".to_owned(), |near| format!("did you mean `{near}`?")))]
+    NoSuchEpisode {
+        /// The name given.
+        wanted: String,
+        /// How many episodes there are.
+        episodes: u64,
+        /// The episode whose name is most like it.
+        near: Option<String>,
+    },
+}
+
+/// Finds an episode in some traces and explains its scores.
+///
+/// # Errors
+/// When the traces are not as they must be, or hold no such episode.
+pub fn explain(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    episode_id: &str,
+    threads: NonZeroUsize,
+) -> Result<Evidence, EvidenceError> {
+    let plan = &definitions.plan;
+    let outputs = plan.outputs.iter().map(|output| output.node);
+    let engine = Engine::for_nodes(plan, plan.needed_by(outputs));
+    let projection = projection(traces, definitions, &engine, &[])?;
+    let (mut found, mut names) = (None, Vec::new());
+    let summary = traces.scan(
+        &projection,
+        threads,
+        |batch| -> Result<_, ScoreError> {
+            let ids = episode_ids(&batch);
+            let position = ids.iter().position(|id| id == episode_id);
+            let evidence = position.map(|at| of_episode(&engine, definitions, &batch, at, episode_id));
+            let file = || traces.files()[batch.origin.file].name().to_owned();
+            let evidence = evidence.transpose().map_err(|source| ScoreError::Engine { file: file(), source })?;
+            Ok((evidence, ids))
+        },
+        |(evidence, ids)| {
+            found = found.take().or(evidence);
+            names.extend(ids);
+            Ok(())
+        },
+    )?;
+    found.ok_or_else(|| EvidenceError::NoSuchEpisode {
+        wanted: episode_id.to_owned(),
+        episodes: summary.episodes,
+        near: nearest(episode_id, names.iter().map(String::as_str)).map(str::to_owned),
+    })
+}
+
+fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
+    let column = batch.episodes.column_by_name("episode_id").expect("every batch names its episodes");
+    let dictionary = column.as_dictionary::<Int32Type>();
+    let texts = dictionary.values().as_string::<i32>();
+    let text = |row| dictionary.key(row).map_or_else(String::new, |key| texts.value(key).to_owned());
+    (0..column.len()).map(text).collect()
+}
+
+fn of_episode(
+    engine: &Engine,
+    definitions: &Definitions,
+    batch: &EpisodeBatch,
+    episode: usize,
+    episode_id: &str,
+) -> Result<Evidence, EngineError> {
+    let (start, end) = (batch.offsets[episode], batch.offsets[episode + 1]);
+    let offsets = [0, end - start];
+    let segments = Segments::new(&offsets);
+    let (steps, episodes) = (batch.steps.slice(start, end - start), batch.episodes.slice(episode, 1));
+    let values = engine.evaluate(&Batch { segments, steps: &steps, episodes: &episodes })?;
+    let reading = Reading { definitions, values, segments };
+    let metrics = definitions.plan.outputs.iter().map(|output| reading.metric(&output.name, output.node)).collect();
+    Ok(Evidence { episode_id: episode_id.to_owned(), length: segments.lengths().value(0), metrics })
+}
+
+/// The values of one episode, read for what decided them.
+struct Reading<'a> {
+    definitions: &'a Definitions,
+    values: Evaluated,
+    segments: Segments<'a>,
+}
+
+impl Reading<'_> {
+    fn plan(&self) -> &Plan {
+        &self.definitions.plan
+    }
+
+    fn metric(&self, name: &str, node: NodeId) -> MetricEvidence {
+        let values = self.values.of(node);
+        let value = values.array().is_valid(0).then(|| match values.ty() {
+            Type::Bool => i64::from(values.bools().value(0)),
+            _ => values.ints().value(0),
+        });
+        let facts: Vec<Fact> = self.plan().needed_by([node]).into_iter().filter_map(|id| self.fact(id)).collect();
+        let timesteps: BTreeSet<i64> = facts.iter().flat_map(|fact| fact.timesteps.iter().copied()).collect();
+        MetricEvidence { metric: name.to_owned(), value, timesteps: timesteps.into_iter().collect(), facts }
+    }
+
+    fn fact(&self, id: NodeId) -> Option<Fact> {
+        let timesteps = match &self.plan().node(id).op {
+            Op::Aggregate(aggregate, operand) => self.deciding(*aggregate, *operand, id),
+            Op::At(_, moment) => self.moment(self.values.of(*moment).ints()).into_iter().collect(),
+            _ => return None,
+        };
+        let expression = self.plan().sources.get(&id).cloned().unwrap_or_default();
+        Some(Fact { name: self.definitions.name_of(id), expression, value: self.text(id), timesteps })
+    }
+
+    fn moment(&self, moments: &Int64Array) -> Option<i64> {
+        let last = self.segments.lengths().value(0);
+        moments.is_valid(0).then(|| moments.value(0)).filter(|t| (1..=last).contains(t))
+    }
+
+    fn deciding(&self, aggregate: Aggregate, operand: NodeId, result: NodeId) -> Vec<i64> {
+        let (values, result) = (self.values.of(operand), self.values.of(result));
+        let rows = 0..values.array().len();
+        match aggregate {
+            Aggregate::First | Aggregate::Last => self.moment(result.ints()).into_iter().collect(),
+            Aggregate::Any => self.segments.timesteps(0, values.bools()).into_iter().take(1).collect(),
+            Aggregate::Count => self.segments.timesteps(0, values.bools()),
+            Aggregate::All => {
+                let holds = truths(values.bools());
+                rows.filter(|&row| !holds.value(row)).take(1).map(as_t).collect()
+            }
+            Aggregate::Sum => {
+                let counts = |&row: &usize| values.array().is_valid(row) && values.ints().value(row) != 0;
+                rows.filter(counts).map(as_t).collect()
+            }
+            Aggregate::Min | Aggregate::Max => {
+                let equal = |row| match values.ty() {
+                    Type::Float => values.floats().value(row).to_bits() == result.floats().value(0).to_bits(),
+                    _ => values.ints().value(row) == result.ints().value(0),
+                };
+                rows.filter(|&row| values.array().is_valid(row) && equal(row)).take(1).map(as_t).collect()
+            }
+        }
+    }
+
+    fn text(&self, id: NodeId) -> Option<String> {
+        let values = self.values.of(id);
+        values.array().is_valid(0).then(|| match values.ty() {
+            Type::Bool => values.bools().value(0).to_string(),
+            Type::Int => values.ints().value(0).to_string(),
+            Type::Float => values.floats().value(0).to_string(),
+            Type::Text => self.values.text(values.symbols().value(0)).to_owned(),
+        })
+    }
+}
+
+/// A row of one episode as a timestep.
+fn as_t(row: usize) -> i64 {
+    i64::try_from(row).map_or(i64::MAX, |row| row + 1)
+}
+
+/// Timesteps as ranges: `3-7, 9`.
+fn ranges(timesteps: &[i64]) -> String {
+    let mut runs: Vec<(i64, i64)> = Vec::new();
+    for &t in timesteps {
+        match runs.last_mut() {
+            Some((_, end)) if *end + 1 == t => *end = t,
+            _ => runs.push((t, t)),
+        }
+    }
+    let run = |&(start, end): &(i64, i64)| if start == end { start.to_string() } else { format!("{start}-{end}") };
+    runs.iter().map(run).collect::<Vec<_>>().join(", ")
+}
+
+fn decided(timesteps: &[i64]) -> String {
+    if timesteps.is_empty() { "no step".to_owned() } else { format!("t = {}", ranges(timesteps)) }
+}
+
+impl fmt::Display for Evidence {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {} steps", self.episode_id.escape_debug(), self.length)?;
+        for metric in &self.metrics {
+            let value = metric.value.map_or_else(|| "undefined".to_owned(), |value| value.to_string());
+            write!(f, "\n\n{} = {value}   decided at {}", metric.metric, decided(&metric.timesteps))?;
+            for fact in &metric.facts {
+                let value = fact.value.as_deref().unwrap_or("null");
+                let name = fact.name.as_ref().map_or_else(String::new, |name| format!("{name} = "));
+                write!(
+                    f,
+                    "\n  {name}{} is {}   ({})",
+                    fact.expression,
+                    value.escape_debug(),
+                    decided(&fact.timesteps)
+                )?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ranges;
+
+    #[test]
+    fn timesteps_print_as_ranges() {
+        for (timesteps, expected) in [(&[][..], ""), (&[4], "4"), (&[1, 2, 3], "1-3"), (&[1, 3, 4, 9], "1, 3-4, 9")] {
+            assert_eq!(ranges(timesteps), expected);
+        }
+    }
+}

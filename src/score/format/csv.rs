@@ -1,0 +1,117 @@
+//! The episode table as comma-separated values.
+
+use std::io::{Read, Write};
+
+use super::FormatError;
+use crate::metric::catalog::Catalog;
+use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+
+/// The key columns, in the order of the file.
+pub(super) const KEYS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
+
+pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatError> {
+    let mut writer = csv::Writer::from_writer(out);
+    let labels = table.labels.iter().map(|label| label.name.as_str());
+    let metrics = table.metrics.iter().map(|metric| metric.name.as_str());
+    writer.write_record(KEYS.into_iter().chain(labels).chain(metrics)).map_err(io)?;
+    for (row, key) in table.keys.iter().enumerate() {
+        let keys = [
+            key.episode_id.clone(),
+            key.model.clone(),
+            key.experiment.clone(),
+            key.seed.to_string(),
+            key.run.to_string(),
+        ];
+        let labels = table.labels.iter().map(|label| label.values[row].clone().unwrap_or_default());
+        let metrics = table.metrics.iter().map(|metric| metric.values[row].map_or_else(String::new, |v| v.to_string()));
+        writer.write_record(keys.into_iter().chain(labels).chain(metrics)).map_err(io)?;
+    }
+    Ok(writer.flush()?)
+}
+
+fn io(error: csv::Error) -> FormatError {
+    FormatError::Io(error.into())
+}
+
+pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
+    let mut reader = csv::Reader::from_reader(input);
+    let header: Vec<String> = reader.headers().map_err(|error| line_fault(&error))?.iter().map(str::to_owned).collect();
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| line_fault(&error))?;
+        rows.push(record.iter().map(|cell| Some(cell.to_owned())).collect());
+    }
+    // The header is line 1; quoted line breaks aside, row i is line i + 2.
+    assemble(catalog, &header, rows, 2)
+}
+
+fn line_fault(error: &csv::Error) -> FormatError {
+    let line = error.position().map_or(1, |position| usize::try_from(position.line()).unwrap_or(usize::MAX));
+    FormatError::Line { line, reason: error.to_string() }
+}
+
+/// A table out of rows of cells; `None` and empty cells are nulls.
+pub(super) fn assemble(
+    catalog: &Catalog,
+    header: &[String],
+    rows: Vec<Vec<Option<String>>>,
+    first_line: usize,
+) -> Result<EpisodeTable, FormatError> {
+    let mut positions = [0; 5];
+    for (position, name) in positions.iter_mut().zip(KEYS) {
+        *position = header.iter().position(|column| column == name).ok_or_else(|| FormatError::Column {
+            column: name.to_owned(),
+            expected: "a key column of scores",
+            found: format!("the columns {}", header.join(", ")),
+        })?;
+    }
+    let is_metric = |name: &&String| catalog.metric.contains_key(*name);
+    let metric_names: Vec<&String> = header.iter().filter(is_metric).collect();
+    let label_names: Vec<&String> =
+        header.iter().filter(|name| !is_metric(name) && !KEYS.contains(&name.as_str())).collect();
+    let column = |name: &String| header.iter().position(|column| column == name).unwrap_or_default();
+    let mut table = EpisodeTable {
+        catalog: catalog.clone(),
+        keys: Vec::with_capacity(rows.len()),
+        labels: label_names.iter().map(|name| LabelColumn { name: (*name).clone(), values: Vec::new() }).collect(),
+        metrics: metric_names.iter().map(|name| MetricColumn { name: (*name).clone(), values: Vec::new() }).collect(),
+    };
+    for (at, row) in rows.into_iter().enumerate() {
+        let line = first_line + at;
+        let cell = |position: usize| row.get(position).cloned().flatten().filter(|cell| !cell.is_empty());
+        let [episode_id, model, experiment, seed, run] = positions;
+        table.keys.push(EpisodeKey {
+            experiment: required(cell(experiment), line, "experiment")?,
+            model: required(cell(model), line, "model")?,
+            seed: integer(&required(cell(seed), line, "seed")?, line, "seed")?,
+            run: integer(&required(cell(run), line, "run")?, line, "run")?,
+            episode_id: required(cell(episode_id), line, "episode_id")?,
+        });
+        for label in &mut table.labels {
+            label.values.push(cell(column(&label.name)));
+        }
+        for metric in &mut table.metrics {
+            let value = cell(column(&metric.name)).map(|text| integer(&text, line, &metric.name)).transpose()?;
+            metric.values.push(value);
+        }
+    }
+    Ok(table.sorted())
+}
+
+fn required(cell: Option<String>, line: usize, column: &str) -> Result<String, FormatError> {
+    cell.ok_or_else(|| FormatError::Value {
+        line,
+        column: column.to_owned(),
+        expected: "a value",
+        found: String::new(),
+    })
+}
+
+fn integer<T: std::str::FromStr>(text: &str, line: usize, column: &str) -> Result<T, FormatError> {
+    text.parse().map_err(|_| FormatError::Value {
+        line,
+        column: column.to_owned(),
+        expected: "an integer",
+        found: text.to_owned(),
+    })
+}

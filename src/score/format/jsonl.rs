@@ -1,0 +1,55 @@
+//! The episode table as JSON lines: an object an episode, keys in the order of the columns.
+
+use std::io::{BufRead as _, BufReader, Read, Write};
+
+use serde_json::{Map, Value};
+
+use super::{FormatError, csv};
+use crate::metric::catalog::Catalog;
+use crate::score::table::EpisodeTable;
+
+pub(super) fn write(table: &EpisodeTable, mut out: impl Write) -> Result<(), FormatError> {
+    for (row, key) in table.keys.iter().enumerate() {
+        let mut object = Map::new();
+        object.insert("episode_id".into(), key.episode_id.clone().into());
+        object.insert("model".into(), key.model.clone().into());
+        object.insert("experiment".into(), key.experiment.clone().into());
+        object.insert("seed".into(), key.seed.into());
+        object.insert("run".into(), key.run.into());
+        for label in &table.labels {
+            object.insert(label.name.clone(), label.values[row].clone().map_or(Value::Null, Value::from));
+        }
+        for metric in &table.metrics {
+            object.insert(metric.name.clone(), metric.values[row].map_or(Value::Null, Value::from));
+        }
+        writeln!(out, "{}", Value::Object(object))?;
+    }
+    Ok(out.flush()?)
+}
+
+pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
+    let mut header: Vec<String> = Vec::new();
+    let mut rows = Vec::new();
+    for (at, line) in BufReader::new(input).lines().enumerate() {
+        let fault = |reason: String| FormatError::Line { line: at + 1, reason };
+        let object: Map<String, Value> = serde_json::from_str(&line?).map_err(|error| fault(error.to_string()))?;
+        if at == 0 {
+            header = object.keys().cloned().collect();
+        }
+        if object.len() != header.len() || header.iter().any(|name| !object.contains_key(name)) {
+            let found: Vec<&str> = object.keys().map(String::as_str).collect();
+            let expected = header.join(", ");
+            return Err(fault(format!("expected the keys of line 1 ({expected}), found {}", found.join(", "))));
+        }
+        rows.push(header.iter().map(|name| cell(&object[name])).collect());
+    }
+    csv::assemble(catalog, &header, rows, 1)
+}
+
+fn cell(value: &Value) -> Option<String> {
+    match value {
+        Value::Null => None,
+        Value::String(text) => Some(text.clone()),
+        other => Some(other.to_string()),
+    }
+}

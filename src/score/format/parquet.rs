@@ -1,0 +1,168 @@
+//! The episode table as Parquet, the definitions in its footer.
+
+use std::io::Write;
+use std::sync::Arc;
+
+use arrow::array::{Array, ArrayRef, AsArray as _, Int32Array, Int64Array, RecordBatch, StringArray};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Int64Type, Schema};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+use parquet::file::reader::ChunkReader;
+
+use super::FormatError;
+use super::csv::KEYS;
+use crate::metric::catalog::Catalog;
+use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+
+/// The footer key that tells scores from traces.
+pub const KIND_KEY: &str = "mirrorstats.kind";
+/// The value of [`KIND_KEY`] for scores.
+pub const SCORES_KIND: &str = "scores";
+/// The footer key of the definitions, as JSON ([`Catalog`]).
+pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
+/// The footer key of the definitions' hash.
+pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
+
+/// Whether a footer is that of scores.
+pub fn is_scores<'a>(metadata: impl IntoIterator<Item = &'a KeyValue>) -> bool {
+    metadata.into_iter().any(|pair| pair.key == KIND_KEY && pair.value.as_deref() == Some(SCORES_KIND))
+}
+
+pub(super) fn write(table: &EpisodeTable, out: impl Write + Send) -> Result<(), FormatError> {
+    let batch = batch(table)?;
+    let definitions =
+        serde_json::to_string(&table.catalog).map_err(|error| FormatError::Definitions(error.to_string()))?;
+    let pair = |key: &str, value: &str| KeyValue::new(key.to_owned(), value.to_owned());
+    let metadata = vec![
+        pair(KIND_KEY, SCORES_KIND),
+        pair("mirrorstats.writer", concat!("mirrorstats ", env!("CARGO_PKG_VERSION"))),
+        pair(HASH_KEY, &table.catalog.hash),
+        pair(DEFINITIONS_KEY, &definitions),
+    ];
+    let properties = WriterProperties::builder()
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        .set_key_value_metadata(Some(metadata))
+        .build();
+    let mut writer = ArrowWriter::try_new(out, batch.schema(), Some(properties))?;
+    writer.write(&batch)?;
+    writer.close()?;
+    Ok(())
+}
+
+fn batch(table: &EpisodeTable) -> Result<RecordBatch, FormatError> {
+    let text = |name: &str, of: fn(&EpisodeKey) -> &str| {
+        let array: StringArray = table.keys.iter().map(|key| Some(of(key))).collect();
+        (Field::new(name, DataType::Utf8, false), Arc::new(array) as ArrayRef)
+    };
+    let int = |name: &str, of: fn(&EpisodeKey) -> i32| {
+        let array: Int32Array = table.keys.iter().map(of).collect::<Vec<_>>().into();
+        (Field::new(name, DataType::Int32, false), Arc::new(array) as ArrayRef)
+    };
+    let mut columns = vec![
+        text(KEYS[0], |key| &key.episode_id),
+        text(KEYS[1], |key| &key.model),
+        text(KEYS[2], |key| &key.experiment),
+        int(KEYS[3], |key| key.seed),
+        int(KEYS[4], |key| key.run),
+    ];
+    for label in &table.labels {
+        let array: StringArray = label.values.iter().map(Option::as_deref).collect();
+        columns.push((Field::new(&label.name, DataType::Utf8, true), Arc::new(array)));
+    }
+    for metric in &table.metrics {
+        let array: Int64Array = metric.values.iter().copied().collect();
+        columns.push((Field::new(&metric.name, DataType::Int64, true), Arc::new(array)));
+    }
+    let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = columns.into_iter().unzip();
+    RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)
+        .map_err(|error| FormatError::Parquet(parquet::errors::ParquetError::ArrowError(error.to_string())))
+}
+
+/// Reads a table and the definitions that it carries.
+///
+/// # Errors
+/// A file that is not Parquet, or not one of scores.
+pub fn read(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
+    let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+    let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
+    let catalog = catalog(builder.metadata().file_metadata().key_value_metadata().into_iter().flatten())?;
+    let mut table = EpisodeTable { catalog, keys: Vec::new(), labels: Vec::new(), metrics: Vec::new() };
+    for batch in builder.build()? {
+        let batch = batch.map_err(|error| FormatError::Parquet(error.into()))?;
+        append(&mut table, &batch)?;
+    }
+    Ok(table.sorted())
+}
+
+fn catalog<'a>(metadata: impl IntoIterator<Item = &'a KeyValue>) -> Result<Catalog, FormatError> {
+    let text = metadata.into_iter().find(|pair| pair.key == DEFINITIONS_KEY).and_then(|pair| pair.value.as_deref());
+    let text = text.ok_or_else(|| FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`")))?;
+    serde_json::from_str(text).map_err(|error| FormatError::Definitions(error.to_string()))
+}
+
+fn append(table: &mut EpisodeTable, batch: &RecordBatch) -> Result<(), FormatError> {
+    let [ids, models, experiments] = [texts(batch, KEYS[0])?, texts(batch, KEYS[1])?, texts(batch, KEYS[2])?];
+    let [seeds, runs] = [ints(batch, KEYS[3])?, ints(batch, KEYS[4])?];
+    for row in 0..batch.num_rows() {
+        let text = |values: &[Option<String>], column| values[row].clone().ok_or_else(|| null(column));
+        let number = |values: &[Option<i64>], column| {
+            values[row].and_then(|value| i32::try_from(value).ok()).ok_or_else(|| null(column))
+        };
+        table.keys.push(EpisodeKey {
+            experiment: text(&experiments, KEYS[2])?,
+            model: text(&models, KEYS[1])?,
+            seed: number(&seeds, KEYS[3])?,
+            run: number(&runs, KEYS[4])?,
+            episode_id: text(&ids, KEYS[0])?,
+        });
+    }
+    let schema = batch.schema();
+    let others = schema.fields().iter().map(|field| field.name()).filter(|name| !KEYS.contains(&name.as_str()));
+    for name in others {
+        if table.catalog.metric.contains_key(name) {
+            let values = ints(batch, name)?;
+            match table.metrics.iter_mut().find(|metric| metric.name == *name) {
+                Some(metric) => metric.values.extend(values),
+                None => table.metrics.push(MetricColumn { name: name.clone(), values }),
+            }
+        } else {
+            let values = texts(batch, name)?;
+            match table.labels.iter_mut().find(|label| label.name == *name) {
+                Some(label) => label.values.extend(values),
+                None => table.labels.push(LabelColumn { name: name.clone(), values }),
+            }
+        }
+    }
+    Ok(())
+}
+
+fn null(column: &str) -> FormatError {
+    FormatError::Column { column: column.to_owned(), expected: "a value in every row", found: "null".to_owned() }
+}
+
+fn column(batch: &RecordBatch, name: &str, ty: &DataType, expected: &'static str) -> Result<ArrayRef, FormatError> {
+    let fault = |found: String| FormatError::Column { column: name.to_owned(), expected, found };
+    let column = batch.column_by_name(name).ok_or_else(|| fault("no such column".to_owned()))?;
+    let fits = match ty {
+        DataType::Int64 => column.data_type().is_integer(),
+        _ => column.data_type().is_string(),
+    };
+    if !fits {
+        return Err(fault(column.data_type().to_string()));
+    }
+    cast(column, ty).map_err(|error| fault(error.to_string()))
+}
+
+fn texts(batch: &RecordBatch, name: &str) -> Result<Vec<Option<String>>, FormatError> {
+    let column = column(batch, name, &DataType::Utf8, "text")?;
+    Ok(column.as_string::<i32>().iter().map(|text| text.map(str::to_owned)).collect())
+}
+
+fn ints(batch: &RecordBatch, name: &str) -> Result<Vec<Option<i64>>, FormatError> {
+    let column = column(batch, name, &DataType::Int64, "integers")?;
+    Ok(column.as_primitive::<Int64Type>().iter().collect())
+}

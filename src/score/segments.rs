@@ -1,0 +1,261 @@
+//! Kernels that know where episodes begin and end: spreading, windows, aggregates, lookups.
+//!
+//! A batch holds whole episodes one after the other. Episode i has the rows `offsets[i]..offsets[i + 1]`,
+//! and its timestep t is the row `offsets[i] + t - 1`. No kernel allocates per episode.
+
+use arrow::array::{
+    Array, ArrowPrimitiveType, BooleanArray, BooleanBufferBuilder, Int64Array, PrimitiveArray, UInt32Array,
+};
+use arrow::buffer::{BooleanBuffer, NullBuffer};
+use arrow::util::bit_chunk_iterator::UnalignedBitChunk;
+
+use super::values::{nulls_of, truths};
+use crate::metric::plan::{Aggregate, Comparison};
+
+/// Where episodes begin and end among the rows of a batch.
+#[derive(Clone, Copy, Debug)]
+pub struct Segments<'a> {
+    offsets: &'a [usize],
+}
+
+impl<'a> Segments<'a> {
+    /// The episodes bounded by `offsets`: ascending, one more than there are episodes, each episode with a row at least.
+    pub fn new(offsets: &'a [usize]) -> Self {
+        Self { offsets }
+    }
+
+    /// The number of episodes.
+    pub fn len(self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+
+    /// Whether there is no episode.
+    pub fn is_empty(self) -> bool {
+        self.len() == 0
+    }
+
+    /// The number of rows.
+    pub fn rows(self) -> usize {
+        self.offsets.last().copied().unwrap_or(0)
+    }
+
+    /// The first row and the length of each episode.
+    fn each(self) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+        self.offsets.windows(2).map(|pair| (pair[0], pair[1] - pair[0]))
+    }
+
+    /// The lengths T; never null.
+    pub(super) fn lengths(self) -> Int64Array {
+        self.each().map(|(_, length)| as_t(length)).collect::<Vec<_>>().into()
+    }
+
+    /// The timestep of every row; never null.
+    pub(super) fn times(self) -> Int64Array {
+        let mut times = Vec::with_capacity(self.rows());
+        self.each().for_each(|(_, length)| times.extend(1..=as_t(length)));
+        times.into()
+    }
+
+    /// An episode's truth value for each of its rows.
+    pub(super) fn spread_bools(self, values: &BooleanArray) -> BooleanArray {
+        let bits = self.spread_bits(values.values());
+        BooleanArray::new(bits, self.spread_nulls(values.nulls()))
+    }
+
+    /// An episode's number (or symbol) for each of its rows.
+    pub(super) fn spread<T: ArrowPrimitiveType>(self, values: &PrimitiveArray<T>) -> PrimitiveArray<T> {
+        let mut rows = Vec::with_capacity(self.rows());
+        for ((_, length), &value) in self.each().zip(values.values()) {
+            rows.extend(std::iter::repeat_n(value, length));
+        }
+        PrimitiveArray::new(rows.into(), self.spread_nulls(values.nulls()))
+    }
+
+    fn spread_bits(self, bits: &BooleanBuffer) -> BooleanBuffer {
+        let mut rows = BooleanBufferBuilder::new(self.rows());
+        for ((_, length), bit) in self.each().zip(bits.iter()) {
+            rows.append_n(length, bit);
+        }
+        rows.finish()
+    }
+
+    fn spread_nulls(self, nulls: Option<&NullBuffer>) -> Option<NullBuffer> {
+        nulls.map(|nulls| NullBuffer::new(self.spread_bits(nulls.inner())))
+    }
+
+    /// Which timesteps compare with an episode's moment as asked: a window of each episode. Null where the moment is.
+    ///
+    /// The timesteps are never written out: a window is a run of set bits.
+    pub(super) fn window(self, comparison: Comparison, moments: &Int64Array) -> BooleanArray {
+        let mut rows = BooleanBufferBuilder::new(self.rows());
+        for ((_, length), &moment) in self.each().zip(moments.values()) {
+            // Rows strictly before the moment, and rows up to it.
+            let before = clamp(moment.saturating_sub(1), length);
+            let until = clamp(moment, length);
+            let (from, to, inside) = match comparison {
+                Comparison::Less => (0, before, true),
+                Comparison::LessEqual => (0, until, true),
+                Comparison::Greater => (until, length, true),
+                Comparison::GreaterEqual => (before, length, true),
+                Comparison::Equal => (before, until, true),
+                Comparison::NotEqual => (before, until, false),
+            };
+            rows.append_n(from, !inside);
+            rows.append_n(to - from, inside);
+            rows.append_n(length - to, !inside);
+        }
+        BooleanArray::new(rows.finish(), self.spread_nulls(moments.nulls()))
+    }
+
+    /// An aggregate whose result is a number of steps or a timestep.
+    pub(super) fn count_or_time(self, aggregate: Aggregate, predicate: &BooleanArray) -> Int64Array {
+        let bits = Bits(&truths(predicate));
+        match aggregate {
+            Aggregate::First => self.each().map(|(start, len)| bits.first(start, len).map(|at| as_t(at + 1))).collect(),
+            Aggregate::Last => self.each().map(|(start, len)| bits.last(start, len).map(|at| as_t(at + 1))).collect(),
+            _ => self.each().map(|(start, len)| as_t(bits.count(start, len))).collect::<Vec<_>>().into(),
+        }
+    }
+
+    /// Whether a predicate holds at some step.
+    pub(super) fn any(self, predicate: &BooleanArray) -> BooleanArray {
+        let bits = Bits(&truths(predicate));
+        self.each().map(|(start, len)| Some(bits.first(start, len).is_some())).collect()
+    }
+
+    /// Whether a predicate holds at every step.
+    pub(super) fn all(self, predicate: &BooleanArray) -> BooleanArray {
+        let bits = Bits(&truths(predicate));
+        self.each().map(|(start, len)| Some(bits.count(start, len) == len)).collect()
+    }
+
+    /// The values of each episode that are not null, folded; null where there is none.
+    ///
+    /// # Errors
+    /// What `fold` gives.
+    pub(super) fn fold<T: ArrowPrimitiveType, E>(
+        self,
+        values: &PrimitiveArray<T>,
+        fold: impl Fn(T::Native, T::Native) -> Result<T::Native, E>,
+    ) -> Result<PrimitiveArray<T>, E> {
+        let numbers = values.values();
+        let folded = self.each().map(|(start, length)| {
+            let mut valid = (start..start + length).filter(|&row| values.is_valid(row)).map(|row| numbers[row]);
+            let Some(first) = valid.next() else { return Ok(None) };
+            valid.try_fold(first, &fold).map(Some)
+        });
+        folded.collect()
+    }
+
+    /// The rows of the timesteps asked for; `None` where there is no such step.
+    fn rows_at(self, moments: &Int64Array) -> impl Iterator<Item = Option<usize>> {
+        self.each().zip(moments.iter()).map(|((start, length), moment)| {
+            let moment = usize::try_from(moment?).ok()?;
+            (1..=length).contains(&moment).then(|| start + moment - 1)
+        })
+    }
+
+    /// The number (or symbol) at a timestep of each episode.
+    pub(super) fn at<T: ArrowPrimitiveType>(
+        self,
+        values: &PrimitiveArray<T>,
+        moments: &Int64Array,
+    ) -> PrimitiveArray<T> {
+        let value = |row: Option<usize>| row.filter(|&row| values.is_valid(row)).map(|row| values.value(row));
+        self.rows_at(moments).map(value).collect()
+    }
+
+    /// The truth value at a timestep of each episode.
+    pub(super) fn bools_at(self, values: &BooleanArray, moments: &Int64Array) -> BooleanArray {
+        let value = |row: Option<usize>| row.filter(|&row| values.is_valid(row)).map(|row| values.value(row));
+        self.rows_at(moments).map(value).collect()
+    }
+
+    /// The 1-based timesteps of one episode where a predicate holds.
+    pub(super) fn timesteps(self, episode: usize, predicate: &BooleanArray) -> Vec<i64> {
+        let (start, length) = (self.offsets[episode], self.offsets[episode + 1] - self.offsets[episode]);
+        truths(predicate).slice(start, length).set_indices().map(|at| as_t(at + 1)).collect()
+    }
+}
+
+/// Repeats one value: a constant for each row or episode.
+pub(super) fn repeat<T: ArrowPrimitiveType>(value: &PrimitiveArray<T>, length: usize) -> PrimitiveArray<T> {
+    if value.is_null(0) {
+        return PrimitiveArray::new_null(length);
+    }
+    PrimitiveArray::from_iter_values(std::iter::repeat_n(value.value(0), length))
+}
+
+/// Repeats one truth value.
+pub(super) fn repeat_bool(value: &BooleanArray, length: usize) -> BooleanArray {
+    if value.is_null(0) {
+        return BooleanArray::new_null(length);
+    }
+    let bits = if value.value(0) { BooleanBuffer::new_set(length) } else { BooleanBuffer::new_unset(length) };
+    BooleanArray::new(bits, None)
+}
+
+/// The symbols whose text fulfils `test`, null where the text is null.
+pub(super) fn test_symbols(symbols: &UInt32Array, mut test: impl FnMut(u32) -> bool) -> BooleanArray {
+    let mut known: Vec<Option<bool>> = Vec::new();
+    let valid: Vec<bool> = (0..symbols.len()).map(|row| symbols.is_valid(row)).collect();
+    let bits = BooleanBuffer::collect_bool(symbols.len(), |row| {
+        let symbol = symbols.value(row) as usize;
+        if !valid[row] {
+            return false;
+        }
+        if known.len() <= symbol {
+            known.resize(symbol + 1, None);
+        }
+        *known[symbol].get_or_insert_with(|| test(symbols.value(row)))
+    });
+    BooleanArray::new(bits, nulls_of(valid))
+}
+
+/// A moment as a number of rows from the start of an episode.
+fn clamp(moment: i64, length: usize) -> usize {
+    usize::try_from(moment.max(0)).map_or(length, |moment| moment.min(length))
+}
+
+/// A row count as a timestep.
+fn as_t(rows: usize) -> i64 {
+    i64::try_from(rows).expect("a batch has fewer than 2^63 rows")
+}
+
+/// Searches of runs of bits, a word at a time.
+struct Bits<'a>(&'a BooleanBuffer);
+
+impl Bits<'_> {
+    fn chunk(&self, start: usize, length: usize) -> UnalignedBitChunk<'_> {
+        UnalignedBitChunk::new(self.0.values(), self.0.offset() + start, length)
+    }
+
+    /// How many bits are set.
+    fn count(&self, start: usize, length: usize) -> usize {
+        self.chunk(start, length).count_ones()
+    }
+
+    /// The position of the first set bit, from `start`.
+    fn first(&self, start: usize, length: usize) -> Option<usize> {
+        let chunk = self.chunk(start, length);
+        let padding = chunk.lead_padding();
+        let (word, at) = chunk
+            .iter()
+            .enumerate()
+            .find_map(|(word, bits)| (bits != 0).then(|| (word, bits.trailing_zeros() as usize)))?;
+        Some(word * 64 + at - padding)
+    }
+
+    /// The position of the last set bit, from `start`.
+    fn last(&self, start: usize, length: usize) -> Option<usize> {
+        let chunk = self.chunk(start, length);
+        let padding = chunk.lead_padding();
+        let (word, at) = chunk
+            .iter()
+            .enumerate()
+            .filter(|(_, bits)| *bits != 0)
+            .last()
+            .map(|(word, bits)| (word, 63 - bits.leading_zeros() as usize))?;
+        Some(word * 64 + at - padding)
+    }
+}

@@ -1,0 +1,462 @@
+//! What can be wrong with a trace, and the words for it: which rule, where, expected, found, what to do.
+//!
+//! The codes are stable: programs may depend on them. A message never says less than a user needs to find the row.
+
+use std::fmt;
+use std::io;
+
+use arrow::error::ArrowError;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// One thing that is wrong with a trace.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Finding {
+    /// Which rule does not hold.
+    pub code: Code,
+    /// Whether the trace is unusable or only unusual.
+    pub severity: Severity,
+    /// The file, as it was named.
+    pub file: String,
+    /// The row group of the file, 0-based.
+    pub row_group: Option<usize>,
+    /// The episode's id.
+    pub episode: Option<String>,
+    /// The timestep as the file has it.
+    pub t: Option<i64>,
+    /// The column.
+    pub column: Option<String>,
+    /// What the rule asks for.
+    pub expected: String,
+    /// What is there.
+    pub found: String,
+    /// What to do about it.
+    pub help: String,
+}
+
+/// How much a finding matters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    /// The trace cannot be scored as it is.
+    Error,
+    /// The trace is read as it is; its writer could do better.
+    Note,
+}
+
+/// A rule of the schema; the name in kebab case is stable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Code {
+    /// The file cannot be opened or read.
+    Unreadable,
+    /// The file has no bytes.
+    EmptyFile,
+    /// The file is not Parquet.
+    NotParquet,
+    /// The file starts as Parquet and ends before its footer.
+    Truncated,
+    /// The footer is there and makes no sense.
+    CorruptFooter,
+    /// The footer is good and the data behind it is not.
+    CorruptData,
+    /// The footer's metadata of mirrorstats cannot be read.
+    InvalidMetadata,
+    /// The file was written under a newer schema.
+    NewerSchema,
+    /// A required column is not there.
+    MissingColumn,
+    /// Two columns have the same name.
+    RepeatedColumn,
+    /// A column of the schema has another type.
+    WrongType,
+    /// The file has no row.
+    NoEpisodes,
+    /// A column that is never null has a null.
+    NullInRequired,
+    /// A name is the empty string.
+    EmptyString,
+    /// An integer does not fit the column's type.
+    OutOfRange,
+    /// A number of pixels, tokens, ... is below zero.
+    NegativeCount,
+    /// An episode's first t is not 1.
+    TStart,
+    /// An episode's t leaves numbers out.
+    TGap,
+    /// An episode has the same t twice in a row.
+    TDuplicate,
+    /// An episode's t goes backward.
+    TOrder,
+    /// A value that names the episode or its setting changes within it.
+    InconsistentConstant,
+    /// The rows of an episode are not together, or two episodes of a file share an id.
+    EpisodeTwice,
+    /// Two files have an episode of the same id.
+    EpisodeInTwoFiles,
+    /// The experiment is none that the definitions know.
+    UnknownExperiment,
+    /// The action is none of the five.
+    UnknownAction,
+    /// The reply status is none of the schema's.
+    UnknownReplyStatus,
+    /// An episode's rows lie in more than one row group.
+    SplitEpisode,
+}
+
+impl Code {
+    /// All codes, in the order of the documentation.
+    pub const ALL: [Self; 27] = [
+        Self::Unreadable,
+        Self::EmptyFile,
+        Self::NotParquet,
+        Self::Truncated,
+        Self::CorruptFooter,
+        Self::CorruptData,
+        Self::InvalidMetadata,
+        Self::NewerSchema,
+        Self::MissingColumn,
+        Self::RepeatedColumn,
+        Self::WrongType,
+        Self::NoEpisodes,
+        Self::NullInRequired,
+        Self::EmptyString,
+        Self::OutOfRange,
+        Self::NegativeCount,
+        Self::TStart,
+        Self::TGap,
+        Self::TDuplicate,
+        Self::TOrder,
+        Self::InconsistentConstant,
+        Self::EpisodeTwice,
+        Self::EpisodeInTwoFiles,
+        Self::UnknownExperiment,
+        Self::UnknownAction,
+        Self::UnknownReplyStatus,
+        Self::SplitEpisode,
+    ];
+
+    /// The stable name, `t-gap`.
+    pub const fn name(self) -> &'static str {
+        self.entry().0
+    }
+
+    /// The rule in one line, as `mirrorstats schema` prints it.
+    pub const fn explain(self) -> &'static str {
+        self.entry().1
+    }
+
+    /// What to do about it, unless the place of the finding has better advice.
+    pub const fn help(self) -> &'static str {
+        self.entry().2
+    }
+
+    /// How much it matters.
+    pub const fn severity(self) -> Severity {
+        match self {
+            Self::SplitEpisode => Severity::Note,
+            _ => Severity::Error,
+        }
+    }
+
+    /// The one table of codes: name, rule, advice.
+    const fn entry(self) -> (&'static str, &'static str, &'static str) {
+        match self {
+            Self::Unreadable => ("unreadable", "the file can be opened and read", "check the path and its permissions"),
+            Self::EmptyFile => (
+                "empty-file",
+                "the file has bytes",
+                "the recording was interrupted or the copy failed: copy it again, or leave the file out",
+            ),
+            Self::NotParquet => ("not-parquet", "the file is Parquet", "give the Parquet traces themselves"),
+            Self::Truncated => {
+                ("truncated", "the file ends with its footer", "the copy or the recording was cut short: copy it again")
+            }
+            Self::CorruptFooter => {
+                ("corrupt-footer", "the footer describes the file", "the file is damaged: restore it from its source")
+            }
+            Self::CorruptData => (
+                "corrupt-data",
+                "the data decodes to what the footer says",
+                "the file is damaged: restore it from its source",
+            ),
+            Self::InvalidMetadata => (
+                "invalid-metadata",
+                "`mirrorstats.schema_version` is a whole number from 1",
+                "correct or remove that key in the footer; a file without it is read as version 1",
+            ),
+            Self::NewerSchema => (
+                "newer-schema",
+                "the schema version is one that this program knows",
+                "update mirrorstats to read this file",
+            ),
+            Self::MissingColumn => (
+                "missing-column",
+                "every required column is there",
+                "`mirrorstats schema` lists the columns: add this one, or rename the one that holds it",
+            ),
+            Self::RepeatedColumn => {
+                ("repeated-column", "every column has its own name", "drop or rename all but one of them")
+            }
+            Self::WrongType => (
+                "wrong-type",
+                "a column of the schema has its logical type, in any width or encoding",
+                "cast the column where the file is written",
+            ),
+            Self::NoEpisodes => {
+                ("no-episodes", "the file has at least one episode", "leave the file out, or record it again")
+            }
+            Self::NullInRequired => (
+                "null-in-required",
+                "a column that is never null has a value in every row",
+                "give the row its value; nothing is filled in",
+            ),
+            Self::EmptyString => {
+                ("empty-string", "a required name is not empty", "give the name, or null where allowed")
+            }
+            Self::OutOfRange => {
+                ("out-of-range", "an integer fits the schema's type", "correct the number, or use smaller ones")
+            }
+            Self::NegativeCount => (
+                "negative-count",
+                "what is counted (px, ms, tokens, USD, agents) is not below zero",
+                "use null where the count is not known",
+            ),
+            Self::TStart => ("t-start", "an episode's first t is 1", "number the steps from 1; t = 0 is not a step"),
+            Self::TGap => ("t-gap", "t goes up by 1 from row to row", "add the missing steps, or record it again"),
+            Self::TDuplicate => ("t-duplicate", "every t of an episode has one row", "keep one row for each t"),
+            Self::TOrder => ("t-order", "t never goes back in an episode", "sort the rows by episode_id and t"),
+            Self::InconsistentConstant => (
+                "inconsistent-constant",
+                "a column that belongs to the episode is the same in all its rows",
+                "correct the rows, or give the episodes ids of their own",
+            ),
+            Self::EpisodeTwice => (
+                "episode-twice",
+                "an episode is in a file once, its rows together",
+                "remove the second one or give it another id; rows of one episode that lie apart belong together",
+            ),
+            Self::EpisodeInTwoFiles => (
+                "episode-in-two-files",
+                "an episode is in one of the files only",
+                "leave one of the files out, or give the second episode another id",
+            ),
+            Self::UnknownExperiment => (
+                "unknown-experiment",
+                "the definitions know the experiment",
+                "add it to the definition file as `[experiment.NAME]`, or say `open = true` there",
+            ),
+            Self::UnknownAction => (
+                "unknown-action",
+                "an action is one of the five, or null",
+                "use one of the names; null where the reply gave none",
+            ),
+            Self::UnknownReplyStatus => {
+                ("unknown-reply-status", "a reply status is one of the schema's", "use one of the names, or null")
+            }
+            Self::SplitEpisode => (
+                "split-episode",
+                "an episode's rows are in one row group",
+                "nothing to do: the episode is read whole; mirrorstats' own writer keeps it together",
+            ),
+        }
+    }
+}
+
+impl fmt::Display for Code {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl Finding {
+    /// A finding about a whole file; the place is narrowed by the methods that follow.
+    pub fn new(code: Code, file: impl Into<String>, expected: impl Into<String>, found: impl Into<String>) -> Self {
+        Self {
+            code,
+            severity: code.severity(),
+            file: file.into(),
+            row_group: None,
+            episode: None,
+            t: None,
+            column: None,
+            expected: expected.into(),
+            found: found.into(),
+            help: code.help().into(),
+        }
+    }
+
+    /// In this row group.
+    #[must_use]
+    pub fn in_row_group(mut self, row_group: usize) -> Self {
+        self.row_group = Some(row_group);
+        self
+    }
+
+    /// In this episode.
+    #[must_use]
+    pub fn in_episode(mut self, episode: impl Into<String>) -> Self {
+        self.episode = Some(episode.into());
+        self
+    }
+
+    /// At this timestep, where it is known.
+    #[must_use]
+    pub fn at(mut self, t: impl Into<Option<i64>>) -> Self {
+        self.t = t.into();
+        self
+    }
+
+    /// In this column.
+    #[must_use]
+    pub fn in_column(mut self, column: impl Into<String>) -> Self {
+        self.column = Some(column.into());
+        self
+    }
+
+    /// With better advice than the code's own.
+    #[must_use]
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.help = help.into();
+        self
+    }
+}
+
+/// `code: file, row group 0, episode x, t = 3, column c: expected .., found ..; help`, on three lines.
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.code, self.file)?;
+        if let Some(row_group) = self.row_group {
+            write!(f, ", row group {row_group}")?;
+        }
+        if let Some(episode) = &self.episode {
+            write!(f, ", episode `{}`", episode.escape_debug())?;
+        }
+        if let Some(t) = self.t {
+            write!(f, ", t = {t}")?;
+        }
+        if let Some(column) = &self.column {
+            write!(f, ", column `{}`", column.escape_debug())?;
+        }
+        write!(f, "\n  expected {}\n  found {}\n  help: {}", self.expected, self.found, self.help)
+    }
+}
+
+/// Why traces could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum TraceError {
+    /// A rule of the schema does not hold.
+    #[error("{first}{}", more_findings(*.more))]
+    Finding {
+        /// The earliest finding by file, row group and row.
+        first: Box<Finding>,
+        /// How many others are known; `validate` shows them all.
+        more: usize,
+    },
+    /// The operating system refused to read something that is not yet known as a trace.
+    #[error("cannot read {what}")]
+    Read {
+        /// What was to be read, as the user named it.
+        what: String,
+        /// Why not.
+        source: io::Error,
+    },
+    /// An argument gives no trace.
+    #[error("`{argument}`: expected {expected}, found {found}; {help}")]
+    NoInput {
+        /// As typed.
+        argument: String,
+        /// What an argument may be.
+        expected: &'static str,
+        /// What this one is.
+        found: String,
+        /// What to do.
+        help: &'static str,
+    },
+    /// Threads could not be started.
+    #[error("cannot start {threads} threads; ask for fewer with --threads")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A column was asked for that the traces cannot give.
+    #[error("column `{column}`: expected {expected}, found {found}")]
+    Column {
+        /// The name asked for.
+        column: String,
+        /// What would do.
+        expected: &'static str,
+        /// What the files have.
+        found: String,
+    },
+    /// Columns could not be put together in memory.
+    #[error("cannot hold the rows in memory; report this as a fault of mirrorstats")]
+    Memory(#[source] ArrowError),
+    /// What a writer was given is not an episode of the schema.
+    #[error("episode `{episode}`: expected {expected}, found {found}; nothing of it was written")]
+    Refused {
+        /// The id of the episode.
+        episode: String,
+        /// The rule.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// The trace could not be written; no file was left behind.
+    #[error("cannot write the trace {file}; no file was left behind")]
+    Write {
+        /// The file, as named.
+        file: String,
+        /// Why not.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+}
+
+fn more_findings(more: usize) -> String {
+    match more {
+        0 => String::new(),
+        more => format!("\n  and {more} more: `mirrorstats validate` shows them all"),
+    }
+}
+
+impl TraceError {
+    /// The error of these findings, the earliest first; `None` for none.
+    pub fn of(findings: Vec<Finding>) -> Option<Self> {
+        let mut findings = findings.into_iter();
+        let first = Box::new(findings.next()?);
+        Some(Self::Finding { first, more: findings.len() })
+    }
+}
+
+impl From<Finding> for TraceError {
+    fn from(finding: Finding) -> Self {
+        Self::Finding { first: Box::new(finding), more: 0 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Code, Finding};
+
+    #[test]
+    fn names_are_unique_and_what_serde_writes() {
+        for (i, code) in Code::ALL.iter().enumerate() {
+            assert_eq!(serde_json::to_string(code).unwrap(), format!("\"{}\"", code.name()));
+            assert!(Code::ALL[..i].iter().all(|before| before.name() != code.name()), "{code} twice");
+        }
+    }
+
+    #[test]
+    fn a_message_says_what_where_expected_found_and_what_to_do() {
+        let finding = Finding::new(Code::TGap, "a.parquet", "t = 3", "t = 4")
+            .in_row_group(0)
+            .in_episode("e1")
+            .at(4)
+            .in_column("t");
+        let expected = "t-gap: a.parquet, row group 0, episode `e1`, t = 4, column `t`\n  expected t = 3\n  found t = 4\
+                        \n  help: add the missing steps, or record it again";
+        assert_eq!(finding.to_string(), expected);
+    }
+}

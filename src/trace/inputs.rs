@@ -1,0 +1,224 @@
+//! From TRACES arguments to a sorted list of files, each once, under a name that is the same on any machine.
+//!
+//! An argument is a file, a folder (every `*.parquet` in it and below it), a glob that the shell did not expand, or
+//! `-` for a list of the first two on standard input, one a line. A name that exists is itself, whatever characters
+//! it has. Links to folders inside a folder are not followed.
+
+use std::collections::BTreeMap;
+use std::ffi::OsStr;
+use std::fs;
+use std::io::{self, Read};
+use std::path::{Component, Path, PathBuf};
+
+use super::finding::TraceError;
+
+/// A file to read, and what it is called in messages and outputs.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Input {
+    /// The path as typed if that was relative; relative to the current folder if below it; otherwise the file's name
+    /// alone. Never absolute; `/` between its parts.
+    pub name: String,
+    /// Where it is.
+    pub path: PathBuf,
+}
+
+impl Input {
+    /// The file at this path, named after it.
+    pub fn new(path: impl Into<PathBuf>) -> Self {
+        let path = path.into();
+        Self { name: display_name(&path), path }
+    }
+}
+
+/// The files that the arguments give, ordered by name, each file once whatever it was called.
+///
+/// `list` is what `-` reads, standard input in the program.
+///
+/// # Errors
+/// [`TraceError::NoInput`] when an argument gives nothing, [`TraceError::Read`] when a folder or the list cannot be
+/// read.
+pub fn resolve(arguments: &[String], list: impl Read) -> Result<Vec<Input>, TraceError> {
+    let mut list = Some(list);
+    let mut paths = Vec::new();
+    for argument in arguments {
+        if argument != "-" {
+            paths.extend(expand(argument)?);
+        } else if let Some(list) = list.take() {
+            paths.extend(listed(list)?);
+        }
+    }
+    let mut files = BTreeMap::new();
+    for path in paths {
+        let input = Input::new(&path);
+        // What cannot be resolved is reported when it is opened, under its own name.
+        let place = fs::canonicalize(&path).unwrap_or(path);
+        let kept = files.entry(place).or_insert_with(|| input.clone());
+        if input < *kept {
+            *kept = input;
+        }
+    }
+    let mut inputs: Vec<_> = files.into_values().collect();
+    inputs.sort();
+    Ok(inputs)
+}
+
+fn expand(argument: &str) -> Result<Vec<PathBuf>, TraceError> {
+    let no_input = |found: &str, help| TraceError::NoInput {
+        argument: argument.to_owned(),
+        expected: "a trace file, a folder of them, a glob, or `-`",
+        found: found.to_owned(),
+        help,
+    };
+    let path = Path::new(argument);
+    if path.exists() {
+        return match traces_at(path)? {
+            traces if traces.is_empty() => {
+                Err(no_input("a folder without any *.parquet in it", "name the folder that the recorder wrote to"))
+            }
+            traces => Ok(traces),
+        };
+    }
+    if !argument.contains(['*', '?', '[']) {
+        return Err(no_input("no such file or folder", "check the spelling and the current folder"));
+    }
+    let matches = glob::glob(argument).map_err(|error| no_input(error.msg, "correct the glob, or name the files"))?;
+    let mut traces = Vec::new();
+    for path in matches {
+        let path = path.map_err(|error| TraceError::Read {
+            what: error.path().display().to_string(),
+            source: io::Error::new(error.error().kind(), error.to_string()),
+        })?;
+        traces.extend(traces_at(&path)?);
+    }
+    if traces.is_empty() {
+        return Err(no_input("a glob that matches no trace", "check the pattern and the current folder"));
+    }
+    Ok(traces)
+}
+
+fn listed(mut list: impl Read) -> Result<Vec<PathBuf>, TraceError> {
+    let mut text = String::new();
+    list.read_to_string(&mut text)
+        .map_err(|source| TraceError::Read { what: "the list on standard input".into(), source })?;
+    let mut paths = Vec::new();
+    for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
+        paths.extend(expand(line)?);
+    }
+    if paths.is_empty() {
+        return Err(TraceError::NoInput {
+            argument: "-".into(),
+            expected: "a list of trace files on standard input, one a line",
+            found: "no line".into(),
+            help: "pipe one in, as in `ls runs/*.parquet | mirrorstats report -`",
+        });
+    }
+    Ok(paths)
+}
+
+/// The path itself, or the traces of the folder there.
+fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
+    if !path.is_dir() {
+        return Ok(vec![path.to_owned()]);
+    }
+    let failed = |source| TraceError::Read { what: path.display().to_string(), source };
+    let mut traces = Vec::new();
+    for entry in fs::read_dir(path).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let below = entry.path();
+        if entry.file_type().map_err(failed)?.is_dir() {
+            traces.extend(traces_at(&below)?);
+        } else if below.extension() == Some(OsStr::new("parquet")) && !below.is_dir() {
+            traces.push(below);
+        }
+    }
+    Ok(traces)
+}
+
+fn display_name(path: &Path) -> String {
+    let relative = if path.is_absolute() {
+        let here = std::env::current_dir().unwrap_or_default();
+        match path.strip_prefix(&here) {
+            Ok(below) => below,
+            Err(_) => path.file_name().map_or(path, Path::new),
+        }
+    } else {
+        path
+    };
+    let parts: Vec<_> = relative
+        .components()
+        .filter(|part| !matches!(part, Component::CurDir | Component::RootDir | Component::Prefix(_)))
+        .map(|part| part.as_os_str().to_string_lossy())
+        .collect();
+    parts.join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(arguments: &[&str], list: &str) -> Result<Vec<String>, String> {
+        let arguments: Vec<_> = arguments.iter().map(ToString::to_string).collect();
+        match resolve(&arguments, list.as_bytes()) {
+            Ok(inputs) => Ok(inputs.into_iter().map(|input| input.name).collect()),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    fn folder() -> (tempfile::TempDir, String) {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir_all(folder.path().join("deep/er")).unwrap();
+        for name in ["b.parquet", "a.parquet", "notes.txt", "deep/er/c.parquet", "x[1].parquet"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        let path = folder.path().to_str().unwrap().to_owned();
+        (folder, path)
+    }
+
+    #[test]
+    fn a_folder_gives_its_traces_and_those_below() {
+        let (_keep, at) = folder();
+        let expected = ["a.parquet", "b.parquet", "c.parquet", "x[1].parquet"].map(String::from).to_vec();
+        assert_eq!(names(&[&at], ""), Ok(expected.clone()));
+        assert_eq!(names(&["-"], &format!("{at}\n\n")), Ok(expected));
+    }
+
+    #[test]
+    fn a_file_counts_once_whatever_it_is_called() {
+        let (_keep, at) = folder();
+        let (plain, detour, glob) =
+            (format!("{at}/a.parquet"), format!("{at}/deep/../a.parquet"), format!("{at}/[a]*.parquet"));
+        assert_eq!(names(&[&plain, &detour, &glob, "-"], &plain), Ok(vec!["a.parquet".into()]));
+    }
+
+    #[test]
+    fn a_name_that_exists_is_no_glob() {
+        let (_keep, at) = folder();
+        assert_eq!(names(&[&format!("{at}/x[1].parquet")], ""), Ok(vec!["x[1].parquet".into()]));
+    }
+
+    #[test]
+    fn what_gives_nothing_is_said() {
+        let (_keep, at) = folder();
+        fs::create_dir(format!("{at}/none")).unwrap();
+        for (argument, list, why) in [
+            (format!("{at}/no.parquet"), "", "no such file or folder"),
+            (format!("{at}/none"), "", "a folder without any *.parquet"),
+            (format!("{at}/z*.parquet"), "", "a glob that matches no trace"),
+            (format!("{at}/***"), "", "glob"),
+            ("-".into(), "\n", "no line"),
+            ("-".into(), "no/such.parquet", "no such file or folder"),
+        ] {
+            let error = names(&[&argument], list).unwrap_err();
+            assert!(error.contains(why), "{argument}: {error}");
+        }
+    }
+
+    #[test]
+    fn names_are_relative() {
+        let here = std::env::current_dir().unwrap();
+        assert_eq!(Input::new("./runs//a.parquet").name, "runs/a.parquet");
+        assert_eq!(Input::new("../a.parquet").name, "../a.parquet");
+        assert_eq!(Input::new(here.join("runs/a.parquet")).name, "runs/a.parquet");
+        assert_eq!(Input::new("/somewhere/else/a.parquet").name, "a.parquet");
+    }
+}

@@ -1,0 +1,383 @@
+//! Opens traces: reads every footer, checks it against the schema, and knows what each column is over all files.
+//!
+//! No row is read here. A file is held by its name and footer, never by an open handle, so that any number of files
+//! can be open at once.
+
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use arrow::datatypes::{DataType, Schema};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+use parquet::arrow::parquet_to_arrow_schema;
+use parquet::basic::ConvertedType;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
+use parquet::schema::types::SchemaDescriptor;
+
+use super::contain::contained;
+use super::finding::{Code, Finding, TraceError};
+use super::inputs::Input;
+use super::schema::{self, COLUMNS, Kind};
+use crate::base::near::nearest;
+
+/// Traces that are open: every footer is read and good, no row is read yet.
+#[derive(Debug)]
+pub struct TraceSet {
+    files: Vec<TraceFile>,
+}
+
+/// One trace whose footer is good.
+#[derive(Debug)]
+pub struct TraceFile {
+    name: String,
+    path: PathBuf,
+    bytes: u64,
+    columns: Vec<FileColumn>,
+    metadata: ArrowReaderMetadata,
+}
+
+/// A column of one file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileColumn {
+    /// Its name.
+    pub name: String,
+    /// Its logical type; `None` for a column that is declared to hold nothing but nulls, which goes with any type.
+    pub kind: Option<Kind>,
+}
+
+/// What a column is over all files of a set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnUse {
+    /// The logical type, the same in all files that have the column; [`Kind::Unsupported`] where they differ.
+    pub kind: Kind,
+    /// The name of a file that does not have the column, if there is one; its rows read as null.
+    pub missing_from: Option<String>,
+    /// Two files that disagree on the type, and the types they have.
+    pub conflict: Option<[(String, Kind); 2]>,
+}
+
+impl TraceSet {
+    /// Opens these files, ordered as they are given ([`resolve`](super::inputs::resolve) orders them by name).
+    ///
+    /// # Errors
+    /// The first fault of a footer, and how many more there are; a file without any row is one.
+    pub fn open(inputs: &[Input]) -> Result<Self, TraceError> {
+        let mut files = Vec::with_capacity(inputs.len());
+        let mut faults = Vec::new();
+        for input in inputs {
+            match TraceFile::open(input) {
+                Ok(file) => files.push(file),
+                Err(findings) => faults.extend(findings),
+            }
+        }
+        match TraceError::of(faults) {
+            Some(error) => Err(error),
+            None => Ok(Self { files }),
+        }
+    }
+
+    /// Files that were opened one by one.
+    pub fn of(files: Vec<TraceFile>) -> Self {
+        Self { files }
+    }
+
+    /// The files, in their order.
+    pub fn files(&self) -> &[TraceFile] {
+        &self.files
+    }
+
+    /// What the column of this name is over all files; `None` if no file has it.
+    pub fn column(&self, name: &str) -> Option<ColumnUse> {
+        let mut seen: Option<(&TraceFile, Kind)> = None;
+        let (mut present, mut missing_from, mut conflict) = (false, None, None);
+        for file in &self.files {
+            match (file.column(name).map(|column| column.kind), seen) {
+                (None, _) => missing_from = missing_from.or_else(|| Some(file.name.clone())),
+                (Some(None), _) => present = true,
+                (Some(Some(kind)), None) => seen = Some((file, kind)),
+                (Some(Some(kind)), Some((first, known))) if kind != known && conflict.is_none() => {
+                    conflict = Some([(first.name.clone(), known), (file.name.clone(), kind)]);
+                }
+                (Some(Some(_)), Some(_)) => {}
+            }
+        }
+        // A column that is null in every file has the schema's type, or text where the schema does not know it.
+        let unseen = || schema::column(name).map_or(Kind::String, |column| column.stored.kind());
+        let kind = if conflict.is_some() { Kind::Unsupported } else { seen.map_or_else(unseen, |(_, kind)| kind) };
+        (present || seen.is_some()).then_some(ColumnUse { kind, missing_from, conflict })
+    }
+
+    /// The names of all columns of all files: those of the schema in its order, then the others in the order of the
+    /// files.
+    pub fn column_names(&self) -> Vec<&str> {
+        let known = COLUMNS.iter().map(|column| column.name);
+        let mut names: Vec<&str> =
+            known.filter(|name| self.files.iter().any(|file| file.column(name).is_some())).collect();
+        for column in self.files.iter().flat_map(|file| &file.columns) {
+            if !names.contains(&column.name.as_str()) {
+                names.push(&column.name);
+            }
+        }
+        names
+    }
+}
+
+impl TraceFile {
+    /// Reads and checks the footer of one file.
+    ///
+    /// # Errors
+    /// Everything that is wrong with it; never empty.
+    pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
+        let (bytes, metadata) = footer(input).map_err(|finding| vec![*finding])?;
+        check_version(&input.name, &metadata).map_err(|finding| vec![*finding])?;
+        let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
+        let mut findings = check_columns(&input.name, &columns);
+        findings.extend(check_rows(&input.name, bytes, &metadata));
+        if !findings.is_empty() {
+            return Err(findings);
+        }
+        let metadata = readable(metadata, &columns)
+            .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
+        Ok(Self { name: input.name.clone(), path: input.path.clone(), bytes, columns, metadata })
+    }
+
+    /// The name in messages and outputs.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Opens the file itself for reading.
+    ///
+    /// # Errors
+    /// Whatever the operating system says.
+    pub fn reader(&self) -> io::Result<File> {
+        File::open(&self.path)
+    }
+
+    /// The size in bytes.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The columns in the file's order.
+    pub fn columns(&self) -> &[FileColumn] {
+        &self.columns
+    }
+
+    /// The column of this name.
+    pub fn column(&self, name: &str) -> Option<&FileColumn> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// The number of rows.
+    pub fn rows(&self) -> u64 {
+        (0..self.row_groups()).map(|row_group| self.row_group_rows(row_group) as u64).sum()
+    }
+
+    /// The number of row groups.
+    pub fn row_groups(&self) -> usize {
+        self.metadata.metadata().num_row_groups()
+    }
+
+    /// The number of rows in a row group.
+    ///
+    /// # Panics
+    /// For a row group that the file has not.
+    pub fn row_group_rows(&self, row_group: usize) -> usize {
+        usize::try_from(self.metadata.metadata().row_group(row_group).num_rows())
+            .expect("opening checked that it is not negative")
+    }
+
+    /// A value of the footer's key-value metadata.
+    pub fn metadata_value(&self, key: &str) -> Option<&str> {
+        value(self.metadata.metadata(), key)
+    }
+
+    /// What a reader needs; strings are read as dictionaries.
+    pub(super) fn reader_metadata(&self) -> &ArrowReaderMetadata {
+        &self.metadata
+    }
+}
+
+fn value<'a>(metadata: &'a ParquetMetaData, key: &str) -> Option<&'a str> {
+    let pairs = metadata.file_metadata().key_value_metadata()?;
+    pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
+}
+
+const MAGIC: [u8; 4] = *b"PAR1";
+const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
+/// A magic number at each end, and the footer's length.
+const SMALLEST: u64 = 12;
+
+/// The file's size and decoded footer.
+fn footer(input: &Input) -> Result<(u64, ParquetMetaData), Box<Finding>> {
+    let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
+    let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
+    let mut file = File::open(&input.path).map_err(unreadable)?;
+    let about = file.metadata().map_err(unreadable)?;
+    if about.is_dir() {
+        return Err(finding(Code::NotParquet, "a Parquet file", "a folder".into()));
+    }
+    let bytes = about.len();
+    if bytes == 0 {
+        return Err(finding(Code::EmptyFile, "a Parquet file", "0 bytes".into()));
+    }
+    let start = magic(&mut file, SeekFrom::Start(0)).map_err(unreadable)?;
+    match start {
+        Some(MAGIC) => {}
+        Some(ENCRYPTED_MAGIC) => {
+            return Err(finding(Code::NotParquet, "a Parquet file that is not encrypted", "an encrypted one".into()));
+        }
+        _ => return Err(finding(Code::NotParquet, "a Parquet file, which starts with `PAR1`", "another start".into())),
+    }
+    let end = magic(&mut file, SeekFrom::End(-4)).map_err(unreadable)?;
+    if bytes < SMALLEST || end != Some(MAGIC) {
+        let found = format!("{bytes} bytes that end without it");
+        return Err(finding(Code::Truncated, "a footer at the end, closed with `PAR1`", found));
+    }
+    match contained(|| ParquetMetaDataReader::new().parse_and_finish(&file)) {
+        Ok(Ok(metadata)) => Ok((bytes, metadata)),
+        Ok(Err(error)) => Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
+        Err(panic) => Err(finding(Code::CorruptFooter, "a readable footer", panic)),
+    }
+}
+
+fn magic(file: &mut File, at: SeekFrom) -> io::Result<Option<[u8; 4]>> {
+    let mut found = [0; 4];
+    let read = file.seek(at).and_then(|_| file.read_exact(&mut found));
+    match read {
+        Ok(()) => Ok(Some(found)),
+        // Shorter than four bytes.
+        Err(error) if matches!(error.kind(), io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// A decoder's message without its own prefix, in one line.
+pub(super) fn plain(error: &ParquetError) -> String {
+    let text = match error {
+        ParquetError::General(text) | ParquetError::EOF(text) | ParquetError::ArrowError(text) => text.clone(),
+        other => other.to_string(),
+    };
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn check_version(file: &str, metadata: &ParquetMetaData) -> Result<(), Box<Finding>> {
+    // A file of another writer has none; its columns are checked all the same.
+    let Some(text) = value(metadata, schema::VERSION_KEY) else { return Ok(()) };
+    match text.parse::<u32>() {
+        Ok(version) if version > schema::SCHEMA_VERSION => {
+            let expected = format!("schema version {} or older", schema::SCHEMA_VERSION);
+            Err(Box::new(Finding::new(Code::NewerSchema, file, expected, format!("version {version}"))))
+        }
+        Ok(version) if version > 0 => Ok(()),
+        _ => {
+            let expected = format!("`{}` to be a whole number from 1", schema::VERSION_KEY);
+            Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", text.escape_debug()))))
+        }
+    }
+}
+
+/// The columns of the file, or that it has none that can be made out.
+fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
+    let corrupt = |found| vec![Finding::new(Code::CorruptFooter, file, "a schema of known types", found)];
+    let fields = contained(|| parquet_to_arrow_schema(descriptor, None))
+        .map_err(corrupt)?
+        .map_err(|error| corrupt(plain(&error)))?;
+    let roots = descriptor.root_schema().get_fields();
+    let columns = fields.fields().iter().zip(roots).map(|(field, root)| {
+        let text = root.get_basic_info().converted_type() == ConvertedType::UTF8;
+        FileColumn { name: field.name().clone(), kind: kind_of(field.data_type(), text) }
+    });
+    Ok(columns.collect())
+}
+
+fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
+    match stored {
+        DataType::Null => None,
+        DataType::Boolean => Some(Kind::Bool),
+        integer if integer.is_integer() => Some(Kind::Int),
+        float if float.is_floating() => Some(Kind::Float),
+        // Text that is only annotated as JSON is not checked to be UTF-8 by the decoder.
+        DataType::Utf8 if text => Some(Kind::String),
+        _ => Some(Kind::Unsupported),
+    }
+}
+
+fn check_columns(file: &str, columns: &[FileColumn]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for (i, column) in columns.iter().enumerate() {
+        if columns[..i].iter().filter(|before| before.name == column.name).count() == 1 {
+            let finding = Finding::new(Code::RepeatedColumn, file, "one column of that name", "more than one");
+            findings.push(finding.in_column(&column.name));
+        }
+    }
+    for known in COLUMNS {
+        let wanted = known.stored.kind();
+        match columns.iter().find(|column| column.name == known.name) {
+            None if known.required => {
+                let strangers = columns.iter().map(|column| column.name.as_str());
+                let like = nearest(known.name, strangers.filter(|name| schema::column(name).is_none()));
+                let found = like.map_or("none".to_owned(), |name| format!("none, though there is `{name}`"));
+                let expected = format!("a column `{}` of type {}", known.name, wanted.name());
+                findings.push(Finding::new(Code::MissingColumn, file, expected, found).in_column(known.name));
+            }
+            Some(column)
+                if column.kind.is_some_and(|kind| kind != wanted) || column.kind.is_none() && !known.nullable =>
+            {
+                let found = column.kind.map_or("nothing but nulls", Kind::name);
+                let finding = Finding::new(Code::WrongType, file, wanted.name(), found);
+                findings.push(finding.in_column(known.name));
+            }
+            None | Some(_) => {}
+        }
+    }
+    findings
+}
+
+/// What the footer says about rows and where they lie.
+fn check_rows(file: &str, bytes: u64, metadata: &ParquetMetaData) -> Option<Finding> {
+    let groups = metadata.row_groups();
+    let declared = metadata.file_metadata().num_rows();
+    let counted = groups.iter().try_fold(0_i64, |sum, group| {
+        let rows = group.num_rows();
+        if rows < 0 { None } else { sum.checked_add(rows) }
+    });
+    if counted != Some(declared) {
+        let found = counted.map_or("counts that make no sum".to_owned(), |counted| counted.to_string());
+        return Some(Finding::new(Code::CorruptFooter, file, format!("row groups of {declared} rows together"), found));
+    }
+    for (i, group) in groups.iter().enumerate() {
+        for chunk in group.columns() {
+            let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
+            let end = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok());
+            if end.and_then(|(start, length)| start.checked_add(length)).is_none_or(|end| end > bytes) {
+                let found = "one that lies outside of it";
+                let finding = Finding::new(Code::CorruptFooter, file, "columns that lie within the file", found);
+                return Some(finding.in_row_group(i).in_column(chunk.column_path().string()));
+            }
+        }
+    }
+    (declared == 0).then(|| Finding::new(Code::NoEpisodes, file, "at least one episode", "no row"))
+}
+
+/// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
+fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
+    let make = || {
+        let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
+        let fields = plain_schema.fields().iter().zip(columns).map(|(field, column)| match column.kind {
+            Some(Kind::String) => Arc::new(field.as_ref().clone().with_data_type(text_type())),
+            _ => Arc::clone(field),
+        });
+        let wanted = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+        ArrowReaderMetadata::try_new(Arc::new(metadata), ArrowReaderOptions::new().with_schema(wanted))
+    };
+    contained(make)?.map_err(|error| plain(&error))
+}
+
+/// How text is held in memory: keys into the distinct values.
+pub(super) fn text_type() -> DataType {
+    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
+}

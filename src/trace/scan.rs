@@ -1,0 +1,183 @@
+//! Scans traces for scoring: one streaming pass over the columns asked for, checked while it goes.
+//!
+//! Rule: what reaches `work` is whole episodes that keep every rule of the schema in the columns that are read; the
+//! first fault by file, row group and row ends the scan, the same one for any number of threads.
+
+use std::num::NonZeroUsize;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, RecordBatch, RecordBatchOptions, UInt64Array};
+use arrow::compute::take;
+use arrow::datatypes::{Field, Schema, SchemaRef};
+
+use super::decode::held_as;
+use super::finding::TraceError;
+use super::layout::{Layout, LayoutColumn};
+use super::open::TraceSet;
+use super::pass::{Episodes, Event, pass};
+use super::rules::{Ids, Located, Rules, Start, starts};
+
+/// The columns that a scan delivers, and what it checks beyond the schema.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Projection {
+    /// Columns with a value a step.
+    pub steps: Vec<String>,
+    /// Columns with a value an episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
+    pub constants: Vec<String>,
+    /// The experiments that are known; an episode of another one is a fault. Any if `None`.
+    pub experiments: Option<Vec<String>>,
+}
+
+/// The first columns of [`EpisodeBatch::episodes`].
+pub const EPISODE_COLUMNS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
+
+/// Some whole episodes of one file.
+///
+/// Columns have one of four types whatever the file stores: bool, `Int64`, `Float64`, and text as
+/// `Dictionary(Int32, Utf8)`. A dictionary may hold values that no row has, and a value under two keys. A column that the
+/// file does not have is null throughout.
+#[derive(Clone, Debug)]
+pub struct EpisodeBatch {
+    /// The rows of episode `i` in `steps` are `offsets[i]..offsets[i + 1]`; its timesteps are 1, 2, ... in that order.
+    pub offsets: Vec<usize>,
+    /// A row a step: the columns of [`Projection::steps`].
+    pub steps: RecordBatch,
+    /// A row an episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
+    pub episodes: RecordBatch,
+    /// Where the first row is.
+    pub origin: Origin,
+}
+
+/// A row of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Origin {
+    /// The file's position in [`TraceSet::files`].
+    pub file: usize,
+    /// The row group of the file.
+    pub row_group: usize,
+    /// The row of the row group.
+    pub row: usize,
+}
+
+/// What a scan went through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ScanSummary {
+    /// Whole episodes.
+    pub episodes: u64,
+    /// Their steps.
+    pub steps: u64,
+}
+
+impl TraceSet {
+    /// Reads all episodes once, `threads` row groups at a time, and gives `sink` the results of `work` in the order
+    /// of files and rows.
+    ///
+    /// # Errors
+    /// The first fault of the traces by file, row group and row, or the first error of `work` or `sink`.
+    pub fn scan<T: Send, E: Send + From<TraceError>>(
+        &self,
+        projection: &Projection,
+        threads: NonZeroUsize,
+        work: impl Fn(EpisodeBatch) -> Result<T, E> + Sync,
+        mut sink: impl FnMut(T) -> Result<(), E>,
+    ) -> Result<ScanSummary, E> {
+        let layout = Layout::new(
+            self,
+            projection.steps.iter().map(String::as_str),
+            EPISODE_COLUMNS.into_iter().chain(projection.constants.iter().map(String::as_str)),
+        )?;
+        let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
+        let shape = Shape::new(&layout, projection);
+        let mut ids = Ids::default();
+        let mut summary = ScanSummary::default();
+        let checked = |episodes: Episodes| {
+            let fault = rules.check(self.files()[episodes.file].name(), &episodes).into_iter().next();
+            let last = fault.as_ref().map_or(usize::MAX, |fault| fault.row);
+            let starts = starts(&episodes).into_iter().filter(|start| start.row <= last).collect();
+            let (count, steps) = (episodes.len(), episodes.columns[0].len());
+            let outcome = match fault {
+                Some(fault) => Outcome::Fault(fault),
+                None => Outcome::Done(shape.batch(episodes).map_err(E::from).and_then(&work)),
+            };
+            Checked { starts, count, steps, outcome }
+        };
+        pass(self.files(), &layout, threads, &checked, |file, event| {
+            let checked = match event {
+                Event::Whole(checked) => checked,
+                Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
+            };
+            for start in checked.starts {
+                if let Some(fault) = ids.admit(start, file, |file| self.files()[file].name().to_owned()) {
+                    return Err(TraceError::from(fault.finding).into());
+                }
+            }
+            summary.episodes += checked.count as u64;
+            summary.steps += checked.steps as u64;
+            match checked.outcome {
+                Outcome::Fault(fault) => Err(TraceError::from(fault.finding).into()),
+                Outcome::Done(result) => sink(result?),
+            }
+        })?;
+        Ok(summary)
+    }
+}
+
+/// What a worker found out about some episodes.
+struct Checked<T, E> {
+    /// The episodes up to the fault, if there is one.
+    starts: Vec<Start>,
+    count: usize,
+    steps: usize,
+    outcome: Outcome<T, E>,
+}
+
+enum Outcome<T, E> {
+    Fault(Located),
+    Done(Result<T, E>),
+}
+
+/// Which columns of the layout go where in a batch.
+struct Shape {
+    steps: (SchemaRef, Vec<usize>),
+    episodes: (SchemaRef, Vec<usize>),
+}
+
+impl Shape {
+    fn new(layout: &Layout, projection: &Projection) -> Self {
+        let part = |names: Vec<&str>| {
+            let places: Vec<usize> = names.iter().filter_map(|name| layout.position(name)).collect();
+            let fields = places.iter().map(|place| field(&layout.columns[*place]));
+            (Arc::new(Schema::new(fields.collect::<Vec<_>>())), places)
+        };
+        let constants = projection.constants.iter().map(String::as_str);
+        Self {
+            steps: part(projection.steps.iter().map(String::as_str).collect()),
+            episodes: part(EPISODE_COLUMNS.into_iter().chain(constants).collect()),
+        }
+    }
+
+    fn batch(&self, episodes: Episodes) -> Result<EpisodeBatch, TraceError> {
+        let rows = episodes.columns[0].len();
+        let firsts: UInt64Array = episodes.offsets[..episodes.len()].iter().map(|row| *row as u64).collect();
+        let (schema, places) = &self.steps;
+        let steps = places.iter().map(|place| Arc::clone(&episodes.columns[*place])).collect();
+        let steps = record_batch(schema, steps, rows)?;
+        let (schema, places) = &self.episodes;
+        let values = places.iter().map(|place| take(&episodes.columns[*place], &firsts, None));
+        let values = values.collect::<Result<Vec<_>, _>>().map_err(TraceError::Memory)?;
+        let constants = record_batch(schema, values, episodes.len())?;
+        let first = episodes.pieces[0];
+        let origin = Origin { file: episodes.file, row_group: first.row_group, row: first.row };
+        Ok(EpisodeBatch { offsets: episodes.offsets, steps, episodes: constants, origin })
+    }
+}
+
+fn record_batch(schema: &SchemaRef, columns: Vec<ArrayRef>, rows: usize) -> Result<RecordBatch, TraceError> {
+    let options = RecordBatchOptions::new().with_row_count(Some(rows));
+    RecordBatch::try_new_with_options(Arc::clone(schema), columns, &options).map_err(TraceError::Memory)
+}
+
+fn field(column: &LayoutColumn) -> Field {
+    let nullable = column.known.is_none_or(|known| known.nullable);
+    Field::new(&column.name, held_as(column.kind), nullable)
+}

@@ -1,0 +1,110 @@
+//! The writer: what it writes, what it refuses, and that a file appears whole or not at all.
+
+use std::fs;
+
+use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
+use parquet::file::reader::{FileReader, SerializedFileReader};
+
+fn episode(id: &str, steps: usize) -> Episode {
+    Episode {
+        episode_id: id.into(),
+        model: "m".into(),
+        experiment: "E1".into(),
+        seed: 1,
+        run: 2,
+        body_color: "red".into(),
+        stated_color: None,
+        distractors: None,
+        steps: (0..steps).map(|_| Step { action: Some(Action::TurnLeft), ..Step::default() }).collect(),
+    }
+}
+
+fn with_extra(mut episode: Episode, extra: Extra) -> Episode {
+    episode.steps[0].extra = extra;
+    episode
+}
+
+fn encode(metadata: &TraceMetadata, episodes: &[Episode]) -> Vec<u8> {
+    let mut encoder = TraceEncoder::new(Vec::new(), metadata).unwrap();
+    episodes.iter().for_each(|episode| encoder.write(episode).unwrap());
+    encoder.finish().unwrap()
+}
+
+#[test]
+fn the_same_episodes_give_the_same_bytes() {
+    let metadata = TraceMetadata { recording: Some(serde_json::json!({"seed": 1})), ..TraceMetadata::default() };
+    let episodes = [episode("a", 3), episode("b", 1)];
+    assert_eq!(encode(&metadata, &episodes), encode(&metadata, &episodes));
+}
+
+#[test]
+fn row_groups_end_where_episodes_do() {
+    let episodes: Vec<_> = (0..401).map(|i| episode(&format!("e{i}"), 999)).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.parquet");
+    write_episodes(&path, None, &episodes).unwrap();
+    let reader = SerializedFileReader::new(fs::File::open(&path).unwrap()).unwrap();
+    let rows: Vec<_> = reader.metadata().row_groups().iter().map(|group| group.num_rows()).collect();
+    assert_eq!(rows, [132 * 999, 132 * 999, 132 * 999, 5 * 999]);
+}
+
+#[test]
+fn only_declared_optional_columns_are_there() {
+    let plain = episode("a", 2);
+    let seen = with_extra(episode("b", 2), Extra { mirror_px: Some(7), ..Extra::default() });
+    assert_eq!(OptionalColumns::used_by([&plain]), OptionalColumns::NONE);
+    assert_eq!(OptionalColumns::used_by([&plain, &seen]), OptionalColumns::named(&["mirror_px"]).unwrap());
+    assert_eq!(OptionalColumns::named(&["t"]), None);
+    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata::default()).unwrap();
+    let error = encoder.write(&seen).unwrap_err().to_string();
+    assert!(error.contains("`mirror_px`, which was not declared"), "{error}");
+}
+
+#[test]
+fn what_the_schema_forbids_is_refused() {
+    let nameless = Episode { model: String::new(), ..episode("a", 1) };
+    let negative = with_extra(episode("a", 1), Extra { prompt_tokens: Some(-1), ..Extra::default() });
+    let costless = with_extra(episode("a", 1), Extra { cost_usd: Some(f64::NAN), ..Extra::default() });
+    let status = with_extra(episode("a", 1), Extra { reply_status: Some("fine".into()), ..Extra::default() });
+    let mut blank = episode("a", 1);
+    blank.steps[0].self_color = Some(String::new());
+    for (refused, why) in [
+        (episode("a", 0), "expected 1 to 2147483647 steps, found 0"),
+        (nameless, "expected `model` not to be empty, found ``"),
+        (negative, "expected `prompt_tokens` not to be below zero, found -1"),
+        (costless, "expected `cost_usd` not to be below zero, found NaN"),
+        (status, "expected `reply_status` to be one of ok, repaired"),
+        (blank, "expected `self_color` not to be empty"),
+    ] {
+        let metadata = TraceMetadata { columns: OptionalColumns::all(), ..TraceMetadata::default() };
+        let mut encoder = TraceEncoder::new(Vec::new(), &metadata).unwrap();
+        let error = encoder.write(&refused).unwrap_err().to_string();
+        assert!(error.contains(why), "{error}");
+        assert_eq!(encoder.finish().unwrap(), encode(&metadata, &[]), "a refused episode leaves no row");
+    }
+}
+
+#[test]
+fn an_id_is_taken_once() {
+    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata::default()).unwrap();
+    encoder.write(&episode("a", 1)).unwrap();
+    let error = encoder.write(&episode("a", 2)).unwrap_err().to_string();
+    assert!(error.contains("expected an id of its own"), "{error}");
+}
+
+#[test]
+fn a_file_appears_when_it_is_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    let mut writer = TraceWriter::create(&path, &TraceMetadata::default()).unwrap();
+    writer.write(&episode("a", 3)).unwrap();
+    assert!(!path.exists());
+    drop(writer);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0, "an unfinished trace leaves nothing behind");
+    write_episodes(&path, None, &[episode("a", 3)]).unwrap();
+    assert!(path.exists());
+    let missing = folder.path().join("no/such/folder/a.parquet");
+    let error = write_episodes(&missing, None, &[]).unwrap_err().to_string();
+    assert!(error.starts_with("cannot write the trace"), "{error}");
+}

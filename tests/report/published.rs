@@ -11,11 +11,13 @@ use std::sync::LazyLock;
 use indexmap::IndexMap;
 use mirrorstats::cells::cell::{Cells, Group, KeyValue};
 use mirrorstats::cells::moments::Moments;
-use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use mirrorstats::metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
+use mirrorstats::metric::definitions::Definitions;
 use mirrorstats::report::layout;
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::{Table, Value};
 use mirrorstats::report::value;
+use mirrorstats::score::run::schema_columns;
 
 /// Episodes behind every published cell.
 pub const EPISODES: u64 = 21;
@@ -125,40 +127,9 @@ pub fn tables(style: &str) -> Vec<Table> {
     layout::tables(&cells(), &Style::load(style).unwrap()).unwrap()
 }
 
-/// The definitions of the paper, as far as a table shows them.
+/// The definitions of the paper.
 pub fn catalog() -> Catalog {
-    let mut metric = IndexMap::new();
-    for (name, kind, better, is_conditional, se) in [
-        ("TSA", Kind::Rate, Better::Higher, false, StandardError::Sample),
-        ("TTD", Kind::Quantity, Better::Lower, false, StandardError::Sample),
-        ("MCR", Kind::Rate, Better::Higher, false, StandardError::Sample),
-        ("MTATO", Kind::Rate, Better::Higher, true, StandardError::Sample),
-        ("CAAL", Kind::Rate, Better::Higher, false, StandardError::Sample),
-        ("CR", Kind::Rate, Better::Lower, false, StandardError::Sample),
-        ("TSA-C", Kind::Rate, Better::Higher, true, StandardError::Sample),
-        ("MGD", Kind::Quantity, Better::Higher, false, StandardError::Sample),
-        ("SC", Kind::Rate, Better::Higher, true, StandardError::Sample),
-        ("AR_SC", Kind::Rate, Better::Neither, false, StandardError::Population),
-    ] {
-        let when = is_conditional.then(|| "some condition".to_owned());
-        metric.insert(name.to_owned(), metric_of(kind, better, when, se));
-    }
-    let experiment = [
-        ("E1", "Active mirror-based self-identification"),
-        ("E2", "Self-identification without mirror evidence"),
-        ("E3", "Self-identification under conflicting linguistic information"),
-        ("E4", "Self–other disambiguation under visual ambiguity"),
-        ("E5", "Robust self-identification under occlusion"),
-    ];
-    let experiment = (1..).zip(experiment).map(|(order, (name, title))| (name.to_owned(), experiment_of(title, order)));
-    Catalog {
-        name: "paper".to_owned(),
-        hash: "0".repeat(64),
-        open: false,
-        lets: IndexMap::new(),
-        metric,
-        experiment: experiment.collect(),
-    }
+    Definitions::load("paper", &schema_columns()).unwrap().catalog
 }
 
 pub fn metric_of(kind: Kind, better: Better, when: Option<String>, se: StandardError) -> Metric {
@@ -174,8 +145,4 @@ pub fn metric_of(kind: Kind, better: Better, when: Option<String>, se: StandardE
         se,
         chance: None,
     }
-}
-
-fn experiment_of(title: &str, order: i64) -> Experiment {
-    Experiment { title: title.to_owned(), order, chance: IndexMap::new(), reference: IndexMap::new() }
 }

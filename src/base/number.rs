@@ -60,9 +60,9 @@ impl Decimal {
     ///
     /// `None` for what is not finite, and where 128 bits do not suffice.
     pub fn of_float(value: f64, places: u32) -> Option<Self> {
-        let (mantissa, exponent) = binary_parts(value)?;
-        // Below 2^-44 every number rounds to zero at nine places or fewer.
+        // With a smaller exponent the number is below 2^-44, which is zero at nine places or fewer.
         const SMALLEST_EXPONENT: i32 = -97;
+        let (mantissa, exponent) = binary_parts(value)?;
         match exponent {
             0.. => Self::of_ratio(mantissa.checked_mul(power_of_two(exponent)?)?, 1, places),
             SMALLEST_EXPONENT.. => Self::of_ratio(mantissa, power_of_two(-exponent)?, places),
@@ -81,11 +81,7 @@ impl Decimal {
     /// How two numbers compare as values: `0.1` equals `0.10`.
     pub fn cmp_value(self, other: Self) -> Ordering {
         let places = self.places.max(other.places);
-        match (self.units_at(places), other.units_at(places)) {
-            (Some(a), Some(b)) => a.cmp(&b),
-            // Too many digits to widen: such numbers differ in size, which their own units show.
-            _ => (self.units, other.places).cmp(&(other.units, self.places)),
-        }
+        self.parts(places).cmp(&other.parts(places))
     }
 
     /// The text without the zero before the point, for rates in little room: `.50`.
@@ -97,8 +93,11 @@ impl Decimal {
         }
     }
 
-    fn units_at(self, places: u32) -> Option<i128> {
-        self.units.checked_mul(power_of_ten(places - self.places)?)
+    /// The whole part and the rest in units of `places` digits, which are at least this number's own.
+    fn parts(self, places: u32) -> (i128, i128) {
+        let scale = |places| power_of_ten(places).unwrap_or(i128::MAX);
+        let own = scale(self.places);
+        (self.units.div_euclid(own), self.units.rem_euclid(own).saturating_mul(scale(places - self.places)))
     }
 }
 
@@ -274,6 +273,9 @@ mod tests {
         assert_eq!(of("-0.00").cmp_value(of("0")), Ordering::Equal);
         assert_eq!(of("9.9").cmp_value(of("10.01")), Ordering::Less);
         assert_eq!(of("-1").cmp_value(of("-1.5")), Ordering::Greater);
+        let huge = i128::MAX.to_string();
+        assert_eq!(of(&huge).cmp_value(of("0.000000001")), Ordering::Greater);
+        assert_eq!(of(&huge).cmp_value(of(&huge)), Ordering::Equal);
     }
 
     #[test]

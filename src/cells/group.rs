@@ -153,6 +153,7 @@ fn canonical_integer(text: &str) -> Option<i64> {
 #[cfg(test)]
 mod tests {
     use indexmap::IndexMap;
+    use proptest::prelude::*;
 
     use super::{GroupError, group};
     use crate::cells::cell::KeyValue;
@@ -242,5 +243,22 @@ mod tests {
     #[test]
     fn no_episode_gives_no_cell() {
         assert_eq!(keys(&[], &["model"]), Vec::<String>::new());
+    }
+
+    proptest! {
+        #[test]
+        fn cells_do_not_depend_on_the_order_of_episodes(
+            rows in prop::collection::vec((0_usize..3, 0_usize..3, 0..3, prop::option::of(-9_i64..9)), 0..30),
+            turn in 0_usize..30,
+        ) {
+            let names = ["a", "b", "c"];
+            let row = |&(e, m, s, value): &(usize, usize, i32, Option<i64>)| (names[e], names[m], s, None, value);
+            let rows: Vec<RowOf> = rows.iter().map(row).collect();
+            let mut turned = rows.clone();
+            turned.rotate_left(turn.min(rows.len()));
+            turned.reverse();
+            let grouped = |rows: &[RowOf]| group(&table(rows), &by(&["model", "seed"])).unwrap();
+            prop_assert_eq!(grouped(&rows), grouped(&turned));
+        }
     }
 }

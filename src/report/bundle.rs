@@ -1,6 +1,6 @@
 //! The folder of a report: every file in it whole, or none of them changed.
 //!
-//! All files are written into a new folder beside the target first and moved into place together. In a folder that
+//! All files are written into a temporary folder first and moved into place together. In a folder that
 //! exists, only the files that a report has are replaced; whatever else is there stays.
 
 use std::collections::BTreeSet;
@@ -10,6 +10,7 @@ use std::path::{Component, Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use tempfile::TempDir;
 
 use crate::base::number::full_precision;
 use crate::cells::cell::{Cells, Group};
@@ -127,6 +128,7 @@ impl Manifest {
     }
 
     /// The text of `manifest.json`.
+    #[expect(clippy::missing_panics_doc, reason = "strings, integers and lists always have a JSON text")]
     pub fn json(&self) -> String {
         let json = serde_json::to_string_pretty(self).expect("a manifest holds only strings, integers and lists");
         json + "\n"
@@ -137,10 +139,8 @@ impl Input {
     /// An input named as a manifest may name it: no absolute path, no way up, `/` between folders.
     pub fn new(path: &Path, sha256: String, bytes: u64, episodes: Option<u64>) -> Self {
         let is_plain = |part: &Component| matches!(part, Component::Normal(_) | Component::CurDir);
-        let shown = match path.components().all(|part| is_plain(&part)) {
-            true => path,
-            false => Path::new(path.file_name().unwrap_or(path.as_os_str())),
-        };
+        let is_inside = path.components().all(|part| is_plain(&part));
+        let shown = if is_inside { path } else { Path::new(path.file_name().unwrap_or(path.as_os_str())) };
         let parts = shown.components().filter(|part| matches!(part, Component::Normal(_)));
         let parts: Vec<_> = parts.map(|part| part.as_os_str().to_string_lossy()).collect();
         Self { path: parts.join("/"), sha256, bytes, episodes }
@@ -158,17 +158,23 @@ pub fn write(out: &Path, bundle: &Bundle) -> Result<Vec<PathBuf>, BundleError> {
     if out.exists() && !out.is_dir() {
         return Err(BundleError::NotAFolder { path: out.to_owned() });
     }
-    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let at_parent = |source| BundleError::Unwritable { path: parent.to_owned(), source };
-    fs::create_dir_all(parent).map_err(at_parent)?;
-    let beside = tempfile::Builder::new().prefix(".mirrorstats-").tempdir_in(parent).map_err(at_parent)?;
+    let stage = stage_for(out)?;
     // The temporary folder is private; the one in it gets the permissions that any new folder has.
-    let staged = beside.path().join("report");
+    let staged = stage.path().join("report");
     for file in &files {
         write_file(&staged.join(&file.path), &file.bytes)?;
     }
     put_in_place(&staged, out, &files)?;
     Ok(files.into_iter().map(|file| out.join(file.path)).collect())
+}
+
+/// A temporary folder on the file system of `out`: inside it if it exists, which may be a mounted volume, else beside.
+fn stage_for(out: &Path) -> Result<TempDir, BundleError> {
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let place = if out.is_dir() { out } else { parent };
+    let unwritable = |source| BundleError::Unwritable { path: place.to_owned(), source };
+    fs::create_dir_all(place).map_err(unwritable)?;
+    tempfile::Builder::new().prefix(".mirrorstats-").tempdir_in(place).map_err(unwritable)
 }
 
 /// Every file of the folder, ordered by path.

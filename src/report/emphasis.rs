@@ -27,7 +27,7 @@ pub fn emphasise(cells: &mut [&mut Cell], better: Better, rule: EmphasisRule) {
     }
     ranked.sort_by(|a, b| best_first(a, b));
     let ties_with =
-        |of: usize| ranked[of..].iter().take_while(|cell| best_first(cell, &ranked[of]) == Ordering::Equal).count();
+        |of: usize| ranked[of..].iter().take_while(|cell| best_first(cell, ranked[of]) == Ordering::Equal).count();
     let bold = ties_with(0);
     let underlined = if bold < ranked.len() { ties_with(bold) } else { 0 };
     if rule == EmphasisRule::ExactMean && bold == ranked.len() {

@@ -7,7 +7,7 @@ use crate::cells::cell::{Cells, Group, KeyValue};
 use crate::metric::catalog::{Catalog, Metric};
 use crate::report::emphasis::emphasise;
 use crate::report::style::{MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
-use crate::report::table::{Cell, Column, Row, RowGroup, Table, Value};
+use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 use crate::report::value;
 
 /// The tables of a report, in the order of the style; the first is `main`.
@@ -73,12 +73,11 @@ impl<'a> Layout<'a> {
         if self.cells.by.get(self.row_key).is_some_and(|key| key == "model") {
             self.emphasise(&mut groups, sheet);
         }
-        let is_any_marked = groups.iter().flat_map(|g| &g.rows).flat_map(|row| &row.cells).any(|cell| cell.is_marked);
         Table {
             name: name.to_owned(),
             title: sheet.title.clone(),
             note: sheet.note.clone(),
-            footnotes: is_any_marked.then(|| self.footnote()).into_iter().collect(),
+            footnotes: self.footnotes(&groups),
             label: sheet.label.clone(),
             undefined: self.style.sheet.undefined.clone(),
             form: self.print.cell,
@@ -89,8 +88,16 @@ impl<'a> Layout<'a> {
         }
     }
 
-    fn footnote(&self) -> String {
-        format!("† defined in fewer than {} episodes.", self.print.mark_n_below)
+    fn footnotes(&self, groups: &[RowGroup]) -> Vec<String> {
+        let cells = || groups.iter().flat_map(|group| &group.rows).flat_map(|row| &row.cells);
+        let mut notes = Vec::new();
+        if cells().any(|cell| cell.emphasis != Emphasis::Plain) {
+            notes.push(self.style.sheet.emphasis_note.clone());
+        }
+        if cells().any(|cell| cell.is_marked) {
+            notes.push(format!("{DAGGER} defined in fewer than {} episodes.", self.print.mark_n_below));
+        }
+        notes
     }
 
     fn column(&self, metric: &str) -> Column {
@@ -166,9 +173,10 @@ impl<'a> Layout<'a> {
         let moments = &group.moments[self.cells.metrics.iter().position(|metric| metric == name)?];
         let metric = self.cells.catalog.metric.get(name)?;
         let is_zero = moments.n == 0 && sheet.undefined_as_zero.iter().any(|zero| zero == name);
-        let value = match is_zero {
-            true => value::zero(metric, &self.print),
-            false => value::value(moments, metric, group.episodes, &self.print),
+        let value = if is_zero {
+            value::zero(metric, &self.print)
+        } else {
+            value::value(moments, metric, group.episodes, &self.print)
         };
         let is_marked = self.is_marked(metric, moments.n, &value);
         Some(Cell { is_marked, ..Cell::plain(value, moments, group.episodes) })

@@ -51,6 +51,9 @@ pub struct Sheet {
     /// What stands where a value is undefined.
     #[serde(default = "default_undefined")]
     pub undefined: String,
+    /// The sentence that explains emphasis, under tables where something is emphasised.
+    #[serde(default)]
+    pub emphasis_note: String,
     /// How cells print in every table, unless the table says otherwise.
     #[serde(default)]
     pub print: PrintSheet,
@@ -321,11 +324,6 @@ impl Style {
                 nearest: nearest(metric, catalog.metric.keys().map(String::as_str)).map(str::to_owned),
             })),
         }
-    }
-
-    /// The columns of a table, if the style has it.
-    pub fn columns(&self, table: &str) -> Option<&[String]> {
-        self.sheet.table.get(table).map(|sheet| &sheet.columns[..])
     }
 
     fn invalid(&self, fault: StyleFault) -> StyleError {

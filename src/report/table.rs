@@ -113,7 +113,7 @@ pub enum Value {
         mean: Decimal,
         /// Its Student interval.
         spread: Spread,
-        /// The episodes where it is defined, if those are not all.
+        /// The episodes where it is defined, if those are not all, or if it is a single one.
         n: Option<u64>,
     },
 }

@@ -23,11 +23,12 @@ pub fn value(moments: &Moments, metric: &Metric, episodes: u64, print: &Print) -
             spread: spread(interval(moments, metric), print.rounding, places),
         },
         (CellForm::CountInterval, Kind::Quantity) => {
-            let spread = match is_constant(moments) {
-                true => Spread::AllEqual,
-                false => spread(interval(moments, metric), print.rounding, places),
+            let spread = if is_constant(moments) {
+                Spread::AllEqual
+            } else {
+                spread(interval(moments, metric), print.rounding, places)
             };
-            Value::Mean { mean, spread, n: (moments.n != episodes).then_some(moments.n) }
+            Value::Mean { mean, spread, n: (moments.n != episodes || moments.n == 1).then_some(moments.n) }
         }
     }
 }

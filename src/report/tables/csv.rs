@@ -75,12 +75,12 @@ fn is_formula(text: &str) -> bool {
 }
 
 /// Writes one record; memory does not fail.
-pub fn write(writer: &mut ::csv::Writer<Vec<u8>>, record: impl IntoIterator<Item = String>) {
+pub(crate) fn write(writer: &mut ::csv::Writer<Vec<u8>>, record: impl IntoIterator<Item = String>) {
     writer.write_record(record).expect("records of one length written to memory");
 }
 
 /// The text written.
-pub fn finish(writer: ::csv::Writer<Vec<u8>>) -> String {
+pub(crate) fn finish(writer: ::csv::Writer<Vec<u8>>) -> String {
     let bytes = writer.into_inner().expect("flushing to memory does not fail");
     String::from_utf8(bytes).expect("every field is text")
 }

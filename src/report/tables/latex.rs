@@ -80,7 +80,8 @@ fn spell(cell: &Cell, table: &Table) -> String {
         Value::MeanSe { mean, se: Some(se) } => format!("{}{mark}", math(&format!("{mean} \\pm {se}"))),
         value => match value.parts(&table.undefined) {
             (estimate, None) => format!("{}{mark}", math(&estimate)),
-            (estimate, Some(detail)) => format!("{}{mark} {}", math(&estimate), escape(&detail)),
+            // A hyphen before a digit is a minus sign only in mathematics.
+            (estimate, Some(detail)) => format!("{}{mark} {}", math(&estimate), detail.replace('-', "$-$")),
         },
     }
 }

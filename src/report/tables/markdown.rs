@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use unicode_width::UnicodeWidthStr;
+
 use crate::base::visible::visible;
 use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 
@@ -25,7 +27,7 @@ fn push_group(text: &mut String, group: &RowGroup, table: &Table) {
     let mut lines = vec![header(table)];
     lines.extend(group.rows.iter().map(|row| cells(row, table)));
     let widths: Vec<usize> = (0..=table.columns.len())
-        .map(|at| lines.iter().map(|line| line[at].chars().count()).max().unwrap_or(0).max(3))
+        .map(|at| lines.iter().map(|line| line[at].width()).max().unwrap_or(0).max(3))
         .collect();
     text.push('\n');
     for (at, line) in lines.iter().enumerate() {
@@ -38,7 +40,8 @@ fn push_group(text: &mut String, group: &RowGroup, table: &Table) {
 
 fn push_line(text: &mut String, cells: &[String], widths: &[usize]) {
     for (at, (cell, &width)) in cells.iter().zip(widths).enumerate() {
-        let _ = if at == 0 { write!(text, "| {cell:<width$} |") } else { write!(text, " {cell:>width$} |") };
+        let room = " ".repeat(width.saturating_sub(cell.width()));
+        let _ = if at == 0 { write!(text, "| {cell}{room} |") } else { write!(text, " {room}{cell} |") };
     }
     text.push('\n');
 }

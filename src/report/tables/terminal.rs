@@ -126,7 +126,8 @@ impl Grid {
     }
 
     fn lines(&self, table: &Table) -> Vec<String> {
-        let rule = "─".repeat(self.width());
+        let headings = table.groups.iter().filter_map(heading).map(|heading| heading.width());
+        let rule = "─".repeat(headings.fold(self.width(), usize::max));
         let mut lines = vec![self.line(&self.header), rule.clone()];
         for (at, (group, rows)) in table.groups.iter().zip(&self.groups).enumerate() {
             if at > 0 {

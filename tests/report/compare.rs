@@ -1,7 +1,5 @@
 //! A table of ours beside a published one: what counts as a difference, and what excuses it.
 
-mod published;
-
 use std::fs;
 use std::path::Path;
 
@@ -18,18 +16,18 @@ fn file(text: &str) -> tempfile::NamedTempFile {
 }
 
 fn paper(table: &str) -> Published {
-    read(Path::new(&published::path(table, "csv"))).unwrap()
+    read(Path::new(&crate::published::path(table, "csv"))).unwrap()
 }
 
 fn against(published: &Published, errata: &Errata) -> Comparison {
     let style = Style::load("paper").unwrap();
-    let tables = published::tables("paper");
+    let tables = crate::published::tables("paper");
     compare(choose(&tables, published, None, &style).unwrap(), published, errata)
 }
 
 /// The published main table after `change`, compared under the paper's errata.
 fn changed(change: impl Fn(&str) -> String) -> Comparison {
-    let text = fs::read_to_string(published::path("main", "csv")).unwrap();
+    let text = fs::read_to_string(crate::published::path("main", "csv")).unwrap();
     against(&read(file(&change(&text)).path()).unwrap(), &Errata::of_paper())
 }
 
@@ -95,7 +93,7 @@ fn cells_that_one_side_lacks_are_told() {
 fn a_table_that_cannot_be_chosen_is_an_error() {
     let of = |style: &str, csv: &str, name: Option<&str>| {
         let published = read(file(&format!("experiment,model,metric,mean,se,emphasis\n{csv}\n")).path()).unwrap();
-        let tables = published::tables(style);
+        let tables = crate::published::tables(style);
         choose(&tables, &published, name, &Style::load(style).unwrap())
             .map(|table| table.name.clone())
             .map_err(|e| e.to_string())

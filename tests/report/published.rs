@@ -4,24 +4,25 @@
 //! episodes and the sum of squares that fits its standard error. Which one of several is chosen does not matter
 //! here: what is under test is how they print.
 
-#![allow(dead_code, reason = "each test file uses its own part")]
-
 use std::collections::BTreeMap;
 use std::fs;
+use std::sync::LazyLock;
 
 use indexmap::IndexMap;
 use mirrorstats::cells::cell::{Cells, Group, KeyValue};
 use mirrorstats::cells::moments::Moments;
-use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use mirrorstats::metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
+use mirrorstats::metric::definitions::Definitions;
 use mirrorstats::report::layout;
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::{Table, Value};
 use mirrorstats::report::value;
+use mirrorstats::score::run::schema_columns;
 
 /// Episodes behind every published cell.
 pub const EPISODES: u64 = 21;
 
-/// A published cell: mean, standard error and emphasis as printed.
+/// A published cell: mean and standard error as printed.
 #[derive(Clone, Debug)]
 pub struct Published {
     pub experiment: String,
@@ -29,7 +30,6 @@ pub struct Published {
     pub metric: String,
     pub mean: String,
     pub se: String,
-    pub emphasis: String,
 }
 
 pub fn path(table: &str, ending: &str) -> String {
@@ -40,14 +40,19 @@ pub fn published(table: &str) -> Vec<Published> {
     let text = fs::read_to_string(path(table, "csv")).unwrap();
     let line = |line: &str| {
         let fields: Vec<String> = line.split(',').map(str::to_owned).collect();
-        let [experiment, model, metric, mean, se, emphasis] = fields.try_into().unwrap();
-        Published { experiment, model, metric, mean, se, emphasis }
+        let [experiment, model, metric, mean, se, _] = fields.try_into().unwrap();
+        Published { experiment, model, metric, mean, se }
     };
     text.lines().skip(1).map(line).collect()
 }
 
 /// The cells behind both published tables.
 pub fn cells() -> Cells {
+    static CELLS: LazyLock<Cells> = LazyLock::new(find_cells);
+    CELLS.clone()
+}
+
+fn find_cells() -> Cells {
     let catalog = catalog();
     let style = Style::load("paper").unwrap();
     let mut found: BTreeMap<(String, String), IndexMap<String, Moments>> = BTreeMap::new();
@@ -122,40 +127,9 @@ pub fn tables(style: &str) -> Vec<Table> {
     layout::tables(&cells(), &Style::load(style).unwrap()).unwrap()
 }
 
-/// The definitions of the paper, as far as a table shows them.
+/// The definitions of the paper.
 pub fn catalog() -> Catalog {
-    let mut metric = IndexMap::new();
-    for (name, kind, better, is_conditional, se) in [
-        ("TSA", Kind::Rate, Better::Higher, false, StandardError::Sample),
-        ("TTD", Kind::Quantity, Better::Lower, false, StandardError::Sample),
-        ("MCR", Kind::Rate, Better::Higher, false, StandardError::Sample),
-        ("MTATO", Kind::Rate, Better::Higher, true, StandardError::Sample),
-        ("CAAL", Kind::Rate, Better::Higher, false, StandardError::Sample),
-        ("CR", Kind::Rate, Better::Lower, false, StandardError::Sample),
-        ("TSA-C", Kind::Rate, Better::Higher, true, StandardError::Sample),
-        ("MGD", Kind::Quantity, Better::Higher, false, StandardError::Sample),
-        ("SC", Kind::Rate, Better::Higher, true, StandardError::Sample),
-        ("AR_SC", Kind::Rate, Better::Neither, false, StandardError::Population),
-    ] {
-        let when = is_conditional.then(|| "some condition".to_owned());
-        metric.insert(name.to_owned(), metric_of(kind, better, when, se));
-    }
-    let experiment = [
-        ("E1", "Active mirror-based self-identification"),
-        ("E2", "Self-identification without mirror evidence"),
-        ("E3", "Self-identification under conflicting linguistic information"),
-        ("E4", "Self–other disambiguation under visual ambiguity"),
-        ("E5", "Robust self-identification under occlusion"),
-    ];
-    let experiment = (1..).zip(experiment).map(|(order, (name, title))| (name.to_owned(), experiment_of(title, order)));
-    Catalog {
-        name: "paper".to_owned(),
-        hash: "0".repeat(64),
-        open: false,
-        lets: IndexMap::new(),
-        metric,
-        experiment: experiment.collect(),
-    }
+    Definitions::load("paper", &schema_columns()).unwrap().catalog
 }
 
 pub fn metric_of(kind: Kind, better: Better, when: Option<String>, se: StandardError) -> Metric {
@@ -171,8 +145,4 @@ pub fn metric_of(kind: Kind, better: Better, when: Option<String>, se: StandardE
         se,
         chance: None,
     }
-}
-
-fn experiment_of(title: &str, order: i64) -> Experiment {
-    Experiment { title: title.to_owned(), order, chance: IndexMap::new(), reference: IndexMap::new() }
 }

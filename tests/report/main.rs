@@ -1,0 +1,8 @@
+//! Reports at the library boundary: styles in, tables, comparisons and folders out.
+
+mod bundle;
+mod compare;
+mod published;
+mod schemas;
+mod styles;
+mod tables;

@@ -16,7 +16,7 @@ pub const SEED: u64 = 0x6d69_7272_6f72;
 /// The bias-corrected and accelerated interval of the mean (Efron 1987), from [`RESAMPLES`] resamples.
 ///
 /// `None` for fewer than two values and for a confidence outside (0, 1). The bounds coincide where all
-/// values are equal: resampling knows no more. Values are small enough for their sum to fit 64 bits.
+/// values are equal: resampling knows no more.
 #[expect(clippy::cast_precision_loss, reason = "exact sums become one quotient here")]
 pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
     let tail = quantile::tail(confidence)?;
@@ -26,7 +26,7 @@ pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
     }
     let mut sorted = values.to_vec();
     sorted.sort_unstable();
-    let total: i64 = sorted.iter().sum();
+    let total = sorted.iter().copied().map(i128::from).sum();
     let sums = resampled_sums(&sorted);
     let correction = Correction { bias: bias(&sums, total), acceleration: acceleration(&sorted, total) };
     let deviate = quantile::normal(tail);
@@ -35,10 +35,10 @@ pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
 }
 
 /// The sums of all resamples, ascending.
-fn resampled_sums(values: &[i64]) -> Vec<i64> {
+fn resampled_sums(values: &[i64]) -> Vec<i128> {
     let mut random = SplitMix64(SEED);
-    let mut sums: Vec<i64> =
-        (0..RESAMPLES).map(|_| (0..values.len()).map(|_| values[random.below(values.len())]).sum()).collect();
+    let mut draw = || i128::from(values[random.below(values.len())]);
+    let mut sums: Vec<i128> = (0..RESAMPLES).map(|_| values.iter().map(|_| draw()).sum()).collect();
     sums.sort_unstable();
     sums
 }
@@ -59,7 +59,7 @@ impl Correction {
 
 /// The normal deviate of the share of resamples below the mean, equal ones counted half.
 #[expect(clippy::cast_precision_loss, reason = "at most the number of resamples")]
-fn bias(sums: &[i64], total: i64) -> f64 {
+fn bias(sums: &[i128], total: i128) -> f64 {
     let below = sums.partition_point(|&sum| sum < total);
     let not_above = sums.partition_point(|&sum| sum <= total);
     // One resample is always granted to each side: an infinite correction helps nobody.
@@ -70,10 +70,11 @@ fn bias(sums: &[i64], total: i64) -> f64 {
 
 /// A sixth of the skewness of the mean, by the jackknife (Efron 1987, section 6), from exact deviations.
 #[expect(clippy::cast_precision_loss, reason = "exact sums become one quotient here")]
-fn acceleration(values: &[i64], total: i64) -> f64 {
-    let deviations = values.iter().map(|&v| i128::from(v) * values.len() as i128 - i128::from(total));
-    let squares: f64 = deviations.clone().map(|d| (d * d) as f64).sum();
-    let cubes: f64 = deviations.map(|d| (d * d) as f64 * d as f64).sum();
+fn acceleration(values: &[i64], total: i128) -> f64 {
+    let size = values.len() as i128;
+    let deviations = values.iter().map(|&value| (i128::from(value) * size - total) as f64);
+    let squares: f64 = deviations.clone().map(|d| d * d).sum();
+    let cubes: f64 = deviations.map(|d| d * d * d).sum();
     if squares > 0.0 { cubes / (6.0 * squares * squares.sqrt()) } else { 0.0 }
 }
 

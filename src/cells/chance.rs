@@ -11,6 +11,9 @@ use crate::base::ratio::Ratio;
 /// Beyond exact weights, how near two weights count as equal.
 const TIE: f64 = 1e-12;
 
+/// No weights of more trials than this fit 128 bits.
+const MOST_EXACT: u64 = 128;
+
 /// The two-sided p value of `successes` in `n` trials under the rate `level`.
 ///
 /// `None` for n = 0, for more successes than trials, and for a level outside [0, 1].
@@ -43,6 +46,9 @@ fn exact(successes: u64, n: u64, odds: Odds) -> Option<f64> {
 }
 
 fn exact_weights(n: u64, odds: Odds) -> Option<Vec<u128>> {
+    if n > MOST_EXACT {
+        return None;
+    }
     let powers = |base: u64| successors(Some(1u128), move |power| power.checked_mul(base.into()));
     let length = usize::try_from(n).ok()?.checked_add(1)?;
     let (hits, misses): (Vec<u128>, Vec<u128>) = powers(odds.hit).zip(powers(odds.miss)).take(length).unzip();

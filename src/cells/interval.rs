@@ -20,6 +20,12 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// The part between `least` and `most`, where bounds beyond them mean nothing.
+    #[must_use]
+    pub fn within(self, least: f64, most: f64) -> Self {
+        Self { low: self.low.clamp(least, most), high: self.high.clamp(least, most) }
+    }
+
     /// Whether `value` lies between the bounds, bounds included.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high

@@ -113,7 +113,7 @@ impl Survival {
         }
         let (mut area, mut variance, mut later) = (0.0, 0.0, horizon);
         for point in self.points.iter().rev().filter(|point| point.steps < horizon) {
-            area += point.undecided * (later - point.steps) as f64;
+            area += point.undecided * (later as f64 - point.steps as f64);
             later = point.steps;
             let remaining = point.at_risk - point.decided;
             if remaining > 0 {

@@ -1,5 +1,7 @@
 //! The verbs: one file each.
 
+pub mod stats;
+
 use super::outcome::{Failure, Outcome};
 
 /// What to do.

@@ -7,21 +7,25 @@ use super::interval::Interval;
 use super::quantile;
 
 /// Resamples drawn. One less than a round number, so that the usual tails fall on whole ranks
-/// (Davison and Hinkley 1997, section 2.4).
+/// (Davison and Hinkley 1997).
 pub const RESAMPLES: usize = 9_999;
+
+/// The most values that are resampled: with more, Student's interval says the same at no cost.
+pub const MOST_VALUES: usize = 2_000;
 
 /// The seed of every bootstrap.
 pub const SEED: u64 = 0x6d69_7272_6f72;
 
-/// The bias-corrected and accelerated interval of the mean (Efron 1987), from [`RESAMPLES`] resamples.
+/// The bias-corrected and accelerated interval of the mean (Efron 1987), from [`RESAMPLES`] resamples:
+/// Efron and Tibshirani 1993, equations 14.9, 14.10, 14.14 and 14.15.
 ///
-/// `None` for fewer than two values and for a confidence outside (0, 1). The bounds coincide where all
+/// `None` for fewer than two values, for more than [`MOST_VALUES`], and for a confidence outside (0, 1). The bounds coincide where all
 /// values are equal: resampling knows no more.
 #[expect(clippy::cast_precision_loss, reason = "exact sums become one quotient here")]
 pub fn mean(values: &[i64], confidence: f64) -> Option<Interval> {
     let tail = quantile::tail(confidence)?;
     let n = values.len();
-    if n < 2 {
+    if !(2..=MOST_VALUES).contains(&n) {
         return None;
     }
     let mut sorted = values.to_vec();
@@ -50,7 +54,7 @@ struct Correction {
 }
 
 impl Correction {
-    /// The level of the resamples' distribution that stands for a normal deviate (Efron 1987, equation 3.9).
+    /// The level of the resamples' distribution that stands for a normal deviate.
     fn level(&self, deviate: f64) -> f64 {
         let moved = self.bias + deviate;
         quantile::normal_below(self.bias + moved / (1.0 - self.acceleration * moved))
@@ -68,7 +72,7 @@ fn bias(sums: &[i128], total: i128) -> f64 {
     if share <= 0.5 { -quantile::normal(share) } else { quantile::normal(1.0 - share) }
 }
 
-/// A sixth of the skewness of the mean, by the jackknife (Efron 1987, section 6), from exact deviations.
+/// A sixth of the skewness of the mean, by the jackknife, from exact deviations.
 #[expect(clippy::cast_precision_loss, reason = "exact sums become one quotient here")]
 fn acceleration(values: &[i64], total: i128) -> f64 {
     let size = values.len() as i128;
@@ -87,7 +91,7 @@ fn acceleration(values: &[i64], total: i128) -> f64 {
 )]
 fn rank(level: f64) -> usize {
     let position = (level * (RESAMPLES + 1) as f64).round();
-    position.clamp(1.0, RESAMPLES as f64) as usize - 1
+    (position.clamp(1.0, RESAMPLES as f64) as usize).saturating_sub(1)
 }
 
 /// A small generator of known quality and a stable stream (Steele, Lea and Flood 2014).
@@ -111,7 +115,7 @@ impl SplitMix64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{SplitMix64, mean};
+    use super::{MOST_VALUES, SplitMix64, mean};
 
     const SKEWED: [i64; 21] = [4, 8, 15, 16, 23, 42, 5, 7, 100, 100, 12, 30, 9, 11, 14, 6, 8, 10, 22, 31, 90];
 
@@ -143,6 +147,7 @@ mod tests {
         assert_eq!(mean(&[], 0.95), None);
         assert_eq!(mean(&[7], 0.95), None);
         assert_eq!(mean(&[7, 8], 1.0), None);
+        assert_eq!(mean(&[7; MOST_VALUES + 1], 0.95), None);
         let alike = mean(&[7, 7, 7], 0.95).unwrap();
         assert_eq!((alike.low, alike.high), (7.0, 7.0));
     }

@@ -23,12 +23,12 @@ pub struct Clustered {
     /// The cluster-robust standard error of the mean (Liang and Zeger 1986), times sqrt(C / (C - 1)):
     /// for clusters of equal size, the standard error of the cluster means.
     pub se: f64,
-    /// The mean plus and minus t(C - 1) of these standard errors (Cameron and Miller 2015, section VI.D).
+    /// The mean plus and minus t(C - 1) of these standard errors (Cameron and Miller 2015, section VI).
     pub interval: Interval,
-    /// The intraclass correlation by analysis of variance (Donner 1986, section 2), negative where clusters
+    /// The intraclass correlation by analysis of variance (Donner 1986), negative where clusters
     /// are more alike than their members; `None` where no value differs or every cluster has one value.
     pub icc: Option<f64>,
-    /// 1 + (m - 1) icc with m = sum of squared sizes / n, the size of a member's cluster (Kish 1965, section 5.4):
+    /// 1 + (m - 1) icc with m = sum of squared sizes / n, the size of a member's cluster (Kish 1965):
     /// by how much clustering multiplies the variance of the mean.
     pub design_effect: Option<f64>,
 }

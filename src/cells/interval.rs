@@ -57,7 +57,7 @@ pub fn clopper_pearson(successes: u64, n: u64, confidence: f64) -> Option<Interv
 }
 
 /// The equal-tailed credible interval of a rate under the Jeffreys prior Beta(1/2, 1/2)
-/// (Brown et al. 2001, section 3.1, with their modification at the ends: 0 for no success, 1 for no failure).
+/// (Brown et al. 2001, section 3.1.3, with their ends: 0 for no success, 1 for no failure).
 ///
 /// `None` as in [`wilson`].
 pub fn jeffreys(successes: u64, n: u64, confidence: f64) -> Option<Interval> {

@@ -48,7 +48,7 @@ impl Pairs {
         (self.n() > 0).then(|| (self.first_only as f64 - self.second_only as f64) / self.n() as f64)
     }
 
-    /// The exact two-sided test of no difference (`McNemar` 1947; exact form: Cochran 1950).
+    /// The exact two-sided test of no difference (`McNemar` 1947; as a sign test: Dixon and Mood 1946).
     ///
     /// Under no difference a discordant pair falls either way with probability 1/2. 1 where no pair is
     /// discordant; `None` without a pair.

@@ -58,7 +58,7 @@ pub enum Intervals {
     Quantity {
         /// Student's t with n - 1 degrees of freedom.
         student_t: Option<Interval>,
-        /// Bias-corrected and accelerated bootstrap, seeded.
+        /// Bias-corrected and accelerated bootstrap, seeded; none for very many values.
         bootstrap: Option<Interval>,
     },
 }

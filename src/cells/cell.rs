@@ -2,6 +2,9 @@
 
 use std::fmt;
 
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
 use super::moments::Moments;
 use crate::metric::catalog::Catalog;
 
@@ -29,8 +32,9 @@ pub struct Group {
     pub moments: Vec<Moments>,
 }
 
-/// A value of a key column; integers order as integers, before text.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+/// A value of a key column; integers order as integers, before text. In JSON: null, a number or a string.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
 pub enum KeyValue {
     /// A null of an optional key column.
     Missing,

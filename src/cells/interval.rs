@@ -1,7 +1,7 @@
 //! Confidence intervals of one cell: a rate from its counts, a mean from its moments.
 //!
-//! Rule: an interval that is not defined is `None`, never a point. Bounds of a rate stay inside [0, 1], and
-//! a rate of 0 or 1 still has an interval with a width: that is what tells `0/21` from `0/2100`.
+//! Rule: an interval that is not defined is `None`. Bounds of a rate stay inside [0, 1], and a rate of 0 or 1
+//! still has an interval with a width: that is what tells `0/21` from `0/2100`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -20,6 +20,12 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// The part between `least` and `most`, where bounds beyond them mean nothing.
+    #[must_use]
+    pub fn within(self, least: f64, most: f64) -> Self {
+        Self { low: self.low.clamp(least, most), high: self.high.clamp(least, most) }
+    }
+
     /// Whether `value` lies between the bounds, bounds included.
     pub fn contains(self, value: f64) -> bool {
         self.low <= value && value <= self.high
@@ -43,17 +49,54 @@ pub fn wilson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
     Some(Interval { low, high })
 }
 
+/// The exact interval of a rate (Clopper and Pearson 1934): never covers less than promised, often more.
+///
+/// Bounds are quantiles of beta distributions (Brown et al. 2001, section 4.2.1). Ends and `None` as in [`wilson`].
+pub fn clopper_pearson(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
+    equal_tails(successes, n, confidence, [(0.0, 1.0), (1.0, 0.0)])
+}
+
+/// The equal-tailed credible interval of a rate under the Jeffreys prior Beta(1/2, 1/2)
+/// (Brown et al. 2001, section 3.1.3, with their ends: 0 for no success, 1 for no failure).
+///
+/// `None` as in [`wilson`].
+pub fn jeffreys(successes: u64, n: u64, confidence: f64) -> Option<Interval> {
+    equal_tails(successes, n, confidence, [(0.5, 0.5), (0.5, 0.5)])
+}
+
+/// Beta quantiles with these additions to successes and failures, for the lower and the upper bound.
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+fn equal_tails(successes: u64, n: u64, confidence: f64, prior: [(f64, f64); 2]) -> Option<Interval> {
+    let failures = counted(successes, n)?;
+    let tail = quantile::tail(confidence)?;
+    let (k, rest) = (successes as f64, failures as f64);
+    let [below, above] = prior;
+    Some(Interval {
+        low: if successes == 0 { 0.0 } else { quantile::beta(tail, k + below.0, rest + below.1) },
+        high: if failures == 0 {
+            1.0
+        } else {
+            quantile::settled(1.0 - quantile::beta(tail, rest + above.1, k + above.0))
+        },
+    })
+}
+
 /// Student's interval of a mean: mean plus and minus t(n - 1) standard errors (Student 1908).
 ///
 /// `form` is the standard error that the metric's definition asks for. `None` for n < 2, where no
-/// spread can be estimated in either form, and for a confidence outside (0, 1).
+/// spread can be estimated in either form, and for a confidence outside (0, 1). The bounds coincide where all
+/// values are equal: the method knows no more.
 #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
 pub fn student_t(moments: &Moments, form: StandardError, confidence: f64) -> Option<Interval> {
+    let freedom = moments.n.checked_sub(1)?;
+    student_t_of(moments.mean()?, moments.se(form)?, freedom as f64, confidence)
+}
+
+/// The same for any estimate with its standard error and degrees of freedom; `None` unless these are positive.
+pub(super) fn student_t_of(estimate: f64, se: f64, freedom: f64, confidence: f64) -> Option<Interval> {
     let tail = quantile::tail(confidence)?;
-    let freedom = moments.n.checked_sub(1).filter(|&freedom| freedom > 0)?;
-    let (mean, se) = (moments.mean()?, moments.se(form)?);
-    let reach = quantile::student(tail, freedom as f64) * se;
-    Some(Interval { low: mean - reach, high: mean + reach })
+    let reach = (freedom > 0.0).then(|| quantile::student(tail, freedom) * se)?;
+    Some(Interval { low: estimate - reach, high: estimate + reach })
 }
 
 /// The failures among `n`, where there is an episode at all and no more successes than episodes.
@@ -64,7 +107,9 @@ fn counted(successes: u64, n: u64) -> Option<u64> {
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::{Interval, student_t, wilson};
+    use proptest::prelude::*;
+
+    use super::{Interval, clopper_pearson, jeffreys, student_t, wilson};
     use crate::cells::moments::Moments;
     use crate::metric::catalog::StandardError::{Population, Sample};
 
@@ -100,7 +145,7 @@ mod tests {
         }
     }
 
-    // statsmodels 0.14: proportion_confint(k, n, 0.05, "wilson")
+    // statsmodels 0.15.0: proportion_confint(k, n, 0.05, "wilson")
     #[test]
     fn wilson_is_the_known_one() {
         check(wilson(5, 21, 0.95), 0.106280130226365, 0.450911736829508);
@@ -109,11 +154,50 @@ mod tests {
         check(wilson(1, 3, 0.95), 0.061491944720396, 0.792340399197952);
     }
 
-    // scipy 1.18: stats.t.interval(0.95, 5, loc=mean(x), scale=sem(x, ddof))
+    // scipy 1.17.1: stats.t.interval(0.95, 5, loc=mean(x), scale=sem(x, ddof))
     #[test]
     fn student_is_the_known_one() {
         let m = of(&[4, 8, 15, 16, 23, 42]);
         check(student_t(&m, Sample, 0.95), 3.8423391926607877, 32.15766080733921);
         check(student_t(&m, Population, 0.95), 5.075883023855853, 30.92411697614415);
+    }
+
+    // statsmodels 0.15.0: proportion_confint(k, n, 0.05, "beta"), likewise "jeffreys" where 0 < k < n;
+    // at the ends Jeffreys is one-sided there, and its inner bound is the same.
+    #[test]
+    fn the_beta_intervals_are_the_known_ones() {
+        for (k, n, [cp_low, cp_high], [j_low, j_high]) in [
+            (0, 21, [0.0, 0.16109761521908], [0.0, 0.111470316193041]),
+            (1, 21, [0.00120488344836351, 0.238159909936821], [0.00518704310790212, 0.201755968321684]),
+            (5, 21, [0.0821758755930226, 0.471659827654621], [0.0971633529367245, 0.445703406360434]),
+            (20, 21, [0.761840090063179, 0.998795116551636], [0.798244031678316, 0.994812956892098]),
+            (21, 21, [0.83890238478092, 1.0], [0.888529683806959, 1.0]),
+            (1, 1, [0.025, 1.0], [0.146746316309575, 1.0]),
+            (300, 10000, [0.0267440137894148, 0.0335333642052194], [0.026791300097862, 0.033480681840341]),
+            (999, 1000, [0.994441075720173, 0.999974682512509], [0.995335541191209, 0.999892081195319]),
+        ] {
+            check(clopper_pearson(k, n, 0.95), cp_low, cp_high);
+            check(jeffreys(k, n, 0.95), j_low, j_high);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn intervals_hold_the_rate_and_mirror_and_nest(n in 1u64..400, part in 0.0f64..=1.0, confidence in 0.5f64..0.999) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, clippy::cast_precision_loss, reason = "a part of n")]
+            let k = (part * n as f64) as u64;
+            #[expect(clippy::cast_precision_loss, reason = "small counts")]
+            let rate = k as f64 / n as f64;
+            for method in [wilson, clopper_pearson, jeffreys] {
+                let (here, mirrored) = (method(k, n, confidence).unwrap(), method(n - k, n, confidence).unwrap());
+                prop_assert!(0.0 <= here.low && here.low < here.high && here.high <= 1.0);
+                prop_assert!(here.contains(rate), "{here:?} {rate}");
+                prop_assert!((here.low - (1.0 - mirrored.high)).abs() < 1e-10);
+                let wider = method(k, n, 0.9995).unwrap();
+                prop_assert!(wider.low <= here.low && here.high <= wider.high);
+            }
+            let (exact, credible) = (clopper_pearson(k, n, confidence).unwrap(), jeffreys(k, n, confidence).unwrap());
+            prop_assert!(exact.low <= credible.low && credible.high <= exact.high);
+        }
     }
 }

@@ -2,8 +2,17 @@
 //!
 //! Rule: integers until the last step. Nothing here formats a number or opens a file.
 
+pub mod bootstrap;
 pub mod cell;
-pub mod group;
+pub mod chance;
+pub mod clustered;
+pub mod contrast;
+pub mod detectable;
 pub mod interval;
+pub mod losses;
 pub mod moments;
+pub mod multiplicity;
+pub mod paired;
 mod quantile;
+pub mod survival;
+pub mod tied;

@@ -1,10 +1,10 @@
-//! Quantiles behind intervals: normal and Student's t, and the confidence they are asked for at.
+//! Quantiles behind intervals: normal, Student's t and beta, and the confidence they are asked for at.
 //!
 //! Rule: a quantile is given to twelve significant digits and no more. Logarithms and exponentials of
 //! a machine's mathematics library may differ in the last bit from another's; the digits kept do not,
 //! and everything later is plain arithmetic, so an interval has the same bits everywhere.
 
-use statrs::distribution::{Continuous, ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{Beta, Continuous, ContinuousCDF, Normal, StudentsT};
 
 /// Above this many degrees of freedom the expansion around the normal is exact to the digits kept.
 const EXPANSION_FROM: f64 = 1000.0;
@@ -19,6 +19,11 @@ pub fn tail(confidence: f64) -> Option<f64> {
 /// Takes 0 < `tail` <= 1/2, as [`tail`] gives.
 pub fn normal(tail: f64) -> f64 {
     settled(-Normal::standard().inverse_cdf(tail))
+}
+
+/// The share of the normal distribution below a deviate.
+pub fn normal_below(deviate: f64) -> f64 {
+    settled(Normal::standard().cdf(deviate))
 }
 
 /// Student's t that leaves `tail` above it, for `freedom` > 0 degrees of freedom.
@@ -47,6 +52,20 @@ fn student_expansion(z: f64, freedom: f64) -> f64 {
     z + terms.iter().rev().fold(0.0, |sum, term| (sum + term) / freedom)
 }
 
+/// The point of the beta distribution with shapes `a` and `b` that leaves `tail` below it.
+///
+/// The library's inverse is improved by Newton steps on its distribution function; a step that would
+/// leave (0, 1) is not taken.
+pub fn beta(tail: f64, a: f64, b: f64) -> f64 {
+    let distribution = Beta::new(a, b).expect("shapes are positive");
+    let start = distribution.inverse_cdf(tail);
+    let refined = (0..3).fold(start, |x, _| {
+        let next = x - (distribution.cdf(x) - tail) / distribution.pdf(x);
+        if next > 0.0 && next < 1.0 { next } else { x }
+    });
+    settled(refined)
+}
+
 /// `x` to twelve significant digits.
 pub fn settled(x: f64) -> f64 {
     format!("{x:.11e}").parse().expect("a printed number is a number")
@@ -61,7 +80,7 @@ mod tests {
         assert!((found / expected - 1.0).abs() < 2e-11, "found {found}, expected {expected}");
     }
 
-    // mpmath 1.3, 40 digits: sqrt(2) * erfinv(1 - 2 * tail)
+    // mpmath 1.4.1, 40 digits: sqrt(2) * erfinv(1 - 2 * tail)
     #[test]
     fn normal_deviates_are_the_known_ones() {
         close(normal(0.025), 1.95996398454005);
@@ -70,7 +89,7 @@ mod tests {
         close(normal(0.0005), 3.29052673149189);
     }
 
-    // scipy 1.18 stats.t.isf, refined with mpmath: findroot of betainc(d/2, 1/2, 0, d/(d+t*t))/2 - tail
+    // scipy 1.17.1 stats.t.isf, refined with mpmath: findroot of betainc(d/2, 1/2, 0, d/(d+t*t))/2 - tail
     #[test]
     fn student_deviates_are_the_known_ones() {
         for (freedom, at_025, at_005) in [

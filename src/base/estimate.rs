@@ -1,0 +1,57 @@
+//! Estimates as people read them: a fixed number of decimals, p values, intervals.
+//!
+//! For numbers that are floating-point to begin with; exact fractions are the business of `number`.
+
+/// What stands for a number that is not defined.
+pub const UNDEFINED: &str = "--";
+
+/// `value` to `places` decimals; zero has no sign. [`UNDEFINED`] for none and for what is not finite.
+pub fn fixed(value: Option<f64>, places: usize) -> String {
+    let Some(value) = value.filter(|value| value.is_finite()) else {
+        return UNDEFINED.to_owned();
+    };
+    let text = format!("{value:.places$}");
+    match text.strip_prefix('-') {
+        Some(digits) if digits.bytes().all(|b| b == b'0' || b == b'.') => digits.to_owned(),
+        _ => text,
+    }
+}
+
+/// A p value: three decimals, four below 0.001, and never a zero.
+pub fn p_value(p: Option<f64>) -> String {
+    match p {
+        Some(p) if p < 0.0001 => "<0.0001".to_owned(),
+        Some(p) if p < 0.001 => fixed(Some(p), 4),
+        _ => fixed(p, 3),
+    }
+}
+
+/// `[low, high]` to `places` decimals; [`UNDEFINED`] for none.
+pub fn bounds(bounds: Option<(f64, f64)>, places: usize) -> String {
+    bounds.map_or_else(
+        || UNDEFINED.to_owned(),
+        |(low, high)| format!("[{}, {}]", fixed(Some(low), places), fixed(Some(high), places)),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{bounds, fixed, p_value};
+
+    #[test]
+    fn zero_has_no_sign_and_nothing_is_not_zero() {
+        assert_eq!(fixed(Some(-0.0004), 3), "0.000");
+        assert_eq!(fixed(Some(-0.0006), 3), "-0.001");
+        assert_eq!(fixed(Some(12.345), 1), "12.3");
+        assert_eq!([fixed(None, 3), fixed(Some(f64::NAN), 3)], ["--"; 2]);
+        assert_eq!(bounds(Some((0.0, 0.1546)), 3), "[0.000, 0.155]");
+        assert_eq!(bounds(None, 3), "--");
+    }
+
+    #[test]
+    fn a_small_p_value_is_not_zero() {
+        let found = [1.0, 0.0391, 0.00027, 1e-30, 0.0].map(|p| p_value(Some(p)));
+        assert_eq!(found, ["1.000", "0.039", "0.0003", "<0.0001", "<0.0001"]);
+        assert_eq!(p_value(None), "--");
+    }
+}

@@ -1,0 +1,75 @@
+//! What a comparison of this size could have shown at all.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::quantile;
+
+/// The power that [`Detectable::likely`] is stated at.
+pub const POWER: f64 = 0.8;
+
+/// The smallest difference of two paired rates that an exact `McNemar` test of n pairs could have shown.
+///
+/// In the most favourable case: all discordant pairs point the same way. With pairs in both directions more is needed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Detectable {
+    /// The number of pairs.
+    pub n: u64,
+    /// The level that p must not exceed.
+    pub level: f64,
+    /// The fewest pairs, all in one direction, with p at most the level.
+    pub pairs: u64,
+    /// The same as a difference of rates: the smallest one that could have been significant.
+    pub smallest: f64,
+    /// The true difference that would have been found with a probability of 0.8.
+    pub likely: f64,
+}
+
+/// The smallest detectable difference of `n` pairs at `level`; `None` where no outcome reaches it.
+///
+/// A family of m tests under Holm's procedure needs `level / m` for its first rejection.
+/// d pairs in one direction have p = 2^(1-d); the power is a binomial tail, inverted by the beta distribution.
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+pub fn detectable(n: u64, level: f64) -> Option<Detectable> {
+    let mut p = 1.0;
+    let mut pairs = 1;
+    while p > level {
+        p /= 2.0;
+        pairs += 1;
+        if pairs > n {
+            return None;
+        }
+    }
+    (n > 0).then(|| Detectable {
+        n,
+        level,
+        pairs,
+        smallest: pairs as f64 / n as f64,
+        likely: 1.0 - quantile::beta(quantile::settled(1.0 - POWER), (n - pairs + 1) as f64, pairs as f64),
+    })
+}
+
+#[cfg(test)]
+#[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
+mod tests {
+    use super::detectable;
+
+    // scipy 1.17.1: beta.ppf(0.8, k, n - k + 1); 2 * 0.5**6 = 0.03125 is the first p at most 0.05
+    #[test]
+    fn twenty_one_pairs_show_six_at_best() {
+        let one = detectable(21, 0.05).unwrap();
+        assert_eq!((one.pairs, one.smallest), (6, 6.0 / 21.0));
+        assert!((one.likely - 0.35032843001535).abs() < 1e-10, "{one:?}");
+        let family = detectable(21, 0.05 / 28.0).unwrap();
+        assert_eq!(family.pairs, 11);
+        assert!((family.likely - 0.589997196567057).abs() < 1e-10, "{family:?}");
+    }
+
+    #[test]
+    fn five_pairs_can_show_nothing() {
+        assert_eq!(detectable(5, 0.05), None);
+        assert_eq!(detectable(6, 0.05).unwrap().pairs, 6);
+        assert_eq!(detectable(0, 0.05), None);
+        assert_eq!(detectable(21, 0.0), None);
+    }
+}

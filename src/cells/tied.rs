@@ -1,0 +1,90 @@
+//! Tied sets: which members of a family no test tells apart, in place of ranks.
+//!
+//! Rule: a set is tied when no two of its members are separated, and it is given whole: every maximal such
+//! set, as in a compact letter display (Piepho 2004). Sets overlap where separation is not transitive,
+//! which is the rule rather than the exception at n = 21.
+
+/// All maximal tied sets among `count` members; `separated` is asked with the smaller index first.
+///
+/// Members ascend within a set, sets ascend by their members; each member is in at least one.
+/// The search is Bron and Kerbosch's with a pivot (1973), exponential only where ties are contrived.
+pub fn tied_sets(count: usize, separated: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
+    let tied = Ties {
+        rows: (0..count).map(|a| (0..count).map(|b| a != b && !separated(a.min(b), a.max(b))).collect()).collect(),
+    };
+    let mut found = Vec::new();
+    if count > 0 {
+        tied.grow(&mut Vec::new(), (0..count).collect(), Vec::new(), &mut found);
+    }
+    found.sort();
+    found
+}
+
+struct Ties {
+    rows: Vec<Vec<bool>>,
+}
+
+impl Ties {
+    /// Extends `set` by each candidate in turn; a set that neither a candidate nor an excluded member extends is whole.
+    fn grow(
+        &self,
+        set: &mut Vec<usize>,
+        mut candidates: Vec<usize>,
+        mut excluded: Vec<usize>,
+        found: &mut Vec<Vec<usize>>,
+    ) {
+        if candidates.is_empty() && excluded.is_empty() {
+            let mut whole = set.clone();
+            whole.sort_unstable();
+            found.push(whole);
+            return;
+        }
+        for member in self.away_from_pivot(&candidates, &excluded) {
+            set.push(member);
+            self.grow(set, self.tied_to(member, &candidates), self.tied_to(member, &excluded), found);
+            set.pop();
+            candidates.retain(|&other| other != member);
+            excluded.push(member);
+        }
+    }
+
+    fn tied_to(&self, member: usize, others: &[usize]) -> Vec<usize> {
+        others.iter().copied().filter(|&other| self.rows[member][other]).collect()
+    }
+
+    /// The candidates not tied to the pivot, the vertex tied to most of them: the others are reached through it.
+    fn away_from_pivot(&self, candidates: &[usize], excluded: &[usize]) -> Vec<usize> {
+        let pivot =
+            candidates.iter().chain(excluded).copied().max_by_key(|&pivot| self.tied_to(pivot, candidates).len());
+        candidates.iter().copied().filter(|&member| pivot.is_none_or(|pivot| !self.rows[pivot][member])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::tied_sets;
+
+    #[test]
+    fn sets_are_maximal_and_may_overlap() {
+        assert_eq!(tied_sets(3, |_, _| false), [[0, 1, 2]]);
+        assert_eq!(tied_sets(3, |_, _| true), [[0], [1], [2]]);
+        assert_eq!(tied_sets(3, |a, b| (a, b) == (0, 2)), [[0, 1], [1, 2]]);
+        assert_eq!(tied_sets(0, |_, _| true), Vec::<Vec<usize>>::new());
+    }
+
+    proptest! {
+        #[test]
+        fn the_sets_are_those_of_trying_every_subset(bits in prop::collection::vec(any::<bool>(), 64)) {
+            const COUNT: usize = 8;
+            let separated = |a: usize, b: usize| bits[a * COUNT + b];
+            let is_tied = |mask: usize| (0..COUNT).all(|b| (0..b).all(|a| mask >> a & mask >> b & 1 == 0 || !separated(a, b)));
+            let whole = |mask: usize| is_tied(mask) && (0..COUNT).all(|m| mask >> m & 1 == 1 || !is_tied(mask | 1 << m));
+            let mut expected: Vec<Vec<usize>> =
+                (1usize..1 << COUNT).filter(|&m| whole(m)).map(|m| (0..COUNT).filter(|i| m >> i & 1 == 1).collect()).collect();
+            expected.sort();
+            prop_assert_eq!(tied_sets(COUNT, separated), expected);
+        }
+    }
+}

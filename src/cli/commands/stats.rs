@@ -1,0 +1,100 @@
+//! `mirrorstats stats`: what can be concluded at this n, and what cannot.
+
+use std::collections::BTreeSet;
+use std::io::Write as _;
+
+use crate::base::near::nearest;
+use crate::cells::cell::Cells;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::report::statistics::{Options, Statistics, text};
+use crate::score::table::EpisodeTable;
+
+/// The word that stands for every metric.
+const ALL: &str = "all";
+
+/// What `stats` prints, and how.
+#[derive(Clone, Debug, clap::Args)]
+pub struct StatsArgs {
+    /// Confidence of every interval; tests are at one minus it
+    #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = confidence)]
+    pub confidence: f64,
+    /// Metrics to print tables for, or `all` [default: those with a chance level, and time to decision]
+    #[arg(long = "metric", value_name = "NAME")]
+    pub metrics: Vec<String>,
+    /// Horizon of restricted means, in steps [default: the last step known for every model of an experiment]
+    #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(i64).range(1..))]
+    pub horizon: Option<i64>,
+    /// Print everything as JSON, of every metric
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A metric asked for that the definitions do not have.
+#[derive(Debug, thiserror::Error)]
+#[error("no metric is named `{name}`; the definitions have {known}{suggestion}")]
+struct UnknownMetric {
+    name: String,
+    known: String,
+    suggestion: String,
+}
+
+impl StatsArgs {
+    /// Prints the statistics of `table`; `cells` are its cells as grouped, `lost` the episodes that the
+    /// infrastructure ended, where the traces say.
+    ///
+    /// # Errors
+    /// For a metric that is not there or too large to square, and when standard output cannot be written.
+    pub fn print(
+        &self,
+        table: &EpisodeTable,
+        cells: &Cells,
+        lost: Option<BTreeSet<String>>,
+    ) -> Result<Outcome, Failure> {
+        let options = Options { confidence: self.confidence, horizon: self.horizon, lost };
+        let statistics = Statistics::of(table, cells, &options).map_err(Failure::input)?;
+        let text = if self.json {
+            serde_json::to_string_pretty(&statistics).map_err(Failure::input)? + "\n"
+        } else {
+            text::render(&statistics, &self.chosen(table, &statistics)?)
+        };
+        std::io::stdout().lock().write_all(text.as_bytes())?;
+        Ok(Outcome::Done)
+    }
+
+    fn chosen(&self, table: &EpisodeTable, statistics: &Statistics) -> Result<Vec<String>, Failure> {
+        let known: Vec<&str> = table.metrics.iter().map(|column| column.name.as_str()).collect();
+        if self.metrics.is_empty() {
+            return Ok(statistics.headline.clone());
+        }
+        if self.metrics.iter().any(|name| name == ALL) {
+            return Ok(known.into_iter().map(str::to_owned).collect());
+        }
+        match self.metrics.iter().find(|name| !known.contains(&name.as_str())) {
+            None => Ok(self.metrics.clone()),
+            Some(name) => {
+                let like = nearest(name, known.iter().copied());
+                let suggestion = like.map_or_else(String::new, |like| format!("; did you mean `{like}`?"));
+                Err(Failure::input(UnknownMetric { name: name.clone(), known: known.join(", "), suggestion }))
+            }
+        }
+    }
+}
+
+fn confidence(text: &str) -> Result<f64, String> {
+    let fault = || format!("expected a number between 0 and 1 such as 0.95, found `{text}`");
+    let value: f64 = text.parse().map_err(|_| fault())?;
+    if value > 0.0 && value < 1.0 { Ok(value) } else { Err(fault()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::confidence;
+
+    #[test]
+    fn a_confidence_lies_strictly_between_zero_and_one() {
+        assert_eq!(confidence("0.99"), Ok(0.99));
+        for text in ["0", "1", "95", "-0.5", "NaN", "", "95%"] {
+            assert!(confidence(text).unwrap_err().contains("between 0 and 1"), "{text}");
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Every cell with its count and its intervals.
+
+use std::collections::BTreeMap;
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::study::{Study, counts};
+use crate::cells::bootstrap;
+use crate::cells::cell::{Cells, Group, KeyValue};
+use crate::cells::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
+use crate::metric::catalog::{Kind, StandardError};
+use crate::score::table::EpisodeTable;
+
+/// Conditional metrics with fewer defined episodes than this are marked.
+pub const FEW: u64 = 5;
+
+/// One cell: the episodes of one group under one metric.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct CellRow {
+    /// The group, by the columns grouped by.
+    pub key: IndexMap<String, KeyValue>,
+    /// The metric.
+    pub metric: String,
+    /// A rate or a quantity.
+    pub kind: Kind,
+    /// The episodes of the group.
+    pub episodes: u64,
+    /// Those in which the metric is defined: the denominator.
+    pub n: u64,
+    /// The sum of the values; for a rate, the successes.
+    pub sum: i128,
+    /// The arithmetic mean.
+    pub mean: Option<f64>,
+    /// The standard error that the definition asks for.
+    pub se: Option<f64>,
+    /// The intervals that fit the kind.
+    pub intervals: Intervals,
+    /// Whether a conditional metric rests on fewer than five episodes here.
+    pub few: bool,
+}
+
+/// Intervals of a mean, by kind.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, deny_unknown_fields)]
+pub enum Intervals {
+    /// Of a rate, from its counts.
+    Rate {
+        /// Score interval, the default.
+        wilson: Option<Interval>,
+        /// Exact interval.
+        clopper_pearson: Option<Interval>,
+        /// Equal-tailed credible interval.
+        jeffreys: Option<Interval>,
+    },
+    /// Of the mean of a quantity.
+    Quantity {
+        /// Student's t with n - 1 degrees of freedom.
+        student_t: Option<Interval>,
+        /// Bias-corrected and accelerated bootstrap, seeded; none for very many values.
+        bootstrap: Option<Interval>,
+    },
+}
+
+impl CellRow {
+    /// All cells, in the order of the groups and metrics.
+    pub(super) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
+        let rows = rows_by_group(study.table, &cells.by);
+        cells.groups.iter().flat_map(|group| Self::of_group(study, cells, group, &rows, confidence)).collect()
+    }
+
+    fn of_group(
+        study: &Study,
+        cells: &Cells,
+        group: &Group,
+        rows: &BTreeMap<Vec<String>, Vec<usize>>,
+        confidence: f64,
+    ) -> Vec<Self> {
+        let key: IndexMap<String, KeyValue> = cells.by.iter().cloned().zip(group.key.iter().cloned()).collect();
+        let texts: Vec<String> = group.key.iter().map(ToString::to_string).collect();
+        let rows = rows.get(&texts).map_or(&[][..], Vec::as_slice);
+        let of_metric = |(metric, moments)| {
+            let moments: &crate::cells::moments::Moments = moments;
+            let metric: &String = metric;
+            let kind = study.kind(metric);
+            let definition = study.metric(metric);
+            let se = definition.map_or(StandardError::Sample, |definition| definition.se);
+            let intervals = match (kind, counts(moments)) {
+                (Kind::Rate, Some((k, n))) => Intervals::rate(k, n, confidence),
+                _ => Intervals::Quantity {
+                    student_t: student_t(moments, se, confidence),
+                    bootstrap: bootstrap::mean(&values(study, metric, rows), confidence),
+                },
+            };
+            Self {
+                key: key.clone(),
+                metric: metric.clone(),
+                kind,
+                episodes: group.episodes,
+                n: moments.n,
+                sum: moments.sum,
+                mean: moments.mean(),
+                se: moments.se(se),
+                intervals,
+                few: moments.n < FEW && definition.is_some_and(|definition| definition.when.is_some()),
+            }
+        };
+        cells.metrics.iter().zip(&group.moments).map(of_metric).collect()
+    }
+}
+
+impl Intervals {
+    fn rate(successes: u64, n: u64, confidence: f64) -> Self {
+        Self::Rate {
+            wilson: wilson(successes, n, confidence),
+            clopper_pearson: clopper_pearson(successes, n, confidence),
+            jeffreys: jeffreys(successes, n, confidence),
+        }
+    }
+}
+
+fn values(study: &Study, metric: &str, rows: &[usize]) -> Vec<i64> {
+    study.column(metric).map_or_else(Vec::new, |column| rows.iter().filter_map(|&row| column.values[row]).collect())
+}
+
+/// The rows of the table by the text of their key; a column that the table lacks is empty everywhere.
+fn rows_by_group(table: &EpisodeTable, by: &[String]) -> BTreeMap<Vec<String>, Vec<usize>> {
+    let mut rows: BTreeMap<Vec<String>, Vec<usize>> = BTreeMap::new();
+    for row in 0..table.len() {
+        rows.entry(by.iter().map(|name| key_text(table, name, row)).collect()).or_default().push(row);
+    }
+    rows
+}
+
+fn key_text(table: &EpisodeTable, name: &str, row: usize) -> String {
+    let key = &table.keys[row];
+    match name {
+        "experiment" => key.experiment.clone(),
+        "model" => key.model.clone(),
+        "seed" => key.seed.to_string(),
+        "run" => key.run.to_string(),
+        "episode_id" => key.episode_id.clone(),
+        label => {
+            let column = table.labels.iter().find(|column| column.name == label);
+            column.and_then(|column| column.values[row].clone()).unwrap_or_default()
+        }
+    }
+}

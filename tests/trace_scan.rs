@@ -37,8 +37,8 @@ fn rows(episodes: &[(&str, usize)]) -> Vec<Row> {
         model: format!("model of {}", &id[..1]),
         seed: 3,
         t: i64::try_from(t).unwrap(),
-        action: (t % 3 != 0).then(|| ["turn_left", "done"][t % 2].into()),
-        px: (t % 2 == 0).then_some(i64::try_from(t * 10).unwrap()),
+        action: (!t.is_multiple_of(3)).then(|| ["turn_left", "done"][t % 2].into()),
+        px: t.is_multiple_of(2).then_some(i64::try_from(t * 10).unwrap()),
         visible: t % 4 == 1,
     };
     episodes.iter().flat_map(|(id, steps)| (1..=*steps).map(move |t| row(id, t))).collect()

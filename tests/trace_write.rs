@@ -4,6 +4,7 @@ use std::fs;
 
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
+use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 fn episode(id: &str, steps: usize) -> Episode {
@@ -27,7 +28,9 @@ fn with_extra(mut episode: Episode, extra: Extra) -> Episode {
 
 fn encode(metadata: &TraceMetadata, episodes: &[Episode]) -> Vec<u8> {
     let mut encoder = TraceEncoder::new(Vec::new(), metadata).unwrap();
-    episodes.iter().for_each(|episode| encoder.write(episode).unwrap());
+    for episode in episodes {
+        encoder.write(episode).unwrap();
+    }
     encoder.finish().unwrap()
 }
 
@@ -45,7 +48,7 @@ fn row_groups_end_where_episodes_do() {
     let path = folder.path().join("long.parquet");
     write_episodes(&path, None, &episodes).unwrap();
     let reader = SerializedFileReader::new(fs::File::open(&path).unwrap()).unwrap();
-    let rows: Vec<_> = reader.metadata().row_groups().iter().map(|group| group.num_rows()).collect();
+    let rows: Vec<_> = reader.metadata().row_groups().iter().map(RowGroupMetaData::num_rows).collect();
     assert_eq!(rows, [132 * 999, 132 * 999, 132 * 999, 5 * 999]);
 }
 

@@ -8,6 +8,7 @@ pub mod chance;
 pub mod clustered;
 pub mod contrast;
 pub mod detectable;
+pub mod group;
 pub mod interval;
 pub mod losses;
 pub mod moments;

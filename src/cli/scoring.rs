@@ -1,5 +1,6 @@
 //! From what was typed to the episode table: traces are scored, files of scores are read.
 
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io;
 use std::num::NonZeroUsize;
@@ -7,6 +8,8 @@ use std::num::NonZeroUsize;
 use super::args::{ScoringArgs, TraceArgs};
 use super::outcome::Failure;
 use crate::base::hash;
+use crate::cells::group::KEY_COLUMNS;
+use crate::cells::losses::INFRASTRUCTURE;
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
@@ -169,6 +172,41 @@ fn at(input: &Input, error: impl std::error::Error) -> Failure {
         cause = error.source();
     }
     Failure::Rendered(text)
+}
+
+/// The columns among those to group by that a score does not have by itself.
+pub fn labels(by: &[String]) -> Vec<String> {
+    by.iter().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
+}
+
+/// The episodes that the infrastructure ended: without `done`, their last reply lost. `None` where the files do not say.
+///
+/// # Errors
+/// What is wrong with the traces.
+pub fn lost(inputs: &[Input], threads: NonZeroUsize) -> Result<Option<BTreeSet<String>>, Failure> {
+    if inputs.iter().any(is_scores) {
+        return Ok(None);
+    }
+    let traces = open(inputs)?;
+    if traces.column("reply_status").is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some()) {
+        return Ok(None);
+    }
+    let columns = run::trace_columns(&traces);
+    let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
+    let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
+    let nothing = Definitions::from_toml("losses", "", &columns).map_err(definition_failure)?;
+    let definitions = nothing.filtered("losses", &ended, &columns).map_err(Failure::input)?;
+    let table = run::score(&traces, &definitions, &[], threads).map_err(score_failure)?;
+    Ok(Some(table.keys.into_iter().map(|key| key.episode_id).collect()))
+}
+
+/// The experiments that the definitions know; any if `None`.
+///
+/// # Errors
+/// Every fault of the definitions.
+pub fn known_experiments(definitions: &str) -> Result<Option<Vec<String>>, Failure> {
+    let catalog = Definitions::load(definitions, &run::schema_columns()).map_err(definition_failure)?.catalog;
+    Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
 }
 
 /// The inputs as a manifest names them, with their hashes.

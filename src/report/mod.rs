@@ -1,5 +1,16 @@
-//! From cells to bytes: tables, and the folder of a report.
+//! From cells to bytes: tables, their comparison with published ones, and the folder of a report.
 //!
-//! Rule: this room sees no trace and no plan, only cells and the episode table.
+//! Rule: this room sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
+//! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`bundle`] writes the folder.
 
+pub mod bundle;
+pub mod comparison;
+pub mod emphasis;
+pub mod errata;
+pub mod layout;
+pub mod published;
 pub mod statistics;
+pub mod style;
+pub mod table;
+pub mod tables;
+pub mod value;

@@ -4,8 +4,10 @@
 
 mod contain;
 mod decode;
+pub mod describe;
 pub mod episode;
 pub mod finding;
+pub mod info;
 pub mod inputs;
 mod layout;
 pub mod open;
@@ -14,4 +16,5 @@ mod rules;
 pub mod scan;
 pub mod schema;
 mod source;
+pub mod validate;
 pub mod write;

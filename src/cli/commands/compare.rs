@@ -3,17 +3,16 @@
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
-use crate::cells::cell::Cells;
 use crate::cells::group::{DEFAULT_BY, group};
-use crate::cli::args::TraceArgs;
+use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::scoring;
 use crate::report::comparison::{Comparison, choose, compare};
 use crate::report::errata::Errata;
 use crate::report::layout;
 use crate::report::published;
 use crate::report::style::Style;
 use crate::report::tables::side_by_side;
-use crate::score::table::EpisodeTable;
 
 /// The style that printed the published tables.
 const PAPER_STYLE: &str = "paper";
@@ -27,6 +26,9 @@ pub struct CompareArgs {
     /// Published cells: a CSV file with the columns experiment,model,metric,mean,se,emphasis
     #[arg(long, value_name = "FILE")]
     pub published: PathBuf,
+    /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub definitions: Option<String>,
     /// The style that prints the tables: `paper` or a style file
     #[arg(long, value_name = "STYLE", default_value = PAPER_STYLE)]
     pub style: String,
@@ -42,17 +44,20 @@ pub struct CompareArgs {
 }
 
 impl CompareArgs {
-    /// Compares what `score` makes of the traces; the check holds if every difference is excused.
+    /// Scores the traces and compares; the check holds if every difference is excused.
     ///
     /// # Errors
-    /// For files that are not as they must be, and for whatever keeps `score` from its end.
-    pub fn run(self, score: impl FnOnce(&TraceArgs) -> Result<EpisodeTable, Failure>) -> Result<Outcome, Failure> {
+    /// For files and definitions that are not as they must be.
+    pub fn run(self) -> Result<Outcome, Failure> {
         // The small files first: a slip in them should not cost a pass over the traces.
         let published = published::read(&self.published).map_err(Failure::input)?;
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let errata = self.errata()?;
         let by = DEFAULT_BY.map(str::to_owned);
-        let cells: Cells = group(&score(&self.traces)?, &by).map_err(Failure::input)?;
+        let inputs = scoring::resolve(&self.traces)?;
+        let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
+        let episodes = scoring::table(&inputs, &scoring, &[], self.traces.threads.count())?;
+        let cells = group(&episodes, &by).map_err(Failure::input)?;
         let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
         let table = choose(&tables, &published, self.table.as_deref(), &style).map_err(Failure::input)?;
         let comparison = compare(table, &published, &errata);

@@ -121,14 +121,12 @@ fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> 
 
 fn explain(metric: &str, definitions: &str, json: bool) -> Result<Outcome, Failure> {
     let definitions = Definitions::load(definitions, &run::schema_columns()).map_err(scoring::definition_failure)?;
-    match definitions.explain(metric) {
-        Some(explanation) => output::print(&explanation, json),
-        None => {
-            let known: Vec<String> = definitions.catalog.metric.keys().cloned().collect();
-            let near = nearest(metric, known.iter().map(String::as_str)).map(str::to_owned);
-            Err(Failure::input(UnknownMetric { name: metric.to_owned(), near, known }))
-        }
+    if let Some(explanation) = definitions.explain(metric) {
+        return output::print(&explanation, json);
     }
+    let known: Vec<String> = definitions.catalog.metric.keys().cloned().collect();
+    let near = nearest(metric, known.iter().map(String::as_str)).map(str::to_owned);
+    Err(Failure::input(UnknownMetric { name: metric.to_owned(), near, known }))
 }
 
 fn show(name: &str) -> Result<Outcome, Failure> {

@@ -1,12 +1,29 @@
 //! The verbs: one file each.
 
+pub mod compare;
+pub mod definitions;
+pub mod info;
+pub mod report;
+pub mod schema;
+pub mod score;
 pub mod stats;
+pub mod validate;
 
 use super::outcome::{Failure, Outcome};
 
 /// What to do.
 #[derive(Debug, clap::Subcommand)]
-pub enum Command {}
+#[expect(missing_docs, reason = "the words of each verb stand with its arguments")]
+pub enum Command {
+    Report(report::ReportArgs),
+    Score(score::ScoreArgs),
+    Stats(stats::StatsArgs),
+    Compare(compare::CompareArgs),
+    Validate(validate::ValidateCommand),
+    Info(info::InfoCommand),
+    Schema(schema::SchemaCommand),
+    Definitions(definitions::DefinitionsArgs),
+}
 
 impl Command {
     /// Does it.
@@ -14,6 +31,15 @@ impl Command {
     /// # Errors
     /// Whatever keeps the command from running to its end.
     pub fn run(self) -> Result<Outcome, Failure> {
-        match self {}
+        match self {
+            Self::Report(args) => args.run(),
+            Self::Score(args) => args.run(),
+            Self::Stats(args) => args.run(),
+            Self::Compare(args) => args.run(),
+            Self::Validate(command) => command.run(),
+            Self::Info(command) => command.run(),
+            Self::Schema(command) => command.run(),
+            Self::Definitions(args) => args.run(),
+        }
     }
 }

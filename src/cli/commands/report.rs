@@ -10,7 +10,7 @@ use super::super::args::{ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, scoring};
 use crate::cells::cell::Cells;
-use crate::cells::group::{DEFAULT_BY, KEY_COLUMNS, group};
+use crate::cells::group::{DEFAULT_BY, group};
 use crate::report::bundle::{self, Bundle, Manifest};
 use crate::report::layout;
 use crate::report::style::{MAIN_TABLE, Style};
@@ -64,8 +64,7 @@ impl ReportArgs {
         // Small files first: a slip in the style should not cost a pass over the traces.
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let inputs = scoring::resolve(&self.traces)?;
-        let labels: Vec<String> =
-            self.by.iter().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect();
+        let labels = scoring::labels(&self.by);
         let episodes = scoring::table(&inputs, &self.scoring, &labels, self.traces.threads.count())?;
         let cells = group(&episodes, &self.by).map_err(Failure::input)?;
         let tables = layout::tables(&cells, &style).map_err(Failure::input)?;

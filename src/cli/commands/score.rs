@@ -49,18 +49,12 @@ impl ScoreArgs {
             return output::print(&found, self.json);
         }
         let table = scoring::table(&inputs, &self.scoring, &[], threads)?;
-        match (&self.output, format) {
-            (Some(path), Some(format)) => {
-                let mut bytes = Vec::new();
-                format::write(&table, format, &mut bytes).map_err(Failure::input)?;
-                output::write_file(path, &bytes)?;
-            }
-            _ => {
-                let format = if self.json { Format::JsonLines } else { Format::Csv };
-                let mut bytes = Vec::new();
-                format::write(&table, format, &mut bytes).map_err(Failure::input)?;
-                io::stdout().lock().write_all(&bytes)?;
-            }
+        let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
+        let mut bytes = Vec::new();
+        format::write(&table, format, &mut bytes).map_err(Failure::input)?;
+        match &self.output {
+            Some(path) => output::write_file(path, &bytes)?,
+            None => io::stdout().lock().write_all(&bytes)?,
         }
         Ok(Outcome::Done)
     }

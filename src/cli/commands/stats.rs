@@ -5,16 +5,31 @@ use std::io::Write as _;
 
 use crate::base::near::nearest;
 use crate::cells::cell::Cells;
+use crate::cells::group::{DEFAULT_BY, group};
+use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::scoring;
 use crate::report::statistics::{Options, Statistics, text};
 use crate::score::table::EpisodeTable;
 
 /// The word that stands for every metric.
 const ALL: &str = "all";
 
-/// What `stats` prints, and how.
+/// Intervals, tests and comparisons that hold at small n
 #[derive(Clone, Debug, clap::Args)]
 pub struct StatsArgs {
+    /// Traces, or files of scores in their place.
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub definitions: Option<String>,
+    /// Only episodes where this holds, in the language of definitions
+    #[arg(long = "where", value_name = "EXPR")]
+    pub condition: Option<String>,
+    /// Group the cells by these columns, separated by commas
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY)]
+    pub by: Vec<String>,
     /// Confidence of every interval; tests are at one minus it
     #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = confidence)]
     pub confidence: f64,
@@ -39,6 +54,21 @@ struct UnknownMetric {
 }
 
 impl StatsArgs {
+    /// Scores and prints.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces, the definitions or the options.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let inputs = scoring::resolve(&self.traces)?;
+        let threads = self.traces.threads.count();
+        let asked =
+            ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
+        let table = scoring::table(&inputs, &asked, &scoring::labels(&self.by), threads)?;
+        let cells = group(&table, &self.by).map_err(Failure::input)?;
+        let lost = scoring::lost(&inputs, threads)?;
+        self.print(&table, &cells, lost)
+    }
+
     /// Prints the statistics of `table`; `cells` are its cells as grouped, `lost` the episodes that the
     /// infrastructure ended, where the traces say.
     ///

@@ -1,0 +1,143 @@
+//! `mirrorstats info`: what traces hold.
+
+use std::fmt::Display;
+use std::io::{self, Write};
+
+use comfy_table::{CellAlignment, Table, presets};
+
+use crate::cli::args::TraceArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::trace::info::{Cell, Info, SeedRun, info};
+use crate::trace::inputs;
+use crate::trace::open::TraceSet;
+
+/// Summarise traces: episodes, steps, models, experiments, coverage, files
+#[derive(Clone, Debug, clap::Args)]
+pub struct InfoCommand {
+    #[command(flatten)]
+    input: TraceArgs,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+impl InfoCommand {
+    /// Reads the traces and prints what they hold.
+    ///
+    /// # Errors
+    /// When the traces are not as they must be, or the output cannot be written.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
+        let set = TraceSet::open(&inputs).map_err(Failure::input)?;
+        let info = info(&set, self.input.threads.count()).map_err(Failure::input)?;
+        let mut out = io::stdout().lock();
+        if self.json {
+            writeln!(out, "{:#}", serde_json::json!(info))?;
+        } else {
+            print(&mut out, &info)?;
+        }
+        Ok(Outcome::Done)
+    }
+}
+
+fn print(out: &mut impl Write, info: &Info) -> io::Result<()> {
+    let bytes: u64 = info.files.iter().map(|file| file.bytes).sum();
+    writeln!(out, "{} episodes, {} steps, {} files, {bytes} bytes\n", info.episodes, info.steps, info.files.len())?;
+    list(out, "models", &info.models)?;
+    list(out, "experiments", &info.experiments)?;
+    list(out, "seeds", &info.seeds)?;
+    list(out, "runs", &info.runs)?;
+    let own: Vec<_> = info.columns.iter().filter(|column| !column.known).map(|column| &column.name).collect();
+    if !own.is_empty() {
+        list(out, "own columns", &own)?;
+    }
+    writeln!(out, "\nepisodes by experiment and model\n{}", coverage(info))?;
+    gaps(out, info)?;
+    writeln!(out, "\nfiles\n{}", files(info))
+}
+
+fn list(out: &mut impl Write, what: &str, values: &[impl Display]) -> io::Result<()> {
+    let shown: Vec<_> = values.iter().map(ToString::to_string).collect();
+    writeln!(out, "{what:<12} {:>3}   {}", values.len(), shown.join(", "))
+}
+
+fn coverage(info: &Info) -> Table {
+    let mut table = table();
+    let numbers = info.experiments.len();
+    table.set_header([&["model".to_owned()], info.experiments.as_slice()].concat());
+    for (row, model) in info.models.iter().enumerate() {
+        // Cells come experiment by experiment, each with all models.
+        let counts = info.coverage.iter().skip(row).step_by(info.models.len()).map(|cell| match cell.episodes {
+            0 => "none".to_owned(),
+            episodes => episodes.to_string(),
+        });
+        table.add_row([model.clone()].into_iter().chain(counts));
+    }
+    align_right(&mut table, 1..=numbers);
+    table
+}
+
+/// Seeds and runs that are listed for a cell.
+const LISTED: usize = 8;
+
+fn gaps(out: &mut impl Write, info: &Info) -> io::Result<()> {
+    let incomplete: Vec<&Cell> = info.coverage.iter().filter(|cell| !cell.missing.is_empty()).collect();
+    if incomplete.is_empty() {
+        writeln!(out, "\nevery cell has every seed and run that any cell has")?;
+    } else {
+        writeln!(out, "\nmissing (seed/run), of those that other cells have")?;
+    }
+    for cell in incomplete {
+        let what = if cell.episodes == 0 { "all".to_owned() } else { pairs(&cell.missing) };
+        writeln!(out, "  {}, {}: {what}", cell.experiment, cell.model)?;
+    }
+    let repeated = info.coverage.iter().filter(|cell| !cell.repeated.is_empty());
+    for (i, cell) in repeated.enumerate() {
+        if i == 0 {
+            writeln!(out, "\nmore than one episode (seed/run)")?;
+        }
+        writeln!(out, "  {}, {}: {}", cell.experiment, cell.model, pairs(&cell.repeated))?;
+    }
+    Ok(())
+}
+
+fn pairs(pairs: &[SeedRun]) -> String {
+    let shown: Vec<_> = pairs.iter().take(LISTED).map(|pair| format!("{}/{}", pair.seed, pair.run)).collect();
+    match pairs.len().saturating_sub(LISTED) {
+        0 => shown.join(" "),
+        more => format!("{} and {more} more", shown.join(" ")),
+    }
+}
+
+fn files(info: &Info) -> Table {
+    let mut table = table();
+    table.set_header(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "writer"]);
+    for file in &info.files {
+        table.add_row([
+            file.name.clone(),
+            file.episodes.to_string(),
+            file.steps.to_string(),
+            file.row_groups.to_string(),
+            file.bytes.to_string(),
+            file.sha256.chars().take(12).collect(),
+            file.schema_version.clone().unwrap_or_else(|| "not named".into()),
+            file.writer.clone().unwrap_or_else(|| "not named".into()),
+        ]);
+    }
+    align_right(&mut table, 1..=4);
+    table
+}
+
+fn table() -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
+    table
+}
+
+fn align_right(table: &mut Table, columns: impl IntoIterator<Item = usize>) {
+    for column in columns {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! `mirrorstats validate`: every rule of the schema, all findings.
+
+use std::io::{self, Write};
+
+use crate::cli::args::TraceArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::scoring;
+use crate::trace::finding::Severity;
+use crate::trace::inputs;
+use crate::trace::validate::{Validation, validate};
+
+/// Check traces against every rule of the schema and report all that is wrong
+///
+/// Exits with 1 if a rule does not hold; notes do not count.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ValidateCommand {
+    #[command(flatten)]
+    input: TraceArgs,
+    /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
+    definitions: String,
+    /// Print all findings as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Findings that are printed for each file and rule.
+const SHOWN: usize = 10;
+
+impl ValidateCommand {
+    /// Checks the traces.
+    ///
+    /// # Errors
+    /// When an argument gives no file, for faults of the definitions, or when the output cannot be written.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let experiments = scoring::known_experiments(&self.definitions)?;
+        let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
+        let report = validate(&inputs, experiments.as_deref(), self.input.threads.count()).map_err(Failure::input)?;
+        let mut out = io::stdout().lock();
+        if self.json {
+            writeln!(out, "{:#}", serde_json::json!(report))?;
+        } else {
+            print(&mut out, &report)?;
+        }
+        Ok(if report.count(Severity::Error) == 0 { Outcome::Done } else { Outcome::CheckFailed })
+    }
+}
+
+fn print(out: &mut impl Write, report: &Validation) -> io::Result<()> {
+    let (shown, rest) = report.abridged(SHOWN);
+    for finding in shown {
+        writeln!(out, "{finding}\n")?;
+    }
+    for rest in &rest {
+        writeln!(out, "{}: {}, and {} more of these", rest.code, rest.file, rest.count)?;
+    }
+    if !rest.is_empty() {
+        writeln!(out, "`--json` prints all findings\n")?;
+    }
+    let incomplete = report.files.iter().filter(|file| !file.complete).count();
+    let (episodes, steps) =
+        report.files.iter().fold((0, 0), |(episodes, steps), file| (episodes + file.episodes, steps + file.steps));
+    write!(out, "{} files, {episodes} episodes, {steps} steps checked", report.files.len())?;
+    if incomplete > 0 {
+        write!(out, " ({incomplete} files not to their end)")?;
+    }
+    writeln!(out, ": {} errors, {} notes", report.count(Severity::Error), report.count(Severity::Note))
+}

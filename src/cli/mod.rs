@@ -5,6 +5,7 @@
 
 pub mod args;
 pub mod commands;
+mod listing;
 pub mod outcome;
 
 use std::ffi::OsString;

@@ -45,6 +45,9 @@ pub struct DamagedFile {
 }
 
 /// All of them, in the order of the README.
+///
+/// # Errors
+/// When Arrow or Parquet refuse the rows, which they do not.
 pub fn damaged_files() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     let mut files = broken_files()?;
     files.extend(broken_schemas()?);
@@ -61,7 +64,7 @@ pub fn readme(files: &[DamagedFile]) -> String {
          | file | code | damage |\n|---|---|---|\n",
     );
     for file in files {
-        text.push_str(&format!("| `{}` | `{}` | {} |\n", file.name, file.code, file.damage));
+        text.extend(["| `", file.name, "` | `", file.code, "` | ", file.damage, " |\n"]);
     }
     text.push_str(
         "\nThe two files of `episode-in-two-files` are sound by themselves; given together, the second one is refused.\n",
@@ -128,9 +131,9 @@ fn broken_values() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     };
     let rows = sound().num_rows();
     let seeds = Int64Array::from(vec![3_000_000_000; rows]);
-    let pixels = Int32Array::from_iter((0..rows).map(|i| Some(if i == 2 { -1 } else { 5 })));
+    let pixels = Int32Array::from_iter_values((0..rows).map(|i| if i == 2 { -1 } else { 5 }));
     let experiments = StringArray::from(vec!["E9"; rows]);
-    let statuses = StringArray::from_iter((0..rows).map(|i| Some(if i == 2 { "fine" } else { "ok" })));
+    let statuses = StringArray::from_iter_values((0..rows).map(|i| if i == 2 { "fine" } else { "ok" }));
     Ok(vec![
         text("null-in-required.parquet", "null-in-required", "`body_color` is null", "body_color", None)?,
         text("empty-string.parquet", "empty-string", "`self_color` is empty", "self_color", Some(""))?,
@@ -169,7 +172,7 @@ fn broken_episodes() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
         steps("t-gap.parquet", "t-gap", "t = 3 is missing", [1, 2, 4, 5])?,
         steps("t-duplicate.parquet", "t-duplicate", "t = 2 is there twice", [1, 2, 2, 3])?,
         steps("t-from-zero.parquet", "t-start", "t starts at 0", [0, 1, 2, 3])?,
-        steps("t-order.parquet", "t-order", "t goes back from 3 to 2", [1, 3, 2, 4])?,
+        steps("t-order.parquet", "t-order", "t goes back from 3 to 2", [1, 2, 3, 2])?,
         file("episode-twice.parquet", "episode-twice", "the first episode again at the end", parquet(&[&again], None)?),
         file(
             "episode-apart.parquet",
@@ -215,7 +218,7 @@ fn sound() -> RecordBatch {
         ),
         ("self_color", text(["unknown", "unknown", "red", "red", "unknown", "red", "red", "red"])),
         ("selected_cube", text(["none", "none", "none", "red", "none", "none", "red", "red"])),
-        ("mirror_visible", Arc::new(BooleanArray::from(vec![false, true, true, false].repeat(2))) as ArrayRef),
+        ("mirror_visible", Arc::new(BooleanArray::from([false, true, true, false].repeat(2))) as ArrayRef),
     ];
     RecordBatch::try_from_iter_with_nullable(columns.map(|(name, values)| (name, values, true)))
         .expect("eight rows in every column")

@@ -357,7 +357,7 @@ fn an_id_is_unique_over_all_files() {
     let two = write(&file(&folder, "2.parquet"), &[batch(&rows(&[("b", 2), ("c", 2)]), Style::Plain)]);
     let (code, text) = fault(&[one, two], &projection());
     assert_eq!(code, Code::EpisodeInTwoFiles);
-    assert!(text.contains("2.parquet") && text.contains("it is in 1.parquet too"), "{text}");
+    assert!(text.contains("2.parquet") && text.contains("its id in 1.parquet too"), "{text}");
 }
 
 #[test]
@@ -368,6 +368,17 @@ fn an_unknown_experiment_names_the_known_ones() {
     let (code, text) = fault(&[input], &known);
     assert_eq!(code, Code::UnknownExperiment);
     assert!(text.contains("expected one of E7, F") && text.contains("found `E1`"), "{text}");
+}
+
+#[test]
+#[should_panic(expected = "scoped thread panicked")]
+fn a_panic_in_the_work_is_not_swallowed() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = batch(&rows(&[("a", 4), ("b", 4)]), Style::Plain);
+    let inputs: Vec<_> = (0..9).map(|i| write(&file(&folder, &format!("{i}.parquet")), std::slice::from_ref(&one))).collect();
+    let set = TraceSet::open(&inputs).unwrap();
+    let fail = |_: EpisodeBatch| -> Result<(), TraceError> { panic!("on purpose") };
+    drop(set.scan(&projection(), threads(2), fail, |()| Ok(())));
 }
 
 #[test]

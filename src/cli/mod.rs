@@ -5,6 +5,7 @@
 
 pub mod args;
 pub mod commands;
+mod listing;
 pub mod outcome;
 pub mod output;
 pub mod scoring;

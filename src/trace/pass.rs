@@ -8,7 +8,7 @@
 use std::collections::VecDeque;
 use std::num::NonZeroUsize;
 use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _};
@@ -100,14 +100,16 @@ pub(super) fn pass<T: Send, E: From<TraceError>>(
     });
     let jobs: VecDeque<Job> = jobs.collect();
     let (give, take) = mpsc::channel::<Order<T>>();
-    let take = Mutex::new(take);
+    // Only workers hold on to it, so that nobody waits for orders when all of them have panicked.
+    let take = Arc::new(Mutex::new(take));
     thread::scope(|scope| {
         // Dropped when this closure returns, early or not: workers then find no job and end.
-        let give = give;
+        let (give, take) = (give, take);
         let wanted = threads.get().min(jobs.len());
         for started in 0..wanted {
             let worker = thread::Builder::new().name("trace".into());
-            let spawned = worker.spawn_scoped(scope, || run_jobs(&take, files, layout, work));
+            let take = Arc::clone(&take);
+            let spawned = worker.spawn_scoped(scope, move || run_jobs(&take, files, layout, work));
             match spawned {
                 Err(source) if started == 0 => return Err(TraceError::Threads { threads: wanted, source }.into()),
                 // Fewer threads give the same results.
@@ -115,6 +117,7 @@ pub(super) fn pass<T: Send, E: From<TraceError>>(
                 Ok(_) => {}
             }
         }
+        drop(take);
         Joiner { files, work, receive, open: Vec::new(), file: 0, failed: false }.run(&give, jobs, wanted + 2)
     })
 }

@@ -326,7 +326,7 @@ impl Ids {
             let found = format!("rows of it in row group {before} already");
             Finding::new(Code::EpisodeTwice, name(file), "the episode once in the file, its rows together", found)
         } else {
-            let found = format!("it is in {} too", name(other));
+            let found = format!("its id in {} too", name(other));
             Finding::new(Code::EpisodeInTwoFiles, name(file), "the episode in one of the files only", found)
         };
         Some(Located { row, finding: finding.in_row_group(row_group).in_episode(id).in_column("episode_id") })

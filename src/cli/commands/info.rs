@@ -3,9 +3,10 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::Table;
 
 use crate::cli::args::TraceArgs;
+use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::trace::info::{Cell, Info, SeedRun, info};
 use crate::trace::inputs;
@@ -42,7 +43,8 @@ impl InfoCommand {
 
 fn print(out: &mut impl Write, info: &Info) -> io::Result<()> {
     let bytes: u64 = info.files.iter().map(|file| file.bytes).sum();
-    writeln!(out, "{} episodes, {} steps, {} files, {bytes} bytes\n", info.episodes, info.steps, info.files.len())?;
+    let (episodes, steps) = (counted(info.episodes, "episode"), counted(info.steps, "step"));
+    writeln!(out, "{episodes}, {steps}, {}, {}\n", counted(info.files.len() as u64, "file"), counted(bytes, "byte"))?;
     list(out, "models", &info.models)?;
     list(out, "experiments", &info.experiments)?;
     list(out, "seeds", &info.seeds)?;
@@ -51,9 +53,9 @@ fn print(out: &mut impl Write, info: &Info) -> io::Result<()> {
     if !own.is_empty() {
         list(out, "own columns", &own)?;
     }
-    writeln!(out, "\nepisodes by experiment and model\n{}", coverage(info))?;
+    writeln!(out, "\nepisodes by experiment and model\n{}", coverage(info).trim_fmt())?;
     gaps(out, info)?;
-    writeln!(out, "\nfiles\n{}", files(info))
+    writeln!(out, "\nfiles\n{}", files(info).trim_fmt())
 }
 
 fn list(out: &mut impl Write, what: &str, values: &[impl Display]) -> io::Result<()> {
@@ -62,9 +64,7 @@ fn list(out: &mut impl Write, what: &str, values: &[impl Display]) -> io::Result
 }
 
 fn coverage(info: &Info) -> Table {
-    let mut table = table();
-    let numbers = info.experiments.len();
-    table.set_header([&["model".to_owned()], info.experiments.as_slice()].concat());
+    let mut table = listing(["model"].into_iter().chain(info.experiments.iter().map(String::as_str)));
     for (row, model) in info.models.iter().enumerate() {
         // Cells come experiment by experiment, each with all models.
         let counts = info.coverage.iter().skip(row).step_by(info.models.len()).map(|cell| match cell.episodes {
@@ -73,8 +73,7 @@ fn coverage(info: &Info) -> Table {
         });
         table.add_row([model.clone()].into_iter().chain(counts));
     }
-    align_right(&mut table, 1..=numbers);
-    table
+    aligned_right(table, 1..=info.experiments.len())
 }
 
 /// Seeds and runs that are listed for a cell.
@@ -110,8 +109,7 @@ fn pairs(pairs: &[SeedRun]) -> String {
 }
 
 fn files(info: &Info) -> Table {
-    let mut table = table();
-    table.set_header(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "writer"]);
+    let mut table = listing(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "writer"]);
     for file in &info.files {
         table.add_row([
             file.name.clone(),
@@ -124,20 +122,5 @@ fn files(info: &Info) -> Table {
             file.writer.clone().unwrap_or_else(|| "not named".into()),
         ]);
     }
-    align_right(&mut table, 1..=4);
-    table
-}
-
-fn table() -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY);
-    table
-}
-
-fn align_right(table: &mut Table, columns: impl IntoIterator<Item = usize>) {
-    for column in columns {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
-        }
-    }
+    aligned_right(table, 1..=4)
 }

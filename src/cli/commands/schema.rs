@@ -2,8 +2,9 @@
 
 use std::io::{self, Write};
 
-use comfy_table::{ContentArrangement, Table, presets};
+use comfy_table::{ContentArrangement, Table};
 
+use crate::cli::listing::listing;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::trace::describe::SchemaDocument;
 
@@ -37,7 +38,7 @@ impl SchemaCommand {
 
 fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
     writeln!(out, "{}, schema version {}\n\n{}\n", schema.title, schema.version, schema.description)?;
-    let mut columns = table(["column", "type", "unit", "required", "null", "per", "meaning"]);
+    let mut columns = wrapped(["column", "type", "unit", "presence", "may be", "per", "meaning"]);
     for column in schema.columns {
         let meaning = match column.values {
             [] => column.doc.to_owned(),
@@ -47,22 +48,21 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
             column.name,
             column.stored.name(),
             column.unit.unwrap_or(""),
-            if column.required { "yes" } else { "" },
-            if column.nullable { "yes" } else { "no" },
+            if column.required { "required" } else { "optional" },
+            if column.nullable { "null" } else { "" },
             if column.constant { "episode" } else { "step" },
             &meaning,
         ]);
     }
-    let mut metadata = table(["footer key", "meaning"]);
+    let mut metadata = wrapped(["footer key", "meaning"]);
     metadata.add_rows(schema.metadata.iter().map(|entry| [entry.key, entry.doc]));
-    let mut rules = table(["code", "rule"]);
+    let mut rules = wrapped(["code", "rule"]);
     rules.add_rows(schema.rules.iter().map(|rule| [rule.code.name(), rule.rule]));
-    writeln!(out, "{columns}\n\n{metadata}\n\n{rules}")
+    writeln!(out, "{}\n\n{}\n\n{}", columns.trim_fmt(), metadata.trim_fmt(), rules.trim_fmt())
 }
 
-fn table<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_header(header);
+fn wrapped<const N: usize>(header: [&str; N]) -> Table {
+    let mut table = listing(header);
     table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
     table
 }

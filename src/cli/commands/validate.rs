@@ -3,6 +3,7 @@
 use std::io::{self, Write};
 
 use crate::cli::args::TraceArgs;
+use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::scoring;
 use crate::trace::finding::Severity;
@@ -58,11 +59,15 @@ fn print(out: &mut impl Write, report: &Validation) -> io::Result<()> {
         writeln!(out, "`--json` prints all findings\n")?;
     }
     let incomplete = report.files.iter().filter(|file| !file.complete).count();
-    let (episodes, steps) =
-        report.files.iter().fold((0, 0), |(episodes, steps), file| (episodes + file.episodes, steps + file.steps));
-    write!(out, "{} files, {episodes} episodes, {steps} steps checked", report.files.len())?;
+    let (episodes, steps) = report
+        .files
+        .iter()
+        .fold((0_u64, 0_u64), |(episodes, steps), file| (episodes + file.episodes, steps + file.steps));
+    let files = counted(report.files.len() as u64, "file");
+    write!(out, "{files}, {}, {} checked", counted(episodes, "episode"), counted(steps, "step"))?;
     if incomplete > 0 {
-        write!(out, " ({incomplete} files not to their end)")?;
+        write!(out, " ({incomplete} of the files not to their end)")?;
     }
-    writeln!(out, ": {} errors, {} notes", report.count(Severity::Error), report.count(Severity::Note))
+    let [errors, notes] = [Severity::Error, Severity::Note].map(|severity| report.count(severity) as u64);
+    writeln!(out, ": {}, {}", counted(errors, "error"), counted(notes, "note"))
 }

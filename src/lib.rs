@@ -1,4 +1,82 @@
 //! mirrorstats scores episodes of embodied agents that must recognise themselves in a mirror.
+//!
+//! Steps of episodes come in as Parquet traces; every metric of the study comes out, exactly and
+//! deterministically, as tables, cells and scores. Metrics are data: definition files that the
+//! program checks, plans and evaluates.
+//!
+//! # Code map
+//!
+//! ```text
+//!          trace ──────► score ───────► cells ───────► report
+//!        (steps of      (one row        (exact         (tables, statistics,
+//!         episodes)      an episode)     moments)       the folder)
+//!                          ▲
+//!                       metric
+//!                 (definitions, checked)
+//! ```
+//!
+//! | room | what it knows |
+//! |---|---|
+//! | [`cli`] | what was typed, standard output, exit codes |
+//! | [`report`] | styles, tables, statistics for people, the folder of a report |
+//! | [`cells`] | grouping, exact moments, intervals, tests |
+//! | [`score`] | the plan evaluated over Arrow batches; the episode table |
+//! | [`metric`] | definition files: TOML, SQL expressions, types, plans |
+//! | [`trace`] | what an episode is: schema, writer, reader, validation |
+//! | [`base`] | exact numbers to text, hashes, near names |
+//!
+//! # Invariants
+//!
+//! - A room imports from the rooms below it alone; a test reads the `use` lines.
+//! - Only [`trace`] opens traces, only [`cli`] prints, only [`base`] rounds.
+//! - An episode's value is an integer, a cell keeps n, Σx, Σx² as integers: results do not depend on
+//!   threads, on the order of files, or on how rows are divided among them.
+//! - Missing is never zero: it is an [`Option`] until the last renderer.
+//! - Output is a function of traces and definitions: no clock, no absolute path, no unordered iteration.
+//!
+//! # The main job
+//!
+//! ```
+//! use std::num::NonZeroUsize;
+//!
+//! use mirrorstats::cells::group::group;
+//! use mirrorstats::report::{layout, style::Style, tables::markdown};
+//! use mirrorstats::score::run::{self, Request};
+//! use mirrorstats::trace::{inputs, open::TraceSet};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let files = inputs::resolve(&["fixtures/paper".to_owned()], std::io::empty())?;
+//! let traces = TraceSet::open(&files)?;
+//! let definitions = run::definitions(&traces, &Request::of("paper"))?;
+//! let episodes = run::score(&traces, &definitions, &[], NonZeroUsize::MIN)?;
+//! assert_eq!(episodes.len(), 840);
+//!
+//! let cells = group(&episodes, &["experiment".to_owned(), "model".to_owned()])?;
+//! let tables = layout::tables(&cells, &Style::load("paper")?)?;
+//! assert!(markdown::render(&tables[0]).contains("Claude Sonnet 4.6"));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Your own metric
+//!
+//! ```
+//! use mirrorstats::metric::definitions::Definitions;
+//! use mirrorstats::score::run::schema_columns;
+//!
+//! let definitions = Definitions::from_toml(
+//!     "mine",
+//!     r#"
+//!     include = ["paper"]
+//!     [metric.TURNS]
+//!     title = "Turns before the decision"
+//!     value = "count(action in ('turn_left', 'turn_right') and t < finish)"
+//!     "#,
+//!     &schema_columns(),
+//! )
+//! .unwrap();
+//! assert!(definitions.explain("TURNS").unwrap().words.starts_with("the number of steps where"));
+//! ```
 
 pub mod base;
 pub mod cells;

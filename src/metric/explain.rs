@@ -181,6 +181,9 @@ fn condition(expr: &Expr) -> String {
         ExprKind::Call { name, arguments } => match (name.as_str(), arguments.as_slice()) {
             ("any", [p]) => format!("at some step {}", part(p)),
             ("all", [p]) => format!("at every step {}", part(p)),
+            ("coalesce", [p, Expr { kind: ExprKind::Literal(Literal::Bool(false)), .. }]) => {
+                format!("{} (null counts as not)", condition(p))
+            }
             ("coalesce", [p, rest @ ..]) => {
                 let rest: Vec<String> =
                     rest.iter().map(|x| format!(", or where that is null, {}", condition(x))).collect();

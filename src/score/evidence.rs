@@ -171,9 +171,21 @@ impl Reading<'_> {
             Type::Bool => i64::from(values.bools().value(0)),
             _ => values.ints().value(0),
         });
-        let facts: Vec<Fact> = self.plan().needed_by([node]).into_iter().filter_map(|id| self.fact(id)).collect();
+        let facts: Vec<Fact> =
+            self.plan().needed_by([self.decisive(node)]).into_iter().filter_map(|id| self.fact(id)).collect();
         let timesteps: BTreeSet<i64> = facts.iter().flat_map(|fact| fact.timesteps.iter().copied()).collect();
         MetricEvidence { metric: name.to_owned(), value, timesteps: timesteps.into_iter().collect(), facts }
+    }
+
+    /// Where a metric is undefined, it is its condition alone that decided.
+    fn decisive(&self, node: NodeId) -> NodeId {
+        match &self.plan().node(node).op {
+            Op::Case { branches, otherwise: None } if branches.len() == 1 => {
+                let (when, _) = branches[0];
+                if truths(self.values.of(when).bools()).value(0) { node } else { when }
+            }
+            _ => node,
+        }
     }
 
     fn fact(&self, id: NodeId) -> Option<Fact> {

@@ -19,7 +19,7 @@ use crate::trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 use crate::trace::schema::{COLUMNS, Kind};
 
 /// What to score.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     /// A built-in definition file by name, or any other by path.
     pub definitions: String,
@@ -27,6 +27,13 @@ pub struct Request {
     pub metrics: Option<Vec<String>>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub condition: Option<String>,
+}
+
+impl Request {
+    /// All metrics of a definition file, over all episodes.
+    pub fn of(definitions: &str) -> Self {
+        Self { definitions: definitions.to_owned(), metrics: None, condition: None }
+    }
 }
 
 /// Why traces were not scored.

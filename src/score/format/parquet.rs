@@ -1,6 +1,5 @@
 //! The episode table as Parquet, the definitions in its footer.
 
-use std::fs::File;
 use std::io::Write;
 use std::sync::Arc;
 
@@ -29,7 +28,7 @@ pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
 /// Whether a file is Parquet with the footer of scores.
-pub fn holds_scores(file: &File) -> bool {
+pub fn holds_scores(file: &impl ChunkReader) -> bool {
     let Ok(metadata) = ParquetMetaDataReader::new().parse_and_finish(file) else { return false };
     let pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     pairs.into_iter().any(|pair| pair.key == KIND_KEY && pair.value.as_deref() == Some(SCORES_KIND))

@@ -1,0 +1,35 @@
+# The two commands of the README: `make demo` and `make test`.
+
+.DELETE_ON_ERROR:
+.PHONY: demo test fmt lint unit docs end-to-end bless
+
+## Build, report on the bundled traces, say where the results are.
+demo:
+	cargo run --quiet -- report fixtures/paper --out reports/latest
+	@echo
+	@echo "The tables are in reports/latest/tables, every cell in reports/latest/cells.csv."
+	@echo "The same in the paper's own layout: cargo run -- report fixtures/paper --style paper"
+
+## Everything that CI checks.
+test: fmt lint unit docs end-to-end
+
+fmt:
+	cargo fmt --check
+
+lint:
+	cargo clippy --all-targets -- -D warnings
+
+unit:
+	cargo test --no-fail-fast
+
+docs:
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
+
+## The main job from outside: the committed report again byte for byte, the published tables cell by cell.
+end-to-end:
+	scripts/end-to-end.sh
+
+## Write generated files anew: JSON Schemas, snapshots, the committed report.
+bless:
+	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test
+	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper

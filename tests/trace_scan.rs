@@ -375,7 +375,8 @@ fn an_unknown_experiment_names_the_known_ones() {
 fn a_panic_in_the_work_is_not_swallowed() {
     let folder = tempfile::tempdir().unwrap();
     let one = batch(&rows(&[("a", 4), ("b", 4)]), Style::Plain);
-    let inputs: Vec<_> = (0..9).map(|i| write(&file(&folder, &format!("{i}.parquet")), std::slice::from_ref(&one))).collect();
+    let inputs: Vec<_> =
+        (0..9).map(|i| write(&file(&folder, &format!("{i}.parquet")), std::slice::from_ref(&one))).collect();
     let set = TraceSet::open(&inputs).unwrap();
     let fail = |_: EpisodeBatch| -> Result<(), TraceError> { panic!("on purpose") };
     drop(set.scan(&projection(), threads(2), fail, |()| Ok(())));

@@ -41,9 +41,9 @@ impl SchemaDocument {
         let rule = |code: Code| Rule { code, severity: code.severity(), rule: code.explain(), help: code.help() };
         Self {
             title: "mirrorstats trace",
-            description: "A Parquet file of whole episodes, one after the other: an episode's rows are contiguous and \
-                          t runs 1..T. Readers take plain and dictionary strings and integers of any width; columns \
-                          that are not listed are kept and can be used in definitions.",
+            description: "A Parquet file of whole episodes: the rows of an episode are together, and t runs 1..T. \
+                          Readers take plain and dictionary strings, and integers of any width. \
+                          Columns that are not listed are kept and can be used in definitions.",
             version: SCHEMA_VERSION,
             columns: COLUMNS,
             metadata: METADATA,

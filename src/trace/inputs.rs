@@ -53,7 +53,8 @@ pub fn resolve(arguments: &[String], list: impl Read) -> Result<Vec<Input>, Trac
         // What cannot be resolved is reported when it is opened, under its own name.
         let place = fs::canonicalize(&path).unwrap_or(path);
         let kept = files.entry(place).or_insert_with(|| input.clone());
-        if input < *kept {
+        // The shortest of its names, so that the order of the arguments does not matter.
+        if (input.name.len(), &input.name) < (kept.name.len(), &kept.name) {
             *kept = input;
         }
     }

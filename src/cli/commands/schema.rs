@@ -37,7 +37,8 @@ impl SchemaCommand {
 }
 
 fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
-    writeln!(out, "{}, schema version {}\n\n{}\n", schema.title, schema.version, schema.description)?;
+    let sentences = schema.description.replace(". ", ".\n");
+    writeln!(out, "{}, schema version {}\n\n{sentences}\n", schema.title, schema.version)?;
     let mut columns = wrapped(["column", "type", "unit", "presence", "may be", "per", "meaning"]);
     for column in schema.columns {
         let meaning = match column.values {

@@ -31,5 +31,5 @@ end-to-end:
 
 ## Write generated files anew: JSON Schemas, snapshots, the committed report.
 bless:
-	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test
+	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --no-fail-fast
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper

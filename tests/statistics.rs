@@ -326,18 +326,3 @@ fn names_from_traces_cannot_write_to_the_terminal() {
     let text = text::render(&found, &found.headline);
     assert!(!text.contains('\u{1b}') && text.contains("evil\\u{1b}[2J") && text.contains("b\\nc"));
 }
-
-/// `MIRRORSTATS_WRITE_SCHEMAS=1 cargo test` writes it.
-#[test]
-fn the_schema_is_current() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/schemas/stats.schema.json");
-    let current = serde_json::to_string_pretty(&schemars::schema_for!(Statistics)).unwrap() + "\n";
-    if std::env::var_os("MIRRORSTATS_WRITE_SCHEMAS").is_some() {
-        std::fs::write(path, &current).unwrap();
-    }
-    let committed = std::fs::read_to_string(path).unwrap_or_default();
-    assert!(
-        committed == current,
-        "schemas/stats.schema.json is not current: set MIRRORSTATS_WRITE_SCHEMAS=1 and test again"
-    );
-}

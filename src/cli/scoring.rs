@@ -217,7 +217,7 @@ pub fn provenance(inputs: &[Input]) -> Result<Vec<bundle::Input>, Failure> {
     let one = |input: &Input| {
         let file = File::open(&input.path)?;
         let bytes = file.metadata()?.len();
-        Ok(bundle::Input::new(input.name.as_ref(), hash::of_reader(file)?, bytes, None))
+        Ok(bundle::Input::new(input.name.as_ref(), hash::of_reader(file)?, bytes))
     };
     inputs.iter().map(|input| one(input).map_err(|error: io::Error| at(input, error))).collect()
 }

@@ -20,4 +20,5 @@ mod functions;
 mod keys;
 pub mod origin;
 pub mod plan;
+pub mod shape;
 mod syntax;

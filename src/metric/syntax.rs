@@ -480,6 +480,8 @@ fn end_of_call(text: &str, start: usize) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Write as _;
+
     use super::*;
 
     /// The expression with every operation in parentheses, to see how it was read.
@@ -577,7 +579,8 @@ mod tests {
             let faults = parse(text).expect_err(text);
             for SyntaxFault { message, span, help } in faults {
                 let help = help.map_or_else(String::new, |help| format!("  [{help}]"));
-                told.push_str(&format!("{text:24} {:14} {message}{help}\n", format!("`{}`", &text[span])));
+                let span = format!("`{}`", &text[span]);
+                writeln!(told, "{text:24} {span:14} {message}{help}").unwrap();
             }
         }
         insta::assert_snapshot!(told);

@@ -55,6 +55,8 @@ pub struct Manifest {
     pub style: StyleOrigin,
     /// The columns that the cells are grouped by.
     pub by: Vec<String>,
+    /// The metrics that were computed, in the order of the definitions.
+    pub metrics: Vec<String>,
     /// The filter over episodes, as typed.
     #[serde(rename = "where")]
     pub filter: Option<String>,
@@ -82,8 +84,6 @@ pub struct Input {
     pub sha256: String,
     /// Its size.
     pub bytes: u64,
-    /// How many episodes it holds, where that was counted.
-    pub episodes: Option<u64>,
 }
 
 /// Why a report cannot be written.
@@ -121,6 +121,7 @@ impl Manifest {
             schema_version,
             style: StyleOrigin { name: style.name.clone(), sha256: style.hash.clone() },
             by: cells.by.clone(),
+            metrics: cells.metrics.clone(),
             filter,
             inputs,
             definitions: cells.catalog.clone(),
@@ -137,13 +138,13 @@ impl Manifest {
 
 impl Input {
     /// An input named as a manifest may name it: no absolute path, no way up, `/` between folders.
-    pub fn new(path: &Path, sha256: String, bytes: u64, episodes: Option<u64>) -> Self {
+    pub fn new(path: &Path, sha256: String, bytes: u64) -> Self {
         let is_plain = |part: &Component| matches!(part, Component::Normal(_) | Component::CurDir);
         let is_inside = path.components().all(|part| is_plain(&part));
         let shown = if is_inside { path } else { Path::new(path.file_name().unwrap_or(path.as_os_str())) };
         let parts = shown.components().filter(|part| matches!(part, Component::Normal(_)));
         let parts: Vec<_> = parts.map(|part| part.as_os_str().to_string_lossy()).collect();
-        Self { path: parts.join("/"), sha256, bytes, episodes }
+        Self { path: parts.join("/"), sha256, bytes }
     }
 }
 

@@ -18,7 +18,7 @@ struct Report {
 fn report() -> Report {
     let cells = published::cells();
     let inputs = ["b.parquet", "/data/of/someone/a.parquet", "../up/c.parquet", "./traces/d.parquet"];
-    let inputs = inputs.map(|path| Input::new(Path::new(path), "0".repeat(64), 5, None)).to_vec();
+    let inputs = inputs.map(|path| Input::new(Path::new(path), "0".repeat(64), 5)).to_vec();
     let filter = Some("seed = 1".to_owned());
     let manifest = Manifest::new(&cells, &Style::load("paper").unwrap(), 1, filter, inputs);
     Report { cells, tables: published::tables("paper"), manifest }

@@ -3,6 +3,5 @@
 mod bundle;
 mod compare;
 mod published;
-mod schemas;
 mod styles;
 mod tables;

@@ -1,0 +1,65 @@
+//! The files of `schemas/` are what the types say. `MIRRORSTATS_WRITE_SCHEMAS=1 cargo test --test schemas` writes them.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::PathBuf;
+
+use mirrorstats::cli::commands::definitions::CheckAnswer;
+use mirrorstats::cli::commands::report::ReportAnswer;
+use mirrorstats::metric::explain::Explanation;
+use mirrorstats::metric::shape::DefinitionFile;
+use mirrorstats::report::bundle::Manifest;
+use mirrorstats::report::comparison::Comparison;
+use mirrorstats::report::errata::Errata;
+use mirrorstats::report::statistics::Statistics;
+use mirrorstats::report::style::Sheet;
+use mirrorstats::score::evidence::Evidence;
+use mirrorstats::trace::describe::SchemaDocument;
+use mirrorstats::trace::info::Info;
+use mirrorstats::trace::validate::Validation;
+use schemars::schema_for;
+use serde_json::{Value, json};
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("schemas")
+}
+
+/// Every file of the folder: what a person writes, what the program reads and prints as JSON.
+fn current() -> Vec<(&'static str, Value)> {
+    vec![
+        ("comparison", json!(schema_for!(Comparison))),
+        ("definitions-check", json!(schema_for!(CheckAnswer))),
+        ("definitions-explain", json!(schema_for!(Explanation))),
+        ("definitions", json!(schema_for!(DefinitionFile))),
+        ("errata", json!(schema_for!(Errata))),
+        ("info", json!(schema_for!(Info))),
+        ("manifest", json!(schema_for!(Manifest))),
+        ("report", json!(schema_for!(ReportAnswer))),
+        ("score-explain", json!(schema_for!(Evidence))),
+        ("stats", json!(schema_for!(Statistics))),
+        ("style", json!(schema_for!(Sheet))),
+        ("trace", json!(SchemaDocument::current())),
+        ("validation", json!(schema_for!(Validation))),
+    ]
+}
+
+#[test]
+fn the_files_are_what_the_types_say() {
+    for (name, value) in current() {
+        let path = folder().join(format!("{name}.schema.json"));
+        let text = format!("{value:#}\n");
+        if std::env::var_os("MIRRORSTATS_WRITE_SCHEMAS").is_some() {
+            fs::write(&path, &text).unwrap();
+        }
+        let committed = fs::read_to_string(&path).unwrap_or_default();
+        assert!(committed == text, "{name}.schema.json is not current; MIRRORSTATS_WRITE_SCHEMAS=1 writes it");
+    }
+}
+
+#[test]
+fn the_folder_holds_nothing_else() {
+    let expected: BTreeSet<String> = current().iter().map(|(name, _)| format!("{name}.schema.json")).collect();
+    let found =
+        fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    assert_eq!(expected, found);
+}

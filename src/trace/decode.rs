@@ -214,12 +214,15 @@ fn normal_column(column: &ArrayRef, kind: Kind) -> Result<ArrayRef, Refused> {
 /// Every key that is not null leads to a value that is not null.
 fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
     let column = column.as_dictionary::<Int32Type>();
-    let values = column.values();
-    let within = |key: &i32| usize::try_from(*key).is_ok_and(|key| key < values.len());
-    let good = values.null_count() == 0
-        && match column.keys().nulls() {
-            None => column.keys().values().iter().filter(|key| !within(key)).count() == 0,
-            Some(_) => column.keys().iter().flatten().all(|key| within(&key)),
-        };
+    let count = column.values().len();
+    let within = |key: i32| usize::try_from(key).is_ok_and(|key| key < count);
+    // What stands in the place of nulls is nearly always within, too, and then there is no need to look at them.
+    let good = column.values().null_count() == 0
+        && (largest(column.keys().values()).is_none_or(within) || column.keys().iter().flatten().all(within));
     if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
+}
+
+/// The largest key, a negative one counting as the largest of all.
+fn largest(keys: &[i32]) -> Option<i32> {
+    keys.iter().map(|key| key.cast_unsigned()).max().map(u32::cast_signed)
 }

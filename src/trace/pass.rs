@@ -83,7 +83,7 @@ struct Job {
 }
 
 /// Results that wait in a row group's queue before its worker does.
-const QUEUED_PARTS: usize = 4;
+const QUEUED_PARTS: usize = 16;
 
 /// Runs `work` on all whole episodes and gives `receive` the results with their file, in order.
 pub(super) fn pass<T: Send, E: From<TraceError>>(

@@ -46,8 +46,11 @@ impl Rules<'_> {
             let mut look = Look { file, episodes, name: &column.name, values, found: &mut found };
             if let Some(known) = column.known {
                 look.nulls(known);
-                look.range(known);
                 look.values(known);
+                // That t counts from 1 says more than any range.
+                if at != T {
+                    look.range(known);
+                }
             }
             if column.constant && at != EPISODE_ID {
                 look.constant(column);
@@ -106,7 +109,8 @@ impl Look<'_> {
         match known.stored.kind() {
             Kind::Int => {
                 let ints = values.as_primitive::<Int64Type>();
-                let (min, max) = extent(ints);
+                let (min, max) =
+                    if known.constant { self.extent_of_firsts(ints) } else { extent(ints.values().iter()) };
                 if min < lowest || max > highest {
                     let expected = format!("{lowest} to {highest}, an {}", known.stored.name());
                     let bad = |row| valid(ints, row).is_some_and(|value| value < lowest || value > highest);
@@ -126,6 +130,12 @@ impl Look<'_> {
             }
             _ => {}
         }
+    }
+
+    /// The extent of the first rows; that the others are the same is another rule.
+    fn extent_of_firsts(&self, ints: &Int64Array) -> (i64, i64) {
+        let firsts = &self.episodes.offsets[..self.episodes.len()];
+        extent(firsts.iter().map(|row| &ints.values()[*row]))
     }
 
     /// Text that is none of the fixed values, and names that are empty.
@@ -250,9 +260,9 @@ pub(super) fn int_at(column: &ArrayRef, row: usize) -> Option<i64> {
     valid(column.as_primitive::<Int64Type>(), row)
 }
 
-/// The smallest and largest value, whatever stands in the place of nulls included.
-fn extent(values: &Int64Array) -> (i64, i64) {
-    values.values().iter().fold((i64::MAX, i64::MIN), |(min, max), value| (min.min(*value), max.max(*value)))
+/// The smallest and largest value, counting also what stands in the place of nulls.
+fn extent<'a>(values: impl IntoIterator<Item = &'a i64>) -> (i64, i64) {
+    values.into_iter().fold((i64::MAX, i64::MIN), |(min, max), value| (min.min(*value), max.max(*value)))
 }
 
 fn is_no_count(value: f64) -> bool {

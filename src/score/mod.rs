@@ -15,4 +15,5 @@ pub mod run;
 pub mod segments;
 pub mod select;
 pub mod table;
+pub mod timeline;
 mod values;

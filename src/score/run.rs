@@ -243,21 +243,27 @@ struct Part {
 impl Part {
     fn of(episodes: &RecordBatch, scores: Scores, labels: &[String]) -> Self {
         let column = |name: &str| episodes.column_by_name(name).expect("the projection asks for this column");
-        let [episode_id, model, experiment, seed, run] = EPISODE_COLUMNS.map(column);
-        let key = |&row: &usize| EpisodeKey {
-            experiment: text_at(experiment, row).unwrap_or_default(),
-            model: text_at(model, row).unwrap_or_default(),
-            seed: int_at(seed, row),
-            run: int_at(run, row),
-            episode_id: text_at(episode_id, row).unwrap_or_default(),
-        };
         let label = |name: &String| scores.kept.iter().map(|&row| text_at(column(name), row)).collect();
         Self {
-            keys: scores.kept.iter().map(key).collect(),
+            keys: keys(episodes, scores.kept.iter().copied()),
             labels: labels.iter().map(label).collect(),
             metrics: scores.metrics,
         }
     }
+}
+
+/// The keys of some rows of [`EpisodeBatch::episodes`].
+pub(super) fn keys(episodes: &RecordBatch, rows: impl IntoIterator<Item = usize>) -> Vec<EpisodeKey> {
+    let column = |name: &str| episodes.column_by_name(name).expect("every batch has the key columns");
+    let [episode_id, model, experiment, seed, run] = EPISODE_COLUMNS.map(column);
+    let key = |row: usize| EpisodeKey {
+        experiment: text_at(experiment, row).unwrap_or_default(),
+        model: text_at(model, row).unwrap_or_default(),
+        seed: int_at(seed, row),
+        run: int_at(run, row),
+        episode_id: text_at(episode_id, row).unwrap_or_default(),
+    };
+    rows.into_iter().map(key).collect()
 }
 
 /// The value at a row as text; `None` for null.

@@ -109,7 +109,7 @@ impl ReportArgs {
 fn terminal_now() -> Terminal {
     let is_terminal = io::stdout().is_terminal();
     let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-    let width = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
+    let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
     Terminal {
         width: if is_terminal { width } else { None },
         emphasis: if is_terminal && !plain { Marks::Ansi } else { Marks::Signs },

@@ -264,14 +264,19 @@ impl Scope<'_, '_> {
                 Some(self.negated_if(*negated, distinct))
             }
             ExprKind::Between { operand, low, high, negated } => {
-                let above = self.comparison(Comparison::GreaterEqual, operand, low, expr);
-                let below = self.comparison(Comparison::LessEqual, operand, high, expr);
+                let (operand, low, high) = (self.bind(operand), self.bind(low), self.bind(high));
+                let (operand, low, high) = (operand?, low?, high?);
+                let above = self.compared(Comparison::GreaterEqual, operand, low, expr);
+                let below = self.compared(Comparison::LessEqual, operand, high, expr);
                 let between = self.combine(&[above?, below?], Type::Bool, |nodes| Op::And(nodes[0], nodes[1]));
                 Some(self.negated_if(*negated, between))
             }
             ExprKind::InList { operand, list, negated } => {
+                let operand = self.bind(operand);
+                let items: Vec<_> = list.iter().map(|item| self.bind(item)).collect();
+                let (operand, items) = (operand?, items.into_iter().collect::<Option<Vec<Bound>>>()?);
                 let equal: Vec<_> =
-                    list.iter().map(|item| self.comparison(Comparison::Equal, operand, item, expr)).collect();
+                    items.into_iter().map(|item| self.compared(Comparison::Equal, operand, item, expr)).collect();
                 let equal: Vec<Bound> = equal.into_iter().collect::<Option<_>>()?;
                 let either =
                     |this: &mut Self, a: Bound, b: Bound| this.combine(&[a, b], Type::Bool, |n| Op::Or(n[0], n[1]));
@@ -401,6 +406,11 @@ impl Scope<'_, '_> {
     /// An operand that must be a number.
     fn number(&mut self, expr: &Expr) -> Option<Bound> {
         let bound = self.bind(expr)?;
+        self.as_number(bound, expr)
+    }
+
+    /// What `expr` came to, as a number.
+    fn as_number(&mut self, bound: Bound, expr: &Expr) -> Option<Bound> {
         match bound.ty {
             Some(Type::Int | Type::Float) => Some(bound),
             Some(Type::Bool) if bound.rate => Some(self.as_int(bound)),
@@ -518,8 +528,14 @@ impl Scope<'_, '_> {
     }
 
     fn comparison(&mut self, comparison: Comparison, left: &Expr, right: &Expr, whole: &Expr) -> Option<Bound> {
-        let (mut left, mut right) = self.pair(left, right, whole, "compared")?;
-        let mut comparison = comparison;
+        let (left, right) = (self.bind(left), self.bind(right));
+        self.compared(comparison, left?, right?, whole)
+    }
+
+    /// A comparison of two operands that have been bound, each once however often it is compared.
+    fn compared(&mut self, mut comparison: Comparison, left: Bound, right: Bound, whole: &Expr) -> Option<Bound> {
+        let (both, _) = self.unified(&[left, right], whole, "compared")?;
+        let (mut left, mut right) = (both[0], both[1]);
         let is_time = |this: &Self, bound: Bound| this.binder.builder.node(bound.node).op == Op::Time;
         // Time to the left: the kernels know windows by that form.
         if is_time(self, right) && !is_time(self, left) {
@@ -545,10 +561,14 @@ impl Scope<'_, '_> {
         otherwise: Option<&Expr>,
         whole: &Expr,
     ) -> Option<Bound> {
+        let operand = operand.map(|operand| self.bind(operand));
         let whens: Vec<Option<Bound>> = branches
             .iter()
             .map(|(when, _)| match operand {
-                Some(operand) => self.comparison(Comparison::Equal, operand, when, when),
+                Some(operand) => {
+                    let bound = self.bind(when);
+                    self.compared(Comparison::Equal, operand?, bound?, when)
+                }
                 None => self.truth(when),
             })
             .collect();
@@ -657,7 +677,7 @@ impl Scope<'_, '_> {
             Some(Type::Float) => Fault::new(self.place(argument), "`sum` takes integers, found a float")
                 .help("a sum of floats depends on its order; count steps, or scale to an integer column"),
             _ => {
-                let number = self.number(argument)?;
+                let number = self.as_number(bound, argument)?;
                 return Some(self.aggregate(Aggregate::Sum, Type::Int, number));
             }
         };
@@ -690,8 +710,9 @@ impl Scope<'_, '_> {
     }
 
     fn null_if(&mut self, value: &Expr, other: &Expr, whole: &Expr) -> Option<Bound> {
-        let equal = self.comparison(Comparison::Equal, value, other, whole)?;
-        let value = self.bind(value)?;
+        let (value, other) = (self.bind(value), self.bind(other));
+        let value = value?;
+        let equal = self.compared(Comparison::Equal, value, other?, whole)?;
         let ty = value.ty.unwrap_or(Type::Bool);
         let null = self.null_of(ty);
         Some(

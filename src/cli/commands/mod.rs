@@ -6,6 +6,7 @@ pub mod info;
 pub mod report;
 pub mod schema;
 pub mod score;
+pub mod sql;
 pub mod stats;
 pub mod validate;
 
@@ -22,6 +23,7 @@ pub enum Command {
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
     Schema(schema::SchemaCommand),
+    Sql(sql::SqlArgs),
     Definitions(definitions::DefinitionsArgs),
 }
 
@@ -39,6 +41,7 @@ impl Command {
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
             Self::Schema(command) => command.run(),
+            Self::Sql(args) => args.run(),
             Self::Definitions(args) => args.run(),
         }
     }

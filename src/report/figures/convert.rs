@@ -1,10 +1,13 @@
-//! SVG to PNG and to PDF, both from one parsed tree and with the embedded font alone.
+//! SVG to PNG and to PDF, both from one parsed tree and with the embedded font alone (feature `raster`).
+
+use std::sync::{Arc, LazyLock};
 
 use krilla::geom::Size;
 use krilla::page::PageSettings;
 use krilla::{Document, SerializeSettings};
 use krilla_svg::{SurfaceExt, SvgSettings};
 use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::fontdb::{Database, Source};
 use resvg::usvg::{Options, Tree};
 
 use super::font;
@@ -14,6 +17,16 @@ const PNG_SCALE: f32 = 3.0;
 
 /// Points to a px.
 const POINTS_PER_PX: f32 = 0.75;
+
+/// The embedded font and no other: an installed one cannot be found in there.
+static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
+    let mut fonts = Database::new();
+    for data in font::FILES {
+        fonts.load_font_source(Source::Binary(Arc::new(data)));
+    }
+    fonts.set_sans_serif_family(font::FAMILY);
+    Arc::new(fonts)
+});
 
 /// A figure that could not be converted.
 #[derive(Debug, thiserror::Error)]
@@ -42,7 +55,7 @@ pub enum ConvertError {
 /// # Errors
 /// When it is not well-formed.
 pub fn tree(svg: &str) -> Result<Tree, ConvertError> {
-    let options = Options { fontdb: font::database(), font_family: font::FAMILY.to_owned(), ..Options::default() };
+    let options = Options { fontdb: FONTS.clone(), font_family: font::FAMILY.to_owned(), ..Options::default() };
     Ok(Tree::from_str(svg, &options)?)
 }
 

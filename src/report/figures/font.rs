@@ -3,9 +3,8 @@
 //! Rule: every width used for layout comes from the font's own advances. Kerning is left out of the sum; it
 //! only ever makes Latin text a little narrower than what layout reserves for it.
 
-use std::sync::{Arc, LazyLock};
+use std::sync::LazyLock;
 
-use resvg::usvg::fontdb::Database;
 use ttf_parser::Face;
 
 /// The family's name: private, so that no installed font is taken in its place.
@@ -39,15 +38,6 @@ static FACES: LazyLock<Faces> = LazyLock::new(|| {
     Faces { regular: parse(REGULAR), semibold: parse(SEMIBOLD) }
 });
 
-static DATABASE: LazyLock<Arc<Database>> = LazyLock::new(|| {
-    let mut database = Database::new();
-    for data in [REGULAR, SEMIBOLD] {
-        database.load_font_source(resvg::usvg::fontdb::Source::Binary(Arc::new(data)));
-    }
-    database.set_sans_serif_family(FAMILY);
-    Arc::new(database)
-});
-
 fn face(weight: Weight) -> &'static Face<'static> {
     match weight {
         Weight::Regular => &FACES.regular,
@@ -55,10 +45,9 @@ fn face(weight: Weight) -> &'static Face<'static> {
     }
 }
 
-/// The font alone, as the converters want it: no installed font can be found in there.
-pub fn database() -> Arc<Database> {
-    DATABASE.clone()
-}
+/// The font files, for a converter.
+#[cfg(feature = "raster")]
+pub const FILES: [&[u8]; 2] = [REGULAR, SEMIBOLD];
 
 /// The width of `text` in px, set in one line at `size` px.
 pub fn width(text: &str, size: f64, weight: Weight) -> f64 {

@@ -6,12 +6,14 @@
 //!
 //! One file a figure. The shared parts, from the ground up: `font` and `palette` (what is embedded), `ink` (the
 //! backend under `plotters`), `sheet` and `mark` (verbs to draw with), `matrix` and `roster` (the data, and who is
-//! who), `plot`, `panels`, `tiles`, `marker`, `dodge`, `legend`, `strip` and `label` (what figures are made of), `convert`.
+//! who), `plot`, `panels`, `tiles`, `marker`, `dodge`, `legend`, `strip` and `label` (what figures are made of), and
+//! `convert` (PNG and PDF, feature `raster`).
 
 pub mod e5_outcomes;
 pub mod gaze;
 
 mod completion_gap;
+#[cfg(feature = "raster")]
 mod convert;
 mod decision_curve;
 mod dodge;
@@ -40,6 +42,7 @@ mod tiles;
 use std::fmt;
 use std::str::FromStr;
 
+#[cfg(feature = "raster")]
 pub use convert::ConvertError;
 
 use crate::base::near;
@@ -280,6 +283,7 @@ impl Figure {
     ///
     /// # Errors
     /// When there is no room for the pixels.
+    #[cfg(feature = "raster")]
     pub fn png(&self) -> Result<Vec<u8>, ConvertError> {
         convert::png(&convert::tree(&self.inline_svg())?)
     }
@@ -288,6 +292,7 @@ impl Figure {
     ///
     /// # Errors
     /// When the page is too large for a PDF.
+    #[cfg(feature = "raster")]
     pub fn pdf(&self) -> Result<Vec<u8>, ConvertError> {
         convert::pdf(&convert::tree(&self.inline_svg())?)
     }

@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod definitions;
+pub mod figure;
 pub mod info;
 pub mod report;
 pub mod schema;

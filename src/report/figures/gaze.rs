@@ -1,7 +1,5 @@
 //! `gaze`: a raster of episodes by steps: the mirror in view, first sight of it, claim and decision.
 
-use std::ops::RangeInclusive;
-
 use plotters::style::RGBColor;
 
 use super::frame::{Frame, many};
@@ -14,7 +12,7 @@ use super::plot::{Plot, whole_ticks};
 use super::sheet::{Fill, Sheet, Stroke};
 use super::tiles;
 use super::{Drawn, MARGIN, Scene};
-use crate::score::table::EpisodeKey;
+use crate::score::timeline::Timeline;
 
 /// The height of all rows of a column together that is aimed at, px.
 const AIM: f64 = 420.0;
@@ -25,23 +23,6 @@ const GAP: f64 = 18.0;
 const MOST_COLUMNS: usize = 5;
 const NAMES: f64 = 150.0;
 const LEAST_PANEL: f64 = 70.0;
-
-/// The landmarks of one episode; all steps are 1-based.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Timeline {
-    /// Which episode.
-    pub key: EpisodeKey,
-    /// How many steps it has.
-    pub length: u32,
-    /// The steps at which the mirror is in view, ascending, as runs that do not touch.
-    pub visible: Vec<RangeInclusive<u32>>,
-    /// The first step with the mirror in view; `None` where there is none.
-    pub first_sight: Option<u32>,
-    /// The first step at which a colour is claimed; `None` where none is.
-    pub claim: Option<u32>,
-    /// The step of the decision; `None` where the episode ends without one.
-    pub decision: Option<u32>,
-}
 
 /// Draws it.
 pub(super) fn draw(scene: Scene<'_>, timelines: &[Timeline]) -> Drawn {

@@ -92,13 +92,15 @@ struct Binder<'a> {
 const DEEPEST: usize = 400;
 
 impl Binder<'_> {
-    /// One name has one meaning.
+    /// One name has one meaning. A column that only some traces have gives way to a definition of its name, so that
+    /// definitions say the same whatever else was recorded.
     fn check_names(&mut self) {
         let lets = self.document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));
         let metrics = self.document.metrics.iter().map(|(name, entry)| (name, &entry.place, "metric"));
         let mut faults = Vec::new();
         for (name, place, what) in lets.chain(metrics) {
-            if name == "t" || self.columns.get(name).is_some() {
+            let is_column = self.columns.of_schema(name).is_some() || self.document.columns.contains_key(name);
+            if name == "t" || is_column {
                 let message = format!("the {what} `{name}` has the name of a column");
                 faults.push(Fault::new(place.clone(), message).help("choose another name"));
             } else if what == "metric" && self.document.lets.contains_key(name) {

@@ -84,7 +84,12 @@ fn the_paper_s_metrics_are_as_worked_out_by_hand() {
 #[test]
 fn an_episode_alone_scores_as_among_others() {
     for Case { episode, expected } in cases() {
-        assert_eq!(values(&score_paper(&[episode.clone()]), &episode.episode_id), expected, "{}", episode.episode_id);
+        assert_eq!(
+            values(&score_paper(std::slice::from_ref(&episode)), &episode.episode_id),
+            expected,
+            "{}",
+            episode.episode_id
+        );
     }
 }
 

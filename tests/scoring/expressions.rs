@@ -71,8 +71,12 @@ impl Author {
     }
 
     /// The literal null now and then, where something else gives the type.
-    fn or_null(&mut self, ty: Type, level: Level, depth: usize) -> Box<Expr> {
-        if self.pick(8) == 7 { Box::new(Expr::Null) } else { self.boxed(ty, level, depth) }
+    fn or_null(&mut self, ty: Type, level: Level, depth: usize) -> Expr {
+        if self.pick(8) == 7 { Expr::Null } else { self.of(ty, level, depth) }
+    }
+
+    fn boxed_or_null(&mut self, ty: Type, level: Level, depth: usize) -> Box<Expr> {
+        Box::new(self.or_null(ty, level, depth))
     }
 
     /// What may stand beside a value of this type: another of it, a number of the other kind, null.
@@ -109,13 +113,13 @@ impl Author {
         match self.pick(5) {
             0 => {
                 let first = self.of(ty, level, depth);
-                Expr::Coalesce(vec![first, self.same(ty, level, depth), self.same(ty, level, depth)])
+                Expr::Coalesce(vec![first, self.or_null(ty, level, depth), self.or_null(ty, level, depth)])
             }
             1 => {
                 let branches =
-                    (0..=self.pick(2)).map(|_| (*self.or_null(Type::Bool, level, depth), self.of(ty, level, depth)));
+                    (0..=self.pick(2)).map(|_| (self.or_null(Type::Bool, level, depth), self.of(ty, level, depth)));
                 let branches = branches.collect();
-                let otherwise = (self.pick(2) == 1).then(|| Box::new(self.same(ty, level, depth)));
+                let otherwise = (self.pick(2) == 1).then(|| self.boxed_or_null(ty, level, depth));
                 Expr::Case(None, branches, otherwise)
             }
             2 => {
@@ -125,14 +129,9 @@ impl Author {
                 let branches = vec![branch(self), branch(self)];
                 Expr::Case(Some(operand), branches, None)
             }
-            3 => Expr::NullIf(self.boxed(ty, level, depth), Box::new(self.same(ty, level, depth))),
-            _ => Expr::At(self.boxed(ty, Level::Step, depth), self.or_null(Type::Int, Level::Episode, depth)),
+            3 => Expr::NullIf(self.boxed(ty, level, depth), self.boxed_or_null(ty, level, depth)),
+            _ => Expr::At(self.boxed(ty, Level::Step, depth), self.boxed_or_null(Type::Int, Level::Episode, depth)),
         }
-    }
-
-    /// Another value of exactly this type, or null.
-    fn same(&mut self, ty: Type, level: Level, depth: usize) -> Expr {
-        *self.or_null(ty, level, depth)
     }
 
     fn boolean(&mut self, level: Level, depth: usize) -> Expr {
@@ -142,9 +141,9 @@ impl Author {
             0 if level == Level::Step => Expr::Column(self.choose(&["mirror_visible", "bumped"])),
             0 | 1 => Expr::Bool(self.pick(2) == 0),
             2 => self.named(Type::Bool, level).unwrap_or(Expr::Bool(true)),
-            3 => Expr::Not(self.or_null(Type::Bool, level, less)),
-            4 => Expr::And(self.or_null(Type::Bool, level, less), self.or_null(Type::Bool, level, less)),
-            5 => Expr::Or(self.or_null(Type::Bool, level, less), self.or_null(Type::Bool, level, less)),
+            3 => Expr::Not(self.boxed_or_null(Type::Bool, level, less)),
+            4 => Expr::And(self.boxed_or_null(Type::Bool, level, less), self.boxed_or_null(Type::Bool, level, less)),
+            5 => Expr::Or(self.boxed_or_null(Type::Bool, level, less), self.boxed_or_null(Type::Bool, level, less)),
             6 | 7 => {
                 let ty = self.any_type();
                 let (op, left) = (self.choose(&COMPARISONS), self.boxed(ty, level, less));
@@ -165,9 +164,9 @@ impl Author {
             }
             10 => {
                 let ty = self.any_type();
-                Expr::IsNull(self.or_null(ty, level, less))
+                Expr::IsNull(self.boxed_or_null(ty, level, less))
             }
-            11 => Expr::Is(self.pick(2) == 0, self.or_null(Type::Bool, level, less)),
+            11 => Expr::Is(self.pick(2) == 0, self.boxed_or_null(Type::Bool, level, less)),
             12 => {
                 let ty = self.any_type();
                 let operand = self.boxed(ty, level, less);
@@ -183,7 +182,7 @@ impl Author {
                 0 => {
                     Expr::Matches(self.boxed(Type::Text, level, less), self.choose(&["e", "(?i)ME", "^$", "^[a-zé]+$"]))
                 }
-                _ => Expr::Aggregate(self.choose(&["any", "all"]), self.or_null(Type::Bool, Level::Step, less)),
+                _ => Expr::Aggregate(self.choose(&["any", "all"]), self.boxed_or_null(Type::Bool, Level::Step, less)),
             },
             _ => self.general(Type::Bool, level, less),
         }
@@ -201,18 +200,18 @@ impl Author {
             3 => self.named(Type::Int, level).or_else(|| self.rate_as_number()).unwrap_or(Expr::Length),
             4 => {
                 let op = self.choose(&["+", "-", "%", "div"]);
-                Expr::Arithmetic(op, self.boxed(Type::Int, level, less), self.or_null(Type::Int, level, less))
+                Expr::Arithmetic(op, self.boxed(Type::Int, level, less), self.boxed_or_null(Type::Int, level, less))
             }
             5 => {
                 let factor = [2, -1, 3][self.pick(3)];
-                Expr::Arithmetic("*", Box::new(Expr::Int(factor)), self.or_null(Type::Int, level, less))
+                Expr::Arithmetic("*", Box::new(Expr::Int(factor)), self.boxed_or_null(Type::Int, level, less))
             }
-            6 => Expr::Negate(self.or_null(Type::Int, level, less)),
+            6 => Expr::Negate(self.boxed_or_null(Type::Int, level, less)),
             7 | 8 => {
                 let name = self.choose(&["first", "last", "count"]);
-                Expr::Aggregate(name, self.or_null(Type::Bool, Level::Step, less))
+                Expr::Aggregate(name, self.boxed_or_null(Type::Bool, Level::Step, less))
             }
-            9 => Expr::Aggregate(self.choose(&["min", "max", "sum"]), self.or_null(Type::Int, Level::Step, less)),
+            9 => Expr::Aggregate(self.choose(&["min", "max", "sum"]), self.boxed_or_null(Type::Int, Level::Step, less)),
             _ => self.general(Type::Int, level, less),
         }
     }

@@ -55,17 +55,13 @@ pub struct Definition {
 /// Definitions as a file; each refers to earlier ones alone, though the file lists metrics last.
 pub fn toml(definitions: &[Definition]) -> String {
     let quoted = |expr: &Expr| serde_json::to_string(&sql(expr, definitions)).unwrap();
-    let mut text = "[let]\n".to_owned();
-    for definition in definitions.iter().filter(|definition| !definition.is_metric) {
-        text += &format!("{} = {}\n", definition.name, quoted(&definition.value));
-    }
-    for definition in definitions.iter().filter(|definition| definition.is_metric) {
-        text += &format!("[metric.{}]\nvalue = {}\n", definition.name, quoted(&definition.value));
-        if let Some(when) = &definition.when {
-            text += &format!("when = {}\n", quoted(when));
-        }
-    }
-    text
+    let (metrics, lets): (Vec<_>, Vec<_>) = definitions.iter().partition(|definition| definition.is_metric);
+    let lets = lets.iter().map(|definition| format!("{} = {}\n", definition.name, quoted(&definition.value)));
+    let metrics = metrics.iter().map(|metric| {
+        let when = metric.when.as_ref().map_or_else(String::new, |when| format!("when = {}\n", quoted(when)));
+        format!("[metric.{}]\nvalue = {}\n{when}", metric.name, quoted(&metric.value))
+    });
+    format!("[let]\n{}{}", lets.collect::<String>(), metrics.collect::<String>())
 }
 
 /// The expression as SQL, everything in parentheses.

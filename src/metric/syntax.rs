@@ -114,6 +114,9 @@ pub struct SyntaxFault {
 
 /// The longest text of one expression, in bytes.
 const LONGEST: usize = 16 * 1024;
+/// The most words and signs of one expression: the parser nests as deeply as a chain of operators is long, and takes its
+/// tree apart again by recursion.
+const MOST_TOKENS: usize = 4000;
 /// The deepest nesting of one expression.
 const DEEPEST: usize = 120;
 
@@ -145,6 +148,14 @@ fn parse_sql(text: &str) -> Result<ast::Expr, SyntaxFault> {
         span: byte_of(text, error.location)..text.len(),
         help: None,
     })?;
+    let count = tokens.iter().filter(|token| !matches!(token.token, Token::Whitespace(_))).count();
+    if count > MOST_TOKENS {
+        return Err(SyntaxFault {
+            message: format!("an expression of {count} words and signs is too long: the most is {MOST_TOKENS}"),
+            span: 0..text.len(),
+            help: Some("name its parts in [let]".into()),
+        });
+    }
     let mut parser = Parser::new(&dialect).with_tokens_with_locations(function_names_only(tokens));
     let parsed = parser.parse_expr().map_err(|error| grammar_fault(text, &error))?;
     let next = parser.peek_token();
@@ -439,7 +450,7 @@ impl Reader<'_> {
             Sql::AnyOp { .. } | Sql::AllOp { .. } => ("a quantified comparison", Some("write `any(p)` or `all(p)`")),
             _ => ("this construct", None),
         };
-        self.refuse(span, format!("{what} is not supported: `{expr}`"), help)
+        self.refuse(span, format!("{what} is not supported: `{}`", shortened(&expr.to_string())), help)
     }
 
     fn refuse<T>(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<&str>) -> Option<T> {
@@ -458,6 +469,15 @@ impl Reader<'_> {
             ast::Expr::Function(_) => start..end_of_call(self.text, start).unwrap_or(end),
             _ => start..end,
         }
+    }
+}
+
+/// The beginning of a text that may be as long as an expression.
+fn shortened(text: &str) -> String {
+    const ENOUGH: usize = 60;
+    match text.char_indices().nth(ENOUGH) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
     }
 }
 

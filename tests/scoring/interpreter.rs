@@ -83,14 +83,13 @@ fn sql(expr: &Expr, names: &[Definition]) -> String {
         Expr::Not(x) => format!("(not {})", one(x)),
         Expr::And(x, y) => format!("({} and {})", one(x), one(y)),
         Expr::Or(x, y) => format!("({} or {})", one(x), one(y)),
-        Expr::Compare(op, x, y) => format!("({} {op} {})", one(x), one(y)),
         Expr::Distinct(x, y) => format!("({} is distinct from {})", one(x), one(y)),
         Expr::IsNull(x) => format!("({} is null)", one(x)),
         Expr::Is(truth, x) => format!("({} is {truth})", one(x)),
         Expr::Between([x, low, high]) => format!("({} between {} and {})", one(x), one(low), one(high)),
         Expr::In(x, items) => format!("({} in ({}))", one(x), list(items)),
         Expr::Arithmetic("div", x, y) => format!("div({}, {})", one(x), one(y)),
-        Expr::Arithmetic(op, x, y) => format!("({} {op} {})", one(x), one(y)),
+        Expr::Compare(op, x, y) | Expr::Arithmetic(op, x, y) => format!("({} {op} {})", one(x), one(y)),
         Expr::Negate(x) => format!("(- {})", one(x)),
         Expr::Case(operand, branches, otherwise) => {
             let operand = operand.as_ref().map_or_else(String::new, |x| format!(" {}", one(x)));

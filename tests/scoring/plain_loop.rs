@@ -20,7 +20,7 @@ fn committed(step: &Step) -> bool {
     }
 }
 
-/// TSA, TTD, MCR, MTATO, CAAL, CR, TSA-C, MGD, SC, AR_SC.
+/// TSA, TTD, MCR, MTATO, CAAL, CR, TSA-C, MGD, SC, `AR_SC`.
 fn metrics(episode: &Episode) -> Vec<Option<i64>> {
     let steps = timed(episode);
     let is_true_color = |step: &Step| step.self_color.as_ref() == Some(&episode.body_color);

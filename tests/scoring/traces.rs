@@ -15,7 +15,9 @@ use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 pub fn write(path: &Path, episodes: &[Episode]) {
     let metadata = TraceMetadata { recording: None, columns: OptionalColumns::all() };
     let mut writer = TraceWriter::create(path, &metadata).unwrap();
-    episodes.iter().for_each(|episode| writer.write(episode).unwrap());
+    for episode in episodes {
+        writer.write(episode).unwrap();
+    }
     writer.finish().unwrap();
 }
 

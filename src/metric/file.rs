@@ -30,6 +30,7 @@ use super::columns::{Column, Level, Type};
 use super::fault::{Fault, Faults, Place, Source};
 use super::keys::Keys;
 use super::origin::Written;
+use crate::base::near::nearest;
 use crate::base::ratio::Ratio;
 
 /// The built-in definition files, by name.
@@ -97,7 +98,7 @@ pub struct ExperimentEntry {
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The file is not there or not readable.
-    #[error("cannot read the definition file `{path}`: {source}; built-in definitions are {}", built_in_names().join(", "))]
+    #[error("cannot read the definition file `{path}`; {}", built_in_help(path))]
     Unreadable {
         /// As it was typed.
         path: String,
@@ -112,6 +113,14 @@ pub enum FileError {
 /// The names of the built-in definition files.
 pub fn built_in_names() -> Vec<&'static str> {
     BUILT_IN.iter().map(|(name, _)| *name).collect()
+}
+
+/// What a name that gives no file may have been meant to be.
+fn built_in_help(name: &str) -> String {
+    match nearest(name, built_in_names()) {
+        Some(near) => format!("did you mean the built-in `{near}`?"),
+        None => format!("built-in definitions are {}", built_in_names().join(", ")),
+    }
 }
 
 /// The text of a built-in definition file.
@@ -214,10 +223,7 @@ impl Reading {
             }
             Ok(file) => self.file(file),
             Err(error) => {
-                let help = format!(
-                    "built-in definitions are {}; a path is relative to this file",
-                    built_in_names().join(", ")
-                );
+                let help = format!("a path is relative to this file; {}", built_in_help(name));
                 let message = format!("cannot read the definition file `{}`: {error}", path.display());
                 self.faults.push(Fault::new(place, message).help(help));
             }

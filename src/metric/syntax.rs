@@ -11,6 +11,8 @@ use sqlparser::keywords::Keyword;
 use sqlparser::parser::{Parser, ParserError};
 use sqlparser::tokenizer::{Location, Token, TokenWithSpan, Tokenizer};
 
+use super::functions;
+
 /// An expression as written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expr {
@@ -162,8 +164,15 @@ fn parse_sql(text: &str) -> Result<ast::Expr, SyntaxFault> {
     if next.token == Token::EOF {
         return Ok(parsed);
     }
+    let before = parser.get_previous_token();
+    if let Some(fault) = unread_construct(text, before) {
+        return Err(fault);
+    }
     let help = match &next.token {
         Token::Eq | Token::DoubleEq => None,
+        Token::RParen => Some("no parenthesis opens before it".into()),
+        Token::SemiColon => Some("a definition is one expression".into()),
+        _ if function_of(before).is_some() => function_of(before).map(|usage| format!("write {usage}")),
         Token::Word(word) if word.keyword == Keyword::FROM => {
             Some("a definition reads one episode; there is no FROM".into())
         }
@@ -175,6 +184,33 @@ fn parse_sql(text: &str) -> Result<ast::Expr, SyntaxFault> {
         span: start..byte_of(text, next.span.end).max(start + 1),
         help,
     })
+}
+
+/// The parser takes `case` and `not` for names where it cannot read what follows them; this says what is the matter.
+fn unread_construct(text: &str, before: &TokenWithSpan) -> Option<SyntaxFault> {
+    let Token::Word(word) = &before.token else { return None };
+    let (message, help) = match (word.keyword, word.quote_style) {
+        (Keyword::CASE, None) => (
+            "this `case` is faulty or not complete",
+            "write `case when p then x else y end`, or `case x when 1 then y end`",
+        ),
+        (Keyword::NOT, None) => {
+            ("what follows this `not` is faulty or nested too deeply", "write `not p` or `not (p and q)`")
+        }
+        _ => return None,
+    };
+    let span = byte_of(text, before.span.start)..byte_of(text, before.span.end);
+    Some(SyntaxFault { message: message.to_owned(), span, help: Some(help.to_owned()) })
+}
+
+/// How the function that a word names is used.
+fn function_of(token: &TokenWithSpan) -> Option<&'static str> {
+    match &token.token {
+        Token::Word(word) if word.quote_style.is_none() => {
+            functions::find(&word.value.to_lowercase()).map(|entry| entry.usage)
+        }
+        _ => None,
+    }
 }
 
 /// `any(`, `all(` and `some(` become plain names, so that they are functions wherever they stand.

@@ -2,6 +2,7 @@
 //!
 //! `faults/NAME.toml` is what was written, `faults/NAME.snap` what is said about it.
 
+use std::error::Error as _;
 use std::fs;
 use std::path::Path;
 
@@ -59,7 +60,10 @@ fn a_file_that_is_no_text_is_named() {
         fs::write(&path, bytes).unwrap();
         path
     };
-    let load = |path: &Path| Definitions::load(path.to_str().unwrap(), &schema_columns()).unwrap_err().to_string();
+    let load = |path: &Path| {
+        let error = Definitions::load(path.to_str().unwrap(), &schema_columns()).unwrap_err();
+        format!("{error}: {}", error.source().map_or_else(String::new, ToString::to_string))
+    };
     let told = load(&write("latin.toml", b"[let]\na = \"\xe9\"\n"));
     assert!(told.contains("latin.toml") && told.contains("UTF-8"), "{told}");
     let told = load(folder.path());

@@ -17,6 +17,7 @@ use super::origin::Written;
 use super::plan::{Aggregate, Arithmetic, Builder, Comparison, Constant, NodeId, Op, Plan};
 use super::syntax::{self, BinaryOp, Expr, ExprKind, Literal};
 use crate::base::near::nearest;
+use crate::base::visible::visible;
 use crate::metric::catalog::Kind;
 
 /// What an expression came to.
@@ -92,13 +93,18 @@ struct Binder<'a> {
 const DEEPEST: usize = 400;
 
 impl Binder<'_> {
-    /// One name has one meaning.
+    /// One name has one meaning. A column that only some traces have gives way to a definition of its name, so that
+    /// definitions say the same whatever else was recorded.
     fn check_names(&mut self) {
         let lets = self.document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));
         let metrics = self.document.metrics.iter().map(|(name, entry)| (name, &entry.place, "metric"));
         let mut faults = Vec::new();
         for (name, place, what) in lets.chain(metrics) {
-            if name == "t" || self.columns.get(name).is_some() {
+            let is_column = self.columns.of_schema(name).is_some() || self.document.columns.contains_key(name);
+            if name.is_empty() || name.contains(|c: char| c == ',' || c.is_control()) {
+                let message = format!("`{}` is no name of a {}", visible(name), what.trim_matches('`'));
+                faults.push(Fault::new(place.clone(), message).help("a name has visible characters and no comma"));
+            } else if name == "t" || is_column {
                 let message = format!("the {what} `{name}` has the name of a column");
                 faults.push(Fault::new(place.clone(), message).help("choose another name"));
             } else if what == "metric" && self.document.lets.contains_key(name) {
@@ -320,7 +326,9 @@ impl Scope<'_, '_> {
         let document = self.binder.document;
         let known = document.lets.keys().chain(document.metrics.keys()).map(String::as_str);
         let known = known.chain(self.binder.columns.names()).chain(["t"]);
+        let is_quoted = self.written.text[expr.span.clone()].starts_with('"');
         let help = match (functions::find(&name.to_lowercase()), nearest(name, known)) {
+            _ if is_quoted => format!("double quotes are for names; a text takes single ones: '{name}'"),
             (Some(entry), _) => format!("functions take parentheses: {}", entry.usage),
             (None, Some(near)) => format!("did you mean `{near}`?"),
             (None, None) => "a column of your own is declared with [column.NAME] and `type`".to_owned(),
@@ -760,6 +768,7 @@ fn arguments_wanted(entry: &Entry) -> String {
         (0, 0) => "no argument".to_owned(),
         (1, 1) => "1 argument".to_owned(),
         (least, most) if least == most => format!("{least} arguments"),
-        (least, _) => format!("at least {least}"),
+        (1, _) => "at least 1 argument".to_owned(),
+        (least, _) => format!("at least {least} arguments"),
     }
 }

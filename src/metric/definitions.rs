@@ -78,10 +78,8 @@ impl Definitions {
 
     fn check(document: Document, columns: &Columns, filter: Option<&Written>) -> Result<Self, Faults> {
         let mut columns = columns.clone();
-        for (name, (column, _)) in &document.columns {
-            columns.add(name.clone(), *column);
-        }
-        let mut faults = experiment_faults(&document);
+        let mut faults = declare(&document, &mut columns);
+        faults.extend(experiment_faults(&document));
         let binding = match bind::bind(&document, &columns, filter) {
             Ok(binding) if faults.is_empty() => binding,
             Ok(_) => return Err(Faults(faults).in_order()),
@@ -117,6 +115,24 @@ fn advice(near: Option<&str>, known: &[String]) -> String {
         Some(near) => format!("did you mean `{near}`?"),
         None => format!("metrics are {}", known.join(", ")),
     }
+}
+
+/// Adds the columns that a document declares; they must not contradict the schema or the traces.
+fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for (name, (declared, place)) in &document.columns {
+        if name == "t" || columns.of_schema(name).is_some_and(|known| known != *declared) {
+            let message = format!("`{name}` is a column of every trace and cannot be declared as another");
+            faults.push(Fault::new(place.clone(), message).help("remove the declaration: `mirrorstats schema` has it"));
+        } else if let Some(found) = columns.get(name).filter(|found| found.ty != declared.ty) {
+            let (declared, found) = (declared.ty.name(), found.ty.name());
+            let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");
+            faults.push(Fault::new(place.clone(), message).help("declare it as the traces have it"));
+        } else {
+            columns.set_own(name.clone(), *declared);
+        }
+    }
+    faults
 }
 
 /// Chance levels must be those of metrics.

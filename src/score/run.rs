@@ -97,7 +97,7 @@ pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns = schema_columns();
     for name in traces.column_names().into_iter().filter(|name| *name != "t") {
         if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
-            columns.add(name, Column { ty, level: Level::Step });
+            columns.set_own(name, Column { ty, level: Level::Step });
         }
     }
     columns

@@ -22,3 +22,11 @@ mirrorstats validate fixtures/paper
 echo "end-to-end: the definitions have no fault"
 mirrorstats definitions check paper
 mirrorstats definitions check extended
+
+echo "end-to-end: the same scores from the SQL lowering on an independent engine"
+target=${CARGO_TARGET_DIR:-target}
+packages=$target/python
+[ -d "$packages/duckdb" ] || python3 -m pip install --quiet --disable-pip-version-check --root-user-action=ignore \
+  --target "$packages" duckdb==2.0.0
+PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper
+PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper --where "seed <> 2 and TSA = 1"

@@ -5,6 +5,7 @@
 
 pub mod args;
 pub mod commands;
+pub mod drawing;
 mod listing;
 pub mod outcome;
 pub mod output;

@@ -119,6 +119,11 @@ fn colored() -> bool {
     io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
+/// Whether these are files of scores rather than traces.
+pub fn are_scores(inputs: &[Input]) -> bool {
+    inputs.iter().any(is_scores)
+}
+
 fn is_scores(input: &Input) -> bool {
     match Format::of_name(&input.name) {
         Ok(Format::Csv | Format::JsonLines) => true,
@@ -198,7 +203,7 @@ pub fn labels(by: &[String]) -> Vec<String> {
 /// # Errors
 /// What is wrong with the traces.
 pub fn lost(inputs: &[Input], threads: NonZeroUsize) -> Result<Option<BTreeSet<String>>, Failure> {
-    if inputs.iter().any(is_scores) {
+    if are_scores(inputs) {
         return Ok(None);
     }
     let traces = open(inputs)?;

@@ -21,4 +21,5 @@ mod keys;
 pub mod origin;
 pub mod plan;
 pub mod shape;
+pub mod sql;
 mod syntax;

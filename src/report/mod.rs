@@ -7,6 +7,7 @@ pub mod bundle;
 pub mod comparison;
 pub mod emphasis;
 pub mod errata;
+pub mod figures;
 pub mod layout;
 pub mod published;
 pub mod statistics;

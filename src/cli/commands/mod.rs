@@ -2,10 +2,12 @@
 
 pub mod compare;
 pub mod definitions;
+pub mod figure;
 pub mod info;
 pub mod report;
 pub mod schema;
 pub mod score;
+pub mod sql;
 pub mod stats;
 pub mod validate;
 
@@ -18,10 +20,12 @@ pub enum Command {
     Report(report::ReportArgs),
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
+    Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
     Schema(schema::SchemaCommand),
+    Sql(sql::SqlArgs),
     Definitions(definitions::DefinitionsArgs),
 }
 
@@ -35,10 +39,12 @@ impl Command {
             Self::Report(args) => args.run(),
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
+            Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
             Self::Schema(command) => command.run(),
+            Self::Sql(args) => args.run(),
             Self::Definitions(args) => args.run(),
         }
     }

@@ -3,21 +3,25 @@
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::PathBuf;
 
+use clap::ValueEnum as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::args::{ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, scoring};
+use super::figure::Format;
 use crate::cells::cell::Cells;
 use crate::cells::group::{DEFAULT_BY, group};
-use crate::report::bundle::{self, Bundle, Manifest};
+use crate::cli::drawing::Sources;
+use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
 use crate::report::layout;
 use crate::report::style::{MAIN_TABLE, Style};
 use crate::report::table::Table;
 use crate::report::tables::terminal::{self, Marks, Terminal};
-use crate::score::format::{self, Format};
+use crate::score::format;
 use crate::score::table::EpisodeTable;
+use crate::trace::inputs::Input;
 
 /// Compute the tables of traces, print the main one, write all of them
 #[derive(Clone, Debug, clap::Args)]
@@ -37,6 +41,9 @@ pub struct ReportArgs {
     /// Group episodes by these columns, separated by commas
     #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY)]
     pub by: Vec<String>,
+    /// Write tables, cells and provenance alone
+    #[arg(long)]
+    pub no_figures: bool,
     /// Print what was written as JSON instead of the table
     #[arg(long)]
     pub json: bool,
@@ -71,12 +78,30 @@ impl ReportArgs {
         let condition = self.scoring.condition.clone();
         let manifest =
             Manifest::new(&cells, &style, scoring::schema_version(), condition, scoring::provenance(&inputs)?);
-        let files = self.write(&episodes, &cells, &tables, &manifest)?;
+        let figures = if self.no_figures { Vec::new() } else { self.figures(&inputs, &episodes, &style)? };
+        let files = self.write(&episodes, &cells, &tables, &manifest, &figures)?;
         if self.json {
             let out = self.out.display().to_string();
             return output::print_json(&ReportAnswer { out, files, episodes: episodes.len(), manifest });
         }
         self.print(&tables, episodes.len())
+    }
+
+    /// Every figure that can be drawn, in every format; why another one cannot is told on standard error.
+    fn figures(&self, inputs: &[Input], episodes: &EpisodeTable, style: &Style) -> Result<Vec<OutputFile>, Failure> {
+        let sources = Sources::of(inputs, &self.scoring, episodes, style, self.traces.threads.count())?;
+        let drawings = sources.draw_all();
+        for (name, reason) in drawings.left_out {
+            writeln!(io::stderr(), "note: no figure `{name}`: {reason}")?;
+        }
+        let mut files = Vec::new();
+        for (name, figure) in &drawings.drawn {
+            for format in Format::value_variants() {
+                let path = format!("figures/{name}.{}", format.ending()).into();
+                files.push(OutputFile { path, bytes: format.encode(figure)? });
+            }
+        }
+        Ok(files)
     }
 
     fn write(
@@ -85,10 +110,11 @@ impl ReportArgs {
         cells: &Cells,
         tables: &[Table],
         manifest: &Manifest,
+        figures: &[OutputFile],
     ) -> Result<Vec<String>, Failure> {
         let mut bytes = Vec::new();
-        format::write(episodes, Format::Parquet, &mut bytes).map_err(Failure::input)?;
-        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, others: &[] };
+        format::write(episodes, format::Format::Parquet, &mut bytes).map_err(Failure::input)?;
+        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, others: figures };
         let written = bundle::write(&self.out, &bundle).map_err(Failure::input)?;
         let inside = |path: &PathBuf| path.strip_prefix(&self.out).unwrap_or(path).display().to_string();
         Ok(written.iter().map(inside).collect())

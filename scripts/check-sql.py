@@ -1,0 +1,44 @@
+"""Runs the SQL lowering on an independent engine (DuckDB) and compares every score with the native engine's.
+
+Usage: check-sql.py MIRRORSTATS TRACES_FOLDER [MIRRORSTATS_ARGUMENT...]
+"""
+
+import csv
+import io
+import subprocess
+import sys
+
+import duckdb
+
+
+def run(*arguments):
+    return subprocess.run(arguments, check=True, capture_output=True, text=True).stdout
+
+
+def native(program, folder, extra):
+    rows = csv.reader(io.StringIO(run(program, "score", folder, *extra)))
+    next(rows)
+    return [(*row[:3], int(row[3]), int(row[4]), *(int(v) if v else None for v in row[5:])) for row in rows]
+
+
+def independent(program, folder, extra):
+    statement = run(program, "sql", *extra)
+    connection = duckdb.connect()
+    source = f"read_parquet('{folder}/*.parquet', union_by_name = true)"
+    connection.execute(f"CREATE VIEW steps AS SELECT * FROM {source}")
+    return connection.execute(statement).fetchall()
+
+
+def main():
+    program, folder, *extra = sys.argv[1:]
+    expected, found = native(program, folder, extra), independent(program, folder, extra)
+    for left, right in zip(expected, found):
+        if left != right:
+            sys.exit(f"native {left}\nDuckDB {right}")
+    if len(expected) != len(found) or not expected:
+        sys.exit(f"native has {len(expected)} episodes, DuckDB {len(found)}")
+    print(f"{len(found)} episodes, {len(found[0]) - 5} metrics: the same on DuckDB {duckdb.__version__}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,63 @@
+//! `sql`: the statement that computes the episode table on another engine.
+
+use std::io::{self, Write as _};
+
+use super::super::args::ScoringArgs;
+use super::super::outcome::{Failure, Outcome};
+use super::super::scoring;
+use crate::metric::definitions::Definitions;
+use crate::metric::sql::{self, Dialect};
+use crate::score::run;
+
+/// Print the SQL statement that computes the episode table from a table `steps`
+#[derive(Clone, Debug, clap::Args)]
+pub struct SqlArgs {
+    /// How the metrics are defined.
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    /// Whose SQL to write
+    #[arg(long, value_enum, default_value_t = DialectArg::Portable)]
+    pub dialect: DialectArg,
+}
+
+/// The dialects by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum DialectArg {
+    /// What all engines share
+    Portable,
+    /// Spark SQL
+    Spark,
+    /// The one of `DuckDB`
+    Duckdb,
+}
+
+impl From<DialectArg> for Dialect {
+    fn from(dialect: DialectArg) -> Self {
+        match dialect {
+            DialectArg::Portable => Self::Portable,
+            DialectArg::Spark => Self::Spark,
+            DialectArg::Duckdb => Self::Duckdb,
+        }
+    }
+}
+
+impl SqlArgs {
+    /// Prints the statement.
+    ///
+    /// # Errors
+    /// Faults of the definitions; a construct that the dialect cannot say.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let columns = run::schema_columns();
+        let name = self.scoring.definitions_name();
+        let mut definitions = Definitions::load(name, &columns).map_err(scoring::definition_failure)?;
+        if let Some(condition) = &self.scoring.condition {
+            definitions = definitions.filtered("--where", condition, &columns).map_err(Failure::input)?;
+        }
+        if let Some(metrics) = &self.scoring.metrics {
+            definitions.select(metrics).map_err(Failure::input)?;
+        }
+        let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
+        io::stdout().lock().write_all(statement.as_bytes())?;
+        Ok(Outcome::Done)
+    }
+}

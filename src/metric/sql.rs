@@ -1,0 +1,488 @@
+//! A plan as one SQL statement over a table `steps`: the second lowering, for other engines.
+//!
+//! Each stage of the statement is a common table expression with one row an episode. An aggregate
+//! belongs to the first stage in which everything it reads is known:
+//!
+//! ```text
+//! WITH e1 AS (SELECT s.episode_id, MIN(CASE WHEN ... THEN s.t END) AS n4, ... FROM steps s GROUP BY s.episode_id),
+//!      e2 AS (SELECT s.episode_id, MAX(...) AS n9 FROM steps s JOIN e1 ON ... GROUP BY s.episode_id)
+//! SELECT ... FROM e1 JOIN e2 ON ... ORDER BY ...
+//! ```
+//!
+//! Nothing is used but CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN and arithmetic, so that Polars SQL,
+//! `DuckDB`, Spark SQL and `DataFusion` run the portable form as it is; a dialect differs only in regular
+//! expressions, for which there is no common function. Truth values of episodes travel as 0 and 1.
+//!
+//! Sums beyond 64 bits, which the native engine refuses, are an error or a wrap of the engine that
+//! runs the statement.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+
+use super::catalog::Kind;
+use super::columns::{Level, Type};
+use super::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Plan};
+
+/// Whose SQL to write.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Dialect {
+    /// What all engines share.
+    #[default]
+    Portable,
+    /// Spark SQL.
+    Spark,
+    /// `DuckDB`.
+    Duckdb,
+}
+
+impl Dialect {
+    /// As it is typed.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Spark => "spark",
+            Self::Duckdb => "duckdb",
+        }
+    }
+
+    /// A name as it stands in a statement.
+    fn quoted(self, name: &str) -> String {
+        match self {
+            _ if is_plain(name) => name.to_owned(),
+            Self::Spark => format!("`{}`", name.replace('`', "``")),
+            Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
+        }
+    }
+
+    /// The column of a metric.
+    pub fn output_name(self, metric: &str) -> String {
+        match self {
+            Self::Portable => metric.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect(),
+            Self::Spark | Self::Duckdb => self.quoted(metric),
+        }
+    }
+
+    /// The function that says whether a text has a match of a regular expression.
+    const fn matches(self) -> Option<&'static str> {
+        match self {
+            Self::Portable => None,
+            Self::Spark => Some("regexp_like"),
+            Self::Duckdb => Some("regexp_matches"),
+        }
+    }
+}
+
+/// A plan that a dialect cannot say.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LoweringError {
+    /// Regular expressions.
+    #[error("`{metric}` uses regexp_like, which has no form that all engines share; choose --dialect spark or duckdb")]
+    Regexp {
+        /// The first metric that needs it.
+        metric: String,
+    },
+    /// A name that needs quotes, which engines write differently.
+    #[error("the name `{name}` needs quotes, which engines write differently; choose --dialect spark or duckdb")]
+    Name {
+        /// The column.
+        name: String,
+    },
+    /// Two metrics whose names are one without quotes.
+    #[error("two metrics would both be called `{name}`; choose --dialect spark or duckdb")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// Too long a statement.
+    #[error("the statement exceeds {limit} bytes; choose fewer metrics with --metrics")]
+    Length {
+        /// The longest statement written.
+        limit: usize,
+    },
+}
+
+/// The longest statement that is written, in bytes.
+const LONGEST: usize = 4 * 1024 * 1024;
+/// The columns that name an episode besides its id, in the order of the episode table.
+const KEYS: [&str; 4] = ["model", "experiment", "seed", "run"];
+
+/// The statement that computes the episode table: `episode_id, model, experiment, seed, run`, then the metrics.
+///
+/// Engines differ in how they quote names, so the portable form quotes none: a metric's `-` becomes `_` there.
+///
+/// # Errors
+/// A construct that the dialect cannot say, by the name of the metric that uses it.
+pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
+    let roots = plan.outputs.iter().map(|output| output.node).chain(plan.filter);
+    let needed = plan.needed_by(roots);
+    let lowering = Lowering { plan, dialect, stages: stages(plan, &needed) };
+    lowering.check_patterns()?;
+    lowering.check_names(&needed)?;
+    let mut text = String::new();
+    let last = needed.iter().filter_map(|id| lowering.stages.get(id)).copied().max().unwrap_or(0).max(1);
+    for stage in 1..=last {
+        text.push_str(if stage == 1 { "WITH " } else { ",\n" });
+        lowering.stage(stage, &needed, &mut text)?;
+    }
+    lowering.select(last, &mut text)?;
+    Ok(text)
+}
+
+/// When each node is known: 0 for what a step says by itself, k for what stage k has computed.
+fn stages(plan: &Plan, needed: &[NodeId]) -> BTreeMap<NodeId, usize> {
+    let mut stages = BTreeMap::new();
+    for &id in needed {
+        let node = plan.node(id);
+        let before = node.op.operands().iter().map(|operand| stages[operand]).max().unwrap_or(0);
+        let stage = match &node.op {
+            Op::Aggregate(..) | Op::At(..) => before + 1,
+            Op::Length => 1,
+            Op::Column(_) if node.level == Level::Episode => 1,
+            _ => before,
+        };
+        stages.insert(id, stage);
+    }
+    stages
+}
+
+/// Whether a node is a column of its stage's table.
+fn is_column_of_stage(op: &Op, level: Level) -> bool {
+    matches!(op, Op::Aggregate(..) | Op::At(..) | Op::Length)
+        || (matches!(op, Op::Column(_)) && level == Level::Episode)
+}
+
+struct Lowering<'p> {
+    plan: &'p Plan,
+    dialect: Dialect,
+    stages: BTreeMap<NodeId, usize>,
+}
+
+impl Lowering<'_> {
+    fn check_patterns(&self) -> Result<(), LoweringError> {
+        if self.dialect.matches().is_some() {
+            return Ok(());
+        }
+        let uses = |root: NodeId| {
+            let nodes = self.plan.needed_by([root]);
+            nodes.into_iter().any(|id| matches!(self.plan.node(id).op, Op::Matches(..)))
+        };
+        let output = self.plan.outputs.iter().find(|output| uses(output.node)).map(|output| output.name.clone());
+        let filter = self.plan.filter.filter(|&node| uses(node)).map(|_| "the filter".to_owned());
+        output.or(filter).map_or(Ok(()), |metric| Err(LoweringError::Regexp { metric }))
+    }
+
+    fn check_names(&self, needed: &[NodeId]) -> Result<(), LoweringError> {
+        if self.dialect != Dialect::Portable {
+            return Ok(());
+        }
+        if let Some((name, _)) = self.plan.columns(needed).into_iter().find(|(name, _)| !is_plain(name)) {
+            return Err(LoweringError::Name { name: name.to_owned() });
+        }
+        let mut seen = BTreeSet::new();
+        for name in self.plan.outputs.iter().map(|output| self.dialect.output_name(&output.name)) {
+            // Some engines fold the case of names without quotes.
+            if !seen.insert(name.to_lowercase()) {
+                return Err(LoweringError::SameName { name });
+            }
+        }
+        Ok(())
+    }
+
+    fn name(&self, name: &str) -> String {
+        self.dialect.quoted(name)
+    }
+
+    /// `e2 AS (SELECT s.episode_id, ... AS n9 FROM steps s JOIN e1 ... GROUP BY s.episode_id)`
+    fn stage(&self, stage: usize, needed: &[NodeId], text: &mut String) -> Result<(), LoweringError> {
+        let _ = write!(text, "e{stage} AS (\n  SELECT s.episode_id AS episode_id");
+        if stage == 1 {
+            for key in KEYS {
+                let _ = write!(text, ",\n    MIN(s.{key}) AS {key}");
+            }
+        }
+        for &id in needed {
+            let node = self.plan.node(id);
+            if self.stages[&id] == stage && is_column_of_stage(&node.op, node.level) {
+                let _ = write!(text, ",\n    {} AS n{}", self.aggregate(id), id.index());
+                check_length(text)?;
+            }
+        }
+        text.push_str("\n  FROM steps s");
+        for before in 1..stage {
+            let _ = write!(text, "\n  JOIN e{before} ON s.episode_id = e{before}.episode_id");
+        }
+        text.push_str("\n  GROUP BY s.episode_id\n)");
+        Ok(())
+    }
+
+    fn select(&self, last: usize, text: &mut String) -> Result<(), LoweringError> {
+        text.push_str("\nSELECT e1.episode_id AS episode_id");
+        for key in KEYS {
+            let _ = write!(text, ",\n  e1.{key} AS {key}");
+        }
+        for output in &self.plan.outputs {
+            let value = match (self.plan.node(output.node).ty, output.kind) {
+                (Type::Bool, _) => self.truth_as_int(output.node),
+                (_, Kind::Rate | Kind::Quantity) => self.value(output.node),
+            };
+            let _ = write!(text, ",\n  {value} AS {}", self.dialect.output_name(&output.name));
+            check_length(text)?;
+        }
+        text.push_str("\nFROM e1");
+        for stage in 2..=last {
+            let _ = write!(text, "\nJOIN e{stage} ON e1.episode_id = e{stage}.episode_id");
+        }
+        if let Some(filter) = self.plan.filter {
+            let _ = write!(text, "\nWHERE {}", self.truth(filter));
+        }
+        text.push_str("\nORDER BY experiment, model, seed, run, episode_id\n");
+        check_length(text)
+    }
+
+    /// The aggregate of a stage's table.
+    fn aggregate(&self, id: NodeId) -> String {
+        let node = self.plan.node(id);
+        match &node.op {
+            Op::Length => "COUNT(s.t)".to_owned(),
+            Op::Column(name) if node.ty == Type::Bool => {
+                format!("MIN(CASE WHEN s.{0} THEN 1 WHEN NOT s.{0} THEN 0 END)", self.name(name))
+            }
+            Op::Column(name) => format!("MIN(s.{})", self.name(name)),
+            Op::At(value, moment) => {
+                let value = if node.ty == Type::Bool { self.truth_as_int(*value) } else { self.value(*value) };
+                format!("MAX(CASE WHEN s.t = {} THEN {value} END)", self.value(*moment))
+            }
+            Op::Aggregate(aggregate, x) => match aggregate {
+                Aggregate::First => format!("MIN(CASE WHEN {} THEN s.t END)", self.truth(*x)),
+                Aggregate::Last => format!("MAX(CASE WHEN {} THEN s.t END)", self.truth(*x)),
+                Aggregate::Any => format!("MAX(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
+                Aggregate::All => format!("MIN(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
+                Aggregate::Count => format!("SUM(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
+                Aggregate::Min => format!("MIN({})", self.value(*x)),
+                Aggregate::Max => format!("MAX({})", self.value(*x)),
+                Aggregate::Sum => format!("SUM({})", self.value(*x)),
+            },
+            _ => self.value(id),
+        }
+    }
+
+    /// Where a stage's column is read.
+    fn column_of_stage(&self, id: NodeId) -> String {
+        format!("e{}.n{}", self.stages[&id], id.index())
+    }
+
+    /// A node of numbers or text.
+    fn value(&self, id: NodeId) -> String {
+        let node = self.plan.node(id);
+        if is_column_of_stage(&node.op, node.level) {
+            return self.column_of_stage(id);
+        }
+        match &node.op {
+            Op::Column(name) if node.ty == Type::Float => format!("CAST(s.{} AS DOUBLE)", self.name(name)),
+            Op::Column(name) => format!("s.{}", self.name(name)),
+            Op::Time => "s.t".to_owned(),
+            Op::Constant(constant) => self.constant(constant, node.ty),
+            Op::Spread(x) => self.value(*x),
+            Op::Negate(x) => format!("(0 - {})", self.value(*x)),
+            Op::Arithmetic(op, x, y) => arithmetic(*op, &self.value(*x), &self.value(*y)),
+            Op::IntFromBool(x) => self.truth_as_int(*x),
+            Op::FloatFromInt(x) => format!("CAST({} AS DOUBLE)", self.value(*x)),
+            Op::Case { branches, otherwise } => self.case(branches, *otherwise, |id| self.value(id)),
+            Op::Coalesce(values) => coalesce(values.iter().map(|&id| self.value(id))),
+            _ => self.truth_as_int(id),
+        }
+    }
+
+    /// A truth value as 0, 1 or null.
+    fn truth_as_int(&self, id: NodeId) -> String {
+        let node = self.plan.node(id);
+        match &node.op {
+            _ if is_column_of_stage(&node.op, node.level) => self.column_of_stage(id),
+            Op::Spread(x) => self.truth_as_int(*x),
+            Op::Case { branches, otherwise } => self.case(branches, *otherwise, |id| self.truth_as_int(id)),
+            Op::Coalesce(values) => coalesce(values.iter().map(|&id| self.truth_as_int(id))),
+            Op::Constant(Constant::Bool(value)) => i64::from(*value).to_string(),
+            Op::Constant(_) => "CAST(NULL AS BIGINT)".to_owned(),
+            _ => {
+                let truth = self.truth(id);
+                format!("CASE WHEN {truth} THEN 1 WHEN NOT {truth} THEN 0 END")
+            }
+        }
+    }
+
+    /// A node of truth values, as a condition.
+    fn truth(&self, id: NodeId) -> String {
+        let node = self.plan.node(id);
+        match &node.op {
+            Op::Column(name) if node.level == Level::Step => format!("s.{}", self.name(name)),
+            Op::Spread(x) => self.truth(*x),
+            Op::Not(x) => format!("(NOT {})", self.truth(*x)),
+            Op::And(x, y) => format!("({} AND {})", self.truth(*x), self.truth(*y)),
+            Op::Or(x, y) => format!("({} OR {})", self.truth(*x), self.truth(*y)),
+            Op::Compare(comparison, x, y) => {
+                let (x, y) = (self.operand(*x), self.operand(*y));
+                format!("({x} {} {y})", symbol(*comparison))
+            }
+            Op::Distinct(x, y) => {
+                let (x, y) = (self.operand(*x), self.operand(*y));
+                format!(
+                    "(CASE WHEN {x} IS NULL AND {y} IS NULL THEN 0 WHEN {x} IS NULL OR {y} IS NULL THEN 1 \
+                     WHEN {x} = {y} THEN 0 ELSE 1 END = 1)"
+                )
+            }
+            Op::IsNull(x) => format!("({} IS NULL)", self.operand(*x)),
+            Op::IsTrue(x) => format!("(CASE WHEN {} THEN 1 ELSE 0 END = 1)", self.truth(*x)),
+            Op::IsFalse(x) => format!("(CASE WHEN NOT {} THEN 1 ELSE 0 END = 1)", self.truth(*x)),
+            Op::Matches(x, pattern) => {
+                let function = self.dialect.matches().unwrap_or("regexp_like");
+                format!("{function}({}, {})", self.value(*x), self.text(pattern))
+            }
+            _ => format!("({} = 1)", self.truth_as_int(id)),
+        }
+    }
+
+    /// An operand of a comparison: truth values are compared as integers.
+    fn operand(&self, id: NodeId) -> String {
+        if self.plan.node(id).ty == Type::Bool { self.truth_as_int(id) } else { self.value(id) }
+    }
+
+    fn case(
+        &self,
+        branches: &[(NodeId, NodeId)],
+        otherwise: Option<NodeId>,
+        value: impl Fn(NodeId) -> String,
+    ) -> String {
+        let mut text = "CASE".to_owned();
+        for (when, then) in branches {
+            let _ = write!(text, " WHEN {} THEN {}", self.truth(*when), value(*then));
+        }
+        if let Some(otherwise) = otherwise {
+            let _ = write!(text, " ELSE {}", value(otherwise));
+        }
+        text + " END"
+    }
+
+    fn constant(&self, constant: &Constant, ty: Type) -> String {
+        match constant {
+            Constant::Null => format!("CAST(NULL AS {})", type_name(ty, self.dialect)),
+            Constant::Bool(value) => i64::from(*value).to_string(),
+            Constant::Int(i64::MIN) => "(-9223372036854775807 - 1)".to_owned(),
+            Constant::Int(value) if *value < 0 => format!("({value})"),
+            Constant::Int(value) => value.to_string(),
+            Constant::Float(bits) => format!("CAST({:e} AS DOUBLE)", f64::from_bits(*bits)),
+            Constant::Text(value) => self.text(value),
+        }
+    }
+
+    fn text(&self, value: &str) -> String {
+        match self.dialect {
+            // Spark reads backslashes in texts as escapes.
+            Dialect::Spark => format!("'{}'", value.replace('\\', "\\\\").replace('\'', "\\'")),
+            Dialect::Portable | Dialect::Duckdb => format!("'{}'", value.replace('\'', "''")),
+        }
+    }
+}
+
+fn check_length(text: &str) -> Result<(), LoweringError> {
+    if text.len() > LONGEST { Err(LoweringError::Length { limit: LONGEST }) } else { Ok(()) }
+}
+
+/// Whether every engine takes a name without quotes.
+fn is_plain(name: &str) -> bool {
+    let starts = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
+    starts && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+fn coalesce(values: impl Iterator<Item = String>) -> String {
+    format!("COALESCE({})", values.collect::<Vec<_>>().join(", "))
+}
+
+const fn symbol(comparison: Comparison) -> &'static str {
+    match comparison {
+        Comparison::Equal => "=",
+        Comparison::NotEqual => "<>",
+        Comparison::Less => "<",
+        Comparison::LessEqual => "<=",
+        Comparison::Greater => ">",
+        Comparison::GreaterEqual => ">=",
+    }
+}
+
+const fn type_name(ty: Type, dialect: Dialect) -> &'static str {
+    match (ty, dialect) {
+        (Type::Text, Dialect::Spark) => "STRING",
+        (Type::Text, _) => "VARCHAR",
+        (Type::Float, _) => "DOUBLE",
+        (Type::Int | Type::Bool, _) => "BIGINT",
+    }
+}
+
+/// Quotient and remainder without a division of integers, which engines disagree about: the remainder is exact
+/// everywhere, and what is left divides without a fraction.
+fn arithmetic(op: Arithmetic, x: &str, y: &str) -> String {
+    match op {
+        Arithmetic::Add => format!("({x} + {y})"),
+        Arithmetic::Subtract => format!("({x} - {y})"),
+        Arithmetic::Multiply => format!("({x} * {y})"),
+        Arithmetic::Remainder => format!("CASE WHEN {y} <> 0 THEN {x} % {y} END"),
+        Arithmetic::Quotient => format!("CASE WHEN {y} <> 0 THEN CAST(({x} - {x} % {y}) / {y} AS BIGINT) END"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metric::columns::{Column, Columns};
+    use crate::metric::definitions::Definitions;
+
+    fn plan(text: &str) -> Plan {
+        let columns = [
+            ("action", Type::Text, Level::Step),
+            ("mirror_visible", Type::Bool, Level::Step),
+            ("pose_x", Type::Float, Level::Step),
+            ("grip force", Type::Int, Level::Step),
+            ("body_color", Type::Text, Level::Episode),
+        ];
+        let columns: Columns = columns.map(|(name, ty, level)| (name, Column { ty, level })).into_iter().collect();
+        Definitions::from_toml("test", text, &columns).unwrap().plan
+    }
+
+    fn metric(value: &str) -> Plan {
+        plan(&format!("[metric.M]\nvalue = \"{value}\""))
+    }
+
+    #[test]
+    fn each_aggregate_stands_in_the_first_stage_that_knows_what_it_reads() {
+        let plan = plan(
+            r#"
+            [let]
+            done = "first(action = 'done')"
+            [metric.SEEN]
+            value = "any(mirror_visible and t < coalesce(done, length()))"
+            [metric.X-Y]
+            value = "count(pose_x > 1)"
+            when = "SEEN = 1 and body_color <> 'it''s'"
+            "#,
+        );
+        insta::assert_snapshot!(lower(&plan, Dialect::Portable).unwrap());
+    }
+
+    #[test]
+    fn what_a_dialect_cannot_say_is_refused_by_name() {
+        let pattern = metric("any(regexp_like(action, 'd.n[e]'))");
+        assert_eq!(lower(&pattern, Dialect::Portable), Err(LoweringError::Regexp { metric: "M".into() }));
+        assert!(lower(&pattern, Dialect::Duckdb).unwrap().contains("regexp_matches(s.action, 'd.n[e]')"));
+        let odd = metric(r#"max(\"grip force\")"#);
+        assert_eq!(lower(&odd, Dialect::Portable), Err(LoweringError::Name { name: "grip force".into() }));
+        assert!(lower(&odd, Dialect::Spark).unwrap().contains("MAX(s.`grip force`)"));
+        let same = plan("[metric.A-B]\nvalue = \"length()\"\n[metric.a_b]\nvalue = \"1\"");
+        assert_eq!(lower(&same, Dialect::Portable), Err(LoweringError::SameName { name: "a_b".into() }));
+    }
+
+    #[test]
+    fn texts_cannot_leave_their_quotes() {
+        let quoted = metric(r"any(action = 'a\\'' or 1=1 --')");
+        assert!(lower(&quoted, Dialect::Portable).unwrap().contains(r"'a\'' or 1=1 --'"));
+        assert!(lower(&quoted, Dialect::Spark).unwrap().contains(r"'a\\\' or 1=1 --'"));
+    }
+}

@@ -66,7 +66,11 @@ fn say(failure: &Failure) {
     };
     let mut cause = failure.source();
     while let Some(error) = cause {
-        let _ = write!(text, "\n  caused by: {error}");
+        let words = error.to_string();
+        // Some messages tell their cause themselves.
+        if !text.contains(&words) {
+            let _ = write!(text, "\n  caused by: {words}");
+        }
         cause = error.source();
     }
     // With standard error closed there is nobody left to tell.

@@ -70,6 +70,20 @@ pub fn open(inputs: &[Input]) -> Result<TraceSet, Failure> {
     TraceSet::open(inputs).map_err(Failure::input)
 }
 
+/// Opens traces for an answer that only steps can give.
+///
+/// # Errors
+/// A file of scores, which has no steps; the first fault of a footer.
+pub fn open_steps(inputs: &[Input]) -> Result<TraceSet, Failure> {
+    match inputs.iter().find(|input| is_scores(input)) {
+        None => open(inputs),
+        Some(scores) => Err(Failure::Rendered(format!(
+            "error: {}: expected traces, found scores, which have no steps\n  help: give the traces that they were computed from",
+            scores.name
+        ))),
+    }
+}
+
 /// The definitions asked for, checked against the traces.
 ///
 /// # Errors

@@ -52,9 +52,21 @@ pub struct Column {
 pub struct Columns {
     schema: IndexMap<String, Column>,
     own: IndexMap<String, Column>,
+    stranger: Option<&'static str>,
 }
 
 impl Columns {
+    /// The same columns; `help` says what to do about a name that is like none of them.
+    #[must_use]
+    pub fn with_help(self, help: &'static str) -> Self {
+        Self { stranger: Some(help), ..self }
+    }
+
+    /// What to do about a name that is like none of these.
+    pub fn help(&self) -> &'static str {
+        self.stranger.unwrap_or("a column of your own is declared with [column.NAME] and `type`")
+    }
+
     /// The column of this name.
     pub fn get(&self, name: &str) -> Option<Column> {
         self.schema.get(name).or_else(|| self.own.get(name)).copied()
@@ -83,6 +95,6 @@ impl<N: Into<String>> FromIterator<(N, Column)> for Columns {
     /// The columns of a schema.
     fn from_iter<I: IntoIterator<Item = (N, Column)>>(columns: I) -> Self {
         let schema = columns.into_iter().map(|(name, column)| (name.into(), column)).collect();
-        Self { schema, own: IndexMap::new() }
+        Self { schema, ..Self::default() }
     }
 }

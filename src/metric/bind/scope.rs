@@ -121,7 +121,7 @@ impl Scope<'_, '_> {
             _ if is_quoted => format!("double quotes are for names; a text takes single ones: '{name}'"),
             (Some(entry), _) => format!("functions take parentheses: {}", entry.usage),
             (None, Some(near)) => format!("did you mean `{near}`?"),
-            (None, None) => "a column of your own is declared with [column.NAME] and `type`".to_owned(),
+            (None, None) => self.binder.columns.help().to_owned(),
         };
         self.binder.refuse(fault.label("not a column, a `let` or a metric").help(help))
     }

@@ -14,7 +14,7 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::reader::ChunkReader;
 
 use super::FormatError;
-use super::csv::KEYS;
+use super::csv::{KEYS, check_unique};
 use crate::metric::catalog::Catalog;
 use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 
@@ -84,14 +84,12 @@ fn batch(table: &EpisodeTable) -> Result<RecordBatch, FormatError> {
         .map_err(|error| FormatError::Parquet(parquet::errors::ParquetError::ArrowError(error.to_string())))
 }
 
-/// Reads a table and the definitions that it carries.
-///
-/// # Errors
-/// A file that is not Parquet, or not one of scores.
-pub fn read(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
+pub(super) fn read(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
     let catalog = catalog(builder.metadata().file_metadata().key_value_metadata().into_iter().flatten())?;
+    let names: Vec<&str> = builder.schema().fields().iter().map(|field| field.name().as_str()).collect();
+    check_unique(&names)?;
     let mut table = EpisodeTable { catalog, keys: Vec::new(), labels: Vec::new(), metrics: Vec::new() };
     for batch in builder.build()? {
         let batch = batch.map_err(|error| FormatError::Parquet(error.into()))?;

@@ -2,11 +2,14 @@
 
 use std::io;
 
-/// The system's own error.
+/// The same error without the path that `tempfile` adds to it.
 pub fn without_name(error: io::Error) -> io::Error {
-    let inner = error.get_ref().and_then(|inner| inner.source());
-    let code = inner.and_then(|inner| inner.downcast_ref::<io::Error>()).and_then(io::Error::raw_os_error);
-    code.map_or(error, io::Error::from_raw_os_error)
+    // The system's own errors carry nothing; what carries something and names a path has had it added.
+    let text = error.to_string();
+    match text.rsplit_once(" at path ") {
+        Some((words, _)) if error.get_ref().is_some() => io::Error::new(error.kind(), words.to_owned()),
+        _ => error,
+    }
 }
 
 #[cfg(test)]

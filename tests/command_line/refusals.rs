@@ -65,9 +65,8 @@ fn check(folder: &Path, cases: &[Case]) {
             assert!(message.contains(word), "{arguments:?}: no `{word}` in\n{message}");
         }
         assert!(!message.contains(".mirrorstats-"), "a temporary name: {message}");
-        let causes: Vec<&str> = message.lines().filter(|line| line.contains("caused by")).collect();
-        let twice = |cause: &&str| message.matches(cause.trim_start().trim_start_matches("caused by: ")).count() > 1;
-        assert!(!causes.iter().any(twice), "told twice: {message}");
+        let because = message.lines().filter_map(|line| line.trim_start().strip_prefix("caused by: "));
+        assert!(because.into_iter().all(|words| message.matches(words).count() == 1), "told twice: {message}");
     }
     assert_eq!(contents(folder), before, "something was written");
 }

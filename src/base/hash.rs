@@ -5,9 +5,16 @@ use std::io::{self, Read};
 
 use sha2::{Digest, Sha256};
 
+use super::base64::base64;
+
 /// The hash of some bytes, 64 hexadecimal digits.
 pub fn of_bytes(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
+}
+
+/// The hash of some bytes as a web page names it: `sha256-` and base64.
+pub fn integrity_of_bytes(bytes: &[u8]) -> String {
+    format!("sha256-{}", base64(&Sha256::digest(bytes)))
 }
 
 /// The hash of everything that `reader` still gives.
@@ -34,12 +41,13 @@ fn hex(digest: &[u8]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{of_bytes, of_reader};
+    use super::{integrity_of_bytes, of_bytes, of_reader};
 
     #[test]
     fn the_empty_hash_is_the_known_one() {
         let known = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855";
         assert_eq!(of_bytes(b""), known);
         assert_eq!(of_reader(&b""[..]).unwrap(), known);
+        assert_eq!(integrity_of_bytes(b""), "sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=");
     }
 }

@@ -1,7 +1,8 @@
-//! What every room stands on: exact numbers and their text, hashes, near names.
+//! What every room stands on: exact numbers and their text, hashes, base64, near names.
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
+pub mod base64;
 pub mod estimate;
 pub mod hash;
 pub mod near;

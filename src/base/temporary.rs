@@ -2,12 +2,13 @@
 
 use std::io;
 
-/// The same error in the system's own words.
+/// The same error without the path that `tempfile` adds to it.
 pub fn without_name(error: io::Error) -> io::Error {
-    let words = error.to_string();
-    match words.split_once(" at path \"") {
-        Some((words, _)) => io::Error::new(error.kind(), words),
-        None => error,
+    // The system's own errors carry nothing; what carries something and names a path has had it added.
+    let text = error.to_string();
+    match text.rsplit_once(" at path ") {
+        Some((words, _)) if error.get_ref().is_some() => io::Error::new(error.kind(), words.to_owned()),
+        _ => error,
     }
 }
 

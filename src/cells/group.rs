@@ -3,7 +3,7 @@
 //! Rule: an undefined value enters no moment; it is counted only in [`Group::episodes`]. Groups are ordered by
 //! their keys, never by arrival.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::cell::{Cells, Group, KeyValue};
 use super::moments::{MomentOverflow, Moments};
@@ -88,6 +88,19 @@ pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
     })
 }
 
+/// For each episode of `table` the position of its group among those of [`group`].
+///
+/// # Errors
+/// As [`group`], sums apart.
+pub fn membership(table: &EpisodeTable, by: &[String]) -> Result<Vec<usize>, GroupError> {
+    let columns = columns(table, by)?;
+    let key = |row| -> Vec<KeyValue> { columns.iter().map(|column| column.value(table, row)).collect() };
+    let keys: Vec<Vec<KeyValue>> = (0..table.len()).map(key).collect();
+    let groups: BTreeSet<&Vec<KeyValue>> = keys.iter().collect();
+    let places: BTreeMap<&Vec<KeyValue>, usize> = groups.into_iter().zip(0..).collect();
+    Ok(keys.iter().map(|key| places[key]).collect())
+}
+
 /// A column to group by, found in the table.
 enum KeyColumn<'a> {
     Key(fn(&EpisodeKey) -> KeyValue),
@@ -155,7 +168,7 @@ mod tests {
     use indexmap::IndexMap;
     use proptest::prelude::*;
 
-    use super::{GroupError, group};
+    use super::{GroupError, group, membership};
     use crate::cells::cell::KeyValue;
     use crate::metric::catalog::Catalog;
     use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
@@ -243,6 +256,20 @@ mod tests {
     #[test]
     fn no_episode_gives_no_cell() {
         assert_eq!(keys(&[], &["model"]), Vec::<String>::new());
+    }
+
+    #[test]
+    fn every_episode_knows_its_group() {
+        let rows = [
+            ("E2", "b", 1, Some("10"), None),
+            ("E1", "b", 1, Some("9"), None),
+            ("E2", "a", 1, None, None),
+            ("E2", "b", 1, Some("9"), None),
+        ];
+        let places = |names: &[&str]| membership(&table(&rows), &by(names)).unwrap();
+        assert_eq!(places(&["experiment", "model"]), [2, 0, 1, 2]);
+        assert_eq!(places(&["distractors"]), [2, 1, 0, 1]);
+        assert!(matches!(membership(&table(&rows), &by(&["x"])), Err(GroupError::UnknownColumn { .. })));
     }
 
     proptest! {

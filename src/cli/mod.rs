@@ -9,6 +9,7 @@ pub mod drawing;
 mod listing;
 pub mod outcome;
 pub mod output;
+pub mod page;
 pub mod scoring;
 
 use std::ffi::OsString;

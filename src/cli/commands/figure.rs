@@ -52,7 +52,7 @@ pub enum Format {
 
 impl Format {
     /// The ending of a file of this format.
-    pub(super) const fn ending(self) -> &'static str {
+    pub(crate) const fn ending(self) -> &'static str {
         match self {
             Self::Svg => "svg",
             #[cfg(feature = "raster")]
@@ -72,7 +72,7 @@ impl Format {
         not(feature = "raster"),
         expect(clippy::unnecessary_wraps, reason = "without the converters nothing can fail")
     )]
-    pub(super) fn encode(self, figure: &Figure) -> Result<Vec<u8>, Failure> {
+    pub(crate) fn encode(self, figure: &Figure) -> Result<Vec<u8>, Failure> {
         match self {
             Self::Svg => Ok(figure.svg().into_bytes()),
             #[cfg(feature = "raster")]

@@ -1,0 +1,111 @@
+// Sorting: rows within their groups, or all in one list. What is undefined comes last either way.
+
+const byText = new Intl.Collator("en", { numeric: true });
+
+function compare(left, right) {
+  return typeof left === "number" ? left - right : byText.compare(left, right);
+}
+
+/**
+ * Makes headers sort the rows of `bodies()`: first, the other way, as it was.
+ *
+ * `keyOf(head)` gives the function from a row to its number or text, null where there is none.
+ */
+function makeSortable(heads, bodies, keyOf) {
+  let sorted = null;
+  const original = new Map();
+  const ways = (head) => (head.dataset.first === "descending" ? ["descending", "ascending"] : ["ascending", "descending"]);
+
+  function arrange() {
+    for (const body of bodies()) {
+      const rows = all(":scope > tr:not(.heading)", body);
+      for (const row of rows) if (!original.has(row)) original.set(row, original.size);
+      body.append(...inOrder(rows));
+    }
+  }
+
+  function inOrder(rows) {
+    rows.sort((left, right) => original.get(left) - original.get(right));
+    if (sorted === null) return rows;
+    const key = keyOf(sorted.head);
+    const sign = sorted.way === "ascending" ? 1 : -1;
+    const keyed = rows.map((row) => [row, key(row)]);
+    const known = keyed.filter(([, value]) => value !== null).sort((a, b) => sign * compare(a[1], b[1]));
+    return [...known, ...keyed.filter(([, value]) => value === null)].map(([row]) => row);
+  }
+
+  function turn(head) {
+    const [first, second] = ways(head);
+    if (sorted?.head !== head) sorted = { head, way: first };
+    else sorted = sorted.way === first ? { head, way: second } : null;
+    for (const other of heads) other.removeAttribute("aria-sort");
+    if (sorted !== null) head.setAttribute("aria-sort", sorted.way);
+    arrange();
+  }
+
+  for (const head of heads) {
+    const button = make("button", { type: "button" }, ...head.childNodes);
+    button.addEventListener("click", () => turn(head));
+    head.append(button);
+  }
+  arrange();
+  return arrange;
+}
+
+/** The value of a metric in a row of results. */
+function meanOf(metric) {
+  return (row) => {
+    const cell = all("td[data-metric]", row).find((cell) => cell.dataset.metric === metric);
+    return cell === undefined || cell.dataset.mean === "" ? null : Number(cell.dataset.mean);
+  };
+}
+
+/** A table of results: sortable, its groups kept together or made one list. */
+class Results {
+  constructor(table) {
+    this.table = table;
+    this.groups = all("tbody", table);
+    this.rows = all("tbody > tr:not(.heading)", table);
+    this.home = new Map(this.rows.map((row) => [row, row.parentElement]));
+    this.list = make("tbody");
+    this.isGrouped = true;
+    this.addGroupColumn();
+    const keyOf = ({ dataset }) => {
+      if (dataset.by === "metric") return meanOf(dataset.metric);
+      if (dataset.by === "group") return (row) => this.groups.indexOf(this.home.get(row));
+      return (row) => row.querySelector("th").textContent;
+    };
+    this.arrange = makeSortable(all("thead th", table), () => this.bodies(), keyOf);
+  }
+
+  bodies() {
+    return this.isGrouped ? this.groups : [this.list];
+  }
+
+  /** A column that says of which group a row is, for when they are one list. */
+  addGroupColumn() {
+    const { groupHeading } = this.table.dataset;
+    if (groupHeading === "") return;
+    const head = make("th", { scope: "col", "data-by": "group", "data-first": "ascending", hidden: "" }, groupHeading);
+    this.table.querySelector("thead tr").prepend(head);
+    for (const row of this.rows) row.prepend(make("td", { class: "group", hidden: "" }, this.home.get(row).dataset.short));
+  }
+
+  group(isGrouped) {
+    this.isGrouped = isGrouped;
+    if (isGrouped) for (const row of this.rows) this.home.get(row).append(row);
+    else this.list.append(...this.rows);
+    this.list.remove();
+    if (!isGrouped) this.table.append(this.list);
+    for (const body of this.groups) body.hidden = !isGrouped;
+    for (const cell of all("td.group, th[data-by='group']", this.table)) cell.hidden = isGrouped;
+    this.arrange();
+  }
+
+  /** Shows the rows that `isWanted`; gives how many these are. */
+  filter(isWanted) {
+    for (const row of this.rows) row.hidden = !isWanted(row);
+    for (const body of this.groups) body.hidden = !this.isGrouped || !this.rows.some((row) => !row.hidden && this.home.get(row) === body);
+    return this.rows.filter((row) => !row.hidden).length;
+  }
+}

@@ -1,0 +1,41 @@
+// Everything begins here.
+
+/** Light or dark: as the system says until the reader says otherwise. */
+function startTheme() {
+  const root = document.documentElement;
+  const button = document.getElementById("theme");
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const isDark = () => (root.dataset.theme ?? (system.matches ? "dark" : "light")) === "dark";
+  const show = () => button.setAttribute("aria-pressed", String(isDark()));
+  button.addEventListener("click", () => {
+    root.dataset.theme = isDark() ? "light" : "dark";
+    show();
+  });
+  system.addEventListener("change", show);
+  button.hidden = false;
+  show();
+}
+
+/** What is folded away on the screen is not on paper. */
+function startPrinting() {
+  const folded = [];
+  addEventListener("beforeprint", () => {
+    hideTip();
+    for (const details of all("details:not([open])")) {
+      details.open = true;
+      folded.push(details);
+    }
+  });
+  addEventListener("afterprint", () => {
+    for (const details of folded.splice(0)) details.open = false;
+  });
+}
+
+startTheme();
+startPrinting();
+startTips();
+const results = all("table.results").map((table) => new Results(table));
+for (const table of all("table.results")) new Grid(table, openEpisodes);
+startFilters(results);
+for (const hint of all(".hint")) hint.hidden = false;
+for (const figure of all("figure")) if (figure.querySelector("svg") !== null) startFigure(figure);

@@ -1,0 +1,117 @@
+//! What the page's script reads: metrics, groups and episodes as JSON inside a `<script>` element.
+//!
+//! Rule: the JSON has no `<`, `>` or `&`, so nothing in it can end the element or begin a comment. Integers that
+//! JavaScript would round are strings.
+
+use std::collections::BTreeMap;
+
+use serde::{Serialize, Serializer};
+
+use super::HtmlError;
+use super::metric::MetricView;
+use super::page::shown;
+use crate::base::visible::visible;
+use crate::cells::cell::Cells;
+use crate::cells::group::membership;
+use crate::score::table::EpisodeTable;
+
+/// The largest integer below which JavaScript knows every other one.
+const LARGEST_SAFE: u64 = (1 << 53) - 1;
+
+/// Everything that the script cannot read off the page.
+#[derive(Debug, Serialize)]
+struct Embedded<'a> {
+    undefined: &'a str,
+    metrics: BTreeMap<&'a str, &'a MetricView>,
+    /// What each group of episodes is called: `E1 · GPT 5.1`.
+    groups: Vec<String>,
+    episodes: Episodes,
+}
+
+/// The episode table by column.
+#[derive(Debug, Serialize)]
+struct Episodes {
+    id: Vec<String>,
+    seed: Vec<i32>,
+    run: Vec<i32>,
+    group: Vec<usize>,
+    values: BTreeMap<String, Vec<Option<Integer>>>,
+}
+
+/// An integer that stays exact in JavaScript.
+#[derive(Clone, Copy, Debug)]
+struct Integer(i64);
+
+impl Serialize for Integer {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        if self.0.unsigned_abs() <= LARGEST_SAFE {
+            serializer.serialize_i64(self.0)
+        } else {
+            serializer.collect_str(&self.0)
+        }
+    }
+}
+
+/// The JSON of a page, ready to stand inside a `<script>` element.
+///
+/// # Errors
+/// When the episodes cannot be grouped as the cells are.
+pub(super) fn json(
+    episodes: &EpisodeTable,
+    cells: &Cells,
+    metrics: &[MetricView],
+    undefined: &str,
+) -> Result<String, HtmlError> {
+    let label = |key: &[_]| key.iter().map(|value| shown(value, undefined)).collect::<Vec<_>>().join(" · ");
+    let undefined = visible(undefined);
+    let embedded = Embedded {
+        undefined: &undefined,
+        metrics: metrics.iter().map(|metric| (metric.name(), metric)).collect(),
+        groups: cells.groups.iter().map(|group| label(&group.key)).collect(),
+        episodes: Episodes {
+            id: episodes.keys.iter().map(|key| visible(&key.episode_id)).collect(),
+            seed: episodes.keys.iter().map(|key| key.seed).collect(),
+            run: episodes.keys.iter().map(|key| key.run).collect(),
+            group: membership(episodes, &cells.by)?,
+            values: episodes.metrics.iter().map(|column| (visible(&column.name), integers(&column.values))).collect(),
+        },
+    };
+    let json =
+        serde_json::to_string(&embedded).expect("strings, integers and maps with names as keys have a JSON text");
+    Ok(inert(&json))
+}
+
+fn integers(values: &[Option<i64>]) -> Vec<Option<Integer>> {
+    values.iter().map(|value| value.map(Integer)).collect()
+}
+
+/// Markup characters of JSON stand in strings alone, where an escape means the same.
+fn inert(json: &str) -> String {
+    json.replace('&', "\\u0026").replace('<', "\\u003c").replace('>', "\\u003e")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Integer, inert};
+
+    #[test]
+    fn nothing_ends_the_element_and_the_text_is_the_same() {
+        for text in ["</script>", "<!--<script>", "a & b", "]]>", "\\u003c", "plain"] {
+            let json = inert(&serde_json::to_string(text).unwrap());
+            assert!(!json.contains(['<', '>', '&']), "{json}");
+            assert_eq!(serde_json::from_str::<String>(&json).unwrap(), text);
+        }
+    }
+
+    #[test]
+    fn integers_beyond_those_of_javascript_are_strings() {
+        for (value, expected) in [
+            (9_007_199_254_740_991, "9007199254740991"),
+            (9_007_199_254_740_992, "\"9007199254740992\""),
+            (-9_007_199_254_740_991, "-9007199254740991"),
+            (i64::MIN, "\"-9223372036854775808\""),
+        ] {
+            assert_eq!(serde_json::to_string(&Integer(value)).unwrap(), expected);
+        }
+    }
+}

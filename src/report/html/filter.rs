@@ -1,0 +1,58 @@
+//! The values of key columns that a reader can choose among.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::page::shown;
+use crate::cells::cell::{Cells, KeyValue};
+use crate::report::table::Table;
+
+/// The choices of one key column.
+#[derive(Debug, Serialize)]
+pub(super) struct Filter {
+    /// Which of the key columns.
+    key: usize,
+    /// The column's name in words.
+    name: String,
+    /// Its values in the order of the tables.
+    values: Vec<String>,
+}
+
+/// The filters of a page, and where each value stands among its filter's.
+#[derive(Debug)]
+pub(super) struct Filters {
+    /// One a key column that has several values.
+    pub(super) filters: Vec<Filter>,
+    places: Vec<BTreeMap<KeyValue, usize>>,
+}
+
+impl Filters {
+    /// The values that the rows of `tables` have, in order of their coming.
+    pub(super) fn of(tables: &[Table], cells: &Cells, undefined: &str) -> Self {
+        let mut values: Vec<Vec<KeyValue>> = vec![Vec::new(); cells.by.len()];
+        let mut places: Vec<BTreeMap<KeyValue, usize>> = vec![BTreeMap::new(); cells.by.len()];
+        for row in tables.iter().flat_map(|table| &table.groups).flat_map(|group| &group.rows) {
+            for ((value, values), places) in row.key.iter().zip(&mut values).zip(&mut places) {
+                places.entry(value.clone()).or_insert_with(|| {
+                    values.push(value.clone());
+                    values.len() - 1
+                });
+            }
+        }
+        let filter = |(key, values): (usize, Vec<KeyValue>)| Filter {
+            key,
+            name: cells.by[key].replace('_', " "),
+            values: values.iter().map(|value| shown(value, undefined)).collect(),
+        };
+        let several = values.into_iter().enumerate().filter(|(_, values)| values.len() > 1);
+        Self { filters: several.map(filter).collect(), places }
+    }
+
+    /// For each key column the place of a row's value: `0,3`.
+    pub(super) fn places(&self, key: &[KeyValue]) -> String {
+        let place = |(value, places): (&KeyValue, &BTreeMap<KeyValue, usize>)| places.get(value).copied();
+        let places = key.iter().zip(&self.places).filter_map(place);
+        places.map(|place| place.to_string()).collect::<Vec<_>>().join(",")
+    }
+}

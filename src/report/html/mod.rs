@@ -1,0 +1,91 @@
+//! `report.html`: tables, figures and provenance of a report as one page that needs nothing but itself.
+//!
+//! ```text
+//! page.rs ──► cell.rs, filter.rs, metric.rs, provenance.rs      template.rs
+//! (the whole   (what the templates say, as text)            ──► (assets/templates: markup,
+//!  page)        embedded.rs (episodes as JSON for the script)    style and script become one)
+//! ```
+//!
+//! Rule: numbers arrive here finished; a cell's attributes carry the text of `cells.csv`. Names from traces are text:
+//! templates escape them, and what acts on a reader is spelled out first ([`visible`]). The page forbids itself every
+//! request and every script but its own. It is complete without its script; the script adds sorting, filters,
+//! values on hover and the episodes behind a cell.
+//!
+//! [`visible`]: crate::base::visible
+
+mod cell;
+mod embedded;
+mod filter;
+mod metric;
+mod page;
+mod provenance;
+mod template;
+
+use crate::cells::cell::Cells;
+use crate::cells::group::GroupError;
+use crate::report::bundle::Manifest;
+use crate::report::statistics::Statistics;
+use crate::report::table::Table;
+use crate::score::table::EpisodeTable;
+
+/// What the page is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Page<'a> {
+    /// The tables, in order.
+    pub tables: &'a [Table],
+    /// The cells that the tables show.
+    pub cells: &'a Cells,
+    /// The episodes that the cells are of.
+    pub episodes: &'a EpisodeTable,
+    /// Where everything comes from.
+    pub manifest: &'a Manifest,
+    /// The figures, in order; none leaves the section out.
+    pub figures: &'a [Figure<'a>],
+    /// What can be concluded; none leaves the section out.
+    pub statistics: Option<&'a Statistics>,
+}
+
+/// A figure to set into the page.
+#[derive(Clone, Copy, Debug)]
+pub struct Figure<'a> {
+    /// `spider`, ...: the name of its files.
+    pub name: &'a str,
+    /// Its heading.
+    pub title: &'a str,
+    /// How to read it.
+    pub caption: &'a str,
+    /// An `<svg>` element, taken as it is: it must have escaped the names in it.
+    pub svg: &'a str,
+}
+
+/// Why a page cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum HtmlError {
+    /// The episodes cannot be grouped as the cells say.
+    #[error(transparent)]
+    Grouping(#[from] GroupError),
+    /// Cells and episodes do not belong together.
+    #[error("expected the cells of the episodes given, found other ones; group the same episode table")]
+    OtherEpisodes,
+    /// Tables and cells do not belong together.
+    #[error("table `{table}`: the row `{row}` is of no cell; lay the tables out from the same cells")]
+    StrayRow {
+        /// The table.
+        table: String,
+        /// The row's name.
+        row: String,
+    },
+    /// A template and what it is given do not fit.
+    #[error("the page cannot be rendered: {0}")]
+    Template(#[from] minijinja::Error),
+}
+
+/// The text of `report.html`.
+///
+/// The same input gives the same text.
+///
+/// # Errors
+/// When tables, cells and episodes are not of one report.
+pub fn render(page: &Page<'_>) -> Result<String, HtmlError> {
+    Ok(template::render(&page::Content::of(page)?)?)
+}

@@ -1,0 +1,77 @@
+//! Templates, style and script of the page, put together.
+//!
+//! Rule: a template escapes all it is given; the few texts that are markup already are marked so in `page`, one by
+//! one. The script's hash stands in the page's own policy, so that no other script runs.
+
+use minijinja::value::{Serde, Value};
+use minijinja::{Environment, Error, UndefinedBehavior};
+use serde::Serialize;
+
+use crate::base::hash::integrity_of_bytes;
+
+const PAGE: &str = "page.html";
+
+const TEMPLATES: [(&str, &str); 7] = [
+    (PAGE, include_str!("../../../assets/templates/page.html")),
+    ("header.html", include_str!("../../../assets/templates/header.html")),
+    ("tables.html", include_str!("../../../assets/templates/tables.html")),
+    ("figures.html", include_str!("../../../assets/templates/figures.html")),
+    ("statistics.html", include_str!("../../../assets/templates/statistics.html")),
+    ("definitions.html", include_str!("../../../assets/templates/definitions.html")),
+    ("provenance.html", include_str!("../../../assets/templates/provenance.html")),
+];
+
+const STYLE: &str = concat!(
+    include_str!("../../../assets/templates/style/page.css"),
+    include_str!("../../../assets/templates/style/tables.css"),
+    include_str!("../../../assets/templates/style/figures.css"),
+    include_str!("../../../assets/templates/style/panel.css"),
+    include_str!("../../../assets/templates/style/print.css"),
+);
+
+const SCRIPT: &str = concat!(
+    "(() => {\n\"use strict\";\n",
+    include_str!("../../../assets/templates/script/page.js"),
+    include_str!("../../../assets/templates/script/tip.js"),
+    include_str!("../../../assets/templates/script/sort.js"),
+    include_str!("../../../assets/templates/script/filter.js"),
+    include_str!("../../../assets/templates/script/grid.js"),
+    include_str!("../../../assets/templates/script/episodes.js"),
+    include_str!("../../../assets/templates/script/figures.js"),
+    include_str!("../../../assets/templates/script/start.js"),
+    "})();\n",
+);
+
+/// What does not depend on the report.
+#[derive(Debug, Serialize)]
+struct Frame<'a, C: Serialize> {
+    style: Value,
+    script: Value,
+    script_hash: String,
+    #[serde(flatten)]
+    content: &'a C,
+}
+
+/// The page with this content.
+///
+/// # Errors
+/// When the templates ask for what the content lacks.
+pub(super) fn render(content: &impl Serialize) -> Result<String, Error> {
+    let mut environment = Environment::new();
+    environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    for (name, source) in TEMPLATES {
+        environment.add_template(name, source)?;
+    }
+    let frame = Frame {
+        style: markup(STYLE),
+        script: markup(SCRIPT),
+        script_hash: integrity_of_bytes(SCRIPT.as_bytes()),
+        content,
+    };
+    environment.get_template(PAGE)?.render(Serde(&frame))
+}
+
+/// A text that stands in the page as it is.
+pub(super) fn markup(text: &str) -> Value {
+    Value::from_safe_string(text.to_owned())
+}

@@ -1,0 +1,78 @@
+//! The bundled traces, scored once, and the pages made of them.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use mirrorstats::cells::cell::Cells;
+use mirrorstats::cells::group::group;
+use mirrorstats::report::bundle::{Input, Manifest};
+use mirrorstats::report::figures::{self, FigureName};
+use mirrorstats::report::html::{self, Figure, HtmlError, Page};
+use mirrorstats::report::layout;
+use mirrorstats::report::statistics::{Options, Statistics};
+use mirrorstats::report::style::Style;
+use mirrorstats::report::table::Table;
+use mirrorstats::score::run::{self, Request};
+use mirrorstats::score::table::EpisodeTable;
+use mirrorstats::trace::{inputs, open::TraceSet};
+
+/// The episodes of the bundled traces under the paper's definitions.
+pub static PAPER: LazyLock<EpisodeTable> = LazyLock::new(|| {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper").to_owned();
+    let traces = TraceSet::open(&inputs::resolve(&[folder], std::io::empty()).unwrap()).unwrap();
+    let definitions = run::definitions(&traces, &Request::of("paper")).unwrap();
+    run::score(&traces, &definitions, &["body_color".to_owned()], NonZeroUsize::MIN).unwrap()
+});
+
+/// Everything that a page is made of.
+pub struct Report {
+    pub episodes: EpisodeTable,
+    pub cells: Cells,
+    pub tables: Vec<Table>,
+    pub manifest: Manifest,
+    pub statistics: Statistics,
+    /// Name, title, caption and picture.
+    pub figures: Vec<(FigureName, String)>,
+}
+
+impl Report {
+    /// The report of some episodes without figures.
+    pub fn of(episodes: EpisodeTable, by: &[&str], style: &str) -> Self {
+        let by: Vec<String> = by.iter().map(|&key| key.to_owned()).collect();
+        let cells = group(&episodes, &by).unwrap();
+        let style = Style::load(style).unwrap();
+        let tables = layout::tables(&cells, &style).unwrap();
+        let input = |name: &str| Input::new(Path::new(name), "0".repeat(64), 1234, None);
+        let inputs = vec![input("traces/a.parquet"), input("traces/b.parquet")];
+        let manifest = Manifest::new(&cells, &style, 1, None, inputs);
+        let statistics = Statistics::of(&episodes, &cells, &Options::default()).unwrap();
+        Self { episodes, cells, tables, manifest, statistics, figures: Vec::new() }
+    }
+
+    /// The report of the bundled traces, with the figures that need nothing but cells and episodes.
+    pub fn paper(style: &str) -> Self {
+        let mut report = Self::of(PAPER.clone(), &["experiment", "model"], style);
+        let input =
+            figures::Input { episodes: Some(&report.episodes), ..figures::Input::of_cells(&report.cells) };
+        let drawn = FigureName::ALL.into_iter().filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes));
+        let picture = |name| (name, figures::draw(name, &input).unwrap().inline_svg());
+        report.figures = drawn.map(picture).collect();
+        report
+    }
+
+    pub fn render(&self) -> Result<String, HtmlError> {
+        let figure = |(name, svg): &'_ (FigureName, String)| -> Figure<'_> {
+            Figure { name: name.name(), title: name.title(), caption: name.caption(), svg }
+        };
+        let figures: Vec<Figure<'_>> = self.figures.iter().map(figure).collect();
+        html::render(&Page {
+            tables: &self.tables,
+            cells: &self.cells,
+            episodes: &self.episodes,
+            manifest: &self.manifest,
+            figures: &figures,
+            statistics: Some(&self.statistics),
+        })
+    }
+}

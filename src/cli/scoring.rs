@@ -101,7 +101,7 @@ pub fn definitions(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Definitio
 pub fn score_failure(error: ScoreError) -> Failure {
     match error {
         ScoreError::Definitions(error) => definition_failure(error),
-        ScoreError::Condition(faults) => Failure::Rendered(faults.render(colored())),
+        ScoreError::Condition(faults) => Failure::Faults(faults.render(colored())),
         other => Failure::input(other),
     }
 }
@@ -109,7 +109,7 @@ pub fn score_failure(error: ScoreError) -> Failure {
 /// Faults of a definition file, underlined.
 pub fn definition_failure(error: FileError) -> Failure {
     match error {
-        FileError::Faults(faults) => Failure::Rendered(faults.render(colored())),
+        FileError::Faults(faults) => Failure::Faults(faults.render(colored())),
         other @ FileError::Unreadable { .. } => Failure::input(other),
     }
 }
@@ -143,7 +143,7 @@ fn read_scores(inputs: &[&Input], scoring: &ScoringArgs) -> Result<EpisodeTable,
     }
     let table = whole.unwrap_or_else(|| unreachable!("the caller has found a file of scores"));
     select::select(table, scoring.metrics.as_deref(), scoring.condition.as_deref()).map_err(|error| match error {
-        select::SelectError::Condition(faults) => Failure::Rendered(faults.render(colored())),
+        select::SelectError::Condition(faults) => Failure::Faults(faults.render(colored())),
         other => Failure::input(other),
     })
 }

@@ -33,8 +33,8 @@ pub struct ReportArgs {
     /// How tables look: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: String,
-    /// Group episodes by these columns, separated by commas
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY)]
+    /// Group episodes by these columns, separated by commas [default: experiment,model]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY, hide_default_value = true)]
     pub by: Vec<String>,
     /// Write tables, cells and provenance alone: no figures, no report.html
     #[arg(long)]

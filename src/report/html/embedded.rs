@@ -76,7 +76,8 @@ pub(super) fn json(
             values: episodes.metrics.iter().map(|column| (visible(&column.name), integers(&column.values))).collect(),
         },
     };
-    let json = serde_json::to_string(&embedded).expect("strings, integers and maps with names as keys have a JSON text");
+    let json =
+        serde_json::to_string(&embedded).expect("strings, integers and maps with names as keys have a JSON text");
     Ok(inert(&json))
 }
 

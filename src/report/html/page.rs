@@ -137,8 +137,7 @@ impl Content {
 
 impl Counts {
     fn of(episodes: &EpisodeTable) -> Self {
-        let distinct =
-            |of: fn(&EpisodeKey) -> &String| episodes.keys.iter().map(of).collect::<BTreeSet<_>>().len();
+        let distinct = |of: fn(&EpisodeKey) -> &String| episodes.keys.iter().map(of).collect::<BTreeSet<_>>().len();
         Self {
             episodes: episodes.len(),
             models: distinct(|key| &key.model),

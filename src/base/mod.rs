@@ -8,4 +8,5 @@ pub mod hash;
 pub mod near;
 pub mod number;
 pub mod ratio;
+pub mod temporary;
 pub mod visible;

@@ -61,11 +61,26 @@ impl FromStr for Ratio {
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let fault = || format!("expected a fraction such as `1/3`, found `{text}`");
+        if let Some((whole, digits)) = text.trim().split_once('.') {
+            return decimal(whole, digits).ok_or_else(fault);
+        }
         let (above, below) = text.split_once('/').unwrap_or((text, "1"));
         let above = above.trim().parse().map_err(|_| fault())?;
         let below = below.trim().parse().map_err(|_| fault())?;
         Self::new(above, below).ok_or_else(fault)
     }
+}
+
+/// `0.25` as the fraction that it is.
+fn decimal(whole: &str, digits: &str) -> Option<Ratio> {
+    const MOST_DIGITS: usize = 17;
+    let all_digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    if !all_digits(whole) || !all_digits(digits) || digits.len() > MOST_DIGITS {
+        return None;
+    }
+    let below = 10i64.checked_pow(u32::try_from(digits.len()).ok()?)?;
+    let above = whole.parse::<i64>().ok()?.checked_mul(below)?.checked_add(digits.parse().ok()?)?;
+    Ratio::new(above, below)
 }
 
 impl TryFrom<String> for Ratio {
@@ -88,14 +103,16 @@ mod tests {
 
     #[test]
     fn text_round_trips_in_lowest_terms() {
-        for (text, expected) in [("1/3", "1/3"), ("2/6", "1/3"), ("0/7", "0"), ("4/2", "2"), (" 1 / 10 ", "1/10")] {
+        for (text, expected) in
+            [("1/3", "1/3"), ("2/6", "1/3"), ("0/7", "0"), ("4/2", "2"), (" 1 / 10 ", "1/10"), ("0.25", "1/4")]
+        {
             assert_eq!(text.parse::<Ratio>().unwrap().to_string(), expected);
         }
     }
 
     #[test]
     fn what_is_no_fraction_is_refused() {
-        for text in ["", "a", "1/0", "1/-3", "0.5", "1/2/3"] {
+        for text in ["", "a", "1/0", "1/-3", ".5", "1.", "-0.5", "1e-1", "1/2/3"] {
             assert!(text.parse::<Ratio>().is_err(), "{text}");
         }
     }

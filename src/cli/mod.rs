@@ -5,9 +5,11 @@
 
 pub mod args;
 pub mod commands;
+pub mod drawing;
 mod listing;
 pub mod outcome;
 pub mod output;
+pub mod page;
 pub mod scoring;
 
 use std::ffi::OsString;
@@ -16,7 +18,7 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use commands::Command;
-use outcome::Outcome;
+use outcome::{Failure, Outcome};
 
 /// Score mirror self-recognition episodes: step traces in, exact metrics, tables and reports out.
 #[derive(Debug, Parser)]
@@ -32,9 +34,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(cli) => outcome::exit_code(cli.command.run()),
         Err(usage) => {
             // Help and version arrive here too; clap knows which stream and code each one takes.
-            let printed = usage.print();
-            let asked_for = usage.exit_code() == 0 && printed.is_ok();
-            outcome::exit_code(if asked_for { Ok(Outcome::Done) } else { Err(outcome::Failure::Usage) })
+            outcome::exit_code(match usage.print() {
+                Err(error) => Err(Failure::Output(error)),
+                Ok(()) if usage.exit_code() == 0 => Ok(Outcome::Done),
+                Ok(()) => Err(Failure::Usage),
+            })
         }
     }
 }

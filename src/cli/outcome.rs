@@ -11,6 +11,8 @@ use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
+use crate::base::visible::visible;
+
 /// A command that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -32,9 +34,12 @@ pub enum Failure {
     /// Input or definitions are not as they must be. The message is complete: what, where, expected, found, remedy.
     #[error(transparent)]
     Input(Box<dyn Error + Send + Sync>),
-    /// A message that already has its own layout, such as faults underlined in a definition file.
+    /// A message that already has its own layout.
     #[error("{0}")]
     Rendered(String),
+    /// Faults of definitions, underlined, with colours where standard error shows them.
+    #[error("{0}")]
+    Faults(String),
 }
 
 impl Failure {
@@ -61,14 +66,24 @@ pub fn exit_code(result: Result<Outcome, Failure>) -> ExitCode {
 
 fn say(failure: &Failure) {
     let mut text = match failure {
-        Failure::Rendered(text) => text.clone(),
-        other => format!("error: {other}"),
+        Failure::Faults(text) => text.clone(),
+        Failure::Rendered(text) => tame(text),
+        other => tame(&format!("error: {other}")),
     };
     let mut cause = failure.source();
     while let Some(error) = cause {
-        let _ = write!(text, "\n  caused by: {error}");
+        let words = tame(&error.to_string());
+        // Some messages tell their cause themselves.
+        if !text.contains(&words) {
+            let _ = write!(text, "\n  caused by: {words}");
+        }
         cause = error.source();
     }
     // With standard error closed there is nobody left to tell.
     let _ = writeln!(io::stderr(), "{}", text.trim_end());
+}
+
+/// The text with nothing that acts on a terminal; names in it may come from a file.
+fn tame(text: &str) -> String {
+    text.lines().map(visible).collect::<Vec<_>>().join("\n")
 }

@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::outcome::{Failure, Outcome};
+use crate::base::temporary;
 
 /// Prints an answer, as text for people or as JSON for programs.
 ///
@@ -46,8 +47,9 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     };
     write().map_err(|error| {
         Failure::Rendered(format!(
-            "error: cannot write `{}`: {error}\n  help: is the folder there and writable, and the disk not full?",
-            path.display()
+            "error: cannot write `{}`: {}\n  help: is the folder there and writable, and the disk not full?",
+            path.display(),
+            temporary::without_name(error)
         ))
     })
 }

@@ -70,6 +70,20 @@ pub fn open(inputs: &[Input]) -> Result<TraceSet, Failure> {
     TraceSet::open(inputs).map_err(Failure::input)
 }
 
+/// Opens traces for an answer that only steps can give.
+///
+/// # Errors
+/// A file of scores, which has no steps; the first fault of a footer.
+pub fn open_steps(inputs: &[Input]) -> Result<TraceSet, Failure> {
+    match inputs.iter().find(|input| is_scores(input)) {
+        None => open(inputs),
+        Some(scores) => Err(Failure::Rendered(format!(
+            "error: {}: expected traces, found scores, which have no steps\n  help: give the traces that they were computed from",
+            scores.name
+        ))),
+    }
+}
+
 /// The definitions asked for, checked against the traces.
 ///
 /// # Errors
@@ -87,7 +101,7 @@ pub fn definitions(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Definitio
 pub fn score_failure(error: ScoreError) -> Failure {
     match error {
         ScoreError::Definitions(error) => definition_failure(error),
-        ScoreError::Condition(faults) => Failure::Rendered(faults.render(colored())),
+        ScoreError::Condition(faults) => Failure::Faults(faults.render(colored())),
         other => Failure::input(other),
     }
 }
@@ -95,7 +109,7 @@ pub fn score_failure(error: ScoreError) -> Failure {
 /// Faults of a definition file, underlined.
 pub fn definition_failure(error: FileError) -> Failure {
     match error {
-        FileError::Faults(faults) => Failure::Rendered(faults.render(colored())),
+        FileError::Faults(faults) => Failure::Faults(faults.render(colored())),
         other @ FileError::Unreadable { .. } => Failure::input(other),
     }
 }
@@ -103,6 +117,11 @@ pub fn definition_failure(error: FileError) -> Failure {
 /// Whether standard error shows colours.
 fn colored() -> bool {
     io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}
+
+/// Whether these are files of scores rather than traces.
+pub fn are_scores(inputs: &[Input]) -> bool {
+    inputs.iter().any(is_scores)
 }
 
 fn is_scores(input: &Input) -> bool {
@@ -124,7 +143,7 @@ fn read_scores(inputs: &[&Input], scoring: &ScoringArgs) -> Result<EpisodeTable,
     }
     let table = whole.unwrap_or_else(|| unreachable!("the caller has found a file of scores"));
     select::select(table, scoring.metrics.as_deref(), scoring.condition.as_deref()).map_err(|error| match error {
-        select::SelectError::Condition(faults) => Failure::Rendered(faults.render(colored())),
+        select::SelectError::Condition(faults) => Failure::Faults(faults.render(colored())),
         other => Failure::input(other),
     })
 }
@@ -184,7 +203,7 @@ pub fn labels(by: &[String]) -> Vec<String> {
 /// # Errors
 /// What is wrong with the traces.
 pub fn lost(inputs: &[Input], threads: NonZeroUsize) -> Result<Option<BTreeSet<String>>, Failure> {
-    if inputs.iter().any(is_scores) {
+    if are_scores(inputs) {
         return Ok(None);
     }
     let traces = open(inputs)?;

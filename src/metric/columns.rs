@@ -47,29 +47,54 @@ pub struct Column {
     pub level: Level,
 }
 
-/// The columns by name, in the order of the schema.
+/// The columns by name: those of the schema in its order, then those that some traces have beside it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Columns(IndexMap<String, Column>);
+pub struct Columns {
+    schema: IndexMap<String, Column>,
+    own: IndexMap<String, Column>,
+    stranger: Option<&'static str>,
+}
 
 impl Columns {
+    /// The same columns; `help` says what to do about a name that is like none of them.
+    #[must_use]
+    pub fn with_help(self, help: &'static str) -> Self {
+        Self { stranger: Some(help), ..self }
+    }
+
+    /// What to do about a name that is like none of these.
+    pub fn help(&self) -> &'static str {
+        self.stranger.unwrap_or("a column of your own is declared with [column.NAME] and `type`")
+    }
+
     /// The column of this name.
     pub fn get(&self, name: &str) -> Option<Column> {
-        self.0.get(name).copied()
+        self.schema.get(name).or_else(|| self.own.get(name)).copied()
+    }
+
+    /// The schema's column of this name: one that every trace means the same by.
+    pub fn of_schema(&self, name: &str) -> Option<Column> {
+        self.schema.get(name).copied()
     }
 
     /// The names in order.
     pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.0.keys().map(String::as_str)
+        self.schema.keys().chain(self.own.keys()).map(String::as_str)
     }
 
-    /// Adds a column; one that is there already stays as it is.
-    pub fn add(&mut self, name: impl Into<String>, column: Column) {
-        self.0.entry(name.into()).or_insert(column);
+    /// Sets what a column beside the schema is; a column of the schema stays as it is.
+    pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
+        let name = name.into();
+        if !self.schema.contains_key(&name) {
+            self.own.insert(name, column);
+        }
     }
 }
 
 impl<N: Into<String>> FromIterator<(N, Column)> for Columns {
+    /// The columns of a schema.
     fn from_iter<I: IntoIterator<Item = (N, Column)>>(columns: I) -> Self {
-        Self(columns.into_iter().map(|(name, column)| (name.into(), column)).collect())
+        let schema = columns.into_iter().map(|(name, column)| (name.into(), column)).collect();
+        Self { schema, ..Self::default() }
     }
 }

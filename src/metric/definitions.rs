@@ -3,7 +3,7 @@
 use indexmap::IndexMap;
 
 use super::bind::{self, Binding};
-use super::catalog::{Catalog, Experiment, Metric};
+use super::catalog::{Catalog, Experiment, Kind, Metric};
 use super::columns::Columns;
 use super::fault::{Fault, Faults, Source};
 use super::file::{self, Document, FileError};
@@ -11,6 +11,7 @@ use super::origin::Written;
 use super::plan::{NodeId, Output, Plan};
 use crate::base::hash;
 use crate::base::near::nearest;
+use crate::base::ratio::Ratio;
 
 /// Checked definitions.
 #[derive(Clone, Debug)]
@@ -78,18 +79,21 @@ impl Definitions {
 
     fn check(document: Document, columns: &Columns, filter: Option<&Written>) -> Result<Self, Faults> {
         let mut columns = columns.clone();
-        for (name, (column, _)) in &document.columns {
-            columns.add(name.clone(), *column);
-        }
-        let mut faults = experiment_faults(&document);
+        let mut faults = declare(&document, &mut columns);
+        faults.extend(experiment_faults(&document));
         let binding = match bind::bind(&document, &columns, filter) {
-            Ok(binding) if faults.is_empty() => binding,
-            Ok(_) => return Err(Faults(faults).in_order()),
+            Ok(binding) => {
+                faults.extend(level_faults(&document, &binding));
+                binding
+            }
             Err(more) => {
                 faults.extend(more);
                 return Err(Faults(faults).in_order());
             }
         };
+        if !faults.is_empty() {
+            return Err(Faults(faults).in_order());
+        }
         let catalog = catalog(&document, &binding);
         let mut plan = binding.plan;
         let outputs = binding.metrics.into_iter().map(|(name, (node, kind))| Output { name, kind, node });
@@ -119,6 +123,24 @@ fn advice(near: Option<&str>, known: &[String]) -> String {
     }
 }
 
+/// Adds the columns that a document declares; they must not contradict the schema or the traces.
+fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for (name, (declared, place)) in &document.columns {
+        if name == "t" || columns.of_schema(name).is_some_and(|known| known != *declared) {
+            let message = format!("`{name}` is a column of every trace and cannot be declared as another");
+            faults.push(Fault::new(place.clone(), message).help("remove the declaration: `mirrorstats schema` has it"));
+        } else if let Some(found) = columns.get(name).filter(|found| found.ty != declared.ty) {
+            let (declared, found) = (declared.ty.name(), found.ty.name());
+            let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");
+            faults.push(Fault::new(place.clone(), message).help("declare it as the traces have it"));
+        } else {
+            columns.set_own(name.clone(), *declared);
+        }
+    }
+    faults
+}
+
 /// Chance levels must be those of metrics.
 fn experiment_faults(document: &Document) -> Vec<Fault> {
     let mut faults = Vec::new();
@@ -129,6 +151,26 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
             let near = nearest(name, document.metrics.keys().map(String::as_str));
             let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
             faults.push(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))));
+        }
+    }
+    faults
+}
+
+/// A level of chance of a rate is a probability.
+fn level_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
+    let metrics = document.metrics.iter().map(|(name, entry)| (name, entry.chance, &entry.place));
+    let experiments = document.experiments.values().flat_map(|entry| {
+        let chance = entry.chance.iter().map(|(name, (level, place))| (name, *level, place));
+        let reference = entry.reference.iter();
+        chance.chain(reference.flat_map(|(name, (levels, place))| levels.iter().map(move |l| (name, Some(*l), place))))
+    });
+    let improbable = |level: Ratio| level.numerator() < 0 || level.numerator() > level.denominator();
+    let mut faults = Vec::new();
+    for (name, level, place) in metrics.chain(experiments) {
+        let is_rate = binding.metrics.get(name).is_some_and(|(_, kind)| *kind == Kind::Rate);
+        if let Some(level) = level.filter(|level| is_rate && improbable(*level)) {
+            let message = format!("the chance level of the rate `{name}` is {level}; expected a fraction from 0 to 1");
+            faults.push(Fault::new(place.clone(), message));
         }
     }
     faults

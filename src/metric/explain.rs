@@ -237,11 +237,14 @@ fn value(expr: &Expr) -> String {
         ExprKind::Binary(BinaryOp::Multiply, x, y) => format!("{} times {}", value(x), value(y)),
         ExprKind::Binary(BinaryOp::Remainder, x, y) => format!("the remainder of {} by {}", value(x), value(y)),
         ExprKind::Case { operand, branches, otherwise } => {
-            let test = |when: &Expr| match operand {
-                Some(operand) => format!("{} is {}", value(operand), value(when)),
-                None => condition(when),
+            let test = |at: usize, when: &Expr| match (operand, at) {
+                (Some(operand), 0) => format!("{} is {}", value(operand), value(when)),
+                // Named once, so that nested operands do not multiply.
+                (Some(_), _) => format!("it is {}", value(when)),
+                (None, _) => condition(when),
             };
-            let branches = branches.iter().map(|(when, then)| format!("{} if {}", value(then), test(when)));
+            let branches = branches.iter().enumerate();
+            let branches = branches.map(|(at, (when, then))| format!("{} if {}", value(then), test(at, when)));
             let otherwise = otherwise.as_ref().map_or_else(|| "else null".to_owned(), |x| format!("else {}", value(x)));
             branches.chain([otherwise]).collect::<Vec<_>>().join(", ")
         }

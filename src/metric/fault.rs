@@ -11,6 +11,8 @@ use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::visible::visible;
+
 /// Text that faults point into: a definition file, or an expression typed on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Source {
@@ -71,18 +73,19 @@ impl Fault {
 
     fn render(&self, renderer: &Renderer) -> String {
         let text = &self.place.source.text;
-        let annotation = AnnotationKind::Primary.span(visible(text, &self.place.span)).label(self.label.as_str());
-        let snippet = Snippet::source(text.as_str()).path(self.place.source.name.as_str()).annotation(annotation);
-        let mut group = Group::with_title(Level::ERROR.primary_title(self.message.as_str())).element(snippet);
+        let annotation = AnnotationKind::Primary.span(within(text, &self.place.span)).label(visible(&self.label));
+        let snippet = Snippet::source(text.as_str()).path(visible(&self.place.source.name)).annotation(annotation);
+        let message = visible(&self.message);
+        let mut group = Group::with_title(Level::ERROR.primary_title(message.as_str())).element(snippet);
         if let Some(help) = &self.help {
-            group = group.element(Level::HELP.message(help.as_str()));
+            group = group.element(Level::HELP.message(visible(help)));
         }
         renderer.render(&[group])
     }
 
     /// The 1-based line and column (in characters) where the fault begins.
     pub fn line_and_column(&self) -> (usize, usize) {
-        let start = visible(&self.place.source.text, &self.place.span).start;
+        let start = within(&self.place.source.text, &self.place.span).start;
         let before = &self.place.source.text[..start];
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
         (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
@@ -90,7 +93,7 @@ impl Fault {
 }
 
 /// The span, moved onto character boundaries within the text.
-fn visible(text: &str, span: &Range<usize>) -> Range<usize> {
+fn within(text: &str, span: &Range<usize>) -> Range<usize> {
     let start = text.floor_char_boundary(span.start.min(text.len()));
     let end = text.ceil_char_boundary(span.end.clamp(start, text.len()));
     start..end
@@ -154,7 +157,7 @@ impl FaultRecord {
             file: fault.place.source.name.clone(),
             line,
             column,
-            text: text[visible(text, &fault.place.span)].to_owned(),
+            text: text[within(text, &fault.place.span)].to_owned(),
             message: fault.message.clone(),
             label: fault.label.clone(),
             help: fault.help.clone(),

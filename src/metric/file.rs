@@ -20,6 +20,7 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::{fs, io};
 
 use indexmap::IndexMap;
 use toml::de::DeTable;
@@ -29,6 +30,7 @@ use super::columns::{Column, Level, Type};
 use super::fault::{Fault, Faults, Place, Source};
 use super::keys::Keys;
 use super::origin::Written;
+use crate::base::near::nearest;
 use crate::base::ratio::Ratio;
 
 /// The built-in definition files, by name.
@@ -96,7 +98,7 @@ pub struct ExperimentEntry {
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
     /// The file is not there or not readable.
-    #[error("cannot read the definition file `{path}`: {source}; built-in definitions are {}", built_in_names().join(", "))]
+    #[error("cannot read the definition file `{path}`; {}", built_in_help(path))]
     Unreadable {
         /// As it was typed.
         path: String,
@@ -113,6 +115,14 @@ pub fn built_in_names() -> Vec<&'static str> {
     BUILT_IN.iter().map(|(name, _)| *name).collect()
 }
 
+/// What a name that gives no file may have been meant to be.
+fn built_in_help(name: &str) -> String {
+    match nearest(name, built_in_names()) {
+        Some(near) => format!("did you mean the built-in `{near}`?"),
+        None => format!("built-in definitions are {}", built_in_names().join(", ")),
+    }
+}
+
 /// The text of a built-in definition file.
 pub fn built_in(name: &str) -> Option<&'static str> {
     BUILT_IN.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
@@ -123,12 +133,10 @@ pub fn built_in(name: &str) -> Option<&'static str> {
 /// # Errors
 /// When a file cannot be read, or all faults of its TOML.
 pub fn read(name_or_path: &str) -> Result<Document, FileError> {
-    let (source, folder) = match built_in(name_or_path) {
-        Some(text) => (Source { name: format!("{name_or_path}.toml"), text: text.to_owned() }, None),
-        None => open(name_or_path, Path::new(name_or_path))?,
-    };
+    let file = find(name_or_path, Path::new(name_or_path))
+        .map_err(|source| FileError::Unreadable { path: name_or_path.to_owned(), source })?;
     let name = Path::new(name_or_path).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-    read_source(name, source, folder.as_deref())
+    Reading::of(name, file)
 }
 
 /// Reads definitions from a text; includes are relative to `folder`, the current one if absent.
@@ -136,42 +144,62 @@ pub fn read(name_or_path: &str) -> Result<Document, FileError> {
 /// # Errors
 /// All faults of its TOML and its includes.
 pub fn read_source(name: String, source: Source, folder: Option<&Path>) -> Result<Document, FileError> {
-    let mut reading =
-        Reading { document: Document { name, ..Document::default() }, faults: Vec::new(), open: Vec::new() };
-    reading.file(source, folder);
-    if reading.faults.is_empty() { Ok(reading.document) } else { Err(Faults(reading.faults).in_order().into()) }
+    Reading::of(name, DefinitionFile { source, folder: folder.map(Path::to_owned), place: None })
 }
 
-fn open(shown: &str, path: &Path) -> Result<(Source, Option<PathBuf>), FileError> {
-    match std::fs::read(path).and_then(|bytes| String::from_utf8(bytes).map_err(std::io::Error::other)) {
-        Ok(text) => Ok((Source { name: shown.to_owned(), text }, path.parent().map(Path::to_owned))),
-        Err(source) => Err(FileError::Unreadable { path: shown.to_owned(), source }),
+/// A definition file's text, and where it is.
+struct DefinitionFile {
+    source: Source,
+    /// What its includes are relative to.
+    folder: Option<PathBuf>,
+    /// Its one place on disk, whatever it is called; `None` for a text that is no file.
+    place: Option<PathBuf>,
+}
+
+/// The built-in file of this name, or the one at this path.
+fn find(name: &str, path: &Path) -> io::Result<DefinitionFile> {
+    if let Some(text) = built_in(name) {
+        let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
+        return Ok(DefinitionFile { source, folder: None, place: None });
     }
+    let text = String::from_utf8(fs::read(path)?)
+        .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, format!("expected UTF-8 text, found {error}")))?;
+    let source = Source { name: path.display().to_string(), text };
+    Ok(DefinitionFile { source, folder: path.parent().map(Path::to_owned), place: fs::canonicalize(path).ok() })
 }
 
 struct Reading {
     document: Document,
     faults: Vec<Fault>,
-    /// The files being read, for includes that lead back.
-    open: Vec<String>,
+    /// The files being read, for includes that lead back: their names and places.
+    open: Vec<(String, Option<PathBuf>)>,
 }
 
 impl Reading {
-    fn file(&mut self, source: Source, folder: Option<&Path>) {
-        let source = Arc::new(source);
+    /// Reads a file and all that it includes into a document of this name.
+    fn of(name: String, file: DefinitionFile) -> Result<Document, FileError> {
+        let mut reading =
+            Self { document: Document { name, ..Document::default() }, faults: Vec::new(), open: Vec::new() };
+        reading.file(file);
+        if reading.faults.is_empty() { Ok(reading.document) } else { Err(Faults(reading.faults).in_order().into()) }
+    }
+
+    fn file(&mut self, file: DefinitionFile) {
+        let source = Arc::new(file.source);
         let (table, errors) = DeTable::parse_recoverable(&source.text);
+        let is_toml = errors.is_empty();
         for error in errors {
             let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
             self.faults.push(Fault::new(place, format!("not TOML: {}", error.message())));
         }
-        if !self.faults.is_empty() {
+        if !is_toml {
             return;
         }
-        self.open.push(source.name.clone());
+        self.open.push((source.name.clone(), file.place));
         let mut root = Keys::new(&source, table.get_ref(), "a definition file");
         if let Some(includes) = root.texts("include", &mut self.faults) {
             for (name, place) in includes {
-                self.include(&name, place, folder);
+                self.include(&name, place, file.folder.as_deref());
             }
         }
         if let Some(open) = root.truth("open", &mut self.faults) {
@@ -187,24 +215,26 @@ impl Reading {
 
     fn include(&mut self, name: &str, place: Place, folder: Option<&Path>) {
         let path = folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
-        let opened = match built_in(name) {
-            Some(text) => Ok((Source { name: format!("{name}.toml"), text: text.to_owned() }, None)),
-            None => open(&path.display().to_string(), &path),
-        };
-        match opened {
-            Ok((source, _)) if self.open.contains(&source.name) => {
-                let chain = [self.open.as_slice(), &[source.name]].concat().join(" -> ");
+        match find(name, &path) {
+            Ok(file) if self.is_open(&file) => {
+                let names = self.open.iter().map(|(name, _)| name).chain([&file.source.name]);
+                let chain = names.map(String::as_str).collect::<Vec<_>>().join(" -> ");
                 self.faults.push(Fault::new(place, format!("the include leads back to itself: {chain}")));
             }
-            Ok((source, folder)) => self.file(source, folder.as_deref()),
+            Ok(file) => self.file(file),
             Err(error) => {
-                let help = format!(
-                    "built-in definitions are {}; a path is relative to this file",
-                    built_in_names().join(", ")
-                );
-                self.faults.push(Fault::new(place, error.to_string()).help(help));
+                let help = format!("a path is relative to this file; {}", built_in_help(name));
+                let message = format!("cannot read the definition file `{}`: {error}", path.display());
+                self.faults.push(Fault::new(place, message).help(help));
             }
         }
+    }
+
+    fn is_open(&self, file: &DefinitionFile) -> bool {
+        self.open.iter().any(|(name, place)| match (place, &file.place) {
+            (Some(open), Some(place)) => open == place,
+            _ => *name == file.source.name,
+        })
     }
 
     fn columns(&mut self, root: &mut Keys) {

@@ -117,15 +117,19 @@ impl<'a> Keys<'a> {
     }
 
     fn ratio_of(&self, value: &Value, faults: &mut Vec<Fault>) -> Option<Ratio> {
-        match value.get_ref().as_str() {
-            Some(text) => match text.parse() {
-                Ok(ratio) => Some(ratio),
-                Err(message) => {
-                    faults.push(Fault::new(self.place(value.span()), message));
-                    None
-                }
-            },
-            None => self.wrong(value, "a fraction in quotes such as \"1/3\"", faults),
+        let text = match value.get_ref() {
+            DeValue::String(text) => text.as_ref(),
+            // A decimal is the fraction that it says: `0.25` is 1/4.
+            DeValue::Float(number) => number.as_str(),
+            DeValue::Integer(number) => number.as_str(),
+            _ => return self.wrong(value, "a fraction in quotes such as \"1/3\"", faults),
+        };
+        match text.parse() {
+            Ok(ratio) => Some(ratio),
+            Err(message) => {
+                faults.push(Fault::new(self.place(value.span()), message));
+                None
+            }
         }
     }
 

@@ -11,6 +11,8 @@ use sqlparser::keywords::Keyword;
 use sqlparser::parser::{Parser, ParserError};
 use sqlparser::tokenizer::{Location, Token, TokenWithSpan, Tokenizer};
 
+use super::functions;
+
 /// An expression as written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expr {
@@ -114,6 +116,9 @@ pub struct SyntaxFault {
 
 /// The longest text of one expression, in bytes.
 const LONGEST: usize = 16 * 1024;
+/// The most words and signs of one expression: the parser nests as deeply as a chain of operators is long, and takes its
+/// tree apart again by recursion.
+const MOST_TOKENS: usize = 4000;
 /// The deepest nesting of one expression.
 const DEEPEST: usize = 120;
 
@@ -145,14 +150,29 @@ fn parse_sql(text: &str) -> Result<ast::Expr, SyntaxFault> {
         span: byte_of(text, error.location)..text.len(),
         help: None,
     })?;
+    let count = tokens.iter().filter(|token| !matches!(token.token, Token::Whitespace(_))).count();
+    if count > MOST_TOKENS {
+        return Err(SyntaxFault {
+            message: format!("an expression of {count} words and signs is too long: the most is {MOST_TOKENS}"),
+            span: 0..text.len(),
+            help: Some("name its parts in [let]".into()),
+        });
+    }
     let mut parser = Parser::new(&dialect).with_tokens_with_locations(function_names_only(tokens));
     let parsed = parser.parse_expr().map_err(|error| grammar_fault(text, &error))?;
     let next = parser.peek_token();
     if next.token == Token::EOF {
         return Ok(parsed);
     }
+    let before = parser.get_previous_token();
+    if let Some(fault) = unread_construct(text, before) {
+        return Err(fault);
+    }
     let help = match &next.token {
         Token::Eq | Token::DoubleEq => None,
+        Token::RParen => Some("no parenthesis opens before it".into()),
+        Token::SemiColon => Some("a definition is one expression".into()),
+        _ if function_of(before).is_some() => function_of(before).map(|usage| format!("write {usage}")),
         Token::Word(word) if word.keyword == Keyword::FROM => {
             Some("a definition reads one episode; there is no FROM".into())
         }
@@ -164,6 +184,33 @@ fn parse_sql(text: &str) -> Result<ast::Expr, SyntaxFault> {
         span: start..byte_of(text, next.span.end).max(start + 1),
         help,
     })
+}
+
+/// The parser takes `case` and `not` for names where it cannot read what follows them; this says what is the matter.
+fn unread_construct(text: &str, before: &TokenWithSpan) -> Option<SyntaxFault> {
+    let Token::Word(word) = &before.token else { return None };
+    let (message, help) = match (word.keyword, word.quote_style) {
+        (Keyword::CASE, None) => (
+            "this `case` is faulty or not complete",
+            "write `case when p then x else y end`, or `case x when 1 then y end`",
+        ),
+        (Keyword::NOT, None) => {
+            ("what follows this `not` is faulty or nested too deeply", "write `not p` or `not (p and q)`")
+        }
+        _ => return None,
+    };
+    let span = byte_of(text, before.span.start)..byte_of(text, before.span.end);
+    Some(SyntaxFault { message: message.to_owned(), span, help: Some(help.to_owned()) })
+}
+
+/// How the function that a word names is used.
+fn function_of(token: &TokenWithSpan) -> Option<&'static str> {
+    match &token.token {
+        Token::Word(word) if word.quote_style.is_none() => {
+            functions::find(&word.value.to_lowercase()).map(|entry| entry.usage)
+        }
+        _ => None,
+    }
 }
 
 /// `any(`, `all(` and `some(` become plain names, so that they are functions wherever they stand.
@@ -439,7 +486,7 @@ impl Reader<'_> {
             Sql::AnyOp { .. } | Sql::AllOp { .. } => ("a quantified comparison", Some("write `any(p)` or `all(p)`")),
             _ => ("this construct", None),
         };
-        self.refuse(span, format!("{what} is not supported: `{expr}`"), help)
+        self.refuse(span, format!("{what} is not supported: `{}`", shortened(&expr.to_string())), help)
     }
 
     fn refuse<T>(&mut self, span: Range<usize>, message: impl Into<String>, help: Option<&str>) -> Option<T> {
@@ -458,6 +505,15 @@ impl Reader<'_> {
             ast::Expr::Function(_) => start..end_of_call(self.text, start).unwrap_or(end),
             _ => start..end,
         }
+    }
+}
+
+/// The beginning of a text that may be as long as an expression.
+fn shortened(text: &str) -> String {
+    const ENOUGH: usize = 60;
+    match text.char_indices().nth(ENOUGH) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
     }
 }
 

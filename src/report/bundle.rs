@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use tempfile::TempDir;
 
 use crate::base::number::full_precision;
+use crate::base::temporary;
 use crate::cells::cell::{Cells, Group};
 use crate::metric::catalog::{Catalog, Metric};
 use crate::report::style::Style;
@@ -102,7 +103,7 @@ pub enum BundleError {
         path: PathBuf,
     },
     /// The file system refuses.
-    #[error("cannot write the report to {}: {source}; is the folder writable?", path.display())]
+    #[error("cannot write the report to {}; is the folder writable?", path.display())]
     Unwritable {
         /// Where.
         path: PathBuf,
@@ -173,7 +174,8 @@ pub fn write(out: &Path, bundle: &Bundle) -> Result<Vec<PathBuf>, BundleError> {
 fn stage_for(out: &Path) -> Result<TempDir, BundleError> {
     let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let place = if out.is_dir() { out } else { parent };
-    let unwritable = |source| BundleError::Unwritable { path: place.to_owned(), source };
+    let unwritable =
+        |source| BundleError::Unwritable { path: place.to_owned(), source: temporary::without_name(source) };
     fs::create_dir_all(place).map_err(unwritable)?;
     tempfile::Builder::new().prefix(".mirrorstats-").tempdir_in(place).map_err(unwritable)
 }

@@ -94,10 +94,10 @@ pub fn schema_columns() -> Columns {
 
 /// The columns that definitions may name over these traces: those of the schema, and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
-    let mut columns = schema_columns();
+    let mut columns = schema_columns().with_help("`mirrorstats schema` and `mirrorstats info` list the columns");
     for name in traces.column_names().into_iter().filter(|name| *name != "t") {
         if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
-            columns.add(name, Column { ty, level: Level::Step });
+            columns.set_own(name, Column { ty, level: Level::Step });
         }
     }
     columns

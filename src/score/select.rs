@@ -85,7 +85,8 @@ fn columns(table: &EpisodeTable) -> Columns {
     let ints = ["seed", "run"].map(|name| (name.to_owned(), column(Type::Int)));
     let labels = table.labels.iter().map(|label| (label.name.clone(), column(Type::Text)));
     let metrics = table.metrics.iter().map(|metric| (metric.name.clone(), column(Type::Int)));
-    texts.into_iter().chain(ints).chain(labels).chain(metrics).collect()
+    let columns: Columns = texts.into_iter().chain(ints).chain(labels).chain(metrics).collect();
+    columns.with_help("scores have their keys and metrics alone; a condition on steps needs the traces")
 }
 
 /// The table as columns that the engine takes.

@@ -11,7 +11,7 @@ thread_local! {
 /// What `decode` gives, or the message of the panic it ended in; nothing is printed for that panic.
 ///
 /// Only for calls into a decoder whose state is thrown away afterwards.
-pub(super) fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
+pub(crate) fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
     silence_contained_panics();
     let before = CONTAINING.replace(true);
     let result = panic::catch_unwind(AssertUnwindSafe(decode));

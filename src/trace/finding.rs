@@ -9,6 +9,8 @@ use arrow::error::ArrowError;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::visible::visible;
+
 /// One thing that is wrong with a trace.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Finding {
@@ -325,7 +327,7 @@ impl Finding {
 /// `code: file, row group 0, episode x, t = 3, column c: expected .., found ..; help`, on three lines.
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.code, self.file)?;
+        write!(f, "{}: {}", self.code, visible(&self.file))?;
         if let Some(row_group) = self.row_group {
             write!(f, ", row group {row_group}")?;
         }

@@ -2,7 +2,7 @@
 //!
 //! An argument is a file, a folder (every `*.parquet` in it and below it), a glob that the shell did not expand, or
 //! `-` for a list of the first two on standard input, one a line. A name that exists is itself, whatever characters
-//! it has. Links to folders inside a folder are not followed.
+//! it has. Inside a folder, links to folders are not followed and reports are passed over.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -127,12 +127,19 @@ fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
         let entry = entry.map_err(failed)?;
         let below = entry.path();
         if entry.file_type().map_err(failed)?.is_dir() {
-            traces.extend(traces_at(&below)?);
+            if !is_report(&below) {
+                traces.extend(traces_at(&below)?);
+            }
         } else if below.extension() == Some(OsStr::new("parquet")) && !below.is_dir() {
             traces.push(below);
         }
     }
     Ok(traces)
+}
+
+/// Whether a folder is what `mirrorstats report` writes: its Parquet file holds scores, no steps.
+fn is_report(folder: &Path) -> bool {
+    ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
 }
 
 fn display_name(path: &Path) -> String {

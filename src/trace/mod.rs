@@ -2,7 +2,7 @@
 //!
 //! Rule: only this room opens traces. It knows no metric.
 
-mod contain;
+pub(crate) mod contain;
 mod decode;
 pub mod describe;
 pub mod episode;

@@ -25,6 +25,7 @@ use super::episode::Episode;
 use super::finding::TraceError;
 use super::schema::{self, COLUMNS, Column};
 use super::source::{Gathered, Source, field};
+use crate::base::temporary;
 
 /// What a trace file is created with, besides its episodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -263,5 +264,5 @@ fn unnamed_in(folder: &Path) -> io::Result<NamedTempFile> {
         use std::os::unix::fs::PermissionsExt as _;
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    builder.tempfile_in(folder)
+    builder.tempfile_in(folder).map_err(temporary::without_name)
 }

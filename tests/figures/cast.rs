@@ -9,8 +9,8 @@ use mirrorstats::cells::moments::Moments;
 use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
 use mirrorstats::report::figures::Input;
 use mirrorstats::report::figures::e5_outcomes::{OutcomeRow, Outcomes};
-use mirrorstats::report::figures::gaze::Timeline;
 use mirrorstats::score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+use mirrorstats::score::timeline::Timeline;
 
 const METRICS: [&str; 7] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "TSA-C"];
 const TITLES: [(&str, &str); 5] = [
@@ -203,6 +203,7 @@ fn timelines(episodes: &EpisodeTable) -> Vec<Timeline> {
             first_sight: sight,
             claim: (length % 3 != 0).then_some((2 + length / 3).min(length)),
             decision: finished.map(|_| length),
+            answered: finished.is_some(),
         }
     };
     let [ttd, finished] = [0, 1].map(|at| &episodes.metrics[at].values);

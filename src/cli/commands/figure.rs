@@ -6,10 +6,13 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use crate::cli::args::TraceArgs;
+use crate::cli::args::{ScoringArgs, TraceArgs};
+use crate::cli::drawing::Sources;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
+use crate::cli::scoring;
 use crate::report::figures::{self, Figure, FigureName, Input};
+use crate::report::style::Style;
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
@@ -20,6 +23,12 @@ pub struct FigureArgs {
     /// The traces to draw it from.
     #[command(flatten)]
     pub traces: TraceArgs,
+    /// How the metrics are defined.
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    /// The style whose order of models is taken: `default`, `paper`, or a TOML file
+    #[arg(long, value_name = "STYLE", default_value = "default")]
+    pub style: String,
     /// The file format [default: by the ending of FILE; svg on standard output]
     #[arg(long, value_enum)]
     pub format: Option<Format>,
@@ -42,6 +51,17 @@ pub enum Format {
 }
 
 impl Format {
+    /// The ending of a file of this format.
+    pub(crate) const fn ending(self) -> &'static str {
+        match self {
+            Self::Svg => "svg",
+            #[cfg(feature = "raster")]
+            Self::Png => "png",
+            #[cfg(feature = "raster")]
+            Self::Pdf => "pdf",
+        }
+    }
+
     /// The format that the ending of `path` asks for, SVG where there is no ending.
     fn of(path: &Path) -> Result<Self, UnknownEnding> {
         let Some(ending) = path.extension().and_then(OsStr::to_str) else { return Ok(Self::Svg) };
@@ -52,7 +72,7 @@ impl Format {
         not(feature = "raster"),
         expect(clippy::unnecessary_wraps, reason = "without the converters nothing can fail")
     )]
-    fn encode(self, figure: &Figure) -> Result<Vec<u8>, Failure> {
+    pub(crate) fn encode(self, figure: &Figure) -> Result<Vec<u8>, Failure> {
         match self {
             Self::Svg => Ok(figure.svg().into_bytes()),
             #[cfg(feature = "raster")]
@@ -64,6 +84,19 @@ impl Format {
 }
 
 impl FigureArgs {
+    /// Scores the traces and draws.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces, the definitions, the style or the output.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let style = Style::load(&self.style).map_err(Failure::input)?;
+        let inputs = scoring::resolve(&self.traces)?;
+        let threads = self.traces.threads.count();
+        let episodes = scoring::table(&inputs, &self.scoring, &[], threads)?;
+        let sources = Sources::of(&inputs, &self.scoring, &episodes, &style, threads)?;
+        self.write(&sources.input())
+    }
+
     /// Draws the figure from `input` and writes it where it was asked for.
     ///
     /// # Errors

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 
 use comfy_table::Table;
 
+use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
@@ -59,19 +60,20 @@ fn print(out: &mut impl Write, info: &Info) -> io::Result<()> {
 }
 
 fn list(out: &mut impl Write, what: &str, values: &[impl Display]) -> io::Result<()> {
-    let shown: Vec<_> = values.iter().map(ToString::to_string).collect();
+    let shown: Vec<_> = values.iter().map(|value| visible(&value.to_string())).collect();
     writeln!(out, "{what:<12} {:>3}   {}", values.len(), shown.join(", "))
 }
 
 fn coverage(info: &Info) -> Table {
-    let mut table = listing(["model"].into_iter().chain(info.experiments.iter().map(String::as_str)));
+    let mut table =
+        listing(std::iter::once("model".to_owned()).chain(info.experiments.iter().map(|name| visible(name))));
     for (row, model) in info.models.iter().enumerate() {
         // Cells come experiment by experiment, each with all models.
         let counts = info.coverage.iter().skip(row).step_by(info.models.len()).map(|cell| match cell.episodes {
             0 => "none".to_owned(),
             episodes => episodes.to_string(),
         });
-        table.add_row([model.clone()].into_iter().chain(counts));
+        table.add_row([visible(model)].into_iter().chain(counts));
     }
     aligned_right(table, 1..=info.experiments.len())
 }
@@ -88,14 +90,14 @@ fn gaps(out: &mut impl Write, info: &Info) -> io::Result<()> {
     }
     for cell in incomplete {
         let what = if cell.episodes == 0 { "all".to_owned() } else { pairs(&cell.missing) };
-        writeln!(out, "  {}, {}: {what}", cell.experiment, cell.model)?;
+        writeln!(out, "  {}, {}: {what}", visible(&cell.experiment), visible(&cell.model))?;
     }
     let repeated = info.coverage.iter().filter(|cell| !cell.repeated.is_empty());
     for (i, cell) in repeated.enumerate() {
         if i == 0 {
             writeln!(out, "\nmore than one episode (seed/run)")?;
         }
-        writeln!(out, "  {}, {}: {}", cell.experiment, cell.model, pairs(&cell.repeated))?;
+        writeln!(out, "  {}, {}: {}", visible(&cell.experiment), visible(&cell.model), pairs(&cell.repeated))?;
     }
     Ok(())
 }
@@ -112,14 +114,14 @@ fn files(info: &Info) -> Table {
     let mut table = listing(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "writer"]);
     for file in &info.files {
         table.add_row([
-            file.name.clone(),
+            visible(&file.name),
             file.episodes.to_string(),
             file.steps.to_string(),
             file.row_groups.to_string(),
             file.bytes.to_string(),
             file.sha256.chars().take(12).collect(),
-            file.schema_version.clone().unwrap_or_else(|| "not named".into()),
-            file.writer.clone().unwrap_or_else(|| "not named".into()),
+            visible(file.schema_version.as_deref().unwrap_or("not named")),
+            visible(file.writer.as_deref().unwrap_or("not named")),
         ]);
     }
     aligned_right(table, 1..=4)

@@ -8,16 +8,15 @@ use serde::Serialize;
 
 use super::super::args::{ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
+use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
 use super::super::{output, scoring};
-use crate::cells::cell::Cells;
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::report::bundle::{self, Bundle, Manifest};
 use crate::report::layout;
 use crate::report::style::{MAIN_TABLE, Style};
 use crate::report::table::Table;
 use crate::report::tables::terminal::{self, Marks, Terminal};
-use crate::score::format::{self, Format};
-use crate::score::table::EpisodeTable;
+use crate::score::format;
 
 /// Compute the tables of traces, print the main one, write all of them
 #[derive(Clone, Debug, clap::Args)]
@@ -34,9 +33,12 @@ pub struct ReportArgs {
     /// How tables look: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: String,
-    /// Group episodes by these columns, separated by commas
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY)]
+    /// Group episodes by these columns, separated by commas [default: experiment,model]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY, hide_default_value = true)]
     pub by: Vec<String>,
+    /// Write tables, cells and provenance alone: no figures, no report.html
+    #[arg(long)]
+    pub no_figures: bool,
     /// Print what was written as JSON instead of the table
     #[arg(long)]
     pub json: bool,
@@ -71,24 +73,34 @@ impl ReportArgs {
         let condition = self.scoring.condition.clone();
         let manifest =
             Manifest::new(&cells, &style, scoring::schema_version(), condition, scoring::provenance(&inputs)?);
-        let files = self.write(&episodes, &cells, &tables, &manifest)?;
+        let made = Made { inputs, episodes, cells, tables, manifest, style };
+        let files = self.write(&made)?;
         if self.json {
             let out = self.out.display().to_string();
+            let Made { episodes, manifest, .. } = made;
             return output::print_json(&ReportAnswer { out, files, episodes: episodes.len(), manifest });
         }
-        self.print(&tables, episodes.len())
+        self.print(&made.tables, made.episodes.len())
     }
 
-    fn write(
-        &self,
-        episodes: &EpisodeTable,
-        cells: &Cells,
-        tables: &[Table],
-        manifest: &Manifest,
-    ) -> Result<Vec<String>, Failure> {
+    fn write(&self, made: &Made) -> Result<Vec<String>, Failure> {
+        let mut others = Vec::new();
+        if !self.no_figures {
+            let asked = Asked { scoring: &self.scoring, threads: self.traces.threads.count() };
+            let drawings = asked.drawings(made)?;
+            for (name, reason) in &drawings.left_out {
+                writeln!(io::stderr(), "note: no figure `{name}`: {reason}")?;
+            }
+            others.extend(figure_files(&drawings)?);
+            match asked.page(made, &drawings)? {
+                Some(page) => others.push(page),
+                None => writeln!(io::stderr(), "note: no report.html: it lists at most {MOST_EPISODES} episodes")?,
+            }
+        }
         let mut bytes = Vec::new();
-        format::write(episodes, Format::Parquet, &mut bytes).map_err(Failure::input)?;
-        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, others: &[] };
+        format::write(&made.episodes, format::Format::Parquet, &mut bytes).map_err(Failure::input)?;
+        let Made { cells, tables, manifest, .. } = made;
+        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, others: &others };
         let written = bundle::write(&self.out, &bundle).map_err(Failure::input)?;
         let inside = |path: &PathBuf| path.strip_prefix(&self.out).unwrap_or(path).display().to_string();
         Ok(written.iter().map(inside).collect())
@@ -100,7 +112,7 @@ impl ReportArgs {
         if let Some(table) = main {
             out.write_all(terminal::render(table, terminal_now()).as_bytes())?;
         }
-        writeln!(io::stderr(), "{episodes} episodes; tables, cells and provenance are in {}", self.out.display())?;
+        writeln!(io::stderr(), "{episodes} episodes; the report is in {}", self.out.display())?;
         Ok(Outcome::Done)
     }
 }

@@ -40,7 +40,7 @@ impl ScoreArgs {
         let inputs = scoring::resolve(&self.traces)?;
         let threads = self.traces.threads.count();
         if let Some(episode) = &self.explain {
-            let traces = scoring::open(&inputs)?;
+            let traces = scoring::open_steps(&inputs)?;
             let definitions = scoring::definitions(&traces, &self.scoring)?;
             let found = evidence::explain(&traces, &definitions, episode, threads).map_err(|error| match error {
                 evidence::EvidenceError::Score(error) => scoring::score_failure(error),

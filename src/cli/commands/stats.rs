@@ -27,8 +27,8 @@ pub struct StatsArgs {
     /// Only episodes where this holds, in the language of definitions
     #[arg(long = "where", value_name = "EXPR")]
     pub condition: Option<String>,
-    /// Group the cells by these columns, separated by commas
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY)]
+    /// Group the cells by these columns, separated by commas [default: experiment,model]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY, hide_default_value = true)]
     pub by: Vec<String>,
     /// Confidence of every interval; tests are at one minus it
     #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = confidence)]

@@ -2,6 +2,7 @@
 
 use std::io::{self, Write};
 
+use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
@@ -53,7 +54,7 @@ fn print(out: &mut impl Write, report: &Validation) -> io::Result<()> {
         writeln!(out, "{finding}\n")?;
     }
     for rest in &rest {
-        writeln!(out, "{}: {}, and {} more of these", rest.code, rest.file, rest.count)?;
+        writeln!(out, "{}: {}, and {} more of these", rest.code, visible(rest.file), rest.count)?;
     }
     if !rest.is_empty() {
         writeln!(out, "`--json` prints all findings\n")?;

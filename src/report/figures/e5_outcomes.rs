@@ -1,5 +1,7 @@
 //! `e5-outcomes`: how the episodes of an open question ended, a stacked bar a model.
 
+use std::collections::{BTreeMap, HashMap};
+
 use super::frame::{Frame, many};
 use super::legend::Swatch;
 use super::lettering::{self, NAME_ROOM};
@@ -9,6 +11,12 @@ use super::plot::{Plot, Tick};
 use super::sheet::{Align, Fill, Lettering, Sheet, Stroke};
 use super::tiles;
 use super::{Drawn, MARGIN, Scene};
+use crate::metric::catalog::Experiment;
+use crate::score::table::{EpisodeKey, EpisodeTable};
+use crate::score::timeline::Timeline;
+
+/// The metric that says whether a decision was right.
+const SUCCESS: &str = "TSA";
 
 const ROW: f64 = 22.0;
 const BAR: f64 = 15.0;
@@ -35,6 +43,32 @@ pub struct OutcomeRow {
     pub wrong: u64,
     /// Episodes whose final self-attribution is `unknown`, or that never gave one.
     pub uncommitted: u64,
+}
+
+impl Outcomes {
+    /// The outcomes of the first experiment that has reference levels instead of a chance level for `TSA`: the one
+    /// whose question is open. `None` where there is none, or no episode of it.
+    ///
+    /// An episode is correct where `TSA` is 1, else wrong where its decision committed to a colour.
+    pub fn of(episodes: &EpisodeTable, timelines: &[Timeline]) -> Option<Self> {
+        let open = |(_, experiment): &(&String, &Experiment)| experiment.reference.contains_key(SUCCESS);
+        let (experiment, _) = episodes.catalog.experiment.iter().find(open)?;
+        let success = episodes.metrics.iter().find(|metric| metric.name == SUCCESS)?;
+        let answered: HashMap<&EpisodeKey, bool> =
+            timelines.iter().map(|timeline| (&timeline.key, timeline.answered)).collect();
+        let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
+        for (key, value) in episodes.keys.iter().zip(&success.values).filter(|(key, _)| key.experiment == *experiment) {
+            let empty = || OutcomeRow { model: key.model.clone(), correct: 0, wrong: 0, uncommitted: 0 };
+            let row = rows.entry(&key.model).or_insert_with(empty);
+            match (value, answered.get(key)?) {
+                (Some(1), _) => row.correct += 1,
+                (_, true) => row.wrong += 1,
+                (_, false) => row.uncommitted += 1,
+            }
+        }
+        let rows: Vec<OutcomeRow> = rows.into_values().collect();
+        (!rows.is_empty()).then(|| Self { experiment: experiment.clone(), rows })
+    }
 }
 
 impl OutcomeRow {

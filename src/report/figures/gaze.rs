@@ -1,9 +1,5 @@
 //! `gaze`: a raster of episodes by steps: the mirror in view, first sight of it, claim and decision.
 
-use std::ops::RangeInclusive;
-
-use plotters::style::RGBColor;
-
 use super::frame::{Frame, many};
 use super::legend::Swatch;
 use super::lettering::{self, FULL_WIDTH, leading};
@@ -14,7 +10,7 @@ use super::plot::{Plot, whole_ticks};
 use super::sheet::{Fill, Sheet, Stroke};
 use super::tiles;
 use super::{Drawn, MARGIN, Scene};
-use crate::score::table::EpisodeKey;
+use crate::score::timeline::Timeline;
 
 /// The height of all rows of a column together that is aimed at, px.
 const AIM: f64 = 420.0;
@@ -25,23 +21,6 @@ const GAP: f64 = 18.0;
 const MOST_COLUMNS: usize = 5;
 const NAMES: f64 = 150.0;
 const LEAST_PANEL: f64 = 70.0;
-
-/// The landmarks of one episode; all steps are 1-based.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Timeline {
-    /// Which episode.
-    pub key: EpisodeKey,
-    /// How many steps it has.
-    pub length: u32,
-    /// The steps at which the mirror is in view, ascending, as runs that do not touch.
-    pub visible: Vec<RangeInclusive<u32>>,
-    /// The first step with the mirror in view; `None` where there is none.
-    pub first_sight: Option<u32>,
-    /// The first step at which a colour is claimed; `None` where none is.
-    pub claim: Option<u32>,
-    /// The step of the decision; `None` where the episode ends without one.
-    pub decision: Option<u32>,
-}
 
 /// Draws it.
 pub(super) fn draw(scene: Scene<'_>, timelines: &[Timeline]) -> Drawn {
@@ -152,15 +131,12 @@ impl<'a> Raster<'a> {
     fn episode(&self, sheet: &mut Sheet, plot: &Plot, timeline: &Timeline, top: f64) {
         let gaze = &PALETTE.gaze;
         let height = if self.row > 3.0 { self.row - 0.8 } else { self.row * 0.85 };
-        let span = |sheet: &mut Sheet, from: u32, to: u32, color: RGBColor| {
-            let (left, right) = (plot.at(f64::from(from.saturating_sub(1)), 0.0).0, plot.at(f64::from(to), 0.0).0);
-            sheet.rectangle(Frame::new(left, top, right - left, height), Fill::plain(color));
-        };
+        let ends =
+            |from: u32, to: u32| (plot.at(f64::from(from.saturating_sub(1)), 0.0).0, plot.at(f64::from(to), 0.0).0);
         sheet.mark(&mark(timeline), |sheet| {
-            span(sheet, 1, timeline.length, gaze.episode.0);
-            for run in &timeline.visible {
-                span(sheet, *run.start(), (*run.end()).min(timeline.length), gaze.visible.0);
-            }
+            sheet.bars(&[ends(1, timeline.length)], top, height, gaze.episode.0);
+            let runs = timeline.visible.iter().map(|run| ends(*run.start(), (*run.end()).min(timeline.length)));
+            sheet.bars(&runs.collect::<Vec<_>>(), top, height, gaze.visible.0);
             let middle = top + height / 2.0;
             let radius = (height * 0.62).clamp(1.1, 2.4);
             for (step, color) in [(timeline.first_sight, gaze.first_sight), (timeline.claim, gaze.claim)] {
@@ -182,9 +158,7 @@ fn mark(timeline: &Timeline) -> Mark {
     let step = |step: &Option<u32>| step.map(|step| step.to_string()).unwrap_or_default();
     let words = |step: &Option<u32>| step.map_or("none".to_owned(), |step| format!("t = {step}"));
     let title = format!(
-        "{} · {} · {}: {length} steps; first sight {}, claim {}, decision {}",
-        key.experiment,
-        key.model,
+        "{}: {length} steps; first sight {}, claim {}, decision {}",
         key.episode_id,
         words(first_sight),
         words(claim),

@@ -33,6 +33,25 @@ impl Ink {
     fn element(&mut self, element: &str, paint: &str) {
         let _ = writeln!(self.body, "<{element}{paint}{}/>", self.extra);
     }
+
+    /// Level bars of one height and colour as one stroke: pairs of left and right ends, ascending, at the height `y`.
+    pub fn bars(&mut self, ends: &[(i32, i32)], y: i32, height: u32, (red, green, blue): (u8, u8, u8)) {
+        let mut path = String::new();
+        let mut at = None;
+        for &(left, right) in ends {
+            let _ = match at {
+                None => write!(path, "M{} {}", px(left), px(y)),
+                Some(at) => write!(path, "m{} 0", px(left - at)),
+            };
+            let _ = write!(path, "h{}", px(right - left));
+            at = Some(right);
+        }
+        if at.is_some() {
+            let width = f64::from(height) / UNITS_PER_PX;
+            let color = format!("#{red:02x}{green:02x}{blue:02x}");
+            let _ = writeln!(self.body, "<path d=\"{path}\" stroke=\"{color}\" stroke-width=\"{width}\"/>");
+        }
+    }
 }
 
 /// The `d` of a path through `points`.

@@ -142,6 +142,16 @@ impl Sheet {
         self.put(&Rectangle::new(corners, shape(fill)), outline_attributes(fill));
     }
 
+    /// Filled rectangles side by side, from the same top and of the same height: pairs of left and right ends,
+    /// ascending. Many of them take little room in the file.
+    pub fn bars(&mut self, ends: &[(f64, f64)], top: f64, height: f64, color: RGBColor) {
+        let ends: Vec<_> =
+            ends.iter().map(|&(left, right)| (lattice((left, top)).0, lattice((right, top)).0)).collect();
+        let RGBColor(red, green, blue) = color;
+        let middle = lattice((0.0, top + height / 2.0)).1;
+        self.ink.borrow_mut().bars(&ends, middle, units(height), (red, green, blue));
+    }
+
     /// A filled circle.
     pub fn circle(&mut self, center: Point, radius: f64, fill: Fill) {
         self.put(&Circle::new(lattice(center), units(radius), shape(fill)), outline_attributes(fill));

@@ -57,12 +57,18 @@ pub(super) fn assemble(
     rows: Vec<Vec<Option<String>>>,
     first_line: usize,
 ) -> Result<EpisodeTable, FormatError> {
+    let names: Vec<&str> = header.iter().map(String::as_str).collect();
+    check_unique(&names)?;
     let mut positions = [0; 5];
     for (position, name) in positions.iter_mut().zip(KEYS) {
         *position = header.iter().position(|column| column == name).ok_or_else(|| FormatError::Column {
             column: name.to_owned(),
             expected: "a key column of scores",
-            found: format!("the columns {}", header.join(", ")),
+            found: if header.is_empty() {
+                "no column".to_owned()
+            } else {
+                format!("the columns {}", header.join(", "))
+            },
         })?;
     }
     let is_metric = |name: &&String| catalog.metric.contains_key(*name);
@@ -96,6 +102,18 @@ pub(super) fn assemble(
         }
     }
     Ok(table.sorted())
+}
+
+/// Each column has a name of its own.
+pub(super) fn check_unique(names: &[&str]) -> Result<(), FormatError> {
+    match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+        None => Ok(()),
+        Some((_, name)) => Err(FormatError::Column {
+            column: (*name).to_owned(),
+            expected: "one column of that name",
+            found: "more than one".to_owned(),
+        }),
+    }
 }
 
 fn required(cell: Option<String>, line: usize, column: &str) -> Result<String, FormatError> {

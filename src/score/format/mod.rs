@@ -8,12 +8,15 @@ mod csv;
 mod jsonl;
 mod parquet;
 
+use std::collections::HashSet;
 use std::io::{Read, Write};
 
-use super::table::EpisodeTable;
-use crate::metric::catalog::Catalog;
+use ::parquet::file::reader::ChunkReader;
 
-pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_scores, read as read_parquet};
+use super::table::EpisodeTable;
+use crate::metric::catalog::{Catalog, Kind};
+
+pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_scores};
 
 /// A format of episode tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,6 +78,18 @@ pub enum FormatError {
         /// What it is.
         found: String,
     },
+    /// An episode that no scoring can have given.
+    #[error("episode `{episode}`, column `{column}`: expected {expected}, found {found}; score the traces again")]
+    Episode {
+        /// Its id.
+        episode: String,
+        /// The column.
+        column: String,
+        /// What it must hold.
+        expected: String,
+        /// What it holds.
+        found: String,
+    },
     /// A line that is no CSV or JSON.
     #[error("line {line}: {reason}")]
     Line {
@@ -103,10 +118,48 @@ pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Re
 /// Reads a table of one of the text formats; `catalog` tells which columns are metrics.
 ///
 /// # Errors
-/// The first line that is not as it must be.
+/// The first line that is not as it must be; scores that the catalog's definitions cannot have given.
 pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
-    match format {
-        Format::JsonLines => jsonl::read(catalog, input),
-        Format::Csv | Format::Parquet => csv::read(catalog, input),
+    checked(match format {
+        Format::JsonLines => jsonl::read(catalog, input)?,
+        Format::Csv | Format::Parquet => csv::read(catalog, input)?,
+    })
+}
+
+/// Reads a table and the definitions that it carries.
+///
+/// # Errors
+/// A file that is not Parquet, or not one of scores; scores that its definitions cannot have given.
+pub fn read_parquet(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
+    checked(parquet::read(input)?)
+}
+
+/// A table as scoring gives it: each episode once, of a known experiment, rates 0 and 1.
+fn checked(table: EpisodeTable) -> Result<EpisodeTable, FormatError> {
+    let fault = |row: usize, column: &str, expected: &str, found: &str| FormatError::Episode {
+        episode: table.keys[row].episode_id.clone(),
+        column: column.to_owned(),
+        expected: expected.to_owned(),
+        found: found.to_owned(),
+    };
+    let experiments = &table.catalog.experiment;
+    let mut seen = HashSet::new();
+    for (row, key) in table.keys.iter().enumerate() {
+        if !seen.insert(key.episode_id.as_str()) {
+            return Err(fault(row, "episode_id", "each episode once", "a second row of it"));
+        }
+        if !table.catalog.open && !experiments.contains_key(&key.experiment) {
+            let known = experiments.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+            return Err(fault(row, "experiment", &format!("one of {known}"), &format!("`{}`", key.experiment)));
+        }
     }
+    for metric in &table.metrics {
+        let is_rate = table.catalog.metric.get(&metric.name).is_some_and(|known| known.kind == Kind::Rate);
+        let strange = |value: &Option<i64>| is_rate && !matches!(value, None | Some(0 | 1));
+        if let Some(row) = metric.values.iter().position(strange) {
+            let found = metric.values[row].map_or_else(String::new, |value| value.to_string());
+            return Err(fault(row, &metric.name, "0 or 1, or nothing where it is undefined", &found));
+        }
+    }
+    Ok(table)
 }

@@ -9,14 +9,16 @@ use arrow::datatypes::{DataType, Field, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, ZstdLevel};
+use parquet::errors::ParquetError;
 use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::ChunkReader;
 
 use super::FormatError;
-use super::csv::KEYS;
+use super::csv::{KEYS, check_unique};
 use crate::metric::catalog::Catalog;
 use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use crate::trace::contain::contained;
 
 /// The footer key that tells scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -29,7 +31,8 @@ pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
 /// Whether a file is Parquet with the footer of scores.
 pub fn holds_scores(file: &impl ChunkReader) -> bool {
-    let Ok(metadata) = ParquetMetaDataReader::new().parse_and_finish(file) else { return false };
+    let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
+    let Ok(Ok(metadata)) = footer else { return false };
     let pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
     pairs.into_iter().any(|pair| pair.key == KIND_KEY && pair.value.as_deref() == Some(SCORES_KIND))
 }
@@ -81,17 +84,19 @@ fn batch(table: &EpisodeTable) -> Result<RecordBatch, FormatError> {
     }
     let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = columns.into_iter().unzip();
     RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)
-        .map_err(|error| FormatError::Parquet(parquet::errors::ParquetError::ArrowError(error.to_string())))
+        .map_err(|error| FormatError::Parquet(ParquetError::ArrowError(error.to_string())))
 }
 
-/// Reads a table and the definitions that it carries.
-///
-/// # Errors
-/// A file that is not Parquet, or not one of scores.
-pub fn read(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
+pub(super) fn read(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
+    contained(|| decode(input)).unwrap_or_else(|panic| Err(FormatError::Parquet(ParquetError::General(panic))))
+}
+
+fn decode(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
     let catalog = catalog(builder.metadata().file_metadata().key_value_metadata().into_iter().flatten())?;
+    let names: Vec<&str> = builder.schema().fields().iter().map(|field| field.name().as_str()).collect();
+    check_unique(&names)?;
     let mut table = EpisodeTable { catalog, keys: Vec::new(), labels: Vec::new(), metrics: Vec::new() };
     for batch in builder.build()? {
         let batch = batch.map_err(|error| FormatError::Parquet(error.into()))?;

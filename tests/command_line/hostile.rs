@@ -1,0 +1,92 @@
+//! Names that would act on a terminal, a table or a shell if they were let through.
+
+use std::fs;
+
+use mirrorstats::trace::write::write_episodes;
+
+use crate::{Answer, contents, episode, run};
+
+const NAMES: [&str; 6] = [
+    "\u{1b}[31mred\u{1b}[0m",
+    "bell\u{7}\rover\u{8}\u{8}",
+    "line\nbreak\ttab",
+    "right\u{202e}tfel",
+    "=cmd|' /C calc'!A0",
+    "a,b\"c'd|e&f_%#$\\{}~^<script>",
+];
+
+/// Whether every character only shows itself; line breaks are the program's own.
+fn is_tame(text: &str) -> bool {
+    text.chars().all(|c| c == '\n' || !(c.is_control() || ('\u{202a}'..='\u{202e}').contains(&c)))
+}
+
+#[track_caller]
+fn check(answer: &Answer) {
+    assert!(is_tame(&answer.stdout) && is_tame(&answer.stderr), "{:?}\n{:?}", answer.stdout, answer.stderr);
+    assert!(!answer.stderr.contains("panicked"), "{}", answer.stderr);
+}
+
+#[test]
+fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let episodes: Vec<_> =
+        NAMES.iter().flat_map(|name| [episode(name, "E1", 0, "red"), episode(name, "E1", 1, name)]).collect();
+    write_episodes(&at.join("a.parquet"), None, &episodes).unwrap();
+    for arguments in [
+        ["report", "a.parquet"].as_slice(),
+        &["report", "a.parquet", "--style", "paper"],
+        &["report", "a.parquet", "--by", "episode_id,model"],
+        &["stats", "a.parquet", "--metric", "all"],
+        &["info", "a.parquet"],
+        &["validate", "a.parquet"],
+        &["score", "a.parquet", "--explain", "E1-\u{1b}[31mred\u{1b}[0m-0"],
+    ] {
+        let answer = run(at, arguments);
+        assert_eq!(answer.code, 0, "{arguments:?}: {}", answer.stderr);
+        check(&answer);
+    }
+    for arguments in [
+        ["score", "a.parquet", "--explain", "\u{1b}[31mnone"].as_slice(),
+        &["score", "a.parquet", "--metrics", "\u{1b}[31mTSA"],
+        &["score", "a.parquet", "--where", "\"\u{1b}[31m\" = 1"],
+        &["score", "\u{1b}[31m.parquet"],
+        &["report", "a.parquet", "--by", "\u{1b}[31mmodel"],
+        &["report", "a.parquet", "--style", "\u{1b}[31m"],
+        &["score", "a.parquet", "--definitions", "\u{1b}[31m"],
+    ] {
+        let answer = run(at, arguments);
+        check(&answer);
+        answer.refused();
+    }
+    // A file of scores is read back as it was, whatever the names.
+    run(at, &["score", "a.parquet", "-o", "s.csv"]).done();
+    run(at, &["score", "a.parquet", "-o", "s.jsonl"]).done();
+    let scores = fs::read_to_string(at.join("s.csv")).unwrap();
+    assert_eq!(run(at, &["score", "s.csv"]).done(), scores);
+    assert_eq!(run(at, &["score", "s.jsonl"]).done(), scores);
+}
+
+#[test]
+fn values_in_a_faulty_trace_are_shown_and_do_not_act() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for name in NAMES {
+        write_episodes(&at.join("a.parquet"), None, &[episode("m", name, 1, "red")]).unwrap();
+        let answer = run(at, &["report", "a.parquet"]);
+        check(&answer);
+        assert!(answer.refused().contains("unknown-experiment"));
+        check(&run(at, &["validate", "a.parquet"]));
+    }
+    assert_eq!(contents(at).len(), 1);
+}
+
+#[test]
+fn the_name_of_a_file_does_not_act() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = "\u{1b}[31mred.parquet";
+    write_episodes(&folder.path().join(name), None, &[episode("m", "E9", 1, "red")]).unwrap();
+    for command in ["score", "validate", "info", "report"] {
+        check(&run(folder.path(), &[command, "."]));
+    }
+}

@@ -1,0 +1,232 @@
+//! The same bytes come out however the same rows are stored: files, order, row groups, encodings, types, threads.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray};
+use arrow::compute::{cast, concat_batches};
+use arrow::datatypes::DataType;
+use assert_cmd::Command;
+use mirrorstats::score::format::{self, Format};
+use mirrorstats::score::run::{self, Request};
+use mirrorstats::trace::episode::Episode;
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use parquet::file::properties::WriterProperties;
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+use tempfile::TempDir;
+
+use crate::random::episodes;
+use crate::traces::{open, write};
+
+/// How a foreign writer may store the columns.
+#[derive(Clone, Copy, Debug)]
+struct Layout {
+    strings: fn() -> DataType,
+    integers: fn() -> DataType,
+    row_group: usize,
+    /// A column that no definition of the paper has heard of, though one of its names is that of a `let`.
+    extra_columns: bool,
+    reversed_columns: bool,
+    dictionary_pages: bool,
+}
+
+const PLAIN: Layout = Layout {
+    strings: || DataType::Utf8,
+    integers: || DataType::Int32,
+    row_group: usize::MAX,
+    extra_columns: false,
+    reversed_columns: false,
+    dictionary_pages: true,
+};
+
+fn dictionary(key: DataType, value: DataType) -> DataType {
+    DataType::Dictionary(Box::new(key), Box::new(value))
+}
+
+fn layouts() -> Vec<Layout> {
+    vec![
+        PLAIN,
+        Layout { dictionary_pages: false, ..PLAIN },
+        Layout { strings: || DataType::LargeUtf8, integers: || DataType::Int64, row_group: 1, ..PLAIN },
+        Layout { strings: || DataType::Utf8View, integers: || DataType::UInt8, row_group: 7, ..PLAIN },
+        Layout { strings: || dictionary(DataType::Int32, DataType::Utf8), row_group: 7, extra_columns: true, ..PLAIN },
+        Layout { strings: || dictionary(DataType::UInt8, DataType::LargeUtf8), reversed_columns: true, ..PLAIN },
+        Layout { integers: || DataType::Int16, row_group: 1000, extra_columns: true, reversed_columns: true, ..PLAIN },
+        Layout { integers: || DataType::UInt64, row_group: 2, dictionary_pages: false, ..PLAIN },
+        Layout { integers: || DataType::Int8, row_group: 3, ..PLAIN },
+    ]
+}
+
+/// Random episodes, the same ones at every run.
+fn sample() -> Vec<Episode> {
+    let mut runner = TestRunner::deterministic();
+    let mut sample = episodes(80..81).new_tree(&mut runner).unwrap().current();
+    // The order of a file is not the order of the table.
+    sample.sort_by_key(|episode| (episode.run, episode.episode_id.clone()));
+    sample
+}
+
+fn read(path: &Path) -> RecordBatch {
+    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap().build().unwrap();
+    let batches = reader.collect::<Result<Vec<_>, _>>().unwrap();
+    concat_batches(&batches[0].schema(), &batches).unwrap()
+}
+
+/// Writes the rows again in another layout.
+fn write_as(layout: Layout, rows: &RecordBatch, path: &Path) {
+    let schema = rows.schema();
+    let mut columns: Vec<(String, ArrayRef, bool)> = Vec::new();
+    for (field, column) in schema.fields().iter().zip(rows.columns()) {
+        let wanted = match field.data_type() {
+            DataType::Utf8 => (layout.strings)(),
+            DataType::Int32 | DataType::Int8 => (layout.integers)(),
+            other => other.clone(),
+        };
+        columns.push((field.name().clone(), cast(column, &wanted).unwrap(), true));
+    }
+    if layout.extra_columns {
+        let count = i64::try_from(rows.num_rows()).unwrap();
+        columns.push(("finish".into(), Arc::new(Int64Array::from_iter_values(0..count)), true));
+        columns.push(("notes".into(), Arc::new(StringArray::from(vec![None::<&str>; rows.num_rows()])), true));
+        let nested = arrow::array::StructArray::from(rows.slice(0, rows.num_rows()));
+        columns.push(("nested".into(), Arc::new(nested), true));
+    }
+    if layout.reversed_columns {
+        columns.reverse();
+    }
+    let rows = RecordBatch::try_from_iter_with_nullable(columns).unwrap();
+    let properties = WriterProperties::builder()
+        .set_max_row_group_row_count(Some(layout.row_group.min(1 << 20)))
+        .set_dictionary_enabled(layout.dictionary_pages)
+        .build();
+    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), rows.schema(), Some(properties)).unwrap();
+    writer.write(&rows).unwrap();
+    writer.close().unwrap();
+}
+
+/// The episode table of these files, in all three formats.
+fn scores(paths: &[PathBuf], threads: usize) -> Vec<Vec<u8>> {
+    let traces = open(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>());
+    let request = Request { condition: Some("seed <> 2 or TSA = 0".into()), ..Request::of("paper") };
+    let definitions = run::definitions(&traces, &request).unwrap();
+    let labels = ["body_color".to_owned(), "distractors".to_owned()];
+    let table = run::score(&traces, &definitions, &labels, NonZeroUsize::new(threads).unwrap()).unwrap();
+    let bytes = |format| {
+        let mut bytes = Vec::new();
+        format::write(&table, format, &mut bytes).unwrap();
+        bytes
+    };
+    [Format::Csv, Format::JsonLines, Format::Parquet].map(bytes).to_vec()
+}
+
+/// The sample in one file and in forty.
+fn one_and_many(folder: &TempDir) -> (PathBuf, Vec<PathBuf>) {
+    let sample = sample();
+    let one = folder.path().join("one.parquet");
+    write(&one, &sample);
+    let many = folder.path().join("many");
+    fs::create_dir(&many).unwrap();
+    let files = sample.chunks(2).enumerate().map(|(at, episodes)| {
+        // Names in an order of their own.
+        let path = many.join(format!("{:03}.parquet", (at * 17) % 40));
+        write(&path, episodes);
+        path
+    });
+    let files = files.collect();
+    (one, files)
+}
+
+#[test]
+fn scores_do_not_depend_on_the_layout() {
+    let folder = tempfile::tempdir().unwrap();
+    let (one, many) = one_and_many(&folder);
+    let expected = scores(std::slice::from_ref(&one), 1);
+    assert!(expected[0].split(|byte| *byte == b'\n').count() > 30, "the condition leaves enough to compare");
+    let rows = read(&one);
+    let other = folder.path().join("other.parquet");
+    for layout in layouts() {
+        write_as(layout, &rows, &other);
+        for threads in [1, 2, 8] {
+            assert!(scores(std::slice::from_ref(&other), threads) == expected, "{layout:?}, {threads} threads");
+        }
+    }
+    let backwards: Vec<PathBuf> = many.iter().rev().cloned().collect();
+    for threads in [1, 2, 8] {
+        assert!(scores(&many, threads) == expected && scores(&backwards, threads) == expected, "{threads} threads");
+    }
+}
+
+/// Every file below a folder, but for the list of inputs in its manifest.
+fn report(folder: &TempDir, out: &str, arguments: &[&str]) -> BTreeMap<PathBuf, Vec<u8>> {
+    let out = folder.path().join(out);
+    let mut command = Command::cargo_bin("mirrorstats").unwrap();
+    command.current_dir(folder.path()).arg("report").args(arguments).arg("--out").arg(&out);
+    command.assert().success();
+    let mut found = BTreeMap::new();
+    let mut open = vec![out.clone()];
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
+            continue;
+        }
+        let mut bytes = fs::read(&path).unwrap();
+        if path.ends_with("manifest.json") {
+            let mut manifest: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
+            assert!(manifest.as_object_mut().unwrap().remove("inputs").is_some());
+            bytes = manifest.to_string().into_bytes();
+        }
+        found.insert(path.strip_prefix(&out).unwrap().to_owned(), bytes);
+    }
+    found
+}
+
+#[test]
+fn reports_do_not_depend_on_the_layout() {
+    let folder = tempfile::tempdir().unwrap();
+    let (one, _) = one_and_many(&folder);
+    let expected = report(&folder, "a", &["one.parquet", "--threads", "1"]);
+    assert!(expected.len() >= 9 && expected.contains_key(Path::new("cells.csv")), "{:?}", expected.keys());
+    let other = Layout { strings: || DataType::Utf8View, row_group: 5, extra_columns: true, ..PLAIN };
+    write_as(other, &read(&one), &folder.path().join("other.parquet"));
+    let cases: [&[&str]; 4] =
+        [&["one.parquet", "--threads", "8"], &["other.parquet", "--threads", "2"], &["many"], &["many/*.parquet"]];
+    for (at, case) in cases.iter().enumerate() {
+        let found = report(&folder, &format!("b{at}"), case);
+        // The page lists its inputs with their hashes, so it is the same for the same files alone.
+        let lists_inputs = |path: &Path| path == Path::new("report.html") && case[0] != "one.parquet";
+        let differ: Vec<_> = found
+            .iter()
+            .filter(|(path, bytes)| !lists_inputs(path) && expected.get(*path) != Some(bytes))
+            .map(|(path, _)| path)
+            .collect();
+        assert!(differ.is_empty() && found.len() == expected.len(), "{case:?}: {differ:?}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_split_into_files_and_row_groups_scores_the_same(
+        episodes in episodes(1..20), row_group in 1_usize..20, files in 1_usize..5, threads in 1_usize..4,
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: String| folder.path().join(name);
+        let whole = path("whole.parquet".into());
+        write(&whole, &episodes);
+        let mut parts = Vec::new();
+        for (at, some) in episodes.chunks(episodes.len().div_ceil(files)).enumerate() {
+            let (plain, part) = (path(format!("plain{at}.parquet")), path(format!("{at}.parquet")));
+            write(&plain, some);
+            write_as(Layout { row_group, ..PLAIN }, &read(&plain), &part);
+            parts.push(part);
+        }
+        prop_assert!(scores(&[whole], 1) == scores(&parts, threads));
+    }
+}

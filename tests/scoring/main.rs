@@ -1,0 +1,9 @@
+//! Scoring, proved from outside: by hand, against a plain loop, against an interpreter, and over every layout of a file.
+
+mod by_hand;
+mod expressions;
+mod interpreter;
+mod layouts;
+mod plain_loop;
+mod random;
+mod traces;

@@ -1,0 +1,56 @@
+//! Episodes written as traces and scored: the way that every test of this folder takes.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+use mirrorstats::metric::definitions::Definitions;
+use mirrorstats::score::run;
+use mirrorstats::score::table::EpisodeTable;
+use mirrorstats::trace::episode::Episode;
+use mirrorstats::trace::inputs::Input;
+use mirrorstats::trace::open::TraceSet;
+use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+
+/// Writes a trace that has every column of the schema.
+pub fn write(path: &Path, episodes: &[Episode]) {
+    let metadata = TraceMetadata { recording: None, columns: OptionalColumns::all() };
+    let mut writer = TraceWriter::create(path, &metadata).unwrap();
+    for episode in episodes {
+        writer.write(episode).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+/// The traces of some files.
+pub fn open(paths: &[&Path]) -> TraceSet {
+    TraceSet::open(&paths.iter().map(Input::new).collect::<Vec<_>>()).unwrap()
+}
+
+/// Scores episodes under the definitions that `load` gives.
+fn score_with(episodes: &[Episode], load: impl FnOnce(&TraceSet) -> Definitions) -> EpisodeTable {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("trace.parquet");
+    write(&path, episodes);
+    let traces = open(&[&path]);
+    let definitions = load(&traces);
+    run::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()
+}
+
+/// Scores episodes under the paper's definitions.
+pub fn score_paper(episodes: &[Episode]) -> EpisodeTable {
+    score_with(episodes, |traces| run::definitions(traces, &run::Request::of("paper")).unwrap())
+}
+
+/// Scores episodes under definitions given as text.
+pub fn score_toml(episodes: &[Episode], toml: &str) -> EpisodeTable {
+    score_with(episodes, |traces| match Definitions::from_toml("test", toml, &run::trace_columns(traces)) {
+        Ok(definitions) => definitions,
+        Err(faults) => panic!("{faults}"),
+    })
+}
+
+/// The values of one episode, metric by metric.
+pub fn values(table: &EpisodeTable, episode_id: &str) -> Vec<Option<i64>> {
+    let row = table.keys.iter().position(|key| key.episode_id == episode_id).expect("the episode was scored");
+    table.metrics.iter().map(|metric| metric.values[row]).collect()
+}

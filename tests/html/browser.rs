@@ -20,7 +20,7 @@ const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "goog
 const REQUIRED: &str = "MIRRORSTATS_REQUIRE_BROWSER";
 
 /// Nothing that a page does on one machine takes this long.
-const PATIENCE: Duration = Duration::from_secs(120);
+const PATIENCE: Duration = Duration::from_mins(2);
 
 const FLAGS: [&str; 13] = [
     "--headless",
@@ -79,17 +79,17 @@ impl Browser {
         let file = browser.home.path().join("report.html");
         std::fs::write(&file, html).unwrap();
         browser.page = format!("file://{}", file.display());
-        let target = browser.send("Target.createTarget", json!({"url": "about:blank"}));
+        let target = browser.send("Target.createTarget", &json!({"url": "about:blank"}));
         let attached = json!({"targetId": target["targetId"], "flatten": true});
-        let session = browser.send("Target.attachToTarget", attached)["sessionId"].as_str().unwrap().to_owned();
+        let session = browser.send("Target.attachToTarget", &attached)["sessionId"].as_str().unwrap().to_owned();
         browser.session = Some(session);
         for domain in ["Page", "Runtime", "Log", "Network"] {
-            browser.send(&format!("{domain}.enable"), json!({}));
+            browser.send(&format!("{domain}.enable"), &json!({}));
         }
         for (method, parameters) in before {
-            browser.send(method, parameters.clone());
+            browser.send(method, parameters);
         }
-        browser.send("Page.navigate", json!({"url": browser.page.clone()}));
+        browser.send("Page.navigate", &json!({"url": browser.page.clone()}));
         while browser.loads == 0 {
             browser.receive();
         }
@@ -130,7 +130,7 @@ impl Browser {
     }
 
     /// A command of the debugging protocol and its result.
-    pub fn send(&mut self, method: &str, parameters: Value) -> Value {
+    pub fn send(&mut self, method: &str, parameters: &Value) -> Value {
         self.last_id += 1;
         let id = self.last_id;
         let mut message = json!({"id": id, "method": method, "params": parameters});
@@ -171,7 +171,7 @@ impl Browser {
     /// The value of an expression in the page.
     pub fn value(&mut self, expression: &str) -> Value {
         let parameters = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
-        let answer = self.send("Runtime.evaluate", parameters);
+        let answer = self.send("Runtime.evaluate", &parameters);
         assert!(answer.get("exceptionDetails").is_none(), "{expression}: {}", answer["exceptionDetails"]);
         answer["result"]["value"].clone()
     }
@@ -213,7 +213,7 @@ impl Browser {
     fn mouse(&mut self, kind: &str, (x, y): (f64, f64)) {
         let button = if kind == "mouseMoved" { "none" } else { "left" };
         let event = json!({"type": kind, "x": x, "y": y, "button": button, "clickCount": 1});
-        self.send("Input.dispatchMouseEvent", event);
+        self.send("Input.dispatchMouseEvent", &event);
     }
 
     /// Presses and releases a key.
@@ -235,9 +235,9 @@ impl Browser {
         if !text.is_empty() {
             event["text"] = json!(text);
         }
-        self.send("Input.dispatchKeyEvent", event.clone());
+        self.send("Input.dispatchKeyEvent", &event);
         event["type"] = json!("keyUp");
-        self.send("Input.dispatchKeyEvent", event);
+        self.send("Input.dispatchKeyEvent", &event);
     }
 
     /// Ends the browser.

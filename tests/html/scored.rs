@@ -25,46 +25,51 @@ pub static PAPER: LazyLock<EpisodeTable> = LazyLock::new(|| {
     run::score(&traces, &definitions, &["body_color".to_owned()], NonZeroUsize::MIN).unwrap()
 });
 
+/// The page of the whole report of the bundled traces.
+pub static PAPER_PAGE: LazyLock<String> = LazyLock::new(|| Report::paper().render().unwrap());
+
 /// Everything that a page is made of.
 pub struct Report {
     pub episodes: EpisodeTable,
     pub cells: Cells,
     pub tables: Vec<Table>,
     pub manifest: Manifest,
-    pub statistics: Statistics,
+    pub statistics: Option<Statistics>,
     /// Name, title, caption and picture.
     pub figures: Vec<(FigureName, String)>,
 }
 
 impl Report {
-    /// The report of some episodes without figures.
+    /// The report of some episodes without figures and statistics.
     pub fn of(episodes: EpisodeTable, by: &[&str], style: &str) -> Self {
         let by: Vec<String> = by.iter().map(|&key| key.to_owned()).collect();
         let cells = group(&episodes, &by).unwrap();
         let style = Style::load(style).unwrap();
         let tables = layout::tables(&cells, &style).unwrap();
-        let input = |name: &str| Input::new(Path::new(name), "0".repeat(64), 1234, None);
+        let input = |name: &str| Input::new(Path::new(name), "0".repeat(64), 1234);
         let inputs = vec![input("traces/a.parquet"), input("traces/b.parquet")];
         let manifest = Manifest::new(&cells, &style, 1, None, inputs);
-        let statistics = Statistics::of(&episodes, &cells, &Options::default()).unwrap();
-        Self { episodes, cells, tables, manifest, statistics, figures: Vec::new() }
+        Self { episodes, cells, tables, manifest, statistics: None, figures: Vec::new() }
+    }
+
+    /// The tables of the bundled traces alone.
+    pub fn bare() -> Self {
+        Self::of(PAPER.clone(), &["experiment", "model"], "default")
     }
 
     /// The report of the bundled traces, with the figures that need nothing but cells and episodes.
-    pub fn paper(style: &str) -> Self {
-        let mut report = Self::of(PAPER.clone(), &["experiment", "model"], style);
-        let input =
-            figures::Input { episodes: Some(&report.episodes), ..figures::Input::of_cells(&report.cells) };
-        let drawn = FigureName::ALL.into_iter().filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes));
+    pub fn paper() -> Self {
+        let mut report = Self::bare();
+        report.statistics = Some(Statistics::of(&report.episodes, &report.cells, &Options::default()).unwrap());
+        let input = figures::Input { episodes: Some(&report.episodes), ..figures::Input::of_cells(&report.cells) };
+        let drawn =
+            FigureName::ALL.into_iter().filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes));
         let picture = |name| (name, figures::draw(name, &input).unwrap().inline_svg());
         report.figures = drawn.map(picture).collect();
         report
     }
 
     pub fn render(&self) -> Result<String, HtmlError> {
-        let figure = |(name, svg): &'_ (FigureName, String)| -> Figure<'_> {
-            Figure { name: name.name(), title: name.title(), caption: name.caption(), svg }
-        };
         let figures: Vec<Figure<'_>> = self.figures.iter().map(figure).collect();
         html::render(&Page {
             tables: &self.tables,
@@ -72,7 +77,11 @@ impl Report {
             episodes: &self.episodes,
             manifest: &self.manifest,
             figures: &figures,
-            statistics: Some(&self.statistics),
+            statistics: self.statistics.as_ref(),
         })
     }
+}
+
+fn figure((name, svg): &(FigureName, String)) -> Figure<'_> {
+    Figure { name: name.name(), title: name.title(), caption: name.caption(), svg }
 }

@@ -43,6 +43,10 @@ function valueList(pairs) {
   return list;
 }
 
+function piece({ text, is_code: isCode }) {
+  return isCode ? make("code", {}, text) : text;
+}
+
 /** The definition in words and as it is written. */
 function sentence(definition) {
   const written = [`value = ${definition.value}`];
@@ -50,7 +54,7 @@ function sentence(definition) {
   return make(
     "div",
     { class: "sentence" },
-    make("p", {}, make("b", {}, `${definition.title}.`), ` ${definition.help}`),
-    make("code", {}, written.join("\n")),
+    make("p", {}, make("b", {}, definition.title), " ", ...definition.help.map(piece)),
+    make("pre", {}, written.join("\n")),
   );
 }

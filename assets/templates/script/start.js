@@ -21,7 +21,7 @@ function startPrinting() {
   const folded = [];
   addEventListener("beforeprint", () => {
     hideTip();
-    for (const details of all("details:not([open])")) {
+    for (const details of all("details:not([open], .raw)")) {
       details.open = true;
       folded.push(details);
     }

@@ -4,6 +4,9 @@ const tip = make("div", { class: "tip", id: "tip", role: "tooltip", hidden: "" }
 document.body.append(tip);
 let tipped = null;
 
+// Keys scroll things under a pointer at rest; what comes to lie there is not what the reader points at.
+let isPointing = true;
+
 /** Shows `content` by `target`, inside the window. */
 function showTip(target, ...content) {
   hideTip();
@@ -35,7 +38,7 @@ function hideTip() {
 function tipContent(target) {
   if (target.matches("td[data-metric]")) {
     const { metric, group, definition } = subject(target);
-    const name = make("p", { class: "name" }, make("b", {}, metric), ` ${data.groups[group]}`);
+    const name = make("p", { class: "name" }, make("b", {}, metric), `, ${data.groups[group]}`);
     return [name, valueList(facts(target)), sentence(definition)];
   }
   if (target.matches("th[data-metric]")) return [sentence(data.metrics[target.dataset.metric])];
@@ -52,7 +55,19 @@ function markText(mark) {
   return mark.getAttribute("aria-label") ?? "";
 }
 
+/** Notices when the pointer moves by itself. */
+function watchPointer() {
+  let last = null;
+  const notice = ({ type, clientX, clientY }) => {
+    const place = `${clientX},${clientY}`;
+    if (type === "pointerdown" || (last !== null && place !== last)) isPointing = true;
+    last = place;
+  };
+  for (const type of ["pointerdown", "pointermove", "pointerover"]) document.addEventListener(type, notice);
+}
+
 function startTips() {
+  watchPointer();
   const selector = ".results td[data-metric], .results th[data-metric], .sheet .mark";
   const show = (event) => {
     const target = event.target.closest?.(selector);
@@ -60,15 +75,16 @@ function startTips() {
     const content = tipContent(target);
     if (content !== null) showTip(target, ...content);
   };
-  const hide = (event) => {
-    if (tipped !== null && !tipped.contains(event.relatedTarget)) hideTip();
+  const hide = ({ target, relatedTarget }) => {
+    if (tipped?.contains(target) && !tipped.contains(relatedTarget)) hideTip();
   };
-  document.addEventListener("pointerover", show);
   document.addEventListener("focusin", show);
-  document.addEventListener("pointerout", hide);
   document.addEventListener("focusout", hide);
+  document.addEventListener("pointerout", hide);
+  document.addEventListener("pointerover", (event) => isPointing && show(event));
   document.addEventListener("scroll", () => tipped !== null && placeTip(), { capture: true, passive: true });
-  document.addEventListener("keydown", (event) => {
-    if (event.key === "Escape") hideTip();
+  document.addEventListener("keydown", ({ key }) => {
+    isPointing = false;
+    if (key === "Escape") hideTip();
   });
 }

@@ -10,7 +10,7 @@ use crate::base::visible::visible;
 use crate::cells::interval::Interval;
 use crate::cells::moments::Moments;
 use crate::metric::catalog::{Catalog, Kind, Metric};
-use crate::report::table::{Cell, DAGGER, Value};
+use crate::report::table::{Cell, DAGGER, Emphasis, Value};
 use crate::report::value::interval;
 
 /// A cell for the templates.
@@ -24,8 +24,8 @@ pub(super) struct CellView {
     detail: String,
     /// Whether emphasis covers the detail too.
     is_whole: bool,
-    /// `bold`, `underline` or empty.
-    emphasis: &'static str,
+    /// The element that spells its emphasis.
+    element: &'static str,
     /// The dagger, or empty.
     mark: String,
     n: u64,
@@ -66,7 +66,7 @@ impl CellView {
             estimate,
             detail: detail.unwrap_or_default(),
             is_whole: matches!(cell.value, Value::MeanSe { .. }),
-            emphasis: cell.emphasis.word(),
+            element: element(cell.emphasis),
             mark: if cell.is_marked { DAGGER.to_string() } else { String::new() },
             n: moments.n,
             sum: moments.sum.to_string(),
@@ -78,6 +78,14 @@ impl CellView {
             chance: chance.unwrap_or_default(),
             strip: strip(metric, moments, interval),
         }
+    }
+}
+
+fn element(emphasis: Emphasis) -> &'static str {
+    match emphasis {
+        Emphasis::Plain => "span",
+        Emphasis::Bold => "strong",
+        Emphasis::Underline => "u",
     }
 }
 

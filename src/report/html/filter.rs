@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::page::shown;
+use crate::base::visible::visible;
 use crate::cells::cell::{Cells, KeyValue};
+use crate::report::layout::heading;
 use crate::report::table::Table;
 
 /// The choices of one key column.
@@ -13,8 +15,8 @@ use crate::report::table::Table;
 pub(super) struct Filter {
     /// Which of the key columns.
     key: usize,
-    /// The column's name in words.
-    name: String,
+    /// The column in words: `Experiment`.
+    heading: String,
     /// Its values in the order of the tables.
     values: Vec<String>,
 }
@@ -42,7 +44,7 @@ impl Filters {
         }
         let filter = |(key, values): (usize, Vec<KeyValue>)| Filter {
             key,
-            name: cells.by[key].replace('_', " "),
+            heading: visible(&heading(&cells.by[key])),
             values: values.iter().map(|value| shown(value, undefined)).collect(),
         };
         let several = values.into_iter().enumerate().filter(|(_, values)| values.len() > 1);

@@ -10,12 +10,19 @@ use crate::metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
 pub(super) struct MetricView {
     name: String,
     title: String,
-    help: String,
+    help: Vec<Piece>,
     value: String,
     when: Option<String>,
     is_rate: bool,
     /// Unit, direction and source in a few words.
     remarks: String,
+}
+
+/// A stretch of prose, or a name between backticks in it.
+#[derive(Debug, PartialEq, Eq, Serialize)]
+struct Piece {
+    text: String,
+    is_code: bool,
 }
 
 /// A named expression.
@@ -51,7 +58,7 @@ impl MetricView {
         Self {
             name: visible(name),
             title: visible(&metric.title),
-            help: visible(&metric.help),
+            help: prose(&metric.help),
             value: multiline(&metric.value),
             when: metric.when.as_deref().map(multiline),
             is_rate: metric.kind == Kind::Rate,
@@ -90,6 +97,18 @@ impl ExperimentView {
     }
 }
 
+/// Prose and the names between its backticks by turns; a backtick without a partner stays where it is.
+fn prose(text: &str) -> Vec<Piece> {
+    let stretches: Vec<&str> = text.split('`').collect();
+    let (paired, rest) = stretches.split_at(stretches.len().saturating_sub(1) / 2 * 2);
+    let pieces = paired.iter().enumerate().map(|(at, text)| (at % 2 == 1, (*text).to_owned()));
+    pieces
+        .chain(std::iter::once((false, rest.join("`"))))
+        .filter(|(_, text)| !text.is_empty())
+        .map(|(is_code, text)| Piece { text: visible(&text), is_code })
+        .collect()
+}
+
 fn remarks(metric: &Metric) -> String {
     let mut remarks = vec![match metric.kind {
         Kind::Rate => "rate, 0 or 1 an episode".to_owned(),
@@ -114,4 +133,24 @@ fn remarks(metric: &Metric) -> String {
 /// An expression as written, its line breaks kept.
 fn multiline(text: &str) -> String {
     text.trim().lines().map(visible).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::prose;
+
+    fn spelled(text: &str) -> Vec<String> {
+        let piece = |piece: super::Piece| if piece.is_code { format!("<{}>", piece.text) } else { piece.text };
+        prose(text).into_iter().map(piece).collect()
+    }
+
+    #[test]
+    fn names_between_backticks_stand_out() {
+        assert_eq!(spelled("Without `done` there is no success."), ["Without ", "<done>", " there is no success."]);
+        assert_eq!(spelled("`a` or `b`"), ["<a>", " or ", "<b>"]);
+        assert_eq!(spelled("plain"), ["plain"]);
+        assert_eq!(spelled("`a` and a ` alone"), ["<a>", " and a ` alone"]);
+        assert_eq!(spelled("one ` alone"), ["one ` alone"]);
+        assert_eq!(spelled(""), Vec::<String>::new());
+    }
 }

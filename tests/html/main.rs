@@ -1,0 +1,10 @@
+//! `report.html`: its text, and what a browser makes of it.
+
+mod browser;
+mod document;
+mod episodes;
+mod figures;
+mod hostile;
+mod results;
+mod scored;
+mod surroundings;

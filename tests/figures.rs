@@ -356,7 +356,7 @@ fn what_cannot_be_drawn_is_said() {
     let bare = Input::of_cells(&cast.cells);
     check(
         draw(FigureName::Gaze, &bare),
-        "figure `gaze` needs the steps of each episode; draw it from traces rather than from scores alone",
+        "figure `gaze` needs the steps of each episode; draw it from traces that have such episodes, not from scores alone",
     );
     let mut by_seed = cast.cells.clone();
     by_seed.by.push("seed".to_owned());

@@ -247,7 +247,7 @@ pub enum FigureError {
         known: String,
     },
     /// An input that was not given.
-    #[error("figure `{figure}` needs {needed}; draw it from traces rather than from scores alone")]
+    #[error("figure `{figure}` needs {needed}; draw it from traces that have such episodes, not from scores alone")]
     MissingInput {
         /// The figure.
         figure: FigureName,

@@ -55,10 +55,10 @@ fn reach_sentence(reach: Reach, names: &[String]) -> String {
         None => "no difference at all".to_owned(),
     };
     format!(
-        "{}: with {} pairs, the smallest difference between two models that could have been shown is {} in one \
+        "{}: with {}, the smallest difference between two models that could have been shown is {} in one \
          comparison and {} as the first of {} under Holm, if every disagreement points the same way.",
         names.join(", "),
-        reach.n,
+        if reach.n == 1 { "1 pair".to_owned() } else { format!("{} pairs", reach.n) },
         least(reach.single),
         least(reach.family),
         reach.tests,

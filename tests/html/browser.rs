@@ -240,14 +240,40 @@ impl Browser {
         self.send("Input.dispatchKeyEvent", &event);
     }
 
+    /// What the browser had to complain of so far.
+    pub fn complaints(&mut self) -> &[String] {
+        // One more turn of the page, so that all that was said before it has come.
+        self.value("new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0, 0)))");
+        &self.faults
+    }
+
     /// Ends the browser.
     ///
     /// # Panics
     /// When it had anything to complain of.
     pub fn close(mut self) {
-        // One more answer, so that all that was said before it has come.
-        self.value("new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0, 0)))");
-        assert_eq!(self.faults, Vec::<String>::new());
+        assert_eq!(self.complaints(), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn whatever_goes_wrong_in_a_page_is_noticed() {
+    for (body, complaint) in [
+        ("<script>console.error('a slip')</script>", "a slip"),
+        ("<script>throw new Error('a slip')</script>", "a slip"),
+        ("<script>Promise.reject(new Error('a slip'))</script>", "a slip"),
+        ("<img src='https://mirror.invalid/a.png' alt=''>", "a request for https://mirror.invalid/a.png"),
+        ("<link rel='stylesheet' href='other.css'>", "other.css"),
+        (
+            "<meta http-equiv='Content-Security-Policy' content=\"script-src 'none'\"><script>0</script>",
+            "Content Security Policy",
+        ),
+    ] {
+        let Some(mut browser) = Browser::open("complaints", &format!("<!doctype html><title>t</title>{body}")) else {
+            return;
+        };
+        let complaints = browser.complaints();
+        assert!(complaints.iter().any(|found| found.contains(complaint)), "{body}: {complaints:?}");
     }
 }
 

@@ -137,7 +137,7 @@ fn a_cell_tells_its_numbers_and_its_definition() {
         "standard error0",
         "Wilson 95 %0.74116",
         " to 1",
-        "Mirror-Then-Action Temporal Ordering",
+        "Mirror-Then-Action Temporal Ordering. Among successful",
         "undefined for failures.",
         "value = MCR",
         "when = TSA = 1",

@@ -54,7 +54,7 @@ function sentence(definition) {
   return make(
     "div",
     { class: "sentence" },
-    make("p", {}, make("b", {}, definition.title), " ", ...definition.help.map(piece)),
+    make("p", {}, make("b", {}, `${definition.title}.`), " ", ...definition.help.map(piece)),
     make("pre", {}, written.join("\n")),
   );
 }

@@ -144,9 +144,19 @@ impl Browser {
             let answer = self.receive();
             if answer["id"] == json!(id) {
                 assert!(answer.get("error").is_none(), "{method}: {}", answer["error"]);
+                if method == "Emulation.setEmulatedMedia" {
+                    self.settle();
+                }
                 return answer["result"].clone();
             }
         }
+    }
+
+    /// Two frames and a turn of the page, so that it has heard of what was done to it: events of changed media come
+    /// with a frame, not with the command.
+    fn settle(&mut self) {
+        let frame = "(done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 0, 0)))";
+        self.value(&format!("new Promise({frame})"));
     }
 
     fn receive(&mut self) -> Value {
@@ -242,8 +252,7 @@ impl Browser {
 
     /// What the browser had to complain of so far.
     pub fn complaints(&mut self) -> &[String] {
-        // One more turn of the page, so that all that was said before it has come.
-        self.value("new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0, 0)))");
+        self.settle();
         &self.faults
     }
 

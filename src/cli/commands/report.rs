@@ -18,7 +18,7 @@ use crate::report::table::Table;
 use crate::report::tables::terminal::{self, Marks, Terminal};
 use crate::score::format;
 
-/// Compute every table and figure of traces: the main table printed, all of it as a folder
+/// Compute the tables of traces, print the main one, write all of them
 #[derive(Clone, Debug, clap::Args)]
 pub struct ReportArgs {
     /// Traces, or files of scores in their place.

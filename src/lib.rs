@@ -18,7 +18,13 @@
 //! | room | what it knows |
 //! |---|---|
 //! | [`cli`] | what was typed, standard output, exit codes |
+//! | `record` | runs episodes: a world, an agent; a trace and a log (feature `sim`) |
+//! | [`replay`] | a recorded episode again: re-simulated, as frames, as a film strip |
+//! | [`agent`] | who decides the next action: scripted, a model behind a provider, a program |
+//! | `sim` | the MuJoCo world: scene, bodies, eye, ground truth from rays (feature `sim`) |
+//! | [`log`] | MCAP logs: in, out, and what can be saved of a cut one |
 //! | [`report`] | styles, tables, statistics for people, the folder of a report |
+//! | [`engine`] | other engines for the SQL lowering: Polars, Spark |
 //! | [`cells`] | grouping, exact moments, intervals, tests |
 //! | [`score`] | the plan evaluated over Arrow batches; the episode table |
 //! | [`metric`] | definition files: TOML, SQL expressions, types, plans |
@@ -78,10 +84,18 @@
 //! assert!(definitions.explain("TURNS").unwrap().words.starts_with("the number of steps where"));
 //! ```
 
+pub mod agent;
 pub mod base;
 pub mod cells;
 pub mod cli;
+pub mod engine;
+pub mod log;
 pub mod metric;
+#[cfg(feature = "sim")]
+pub mod record;
+pub mod replay;
 pub mod report;
 pub mod score;
+#[cfg(feature = "sim")]
+pub mod sim;
 pub mod trace;

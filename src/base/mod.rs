@@ -4,9 +4,11 @@
 
 pub mod base64;
 pub mod estimate;
+pub mod frame;
 pub mod hash;
 pub mod near;
 pub mod number;
+pub mod palette;
 pub mod ratio;
 pub mod temporary;
 pub mod visible;

@@ -1,0 +1,14 @@
+//! Tells binaries and tests where MuJoCo's library is, so that they start without LD_LIBRARY_PATH. Feature `sim` only.
+
+fn main() {
+    println!("cargo::rerun-if-changed=build.rs");
+    println!("cargo::rerun-if-env-changed=MUJOCO_DYNAMIC_LINK_DIR");
+    if std::env::var_os("CARGO_FEATURE_SIM").is_none() {
+        return;
+    }
+    if let Ok(directory) = std::env::var("MUJOCO_DYNAMIC_LINK_DIR") {
+        println!("cargo::rustc-link-arg=-Wl,-rpath,{directory}");
+    }
+    // A distribution with bin/mirrorstats and lib/libmujoco.so beside it.
+    println!("cargo::rustc-link-arg=-Wl,-rpath,$ORIGIN/../lib");
+}

@@ -1,0 +1,159 @@
+//! Who decides the next action.
+//!
+//! An agent gets what a vision-language model gets, the frame and the words around it, and nothing else: no pose of
+//! another body, no label, no ground truth. It answers with a [`Reply`], which the recorder writes down as it is.
+//!
+//! Rule: an agent is a function of its task and its observations (and, for a model behind a network, of what that said).
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+
+use crate::base::frame::Frame;
+use crate::trace::episode::Action;
+
+/// What an agent is told once, before the first step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Task {
+    /// Which of the two prompts of the paper is in force.
+    pub family: Family,
+    /// The false colour of the first line of the prompt in E3.
+    pub stated_color: Option<String>,
+    /// Steps after which the episode ends by itself (100 in the paper).
+    pub step_budget: i32,
+    /// The only source of chance for an agent; differs from episode to episode, equal from recording to recording.
+    pub seed: u64,
+}
+
+/// The two prompt families (paper, appendix "Prompt Templates").
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Family {
+    /// E1 to E4: find out one's colour, then select the cube of that colour.
+    CubeSelection,
+    /// E5: explore; no cube is asked for.
+    Exploration,
+}
+
+/// What an agent perceives before it acts.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// The timestep, from 1.
+    pub t: i32,
+    /// Steps left, this one included.
+    pub remaining: i32,
+    /// Where the body stands, m, in the coordinates of the room.
+    pub x: f32,
+    /// See `x`.
+    pub y: f32,
+    /// Where the body faces: degrees, counter-clockwise from +x, a multiple of 30.
+    pub yaw: f32,
+    /// The last move was blocked.
+    pub bumped: bool,
+    /// The step before: what was done, and the summary given for it; `None` at t = 1.
+    pub history: Option<(Option<Action>, Option<String>)>,
+    /// What the eye sees.
+    pub frame: Arc<Frame>,
+}
+
+/// What an agent answered, and how that was got.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reply {
+    /// The outcome of getting and reading it.
+    pub status: Status,
+    /// The action; `None` where the reply gave none: the body stands still.
+    pub action: Option<Action>,
+    /// The self-attribution: a colour of the palette, `unknown`, or `None` where the reply gave none.
+    pub self_color: Option<String>,
+    /// The cube: a colour, `none`, or `None` where the reply gave none.
+    pub selected_cube: Option<String>,
+    /// The words around the decision, as given.
+    pub words: Words,
+    /// The whole reply, as it came.
+    pub raw: Option<String>,
+    /// What it cost.
+    pub usage: Usage,
+}
+
+/// The free text of a reply; the keys of the reply's JSON object in the paper.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Words {
+    /// `view-description`.
+    pub view_description: Option<String>,
+    /// `reasoning`.
+    pub reasoning: Option<String>,
+    /// `summary`; comes back as the history of the next step.
+    pub summary: Option<String>,
+    /// `identification`, of which the self-attribution is the normal form.
+    pub identification: Option<String>,
+}
+
+/// Time, tokens and money of one reply; `None` where nobody counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Usage {
+    /// From sending the request to the whole reply, ms.
+    pub latency_ms: Option<i32>,
+    /// Tokens of the request.
+    pub prompt_tokens: Option<i32>,
+    /// Tokens of the reply.
+    pub completion_tokens: Option<i32>,
+    /// US dollars.
+    pub cost_usd: Option<f64>,
+}
+
+/// The outcome of getting and reading a reply: the values of the trace's `reply_status` column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Status {
+    /// Valid as it came.
+    Ok,
+    /// Valid after a named repair.
+    Repaired,
+    /// No JSON object in it.
+    ParseFailed,
+    /// A JSON object, but not the one asked for.
+    SchemaInvalid,
+    /// The model declined.
+    Refusal,
+    /// Cut off by the limit of tokens.
+    Truncated,
+    /// Nothing in it.
+    Empty,
+    /// The provider's limit of requests, to the last attempt.
+    RateLimited,
+    /// The provider failed, to the last attempt.
+    ServerError,
+    /// No whole reply in time, to the last attempt.
+    Timeout,
+}
+
+impl Status {
+    /// The name in the `reply_status` column.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ok => "ok",
+            Self::Repaired => "repaired",
+            Self::ParseFailed => "parse_failed",
+            Self::SchemaInvalid => "schema_invalid",
+            Self::Refusal => "refusal",
+            Self::Truncated => "truncated",
+            Self::Empty => "empty",
+            Self::RateLimited => "rate_limited",
+            Self::ServerError => "server_error",
+            Self::Timeout => "timeout",
+        }
+    }
+}
+
+/// The episode cannot go on, and that is not the agent's doing: the infrastructure failed. Such an episode is counted
+/// apart and recorded again by the next run of the command; it is never scored.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct Lost(pub String);
+
+/// A decision that may take its time: scripted agents are ready at once, others wait for a network or a program.
+pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
+
+/// One agent in one episode.
+pub trait Agent {
+    /// Decides the next action.
+    fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
+}

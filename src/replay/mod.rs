@@ -1,0 +1,1 @@
+//! A recorded episode again: the world re-simulated, frames, film strips.

@@ -5,6 +5,10 @@
 //!
 //! Rule: an agent is a function of its task and its observations (and, for a model behind a network, of what that said).
 
+pub mod identification;
+pub mod prompt;
+pub mod reply;
+
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;

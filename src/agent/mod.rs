@@ -8,6 +8,8 @@
 pub mod identification;
 pub mod prompt;
 pub mod reply;
+#[cfg(feature = "sim")]
+pub mod vlm;
 
 use std::future::Future;
 use std::pin::Pin;
@@ -130,6 +132,25 @@ pub enum Status {
 }
 
 impl Status {
+    /// All of them, in the order of the schema.
+    pub const ALL: [Self; 10] = [
+        Self::Ok,
+        Self::Repaired,
+        Self::ParseFailed,
+        Self::SchemaInvalid,
+        Self::Refusal,
+        Self::Truncated,
+        Self::Empty,
+        Self::RateLimited,
+        Self::ServerError,
+        Self::Timeout,
+    ];
+
+    /// The status of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|status| status.name() == name)
+    }
+
     /// The name in the `reply_status` column.
     pub const fn name(self) -> &'static str {
         match self {

@@ -182,3 +182,29 @@ pub trait Agent {
     /// Decides the next action.
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
 }
+
+/// Who plays: makes the agent of each episode.
+pub trait Player: Send + Sync {
+    /// The name shown in tables.
+    fn model(&self) -> &str;
+
+    /// What goes into recordings: everything that shapes the agent's decisions, and nothing that differs from one start of
+    /// the same recording to the next.
+    fn description(&self) -> serde_json::Value;
+
+    /// The agent of one episode.
+    ///
+    /// # Errors
+    /// When it cannot be made; the episode is lost then.
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost>;
+
+    /// How many episodes of a thread are worth having under way at once; more than one where agents wait.
+    fn in_flight(&self) -> usize {
+        1
+    }
+
+    /// Why no further episode makes sense, once there is such a reason.
+    fn stopped(&self) -> Option<String> {
+        None
+    }
+}

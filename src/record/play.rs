@@ -125,9 +125,9 @@ pub async fn play(
         let observation = Observation {
             t,
             remaining: budget - t + 1,
-            x: metres(world.pose().x),
-            y: metres(world.pose().y),
-            yaw: world.pose().heading.degrees(),
+            x: narrowed(world.pose().x),
+            y: narrowed(world.pose().y),
+            yaw: narrowed(world.pose().heading.degrees()),
             bumped,
             history: history.take(),
             frame: frame.clone().unwrap_or_else(nothing),
@@ -176,11 +176,11 @@ fn row(world: &World, key: Key, t: i32, census: &Census, reply: Reply) -> Step {
         mirror_other_px: px(census.other_px),
         mirror_px: px(census.mirror_px),
         direct_other_px: px(census.direct_other_px),
-        pose_x: Some(metres(pose.x)),
-        pose_y: Some(metres(pose.y)),
-        pose_yaw: Some(pose.heading.degrees()),
+        pose_x: Some(narrowed(pose.x)),
+        pose_y: Some(narrowed(pose.y)),
+        pose_yaw: Some(narrowed(pose.heading.degrees())),
         bumped: None,
-        cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(metres),
+        cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
         reply_status: Some(reply.status.name().to_owned()),
         view_description: reply.words.view_description,
         reasoning: reply.words.reasoning,
@@ -202,8 +202,8 @@ fn row(world: &World, key: Key, t: i32, census: &Census, reply: Reply) -> Step {
     }
 }
 
-/// As traces store lengths.
+/// As traces store lengths and angles.
 #[expect(clippy::cast_possible_truncation, reason = "seven digits of a room's metres are micrometres")]
-fn metres(value: f64) -> f32 {
+fn narrowed(value: f64) -> f32 {
     value as f32
 }

@@ -7,16 +7,15 @@
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::num::NonZeroUsize;
-use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use tokio::task::{JoinSet, LocalSet};
+use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
 use super::plan::Key;
 use super::play::{self, Broken, Onlooker, Seen, Stage};
-use super::store::{Store, StoreError};
+use super::store::Store;
 use crate::agent::Player;
 use crate::sim::config::WorldConfig;
 use crate::sim::eye::Eye;
@@ -169,25 +168,80 @@ impl Recording<'_> {
 
     fn episodes(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
         let eye = match self.settings.frames {
-            true => Some(Rc::new(RefCell::new(Eye::new(self.config).map_err(Broken::fatal)?))),
+            true => Some(RefCell::new(Eye::new(self.config).map_err(Broken::fatal)?)),
             false => None,
         };
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(Broken::fatal)?;
         let mut tally = Tally::default();
-        // Futures of a thread borrow from it, which a local task may not; joined by hand, they may.
         runtime.block_on(async {
-            let mut under_way = futures(each);
+            let mut under_way = FuturesUnordered::new();
             loop {
                 while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
                     let Some(key) = next(queue) else { break };
-                    under_way.push(self.episode(key, eye.clone()));
+                    under_way.push(async { (key, self.episode(key, eye.as_ref()).await) });
                 }
                 let Some((key, result)) = under_way.next().await else { break };
                 self.note(key, result, &mut tally)?;
             }
-            Ok(())
+            Ok::<(), Broken>(())
         })?;
         tally.stopped = self.stop.load(Ordering::Relaxed);
         Ok(tally)
+    }
+
+    /// One episode, from its scene to its commit.
+    async fn episode(&self, key: Key, eye: Option<&RefCell<Eye>>) -> Result<usize, Broken> {
+        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(Broken::fatal)?;
+        let episode = play::head(&scene, key, self.player.model());
+        let mut agent = self.player.agent(play::task(self.config, &scene, key), &episode.episode_id)?;
+        let mut world = World::new(self.config, scene).map_err(Broken::fatal)?;
+        let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
+        let mut onlooker = Counter(self.progress);
+        let episode = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await?;
+        let start = Instant::now();
+        self.store.commit(key, &episode).map_err(Broken::fatal)?;
+        self.shares.writing(start);
+        Ok(episode.steps.len())
+    }
+
+    /// Counts what became of an episode.
+    fn note(&self, key: Key, result: Result<usize, Broken>, tally: &mut Tally) -> Result<(), Broken> {
+        let id = key.episode_id(self.player.model());
+        match result {
+            Ok(steps) => {
+                tally.recorded += 1;
+                tally.steps += steps as u64;
+                self.progress.episode(&id, steps);
+            }
+            Err(Broken::Stopped) => {}
+            Err(Broken::Lost(lost)) => {
+                self.progress.lost(&id, &lost.0);
+                tally.lost.push((id, lost.0));
+                if self.player.stopped().is_some() {
+                    self.stop.store(true, Ordering::Relaxed);
+                }
+            }
+            Err(fatal @ Broken::Fatal(_)) => return Err(fatal),
+        }
+        Ok(())
+    }
+}
+
+/// The next episode to play.
+fn next(queue: &Mutex<VecDeque<Key>>) -> Option<Key> {
+    queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
+}
+
+fn panicked() -> Broken {
+    Broken::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
+}
+
+/// Counts steps.
+struct Counter<'a>(&'a dyn Progress);
+
+impl Onlooker for Counter<'_> {
+    fn step(&mut self, _: &Seen<'_>) -> Result<(), Broken> {
+        self.0.step();
+        Ok(())
     }
 }

@@ -73,7 +73,8 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
     };
     let (ids, seeds, runs) =
         (column("episode_id", &DataType::Utf8)?, column("seed", &DataType::Int64)?, column("run", &DataType::Int64)?);
-    let (ids, seeds, runs) = (ids.as_string::<i32>(), seeds.as_primitive::<Int64Type>(), runs.as_primitive::<Int64Type>());
+    let (ids, seeds, runs) =
+        (ids.as_string::<i32>(), seeds.as_primitive::<Int64Type>(), runs.as_primitive::<Int64Type>());
     let mut found = Vec::new();
     let mut start = 0;
     for end in 1..=ids.len() {
@@ -95,7 +96,10 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
 /// # Errors
 /// When the episodes do not have the same columns, or whatever writing gives.
 pub fn write(path: &Path, recording: Option<serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
-    let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write { file: path.display().to_string(), source };
+    let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write {
+        file: path.display().to_string(),
+        source,
+    };
     let Some(first) = episodes.first() else { return Err(failed("there is no episode to write".into())) };
     let schema = first.rows.schema();
     if let Some(other) = episodes.iter().find(|episode| !same_columns(&schema, &episode.rows.schema())) {

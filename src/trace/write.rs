@@ -99,7 +99,9 @@ impl<W: Write + Send> TraceEncoder<W> {
         let columns = layout.iter().filter_map(|column| Source::of(column.name)).map(Gathered::new).collect();
         let layout = Arc::new(Schema::new(layout.into_iter().map(field).collect::<Vec<_>>()));
         // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
-        let options = ArrowWriterOptions::new().with_properties(properties(metadata.recording.as_ref())).with_skip_arrow_metadata(true);
+        let options = ArrowWriterOptions::new()
+            .with_properties(properties(metadata.recording.as_ref()))
+            .with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(out, Arc::clone(&layout), options).map_err(failed)?;
         Ok(Self { parquet, layout, columns, undeclared, seen: HashSet::new(), gathered_rows: 0, row_group_rows: 0 })
     }

@@ -5,6 +5,11 @@
 //!
 //! Rule: an agent is a function of its task and its observations (and, for a model behind a network, of what that said).
 
+#[cfg(feature = "sim")]
+pub mod scripted;
+#[cfg(feature = "sim")]
+pub mod sight;
+
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;

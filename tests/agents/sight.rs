@@ -39,13 +39,15 @@ fn view(room: &Painted, pose: Pose) -> View {
 /// What is known after looking from each of `poses`.
 fn known(room: &Painted, poses: &[Pose]) -> Knowledge {
     let mut known = Knowledge::new(&observation(room, poses[0]));
-    poses.iter().for_each(|&pose| known.see(&observation(room, pose)));
+    for &pose in poses {
+        known.see(&observation(room, pose));
+    }
     known
 }
 
 /// Before the mirror: three views from two places.
 fn before_the_mirror() -> [Pose; 4] {
-    [pose(0.0, 0.3, 60.0), pose(1.2, 0.3, 0.0), pose(1.6, 0.3, 0.0), pose(1.6, 0.3, 30.0)]
+    [pose(0.0, 0.3, 60.0), pose(2.0, 0.3, 0.0), pose(2.3, 0.3, 0.0), pose(2.3, 0.3, 30.0)]
 }
 
 #[test]
@@ -118,14 +120,14 @@ fn ones_own_color_is_known_after_tests_from_two_places() {
 #[test]
 fn a_body_before_the_mirror_is_not_oneself_and_neither_is_its_reflection() {
     // It hides one's own reflection from straight across; its own is behind it.
-    let room = Painted { others: vec![(Color::Purple, at(3.0, 0.3))], ..room() };
+    let room = Painted { others: vec![(Color::Purple, at(3.2, 0.3))], ..room() };
     let known = known(&room, &before_the_mirror());
     assert_eq!(known.reflection.own_color(), None);
 }
 
 #[test]
 fn among_others_ones_own_body_is_told_by_its_place() {
-    let others = vec![(Color::Purple, at(0.2, 1.6)), (Color::Orange, at(2.8, -1.2)), (Color::Red, at(-2.0, 1.2))];
+    let others = vec![(Color::Purple, at(0.2, 1.6)), (Color::Orange, at(3.2, -1.2)), (Color::Red, at(-2.0, 1.2))];
     let room = Painted { others, ..room() };
     let known = known(&room, &before_the_mirror());
     assert_eq!(known.reflection.own_color(), Some(Color::Green));

@@ -46,7 +46,7 @@ fn the_gullible_walks_to_the_stated_cube() {
 #[test]
 fn the_guesser_takes_what_it_sees() {
     let mut taken: Vec<String> = (0..12)
-        .map(|seed| room().play(Scripted::Guesser, &task(Family::CubeSelection, seed), pose(3.0, 0.0, 180.0)).0)
+        .map(|seed| room().play(Scripted::Guesser, &task(Family::CubeSelection, seed), pose(3.3, 1.0, 180.0)).0)
         .map(|replies| replies.last().unwrap().selected_cube.clone().unwrap())
         .collect();
     taken.sort();

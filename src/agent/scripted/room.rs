@@ -112,9 +112,13 @@ impl Room {
         Side::ALL.into_iter().all(|side| self.wall(side).is_none_or(|wall| side.out(place) <= wall - margin))
     }
 
-    /// Whether a wall is a mirror at a place along it.
+    /// Whether a wall is a mirror at a place along it. Right across from oneself one's own head hides what lies beyond, so the
+    /// pieces to either side have a say.
     pub fn is_mirror(&self, side: Side, along: f64) -> bool {
-        self.votes[side as usize].get(piece(along)).is_some_and(|&votes| votes > 1)
+        let votes = &self.votes[side as usize];
+        let at = piece(along);
+        let around = at.checked_sub(1).and_then(|first| votes.get(first..at + 2));
+        around.is_some_and(|around| around[1] >= 0 && around.iter().sum::<i32>() > 2)
     }
 
     /// The sides whose wall is a mirror, as far as seen, for at least half a metre.

@@ -52,9 +52,9 @@ fn cube(patch: &Patch, camera: &Camera) -> Option<Thing> {
     let fall = (EYE_HEIGHT - camera.height(ahead, patch.top as f64)) / ahead;
     let edge = (EYE_HEIGHT - fall * ahead) / (1.0 + fall);
     let width = patch.width() as f64 / camera.scale(ahead);
-    let full = patch.pixels as f64 >= FULLNESS * (patch.width() * patch.height()) as f64;
+    let is_full = patch.pixels as f64 >= FULLNESS * (patch.width() * patch.height()) as f64;
     let is_cube = patch.pixels >= LEAST_OF_CUBE
-        && full
+        && is_full
         && (EDGES.0..=EDGES.1).contains(&edge)
         && (WIDTHS.0 * edge..=WIDTHS.1 * edge).contains(&width);
     is_cube.then(|| {

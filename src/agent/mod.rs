@@ -9,6 +9,10 @@ pub mod identification;
 pub mod prompt;
 pub mod reply;
 #[cfg(feature = "sim")]
+pub mod scripted;
+#[cfg(feature = "sim")]
+pub mod sight;
+#[cfg(feature = "sim")]
 pub mod vlm;
 
 use std::future::Future;

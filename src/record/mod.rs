@@ -16,6 +16,7 @@
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
 //! shards, interruptions and their order change nothing in a trace. Nothing here knows a metric.
 
+pub mod metadata;
 pub mod plan;
 pub mod play;
 pub mod run;

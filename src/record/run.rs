@@ -178,7 +178,8 @@ impl Recording<'_> {
             loop {
                 while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
                     let Some(key) = next(queue) else { break };
-                    under_way.push(async { (key, self.episode(key, eye.as_ref()).await) });
+                    let eye = eye.as_ref();
+                    under_way.push(async move { (key, self.episode(key, eye).await) });
                 }
                 let Some((key, result)) = under_way.next().await else { break };
                 self.note(key, result, &mut tally)?;

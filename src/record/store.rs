@@ -186,15 +186,9 @@ impl Store {
 
     /// Puts the trace and the log of an experiment together from what is there; nothing if there are no parts.
     ///
-    /// `logs` puts the logs of these episodes together, given the log that is there, the parts in order, and where to.
-    ///
     /// # Errors
     /// Whatever reading and writing give; the parts stay then.
-    pub fn assemble(
-        &self,
-        experiment: Experiment,
-        logs: &mut dyn FnMut(&[PathBuf], &Path) -> Result<(), StoreError>,
-    ) -> Result<(), StoreError> {
+    pub fn assemble(&self, experiment: Experiment) -> Result<(), StoreError> {
         let _lock = self.lock()?;
         let parts = self.part_files(experiment)?;
         if parts.is_empty() {
@@ -210,7 +204,6 @@ impl Store {
         episodes.sort_by_key(|episode| (episode.seed, episode.run));
         episodes.dedup_by(|later, earlier| later.episode_id == earlier.episode_id);
         let log_parts: Vec<PathBuf> = parts.iter().map(|part| part.with_extension("mcap")).collect();
-        logs(&log_parts, &self.log(experiment))?;
         let mut recording = self.recording.clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);

@@ -19,6 +19,7 @@ use super::contain::contained;
 use super::episode::Episode;
 use super::finding::TraceError;
 use super::write::{self, OptionalColumns, ROW_GROUP_ROWS, TraceEncoder, TraceMetadata};
+use crate::base::temporary;
 
 /// The rows of one episode, with what it is ordered and found by.
 #[derive(Clone, Debug)]
@@ -126,7 +127,7 @@ pub fn write(path: &Path, recording: Option<serde_json::Value>, episodes: &[Epis
         return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = write::unnamed_in(folder).map_err(|error| failed(error.into()))?;
+    let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
     let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
     file.as_file().sync_all().map_err(|error| failed(error.into()))?;
     file.persist(path).map(drop).map_err(|error| failed(error.error.into()))

@@ -10,6 +10,8 @@ use super::outcome::Failure;
 use crate::base::hash;
 use crate::cells::group::KEY_COLUMNS;
 use crate::cells::losses::INFRASTRUCTURE;
+#[cfg(feature = "polars")]
+use crate::engine::polars::{self, run::PolarsError};
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
@@ -76,8 +78,12 @@ fn polars_table(
     labels: &[String],
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, Failure> {
-    let _ = (inputs, scoring, labels, threads);
-    Err(Failure::Rendered("error: `--engine polars` is not there yet".to_owned()))
+    let traces = open_steps(inputs)?;
+    let definitions = definitions(&traces, scoring)?;
+    polars::score::score(&traces, &definitions, labels, threads).map_err(|error| match error {
+        PolarsError::Score(error) => score_failure(error),
+        other => Failure::input(other),
+    })
 }
 
 /// The refusal of a build without Polars.

@@ -12,6 +12,15 @@ type Range = (i128, i128);
 /// All integers of 64 bits.
 const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
 
+/// A node whose value may leave 64 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Suspect {
+    /// The node.
+    pub node: NodeId,
+    /// Whether it does so in every trace, being made of constants alone.
+    pub certain: bool,
+}
+
 /// The nodes among `needed` whose value may leave 64 bits in traces of `rows` rows.
 ///
 /// `column` gives the smallest and largest value of an integer column, where they are known.
@@ -20,13 +29,22 @@ pub fn may_overflow(
     needed: &[NodeId],
     rows: u64,
     column: impl Fn(&str) -> Option<(i64, i64)>,
-) -> Vec<NodeId> {
+) -> Vec<Suspect> {
     let mut ranges: Vec<Range> = vec![(0, 1); plan.nodes().len()];
+    let mut constant = vec![false; plan.nodes().len()];
     let mut found = Vec::new();
     for &id in needed.iter().filter(|&&id| plan.node(id).ty == Type::Int) {
         let (low, high) = range(&plan.node(id).op, i128::from(rows.max(1)), &column, |id| ranges[id.index()]);
+        constant[id.index()] = match &plan.node(id).op {
+            Op::Constant(Constant::Int(_)) => true,
+            op @ (Op::Spread(_) | Op::Negate(_) | Op::Arithmetic(..)) => {
+                op.operands().iter().all(|operand| constant[operand.index()])
+            }
+            _ => false,
+        };
         if low < ALL.0 || high > ALL.1 {
-            found.push(id);
+            let certain = constant[id.index()] && (low > ALL.1 || high < ALL.0);
+            found.push(Suspect { node: id, certain });
         }
         ranges[id.index()] = (low.max(ALL.0), high.min(ALL.1));
     }

@@ -351,7 +351,7 @@ impl Lowering<'_> {
             Op::Column(name) => format!("MIN(s.{})", self.name(name)),
             Op::At(value, moment) => {
                 let value = if node.ty == Type::Bool { self.truth_as_int(*value) } else { self.value(*value) };
-                format!("MAX(CASE WHEN s.t = {} THEN {value} END)", self.value(*moment))
+                self.extreme("MAX", node.ty, &format!("CASE WHEN s.t = {} THEN {value} END", self.value(*moment)))
             }
             Op::Aggregate(aggregate, x) => match aggregate {
                 Aggregate::First => format!("MIN(CASE WHEN {} THEN s.t END)", self.truth(*x)),
@@ -489,6 +489,10 @@ impl Lowering<'_> {
             Constant::Int(i64::MIN) => "(-9223372036854775807 - 1)".to_owned(),
             Constant::Int(value) if *value < 0 => format!("({value})"),
             Constant::Int(value) => value.to_string(),
+            // Polars takes no exponent without a point.
+            Constant::Float(bits) if self.dialect == Dialect::Polars => {
+                format!("CAST('{:?}' AS DOUBLE)", f64::from_bits(*bits))
+            }
             Constant::Float(bits) => format!("CAST({:e} AS DOUBLE)", f64::from_bits(*bits)),
             Constant::Text(value) => self.text(value),
         }

@@ -61,14 +61,19 @@ fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFram
     let plan = &definitions.plan;
     let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
     let rows = traces.files().iter().map(|file| file.rows()).sum();
-    let checked = may_overflow(plan, &needed, rows, |name| schema::column(name)?.stored.range());
+    let suspects = may_overflow(plan, &needed, rows, |name| schema::column(name)?.stored.range());
+    let overflow = |node| Err(PolarsError::Overflow { metric: user_of(definitions, node) });
+    if let Some(certain) = suspects.iter().find(|suspect| suspect.certain) {
+        return overflow(certain.node);
+    }
+    let checked: Vec<NodeId> = suspects.into_iter().map(|suspect| suspect.node).collect();
     if checked.is_empty() {
         return Ok(());
     }
     let checks = answer(steps, &sql::lower_checks(plan, Dialect::Polars, &checked)?)?;
     for node in checked {
         if ints(&checks, &format!("g{}", node.index()))?.contains(&Some(1)) {
-            return Err(PolarsError::Overflow { metric: user_of(definitions, node) });
+            return overflow(node);
         }
     }
     Ok(())

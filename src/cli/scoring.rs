@@ -80,10 +80,16 @@ fn polars_table(
 ) -> Result<EpisodeTable, Failure> {
     let traces = open_steps(inputs)?;
     let definitions = definitions(&traces, scoring)?;
-    polars::score::score(&traces, &definitions, labels, threads).map_err(|error| match error {
+    polars::score::score(&traces, &definitions, labels, threads).map_err(polars_failure)
+}
+
+/// Faults of definitions have their own layout.
+#[cfg(feature = "polars")]
+pub fn polars_failure(error: PolarsError) -> Failure {
+    match error {
         PolarsError::Score(error) => score_failure(error),
         other => Failure::input(other),
-    })
+    }
 }
 
 /// The refusal of a build without Polars.
@@ -165,7 +171,7 @@ pub fn definition_failure(error: FileError) -> Failure {
 }
 
 /// Whether standard error shows colours.
-fn colored() -> bool {
+pub fn colored() -> bool {
     io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 

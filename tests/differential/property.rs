@@ -25,6 +25,8 @@ enum Answer {
     Values(Vec<(EpisodeKey, Vec<Option<i64>>)>),
     Overflow,
     NotARate,
+    /// The traces are not as they must be, in the words of the reader that both engines share.
+    Refused(String),
 }
 
 fn values(table: EpisodeTable) -> Answer {
@@ -37,7 +39,8 @@ fn native(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String
         Ok(table) => Ok(values(table)),
         Err(ScoreError::Engine { source: EngineError::Overflow { .. }, .. }) => Ok(Answer::Overflow),
         Err(ScoreError::Engine { source: EngineError::NotARate { .. }, .. }) => Ok(Answer::NotARate),
-        Err(other) => Err(format!("native: {other}")),
+        Err(ScoreError::Trace(error)) => Ok(Answer::Refused(error.to_string())),
+        Err(other) => Err(other.to_string()),
     }
 }
 
@@ -46,7 +49,8 @@ fn polars(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String
         Ok(table) => Ok(values(table)),
         Err(PolarsError::Overflow { .. }) => Ok(Answer::Overflow),
         Err(PolarsError::NotARate { .. }) => Ok(Answer::NotARate),
-        Err(other) => Err(format!("polars: {other}")),
+        Err(PolarsError::Score(ScoreError::Trace(error))) => Ok(Answer::Refused(error.to_string())),
+        Err(other) => Err(other.to_string()),
     }
 }
 

@@ -4,6 +4,7 @@ pub mod compare;
 pub mod definitions;
 pub mod figure;
 pub mod info;
+pub mod query;
 pub mod report;
 pub mod schema;
 pub mod score;
@@ -26,6 +27,7 @@ pub enum Command {
     Info(info::InfoCommand),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
+    Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
 }
 
@@ -45,6 +47,7 @@ impl Command {
             Self::Info(command) => command.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
+            Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
         }
     }

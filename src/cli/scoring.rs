@@ -88,6 +88,7 @@ fn polars_table(
 pub fn polars_failure(error: PolarsError) -> Failure {
     match error {
         PolarsError::Score(error) => score_failure(error),
+        PolarsError::ReaderGone => Failure::Output(io::ErrorKind::BrokenPipe.into()),
         other => Failure::input(other),
     }
 }

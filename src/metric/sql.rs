@@ -118,6 +118,8 @@ const LONGEST: usize = 4 * 1024 * 1024;
 /// Positive infinity, and the number that is none.
 const INFINITY: &str = "CAST('inf' AS DOUBLE)";
 const NAN: &str = "CAST('NaN' AS DOUBLE)";
+/// The smallest integer, which has no literal of its own.
+const SMALLEST: &str = "(-9223372036854775807 - 1)";
 /// The columns that name an episode besides its id, in the order of the episode table.
 const KEYS: [&str; 4] = ["model", "experiment", "seed", "run"];
 
@@ -297,7 +299,9 @@ impl Lowering<'_> {
     fn check_of_stage(&self, id: NodeId) -> Option<String> {
         let node = self.plan.node(id);
         match &node.op {
-            Op::Aggregate(_, x) => Some(format!("SUM(CAST({} AS DOUBLE))", self.value(*x))),
+            Op::Aggregate(_, x) => {
+                Some(format!("SUM({})", self.each_step(*x, format!("CAST({} AS DOUBLE)", self.value(*x)))))
+            }
             _ if node.level == Level::Step => Some(format!("MAX(CASE WHEN {} THEN 1 ELSE 0 END)", self.overflows(id))),
             _ => None,
         }
@@ -327,8 +331,7 @@ impl Lowering<'_> {
         let double = |id: &NodeId| format!("CAST({} AS DOUBLE)", self.value(*id));
         let exact = match &self.plan.node(id).op {
             Op::Arithmetic(Arithmetic::Quotient | Arithmetic::Remainder, x, y) => {
-                let smallest = self.constant(&Constant::Int(i64::MIN), Type::Int);
-                return format!("({} = {smallest} AND {} = -1)", self.value(*x), self.value(*y));
+                return format!("({} = {SMALLEST} AND {} = -1)", self.value(*x), self.value(*y));
             }
             Op::Arithmetic(op, x, y) => arithmetic(self.dialect, *op, &double(x), &double(y)),
             Op::Negate(x) => format!("(0 - {})", double(x)),
@@ -358,13 +361,29 @@ impl Lowering<'_> {
                 Aggregate::Last => format!("MAX(CASE WHEN {} THEN s.t END)", self.truth(*x)),
                 Aggregate::Any => format!("MAX(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
                 Aggregate::All => format!("MIN(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
-                Aggregate::Count => format!("SUM(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
+                Aggregate::Count => {
+                    let counted = format!("CASE WHEN {} THEN 1 ELSE 0 END", self.truth(*x));
+                    format!("SUM({})", self.each_step(*x, counted))
+                }
                 Aggregate::Min => self.extreme("MIN", node.ty, &self.value(*x)),
                 Aggregate::Max => self.extreme("MAX", node.ty, &self.value(*x)),
-                Aggregate::Sum => format!("SUM({})", wide(&self.value(*x))),
+                Aggregate::Sum => format!("SUM({})", self.each_step(*x, wide(&self.value(*x)))),
             },
             _ => self.value(id),
         }
+    }
+
+    /// What is summed over the steps. A constant is one value to Polars, however many steps there are.
+    fn each_step(&self, summed: NodeId, text: String) -> String {
+        let nodes = self.plan.needed_by([summed]);
+        let varies = |id: &NodeId| {
+            let node = self.plan.node(*id);
+            node.op == Op::Time || matches!(node.op, Op::Column(_)) || is_column_of_stage(&node.op, node.level)
+        };
+        if self.dialect != Dialect::Polars || nodes.iter().any(varies) {
+            return text;
+        }
+        format!("CASE WHEN s.t IS NOT NULL THEN {text} END")
     }
 
     /// The smallest or largest value. A NaN is above all other numbers; Polars passes over it.
@@ -486,7 +505,7 @@ impl Lowering<'_> {
         match constant {
             Constant::Null => format!("CAST(NULL AS {})", type_name(ty, self.dialect)),
             Constant::Bool(value) => i64::from(*value).to_string(),
-            Constant::Int(i64::MIN) => "(-9223372036854775807 - 1)".to_owned(),
+            Constant::Int(i64::MIN) => SMALLEST.to_owned(),
             Constant::Int(value) if *value < 0 => format!("({value})"),
             Constant::Int(value) => value.to_string(),
             // Polars takes no exponent without a point.
@@ -565,12 +584,24 @@ fn arithmetic(dialect: Dialect, op: Arithmetic, x: &str, y: &str) -> String {
         Arithmetic::Add => format!("({x} + {y})"),
         Arithmetic::Subtract => format!("({x} - {y})"),
         Arithmetic::Multiply => format!("({x} * {y})"),
-        Arithmetic::Remainder => format!("CASE WHEN {y} <> 0 THEN {x} % {y} END"),
+        Arithmetic::Remainder => format!("CASE WHEN {y} <> 0 THEN {} END", remainder(dialect, x, y)),
         Arithmetic::Quotient if matches!(dialect, Dialect::Polars | Dialect::Duckdb) => {
-            format!("CASE WHEN {y} <> 0 THEN ({x} - {x} % {y}) // {y} END")
+            format!("CASE WHEN {y} <> 0 THEN ({x} - {}) // {y} END", remainder(dialect, x, y))
         }
         Arithmetic::Quotient => format!("CASE WHEN {y} <> 0 THEN CAST(({x} - {x} % {y}) / {y} AS BIGINT) END"),
     }
+}
+
+/// The remainder with the sign of x. Polars gives it that of y, so that y is given that of x; the smallest integer
+/// has no other sign.
+fn remainder(dialect: Dialect, x: &str, y: &str) -> String {
+    if dialect != Dialect::Polars {
+        return format!("{x} % {y}");
+    }
+    format!(
+        "CASE WHEN {y} = {SMALLEST} AND {x} <> {SMALLEST} THEN {x} \
+         ELSE {x} % (CASE WHEN ({x} < 0) = ({y} < 0) THEN {y} ELSE (0 - {y}) END) END"
+    )
 }
 
 #[cfg(test)]

@@ -157,7 +157,7 @@ impl TraceFile {
     }
 
     /// Where it is, for an engine that reads files by itself.
-    pub(crate) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         &self.path
     }
 

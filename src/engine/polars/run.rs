@@ -40,6 +40,9 @@ pub enum PolarsError {
         /// The value found.
         value: i64,
     },
+    /// Nobody reads the answer any more.
+    #[error("the reader of the answer is gone")]
+    ReaderGone,
     /// Polars' own words.
     #[error("Polars cannot do this: {0}")]
     Failed(String),
@@ -47,7 +50,10 @@ pub enum PolarsError {
 
 impl From<Inner> for PolarsError {
     fn from(error: Inner) -> Self {
-        Self::Failed(cause(&error.to_string()))
+        match &error {
+            Inner::IO { error, .. } if error.kind() == io::ErrorKind::BrokenPipe => Self::ReaderGone,
+            other => Self::Failed(cause(&other.to_string())),
+        }
     }
 }
 

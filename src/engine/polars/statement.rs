@@ -82,11 +82,12 @@ impl Checked {
     ///
     /// `columns` are those of the tables.
     pub fn fault(&self, words: &str, columns: &[String]) -> Faults {
-        let unknown = ["column '", "column \"", "column: ", "Column '"].into_iter().find_map(|before| {
-            let rest = words.split_once(before)?.1;
-            let name: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
-            (!name.is_empty() && !columns.contains(&name)).then_some(name)
-        });
+        let unknown =
+            ["column '", "column \"", "column named '", "column: ", "Column '"].into_iter().find_map(|before| {
+                let rest = words.split_once(before)?.1;
+                let name: String = rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                (!name.is_empty() && !columns.contains(&name)).then_some(name)
+            });
         let Some(name) = unknown else {
             let place = Place { source: Arc::clone(&self.source), span: 0..self.source.text.len() };
             return Faults(vec![Fault::new(place, format!("Polars cannot do this: {words}"))]);

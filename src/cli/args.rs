@@ -48,3 +48,23 @@ impl ScoringArgs {
         self.definitions.as_deref().unwrap_or("paper")
     }
 }
+
+/// What computes the episode table.
+#[derive(Clone, Debug, Default, PartialEq, Eq, clap::Args)]
+pub struct EngineArgs {
+    /// What computes the scores; the result is the same
+    #[arg(long, value_enum, default_value_t)]
+    pub engine: Engine,
+}
+
+/// The engines by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Engine {
+    /// The program's own kernels
+    #[default]
+    Native,
+    /// The SQL statement of `mirrorstats sql` on Polars, in this process
+    Polars,
+    /// The same statement on a Spark cluster
+    Spark,
+}

@@ -5,11 +5,13 @@ use std::fs::File;
 use std::io;
 use std::num::NonZeroUsize;
 
-use super::args::{ScoringArgs, TraceArgs};
+use super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::outcome::Failure;
 use crate::base::hash;
 use crate::cells::group::KEY_COLUMNS;
 use crate::cells::losses::INFRASTRUCTURE;
+#[cfg(feature = "polars")]
+use crate::engine::polars::{self, run::PolarsError};
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
@@ -48,6 +50,61 @@ pub fn table(
             scores[0].name
         ))),
     }
+}
+
+/// The same table, computed by the engine asked for.
+///
+/// # Errors
+/// As [`table`]; an engine that this build has not; files of scores, of which there is nothing to compute.
+pub fn table_on(
+    engine: &EngineArgs,
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, Failure> {
+    match engine.engine {
+        Engine::Native => table(inputs, scoring, labels, threads),
+        Engine::Polars => polars_table(inputs, scoring, labels, threads),
+        Engine::Spark => Err(Failure::Rendered("error: `--engine spark` is not there yet".to_owned())),
+    }
+}
+
+/// The table out of the SQL lowering on Polars.
+#[cfg(feature = "polars")]
+fn polars_table(
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, Failure> {
+    let traces = open_steps(inputs)?;
+    let definitions = definitions(&traces, scoring)?;
+    polars::score::score(&traces, &definitions, labels, threads).map_err(polars_failure)
+}
+
+/// Faults of definitions have their own layout.
+#[cfg(feature = "polars")]
+pub fn polars_failure(error: PolarsError) -> Failure {
+    match error {
+        PolarsError::Score(error) => score_failure(error),
+        PolarsError::ReaderGone => Failure::Output(io::ErrorKind::BrokenPipe.into()),
+        other => Failure::input(other),
+    }
+}
+
+/// The refusal of a build without Polars.
+#[cfg(not(feature = "polars"))]
+fn polars_table(_: &[Input], _: &ScoringArgs, _: &[String], _: NonZeroUsize) -> Result<EpisodeTable, Failure> {
+    Err(without_polars("--engine polars"))
+}
+
+/// What to say where a build has no Polars.
+#[cfg(not(feature = "polars"))]
+pub fn without_polars(what: &str) -> Failure {
+    Failure::Rendered(format!(
+        "error: `{what}` needs Polars, which this build has not\n  help: build with it: cargo build --release --features polars"
+    ))
 }
 
 /// Scores traces.
@@ -115,7 +172,7 @@ pub fn definition_failure(error: FileError) -> Failure {
 }
 
 /// Whether standard error shows colours.
-fn colored() -> bool {
+pub fn colored() -> bool {
     io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 

@@ -3,7 +3,7 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::super::args::{ScoringArgs, TraceArgs};
+use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, scoring};
 use crate::score::evidence;
@@ -18,6 +18,9 @@ pub struct ScoreArgs {
     /// How it is defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
+    /// What computes it.
+    #[command(flatten)]
+    pub engine: EngineArgs,
     /// Write the episode table here: a name that ends in .parquet, .csv or .jsonl [default: CSV on standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -48,7 +51,7 @@ impl ScoreArgs {
             })?;
             return output::print(&found, self.json);
         }
-        let table = scoring::table(&inputs, &self.scoring, &[], threads)?;
+        let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
         let mut bytes = Vec::new();
         format::write(&table, format, &mut bytes).map_err(Failure::input)?;

@@ -7,6 +7,7 @@ Nothing is printed. Only the driver needs Python; the executors run SQL alone.
 
 import json
 import os
+import shutil
 import sys
 import threading
 import time
@@ -49,6 +50,8 @@ class Refusal(Exception):
 def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         request = json.load(file)
+    # It may hold secrets, and is needed no more.
+    os.remove(sys.argv[1])
     threading.Thread(target=watch, args=(request,), daemon=True).start()
     try:
         spark = session(request)
@@ -78,11 +81,12 @@ def watch(request):
         try:
             os.kill(request["parent"], 0)
         except ProcessLookupError:
+            shutil.rmtree(os.path.dirname(request["answer"]), ignore_errors=True)
             os._exit(1)
         except PermissionError:
             pass
         if request["timeout"] is not None and waited >= request["timeout"]:
-            reply(request, {"late": True})
+            reply(request, {"late": {}})
             os._exit(1)
 
 

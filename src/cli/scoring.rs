@@ -13,7 +13,7 @@ use crate::cells::losses::INFRASTRUCTURE;
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
-use crate::score::format::{self, Format};
+use crate::score::format::{self, Format, Surroundings};
 use crate::score::run::{self, Request, ScoreError};
 use crate::score::select;
 use crate::score::table::EpisodeTable;
@@ -97,6 +97,25 @@ pub fn definitions(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Definitio
     run::definitions(traces, &request).map_err(score_failure)
 }
 
+/// The definitions over the columns of the schema, for traces that are not opened here.
+///
+/// # Errors
+/// Every fault of the definitions and the condition; an unknown metric.
+pub fn definitions_unopened(scoring: &ScoringArgs) -> Result<Definitions, Failure> {
+    let columns = run::schema_columns();
+    let name = scoring.definitions_name();
+    let mut definitions = Definitions::load(name, &columns).map_err(definition_failure)?;
+    if let Some(condition) = &scoring.condition {
+        definitions = definitions
+            .filtered("--where", condition, &columns)
+            .map_err(|faults| Failure::Faults(faults.render(colored())))?;
+    }
+    if let Some(metrics) = &scoring.metrics {
+        definitions.select(metrics).map_err(Failure::input)?;
+    }
+    Ok(definitions)
+}
+
 /// Faults of definitions have their own layout.
 pub fn score_failure(error: ScoreError) -> Failure {
     match error {
@@ -127,7 +146,10 @@ pub fn are_scores(inputs: &[Input]) -> bool {
 fn is_scores(input: &Input) -> bool {
     match Format::of_name(&input.name) {
         Ok(Format::Csv | Format::JsonLines) => true,
-        Ok(Format::Parquet) | Err(_) => File::open(&input.path).is_ok_and(|file| format::holds_scores(&file)),
+        Ok(Format::Parquet) | Err(_) => {
+            let folders = inputs::folder_values(&input.path);
+            File::open(&input.path).is_ok_and(|file| format::holds_scores(&file, &folders))
+        }
     }
 }
 
@@ -150,14 +172,16 @@ fn read_scores(inputs: &[&Input], scoring: &ScoringArgs) -> Result<EpisodeTable,
 
 fn read_one(input: &Input, scoring: &ScoringArgs) -> Result<EpisodeTable, Failure> {
     let file = File::open(&input.path).map_err(|error| at(input, error))?;
+    let named = || Definitions::load(scoring.definitions_name(), &run::schema_columns()).map_err(definition_failure);
     match Format::of_name(&input.name) {
         Ok(text @ (Format::Csv | Format::JsonLines)) => {
-            let definitions =
-                Definitions::load(scoring.definitions_name(), &run::schema_columns()).map_err(definition_failure)?;
-            format::read_text(text, &definitions.catalog, file).map_err(|error| at(input, error))
+            format::read_text(text, &named()?.catalog, file).map_err(|error| at(input, error))
         }
         Ok(Format::Parquet) | Err(_) => {
-            let table = format::read_parquet(file).map_err(|error| at(input, error))?;
+            let named = if format::holds_definitions(&file) { None } else { Some(named()?.catalog) };
+            let folders = inputs::folder_values(&input.path);
+            let surroundings = Surroundings { folders: &folders, definitions: named.as_ref() };
+            let table = format::read_parquet(file, &surroundings).map_err(|error| at(input, error))?;
             match &scoring.definitions {
                 Some(name) => check_hash(name, input, table),
                 None => Ok(table),

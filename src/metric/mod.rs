@@ -19,6 +19,7 @@ pub mod file;
 mod functions;
 mod keys;
 pub mod origin;
+mod pattern;
 pub mod plan;
 pub mod shape;
 pub mod sql;

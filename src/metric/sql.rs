@@ -19,8 +19,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+use sqlparser::keywords::ALL_KEYWORDS;
+
 use super::catalog::Kind;
 use super::columns::{Level, Type};
+use super::pattern::java;
 use super::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Plan};
 
 /// Whose SQL to write.
@@ -48,7 +51,8 @@ impl Dialect {
     /// A name as it stands in a statement.
     fn quoted(self, name: &str) -> String {
         match self {
-            _ if is_plain(name) => name.to_owned(),
+            Self::Portable if is_plain(name) => name.to_owned(),
+            Self::Spark | Self::Duckdb if is_plain(name) && !is_keyword(name) => name.to_owned(),
             Self::Spark => format!("`{}`", name.replace('`', "``")),
             Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
         }
@@ -68,6 +72,33 @@ impl Dialect {
             Self::Portable => None,
             Self::Spark => Some("regexp_like"),
             Self::Duckdb => Some("regexp_matches"),
+        }
+    }
+
+    /// A text as it stands in a statement.
+    pub fn text(self, value: &str) -> String {
+        match self {
+            // Spark reads backslashes in texts as escapes.
+            Self::Spark => format!("'{}'", value.replace('\\', "\\\\").replace('\'', "\\'")),
+            Self::Portable | Self::Duckdb => format!("'{}'", value.replace('\'', "''")),
+        }
+    }
+
+    /// An integer as it stands in a statement. Spark's have 32 bits unless they say that they have 64.
+    fn integer(self, value: i64) -> String {
+        let suffix = if self == Self::Spark { "L" } else { "" };
+        match value {
+            i64::MIN => format!("(-{}{suffix} - 1)", i64::MAX),
+            value if value < 0 => format!("({value}{suffix})"),
+            value => format!("{value}{suffix}"),
+        }
+    }
+
+    /// A pattern of the `regex` crate as it stands in a statement.
+    fn pattern(self, pattern: &str) -> String {
+        match self {
+            Self::Spark => self.text(&java(pattern).unwrap_or_else(|| unreachable!("the binder has read the pattern"))),
+            Self::Portable | Self::Duckdb => self.text(pattern),
         }
     }
 }
@@ -284,7 +315,11 @@ impl Lowering<'_> {
             Op::Constant(constant) => self.constant(constant, node.ty),
             Op::Spread(x) => self.value(*x),
             Op::Negate(x) => format!("(0 - {})", self.value(*x)),
-            Op::Arithmetic(op, x, y) => arithmetic(*op, &self.value(*x), &self.value(*y)),
+            Op::Arithmetic(op, x, y) => arithmetic(self.dialect, *op, &self.value(*x), &self.value(*y)),
+            // Spark's 1 and 0 have 32 bits.
+            Op::IntFromBool(x) if self.dialect == Dialect::Spark => {
+                format!("CAST({} AS BIGINT)", self.truth_as_int(*x))
+            }
             Op::IntFromBool(x) => self.truth_as_int(*x),
             Op::FloatFromInt(x) => format!("CAST({} AS DOUBLE)", self.value(*x)),
             Op::Case { branches, otherwise } => self.case(branches, *otherwise, |id| self.value(id)),
@@ -335,7 +370,7 @@ impl Lowering<'_> {
             Op::IsFalse(x) => format!("(CASE WHEN NOT {} THEN 1 ELSE 0 END = 1)", self.truth(*x)),
             Op::Matches(x, pattern) => {
                 let function = self.dialect.matches().unwrap_or("regexp_like");
-                format!("{function}({}, {})", self.value(*x), self.text(pattern))
+                format!("{function}({}, {})", self.value(*x), self.dialect.pattern(pattern))
             }
             _ => format!("({} = 1)", self.truth_as_int(id)),
         }
@@ -366,19 +401,9 @@ impl Lowering<'_> {
         match constant {
             Constant::Null => format!("CAST(NULL AS {})", type_name(ty, self.dialect)),
             Constant::Bool(value) => i64::from(*value).to_string(),
-            Constant::Int(i64::MIN) => "(-9223372036854775807 - 1)".to_owned(),
-            Constant::Int(value) if *value < 0 => format!("({value})"),
-            Constant::Int(value) => value.to_string(),
+            Constant::Int(value) => self.dialect.integer(*value),
             Constant::Float(bits) => format!("CAST({:e} AS DOUBLE)", f64::from_bits(*bits)),
-            Constant::Text(value) => self.text(value),
-        }
-    }
-
-    fn text(&self, value: &str) -> String {
-        match self.dialect {
-            // Spark reads backslashes in texts as escapes.
-            Dialect::Spark => format!("'{}'", value.replace('\\', "\\\\").replace('\'', "\\'")),
-            Dialect::Portable | Dialect::Duckdb => format!("'{}'", value.replace('\'', "''")),
+            Constant::Text(value) => self.dialect.text(value),
         }
     }
 }
@@ -417,14 +442,20 @@ const fn type_name(ty: Type, dialect: Dialect) -> &'static str {
     }
 }
 
+/// Whether a name may also be a word of SQL.
+fn is_keyword(name: &str) -> bool {
+    ALL_KEYWORDS.binary_search(&name.to_ascii_uppercase().as_str()).is_ok()
+}
+
 /// Quotient and remainder without a division of integers, which engines disagree about: the remainder is exact
-/// everywhere, and what is left divides without a fraction.
-fn arithmetic(op: Arithmetic, x: &str, y: &str) -> String {
+/// everywhere, and what is left divides without a fraction. Spark divides as doubles, and has a word of its own.
+fn arithmetic(dialect: Dialect, op: Arithmetic, x: &str, y: &str) -> String {
     match op {
         Arithmetic::Add => format!("({x} + {y})"),
         Arithmetic::Subtract => format!("({x} - {y})"),
         Arithmetic::Multiply => format!("({x} * {y})"),
         Arithmetic::Remainder => format!("CASE WHEN {y} <> 0 THEN {x} % {y} END"),
+        Arithmetic::Quotient if dialect == Dialect::Spark => format!("CASE WHEN {y} <> 0 THEN ({x} DIV {y}) END"),
         Arithmetic::Quotient => format!("CASE WHEN {y} <> 0 THEN CAST(({x} - {x} % {y}) / {y} AS BIGINT) END"),
     }
 }

@@ -52,11 +52,11 @@ impl ScoringArgs {
     }
 }
 
-/// What computes the scores.
+/// What computes the episode table.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct EngineArgs {
-    /// What computes the scores; they do not depend on it
-    #[arg(long, value_enum, default_value_t = Engine::Native)]
+    /// What computes the scores; the result is the same
+    #[arg(long, value_enum, default_value_t)]
     pub engine: Engine,
     /// The cluster.
     #[command(flatten)]
@@ -66,10 +66,12 @@ pub struct EngineArgs {
 /// The engines by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Engine {
-    /// The built-in kernels
+    /// The program's own kernels
     #[default]
     Native,
-    /// Your own Spark: SPARK_HOME, `spark-submit` on PATH, or Python's package `pyspark`
+    /// The SQL statement of `mirrorstats sql` on Polars, in this process
+    Polars,
+    /// The same statement on your own Spark: SPARK_HOME, `spark-submit` on PATH, or Python's package `pyspark`
     Spark,
 }
 

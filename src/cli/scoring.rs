@@ -5,11 +5,13 @@ use std::fs::File;
 use std::io;
 use std::num::NonZeroUsize;
 
-use super::args::{ScoringArgs, TraceArgs};
+use super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::outcome::Failure;
+use super::spark;
 use crate::base::hash;
 use crate::cells::group::KEY_COLUMNS;
 use crate::cells::losses::INFRASTRUCTURE;
+use crate::engine::spark::source::is_uri;
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
@@ -26,6 +28,11 @@ use crate::trace::schema::SCHEMA_VERSION;
 /// # Errors
 /// When an argument names none, or the list on standard input cannot be read.
 pub fn resolve(arguments: &TraceArgs) -> Result<Vec<Input>, Failure> {
+    if let Some(uri) = arguments.traces.iter().find(|argument| is_uri(argument)) {
+        return Err(Failure::Rendered(format!(
+            "error: `{uri}`: expected files of this machine, found a URI, which Spark alone can read\n  help: `mirrorstats score --engine spark {uri} -o scores.parquet`, then give the scores"
+        )));
+    }
     inputs::resolve(&arguments.traces, io::stdin().lock()).map_err(Failure::input)
 }
 
@@ -48,6 +55,51 @@ pub fn table(
             scores[0].name
         ))),
     }
+}
+
+/// The same table, computed by the engine asked for.
+///
+/// # Errors
+/// As [`table`]; an engine that this build has not; files of scores, of which there is nothing to compute.
+pub fn table_on(
+    engine: &EngineArgs,
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, Failure> {
+    engine.check()?;
+    match engine.engine {
+        Engine::Native => table(inputs, scoring, labels, threads),
+        Engine::Polars => polars_table(inputs, scoring, labels, threads),
+        Engine::Spark => spark::Asked::of_files(inputs, scoring, engine)?.score(labels),
+    }
+}
+
+/// The table out of the SQL lowering on Polars.
+#[cfg(feature = "polars")]
+fn polars_table(
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, Failure> {
+    let _ = (inputs, scoring, labels, threads);
+    Err(Failure::Rendered("error: `--engine polars` is not there yet".to_owned()))
+}
+
+/// The refusal of a build without Polars.
+#[cfg(not(feature = "polars"))]
+fn polars_table(_: &[Input], _: &ScoringArgs, _: &[String], _: NonZeroUsize) -> Result<EpisodeTable, Failure> {
+    Err(without_polars("--engine polars"))
+}
+
+/// What to say where a build has no Polars.
+#[cfg(not(feature = "polars"))]
+pub fn without_polars(what: &str) -> Failure {
+    Failure::Rendered(format!(
+        "error: `{what}` needs Polars, which this build has not\n  help: build with it: cargo build --release --features polars"
+    ))
 }
 
 /// Scores traces.

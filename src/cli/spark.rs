@@ -13,19 +13,19 @@ use crate::score::table::EpisodeTable;
 use crate::trace::inputs::Input;
 
 impl EngineArgs {
-    /// Whether Spark is asked for.
+    /// Refuses words for Spark where another engine is asked for.
     ///
     /// # Errors
-    /// Words for Spark where another engine is asked for.
-    pub fn is_spark(&self) -> Result<bool, Failure> {
+    /// Such words.
+    pub fn check(&self) -> Result<(), Failure> {
         let SparkArgs { master, spark_conf, spark_timeout, spark_log } = &self.spark;
         let words = master.is_some() || !spark_conf.is_empty() || spark_timeout.is_some() || spark_log.is_some();
-        if self.engine != Engine::Spark && words {
-            return Err(Failure::Rendered(
-                "error: --master and --spark-... are words for Spark\n  help: add --engine spark".to_owned(),
-            ));
+        if self.engine == Engine::Spark || !words {
+            return Ok(());
         }
-        Ok(self.engine == Engine::Spark)
+        Err(Failure::Rendered(
+            "error: --master and --spark-... are words for Spark\n  help: add --engine spark".to_owned(),
+        ))
     }
 
     fn cluster(&self) -> Cluster {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
-use super::super::{output, scoring, spark};
+use super::super::{output, scoring};
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::report::bundle::{self, Bundle, Manifest};
 use crate::report::layout;
@@ -27,7 +27,7 @@ pub struct ReportArgs {
     /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    /// What computes the scores.
+    /// What computes it.
     #[command(flatten)]
     pub engine: EngineArgs,
     /// The folder to write
@@ -70,11 +70,7 @@ impl ReportArgs {
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let inputs = scoring::resolve(&self.traces)?;
         let labels = scoring::labels(&self.by);
-        let episodes = if self.engine.is_spark()? {
-            spark::Asked::of_files(&inputs, &self.scoring, &self.engine)?.score(&labels)?
-        } else {
-            scoring::table(&inputs, &self.scoring, &labels, self.traces.threads.count())?
-        };
+        let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &labels, self.traces.threads.count())?;
         let cells = group(&episodes, &self.by).map_err(Failure::input)?;
         let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
         let condition = self.scoring.condition.clone();

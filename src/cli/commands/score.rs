@@ -3,7 +3,7 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
+use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, scoring, spark};
 use crate::score::evidence;
@@ -40,7 +40,8 @@ impl ScoreArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions or the output.
     pub fn run(self) -> Result<Outcome, Failure> {
-        if self.engine.is_spark()? {
+        self.engine.check()?;
+        if self.engine.engine == Engine::Spark {
             return self.run_on_spark();
         }
         // An output name of no known format should not cost a pass over the traces.
@@ -56,7 +57,7 @@ impl ScoreArgs {
             })?;
             return output::print(&found, self.json);
         }
-        let table = scoring::table(&inputs, &self.scoring, &[], threads)?;
+        let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
         self.deliver(&table, format)
     }
 

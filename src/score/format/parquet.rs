@@ -18,7 +18,6 @@ use super::FormatError;
 use super::csv::{KEYS, check_unique};
 use super::footer;
 use super::surroundings::Surroundings;
-use crate::metric::catalog::Catalog;
 use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 use crate::trace::contain::contained;
 
@@ -122,10 +121,12 @@ fn decode(input: impl ChunkReader + 'static, surroundings: &Surroundings<'_>) ->
     check_unique(&names)?;
     let mut table = EpisodeTable { catalog, keys: Vec::new(), labels: Vec::new(), metrics: Vec::new() };
     // A part without rows has its columns all the same.
-    append(&mut table, &surroundings.complete(&RecordBatch::new_empty(builder.schema().clone()), &table.catalog)?)?;
+    let none = surroundings.complete(&RecordBatch::new_empty(builder.schema().clone()), &table.catalog)?;
+    append(&mut table, &none)?;
     for batch in builder.build()? {
         let batch = batch.map_err(|error| FormatError::Parquet(error.into()))?;
-        append(&mut table, &surroundings.complete(&batch, &table.catalog)?)?;
+        let batch = surroundings.complete(&batch, &table.catalog)?;
+        append(&mut table, &batch)?;
     }
     Ok(table.sorted())
 }

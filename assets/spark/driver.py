@@ -122,8 +122,15 @@ def score(spark, request):
 
 def load(spark, request, recursive):
     """The traces with the columns that the statements name, each in the widest type of its kind; absent ones are null."""
-    fields = [T.StructField(name, TYPES[kind]) for name, kind in request["columns"]]
-    return reader(spark, request, recursive).schema(T.StructType(fields)).parquet(*request["sources"])
+    steps = None
+    for group in request["sources"]:
+        fields = [T.StructField(name, TYPES[kind]) for name, kind in request["columns"] if name not in group["void"]]
+        part = reader(spark, request, recursive).schema(T.StructType(fields)).parquet(*group["paths"])
+        for name, kind in request["columns"]:
+            if name in group["void"]:
+                part = part.withColumn(name, F.lit(None).cast(TYPES[kind]))
+        steps = part if steps is None else steps.unionByName(part)
+    return steps
 
 
 def reader(spark, request, recursive=False):
@@ -139,11 +146,15 @@ def inspect(spark, request):
 
     Tells whether the files lie in folders that name no partition, which Spark would otherwise pass over.
     """
-    for source in request["sources"]:
-        if not reader(spark, request, recursive=True).schema("t BIGINT").parquet(source).inputFiles():
-            raise Refusal(empty=source)
-    files = reader(spark, request, recursive=True).schema("t BIGINT").parquet(*request["sources"]).inputFiles()
-    named = reader(spark, request).schema("t BIGINT").parquet(*request["sources"]).inputFiles()
+    [group] = request["sources"]
+
+    def files(recursive, *paths):
+        return reader(spark, request, recursive).schema("t BIGINT").parquet(*paths).inputFiles()
+
+    for path in group["paths"]:
+        if not files(True, path):
+            raise Refusal(empty=path)
+    every = files(True, *group["paths"])
 
     def look(file):
         path = unquote(file)
@@ -152,9 +163,9 @@ def inspect(spark, request):
         return path, folders, {field.name: field.dataType for field in single.schema}
 
     with ThreadPool(8) as pool:
-        for path, folders, found in pool.imap(look, sorted(files)):
+        for path, folders, found in pool.imap(look, sorted(every)):
             compare(path, folders, found, request["columns"])
-    return set(files) != set(named)
+    return set(every) != set(files(False, *group["paths"]))
 
 
 def compare(path, folders, found, columns):
@@ -163,7 +174,7 @@ def compare(path, folders, found, columns):
             raise Refusal(column={"file": path, "column": name, "expected": "one value", "found": "one in the file and one in the name of its folder"})
         if name not in folders and name not in found:
             raise Refusal(column={"file": path, "column": name, "expected": kind, "found": None})
-        if name in found and not isinstance(found[name], ACCEPTED[kind] + (T.NullType,)):
+        if name in found and not isinstance(found[name], ACCEPTED[kind]):
             raise Refusal(column={"file": path, "column": name, "expected": kind, "found": found[name].simpleString()})
 
 
@@ -205,4 +216,5 @@ def cause(error):
     return {"name": type(error).__name__, "message": message}
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -51,8 +51,8 @@ impl Dialect {
     /// A name as it stands in a statement.
     fn quoted(self, name: &str) -> String {
         match self {
-            Self::Portable if is_plain(name) => name.to_owned(),
-            Self::Spark | Self::Duckdb if is_plain(name) && !is_keyword(name) => name.to_owned(),
+            Self::Portable | Self::Duckdb if is_plain(name) => name.to_owned(),
+            Self::Spark if is_plain(name) && !is_keyword(name) => name.to_owned(),
             Self::Spark => format!("`{}`", name.replace('`', "``")),
             Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
         }

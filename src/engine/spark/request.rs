@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::source::Sources;
+use super::source::{Group, Sources};
 use super::submit::Place;
 use super::{Cluster, Job, SparkError, check};
 use crate::metric::columns::Type;
@@ -23,7 +23,7 @@ pub(super) struct Request {
     timeout: Option<u32>,
     /// Settings that must not stand on a command line.
     settings: Map<String, Value>,
-    sources: Vec<String>,
+    sources: Vec<Group>,
     /// Whether the driver has to look into the files itself.
     inspect: bool,
     /// Names and kinds of the columns to read.
@@ -61,7 +61,7 @@ impl Request {
             parent: std::process::id(),
             timeout: cluster.timeout_s.map(std::num::NonZeroU32::get),
             settings: secrets.map(|setting| (setting.key().to_owned(), setting.value().into())).collect(),
-            sources: job.sources.uris().to_vec(),
+            sources: job.sources.groups(),
             inspect: rows.is_none(),
             rows,
             check: check::statement(&rules),

@@ -1,7 +1,10 @@
 //! What Spark reads: files of this machine, or URIs that it alone understands.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
+
+use serde::Serialize;
 
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
@@ -13,8 +16,8 @@ pub enum Sources {
     Files {
         /// What they are called, for messages.
         names: Vec<String>,
-        /// `file://` URIs, no character of which is a wildcard.
-        uris: Vec<String>,
+        /// The same files, by what they have.
+        groups: Vec<Group>,
         /// How many rows they have together.
         rows: u64,
     },
@@ -22,23 +25,39 @@ pub enum Sources {
     Uris(Vec<String>),
 }
 
+/// Traces that are read alike.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Group {
+    /// URIs; of files of this machine `file://` and no wildcard.
+    pub(super) paths: Vec<String>,
+    /// Columns that are declared to hold nothing but nulls, and so have no type to be read by.
+    pub(super) void: Vec<String>,
+}
+
 impl Sources {
     /// Files of this machine.
+    ///
+    /// `traces` are these inputs, opened.
     ///
     /// # Errors
     /// When a path cannot be resolved.
     pub fn files(inputs: &[Input], traces: &TraceSet) -> io::Result<Self> {
-        let uris = inputs.iter().map(|input| local_uri(&input.path).map(|uri| literal(&uri)));
+        let mut groups: BTreeMap<Vec<String>, Vec<String>> = BTreeMap::new();
+        for (input, file) in inputs.iter().zip(traces.files()) {
+            let void = file.columns().iter().filter(|column| column.kind.is_none()).map(|column| column.name.clone());
+            groups.entry(void.collect()).or_default().push(literal(&local_uri(&input.path)?));
+        }
         Ok(Self::Files {
             names: inputs.iter().map(|input| input.name.clone()).collect(),
-            uris: uris.collect::<io::Result<_>>()?,
+            groups: groups.into_iter().map(|(void, paths)| Group { paths, void }).collect(),
             rows: traces.files().iter().map(|file| file.rows()).sum(),
         })
     }
 
-    pub(super) fn uris(&self) -> &[String] {
+    pub(super) fn groups(&self) -> Vec<Group> {
         match self {
-            Self::Files { uris, .. } | Self::Uris(uris) => uris,
+            Self::Files { groups, .. } => groups.clone(),
+            Self::Uris(uris) => vec![Group { paths: uris.clone(), void: Vec::new() }],
         }
     }
 

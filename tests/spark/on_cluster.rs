@@ -5,6 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command as Process, Stdio};
 
+use mirrorstats::trace::episode::{Episode, Extra};
 use mirrorstats::trace::write::OptionalColumns;
 use serde_json::Value;
 
@@ -94,7 +95,9 @@ fn what_the_traces_break_is_refused(cluster: &Cluster) {
     let at = folder.path();
     let (one, other) = (episode("one", "E1", 1), episode("other", "E1", 2));
     write(&at.join("a.parquet"), &[one.clone(), other], OptionalColumns::all());
-    write(&at.join("b.parquet"), &[one], OptionalColumns::NONE);
+    let mut bare = Episode { stated_color: None, ..one };
+    bare.steps.iter_mut().for_each(|step| step.extra = Extra::default());
+    write(&at.join("b.parquet"), &[bare], OptionalColumns::NONE);
     let twice = spark(cluster, at, &["a.parquet", "b.parquet", "-o", "out.csv"]).refused();
     for words in ["t-duplicate: ", "episode `one`", "8 rows of 4 timesteps", "help: "] {
         assert!(twice.contains(words), "no `{words}` in {twice}");

@@ -16,6 +16,7 @@ use super::answer::Answer;
 use super::locate::{Spark, locate};
 use super::request::Request;
 use super::{Cluster, SparkError, cause};
+use crate::base::temporary;
 
 const DRIVER: &str = include_str!("../../../assets/spark/driver.py");
 /// How long a master may take to accept a connection.
@@ -26,8 +27,13 @@ pub(super) struct Place(TempDir);
 
 impl Place {
     pub(super) fn new() -> Result<Self, SparkError> {
-        let folder = tempfile::Builder::new().prefix("mirrorstats-spark-").tempdir();
-        folder.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
+        let mut folder = tempfile::Builder::new();
+        folder.prefix("mirrorstats-spark-");
+        // The request may hold secrets.
+        #[cfg(unix)]
+        folder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
+        let made = folder.tempdir().map_err(temporary::without_name);
+        made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
     }
 
     /// Where the driver writes the table, if Spark does not.

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, Int32Array, Int64Array, RecordBatch, StringArray};
+use arrow::array::{ArrayRef, Float64Array, Int32Array, Int64Array, RecordBatch, StringArray};
 use mirrorstats::trace::write::OptionalColumns;
 use parquet::arrow::ArrowWriter;
 
@@ -34,11 +34,11 @@ fn ints(values: &[Option<i64>]) -> ArrayRef {
 fn parts_without_definitions_are_scores_of_those_that_are_named() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    // As the portable statement names them, `TSA_C` for `TSA-C`; the other keys stand in the folders' names.
+    // As an engine that folds case writes the portable `TSA_C` for `TSA-C`; the other keys stand in the folders' names.
     for (place, id, value) in [("experiment=E2/model=a%2Fb", "x", Some(1)), ("experiment=E1/model=a%2Fb", "y", None)] {
         let run: ArrayRef = Arc::new(Int32Array::from(vec![7]));
         let columns =
-            vec![("episode_id", texts(&[id])), ("seed", ints(&[Some(1)])), ("run", run), ("TSA_C", ints(&[value]))];
+            vec![("episode_id", texts(&[id])), ("seed", ints(&[Some(1)])), ("run", run), ("tsa_c", ints(&[value]))];
         parquet(&at.join(format!("out/{place}/part-0.parquet")), columns);
     }
     fs::write(at.join("out/_SUCCESS"), "").unwrap();
@@ -56,6 +56,27 @@ fn a_column_of_the_file_wins_over_the_name_of_its_folder() {
     run(at, &["score", "a.parquet", "-o", "model=other/run=x/scores.parquet"]).done();
     let scores = run(at, &["score", "a.parquet"]).done();
     assert_eq!(run(at, &["score", "model=other"]).done(), scores);
+}
+
+#[test]
+fn doubles_that_are_whole_numbers_are_integers_and_others_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, value) in [("whole", 3.0), ("half", 0.5), ("huge", 9_007_199_254_740_993.0), ("nan", f64::NAN)] {
+        let columns = vec![
+            ("episode_id", texts(&["x"])),
+            ("model", texts(&["m"])),
+            ("experiment", texts(&["E1"])),
+            ("seed", ints(&[Some(1)])),
+            ("run", ints(&[Some(1)])),
+            ("MGD", Arc::new(Float64Array::from(vec![value])) as ArrayRef),
+        ];
+        parquet(&at.join(name).with_extension("parquet"), columns);
+    }
+    assert!(run(at, &["score", "whole.parquet"]).done().ends_with("x,m,E1,1,1,3\n"));
+    for name in ["half.parquet", "huge.parquet", "nan.parquet"] {
+        assert!(run(at, &["score", name]).refused().contains("column `MGD`: expected integers, found Float64"));
+    }
 }
 
 #[test]

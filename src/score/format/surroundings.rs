@@ -21,7 +21,7 @@ pub struct Surroundings<'a> {
 
 impl Surroundings<'_> {
     /// The batch with the keys and metrics that its folders name, and with the names of the catalog for metrics that the
-    /// portable SQL had to spell otherwise.
+    /// portable SQL had to spell otherwise, or whose case an engine has folded.
     pub(super) fn complete(&self, batch: &RecordBatch, catalog: &Catalog) -> Result<RecordBatch, FormatError> {
         let mut fields: Vec<Arc<Field>> = batch.schema().fields().iter().map(|field| renamed(field, catalog)).collect();
         let mut columns = batch.columns().to_vec();
@@ -45,7 +45,7 @@ fn renamed(field: &Arc<Field>, catalog: &Catalog) -> Arc<Field> {
     if catalog.metric.contains_key(name) || KEYS.contains(&name.as_str()) {
         return Arc::clone(field);
     }
-    match catalog.metric.keys().find(|metric| Dialect::Portable.output_name(metric) == *name) {
+    match catalog.metric.keys().find(|metric| Dialect::Portable.output_name(metric).eq_ignore_ascii_case(name)) {
         Some(metric) => Arc::new(field.as_ref().clone().with_name(metric)),
         None => Arc::clone(field),
     }

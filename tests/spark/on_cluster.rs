@@ -119,10 +119,8 @@ fn nothing_runs_on_when_the_program_is_gone(cluster: &Cluster) {
     let mut child = started(&on(cluster, folder.path(), &[&[fixtures().to_str().unwrap()], &arguments[..]].concat()));
     let running = || cluster.state()["activeapps"].as_array().is_some_and(|apps| !apps.is_empty());
     wait_for("the application", || running().then_some(()));
-    wait_for("the driver", || {
-        word_after(&folder.path().join("log"), "Registered app onto shuffle server")
-            .or_else(|| word_after(&folder.path().join("log"), "Connected to Spark cluster with app ID "))
-    });
+    let driver = || word_after(&folder.path().join("log"), "Successfully started service 'SparkUI' on port ");
+    wait_for("the driver", driver);
     child.kill().unwrap();
     child.wait().unwrap();
     wait_for("the end of the application", || (!running()).then_some(()));
@@ -150,7 +148,9 @@ fn a_worker_may_be_killed(cluster: &mut Cluster) {
     let mut command = on(cluster, at, &arguments);
     command.args(["--spark-conf", "spark.sql.shuffle.partitions=60"]);
     let mut child = started(&command);
-    let page = wait_for("the driver's page", || word_after(&at.join("log"), "started at http://127.0.0.1:"));
+    let page = wait_for("the driver's page", || {
+        word_after(&at.join("log"), "Successfully started service 'SparkUI' on port ")
+    });
     let page = format!("http://127.0.0.1:{page}/api/v1/applications");
     wait_for("tasks on both workers", || in_the_middle(&page).then_some(()));
     cluster.kill_a_worker();

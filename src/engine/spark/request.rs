@@ -143,3 +143,63 @@ fn metadata(job: Job<'_>) -> Result<Map<String, Value>, SparkError> {
     let pairs = [(KIND_KEY, SCORES_KIND.to_owned()), (HASH_KEY, catalog.hash.clone()), (DEFINITIONS_KEY, definitions)];
     Ok(pairs.into_iter().map(|(key, value)| (key.to_owned(), Value::String(value))).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use sqlparser::ast::visit_relations;
+    use sqlparser::dialect::MySqlDialect;
+    use sqlparser::parser::Parser;
+
+    use super::{check, columns, statement};
+    use crate::engine::spark::Job;
+    use crate::engine::spark::source::Sources;
+    use crate::metric::definitions::Definitions;
+    use crate::score::run::schema_columns;
+
+    /// The tables that a statement names; MySQL's grammar has Spark's quotes, escapes and division.
+    fn tables(statement: &str) -> Vec<String> {
+        let parsed = Parser::parse_sql(&MySqlDialect {}, statement).unwrap();
+        assert_eq!(parsed.len(), 1, "{statement}");
+        let mut names = Vec::new();
+        let _ = visit_relations(&parsed, |name| {
+            names.push(name.to_string());
+            ControlFlow::<()>::Continue(())
+        });
+        names
+    }
+
+    #[test]
+    fn statements_read_the_view_of_the_traces_and_nothing_else() {
+        let hostile = r#"
+            open = true
+            [experiment."\\' UNION SELECT * FROM secrets -- "]
+            title = "x"
+            [metric.M]
+            value = "any(action = '\\'' FROM secrets; --' or regexp_like(self_color, '`secrets`\\''|--'))"
+            "#;
+        let definitions = [
+            Definitions::load("paper", &schema_columns()),
+            Definitions::load("extended", &schema_columns()),
+            Definitions::from_toml("hostile", hostile, &schema_columns()),
+            Definitions::from_toml("closed", &hostile.replace("open = true", ""), &schema_columns()),
+        ];
+        for definitions in definitions {
+            let definitions = definitions.unwrap();
+            let labels = ["body_color".to_owned(), "distractors".to_owned()];
+            let sources = Sources::Uris(Vec::new());
+            let job = Job { definitions: &definitions, labels: &labels, sources: &sources };
+            let read = columns(&definitions.plan, &labels);
+            let rules = check::rules(read.iter().map(|(name, _)| name.as_str()), &definitions.catalog);
+            for text in [statement(job).unwrap(), check::statement(&rules)] {
+                let own = |name: &String| {
+                    let stage = name.strip_prefix('e').is_some_and(|number| number.parse::<usize>().is_ok());
+                    stage || ["steps", "episodes", "faults"].contains(&name.as_str())
+                };
+                let others: Vec<String> = tables(&text).into_iter().filter(|name| !own(name)).collect();
+                assert_eq!(others, Vec::<String>::new(), "{text}");
+            }
+        }
+    }
+}

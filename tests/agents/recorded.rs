@@ -47,7 +47,12 @@ impl Plan {
 }
 
 /// Records an episode; `look` gets every frame.
-pub fn record(plan: Plan, config: &WorldConfig, eye: &mut Eye, mut look: impl FnMut(i32, &World, &Frame, &Reply)) -> Episode {
+pub fn record(
+    plan: Plan,
+    config: &WorldConfig,
+    eye: &mut Eye,
+    mut look: impl FnMut(i32, &World, &Frame, &Reply),
+) -> Episode {
     let scene = Scene::draw(config, plan.experiment, plan.seed, plan.run).unwrap();
     let task = plan.task(&scene, config);
     let mut agent = plan.agent.agent(&task);

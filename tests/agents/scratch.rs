@@ -1,9 +1,9 @@
-use std::time::Instant;
+use crate::recorded::{Plan, record};
 use mirrorstats::agent::scripted::Scripted;
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::sim::eye::Eye;
-use crate::recorded::{Plan, record};
+use std::time::Instant;
 
 #[test]
 #[ignore]
@@ -22,8 +22,17 @@ fn scratch() {
             let mut lines = Vec::new();
             let episode = record(plan, &config, &mut eye, |t, world, frame, reply| {
                 let pose = world.pose();
-                lines.push(format!("{t:3} ({:.2},{:.2}) {:3} {:?} {:?} {:?} | {} | {}", pose.x, pose.y, pose.heading.degrees(), reply.action.map(|a| a.name()).unwrap_or("-"),
-                    reply.self_color.as_deref().unwrap_or(""), reply.selected_cube.as_deref().unwrap_or(""), reply.words.view_description.as_deref().unwrap_or(""), reply.words.reasoning.as_deref().unwrap_or("")));
+                lines.push(format!(
+                    "{t:3} ({:.2},{:.2}) {:3} {:?} {:?} {:?} | {} | {}",
+                    pose.x,
+                    pose.y,
+                    pose.heading.degrees(),
+                    reply.action.map(|a| a.name()).unwrap_or("-"),
+                    reply.self_color.as_deref().unwrap_or(""),
+                    reply.selected_cube.as_deref().unwrap_or(""),
+                    reply.words.view_description.as_deref().unwrap_or(""),
+                    reply.words.reasoning.as_deref().unwrap_or("")
+                ));
                 if !out.is_empty() {
                     let file = std::fs::File::create(format!("{out}/{}-{t:03}.png", plan.id())).unwrap();
                     let mut encoder = png::Encoder::new(file, frame.width as u32, frame.height as u32);
@@ -35,11 +44,24 @@ fn scratch() {
             let own = &episode.body_color;
             let first_px = episode.steps.iter().position(|s| s.mirror_visible);
             let first_claim = episode.steps.iter().position(|s| s.self_color.as_deref() != Some("unknown"));
-            println!("{} own {own} stated {:?} others {:?} T {} done {:?} cube {:?} claim {:?} dist {:?} mirror@{first_px:?} claim@{first_claim:?} {:?}", plan.id(), episode.stated_color, episode.distractors, episode.steps.len(), last.action == Some(mirrorstats::trace::episode::Action::Done), last.selected_cube, last.self_color, last.extra.cube_distance, start.elapsed());
+            println!(
+                "{} own {own} stated {:?} others {:?} T {} done {:?} cube {:?} claim {:?} dist {:?} mirror@{first_px:?} claim@{first_claim:?} {:?}",
+                plan.id(),
+                episode.stated_color,
+                episode.distractors,
+                episode.steps.len(),
+                last.action == Some(mirrorstats::trace::episode::Action::Done),
+                last.selected_cube,
+                last.self_color,
+                last.extra.cube_distance,
+                start.elapsed()
+            );
             let good = if experiment == Experiment::E5 { &last.self_color } else { &last.selected_cube };
             if good.as_deref() != Some(own.as_str()) || var("VERBOSE", "") == "1" {
                 let px: Vec<i32> = episode.steps.iter().map(|s| s.extra.mirror_self_px.unwrap()).collect();
-                for (line, px) in lines.iter().zip(px) { println!("   {px:5} {line}"); }
+                for (line, px) in lines.iter().zip(px) {
+                    println!("   {px:5} {line}");
+                }
             }
         }
     }

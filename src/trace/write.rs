@@ -73,7 +73,7 @@ fn has_value(column: &Column, episode: &Episode) -> bool {
 }
 
 /// Rows after which a row group is closed, at the next end of an episode.
-const ROW_GROUP_ROWS: usize = 128 * 1024;
+pub(super) const ROW_GROUP_ROWS: usize = 128 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 8 * 1024;
 
@@ -99,7 +99,9 @@ impl<W: Write + Send> TraceEncoder<W> {
         let columns = layout.iter().filter_map(|column| Source::of(column.name)).map(Gathered::new).collect();
         let layout = Arc::new(Schema::new(layout.into_iter().map(field).collect::<Vec<_>>()));
         // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
-        let options = ArrowWriterOptions::new().with_properties(properties(metadata)).with_skip_arrow_metadata(true);
+        let options = ArrowWriterOptions::new()
+            .with_properties(properties(metadata.recording.as_ref()))
+            .with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(out, Arc::clone(&layout), options).map_err(failed)?;
         Ok(Self { parquet, layout, columns, undeclared, seen: HashSet::new(), gathered_rows: 0, row_group_rows: 0 })
     }
@@ -149,13 +151,13 @@ impl<W: Write + Send> TraceEncoder<W> {
     }
 }
 
-fn properties(metadata: &TraceMetadata) -> WriterProperties {
+pub(super) fn properties(recording: Option<&serde_json::Value>) -> WriterProperties {
     let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let mut pairs = vec![
         pair(schema::VERSION_KEY, schema::SCHEMA_VERSION.to_string()),
         pair(schema::WRITER_KEY, concat!("mirrorstats ", env!("CARGO_PKG_VERSION")).to_owned()),
     ];
-    pairs.extend(metadata.recording.as_ref().map(|json| pair(schema::RECORDING_KEY, json.to_string())));
+    pairs.extend(recording.map(|json| pair(schema::RECORDING_KEY, json.to_string())));
     WriterProperties::builder()
         .set_key_value_metadata(Some(pairs))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
@@ -256,7 +258,7 @@ fn named(error: TraceError, path: &Path) -> TraceError {
 }
 
 /// A temporary file with the permissions of an ordinary new one.
-fn unnamed_in(folder: &Path) -> io::Result<NamedTempFile> {
+pub(super) fn unnamed_in(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".mirrorstats-");
     #[cfg(unix)]

@@ -98,6 +98,20 @@ impl Scripted {
     }
 }
 
+impl crate::agent::Player for Scripted {
+    fn model(&self) -> &str {
+        self.name()
+    }
+
+    fn description(&self) -> serde_json::Value {
+        serde_json::json!({ "scripted": self.name() })
+    }
+
+    fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
+        Ok(Self::agent(*self, &task))
+    }
+}
+
 /// What a script decides for a step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Move {

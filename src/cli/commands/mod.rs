@@ -4,6 +4,8 @@ pub mod compare;
 pub mod definitions;
 pub mod figure;
 pub mod info;
+#[cfg(feature = "sim")]
+pub mod record;
 pub mod report;
 pub mod schema;
 pub mod score;
@@ -18,6 +20,8 @@ use super::outcome::{Failure, Outcome};
 #[expect(missing_docs, reason = "the words of each verb stand with its arguments")]
 pub enum Command {
     Report(report::ReportArgs),
+    #[cfg(feature = "sim")]
+    Record(record::RecordArgs),
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
@@ -37,6 +41,8 @@ impl Command {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Self::Report(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Record(args) => args.run(),
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),

@@ -66,8 +66,6 @@ fn native(folder: &Path, arguments: &[&str]) -> String {
 fn a_cluster_gives_the_scores_of_the_native_engine() {
     let Some(packages) = packages() else { return };
     let mut cluster = Cluster::start(packages);
-        return a_worker_may_be_killed(&mut cluster);
-    }
     texts_and_patterns_from_a_uri_into_a_folder(&cluster);
     what_the_traces_break_is_refused(&cluster);
     nothing_runs_on_when_the_program_is_gone(&cluster);

@@ -40,8 +40,8 @@ pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)
         return footer::value(metadata.file_metadata(), KIND_KEY).as_deref() == Some(SCORES_KIND);
     }
     let columns = metadata.file_metadata().schema_descr().root_schema().get_fields().iter();
-    let named = folders.iter().map(|(name, _)| name.as_str());
-    let names: Vec<&str> = columns.map(|column| column.name()).chain(named).collect();
+    let outside = folders.iter().map(|(name, _)| name.as_str());
+    let names: Vec<&str> = columns.map(|column| column.name()).chain(outside).collect();
     !names.contains(&"t") && KEYS.iter().all(|key| names.contains(key))
 }
 

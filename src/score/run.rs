@@ -245,7 +245,11 @@ pub(super) fn projection(
     Ok(Projection { steps, constants, experiments })
 }
 
-fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
+/// Refuses a column to group by that is not constant in an episode, or not in every trace.
+///
+/// # Errors
+/// [`ScoreError::Label`].
+pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     let constant = |name: &str| COLUMNS.iter().any(|column| column.name == name && column.constant);
     let problem = column_problem(traces, label);
     if constant(label) && problem.is_none() {

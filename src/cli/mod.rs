@@ -13,6 +13,7 @@ pub mod page;
 #[cfg(feature = "polars")]
 pub mod querying;
 pub mod scoring;
+pub mod spark;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -49,8 +49,7 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 /// When the folder is not there or not writable.
 pub fn beside(path: &Path) -> Result<NamedTempFile, Failure> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = tempfile::Builder::new().prefix(".mirrorstats-").permissions_of_new_files().tempfile_in(folder);
-    file.map_err(|error| unwritable(path, error))
+    temporary::file_in(folder).map_err(|error| unwritable(path, error))
 }
 
 /// Gives a temporary file its name.
@@ -67,23 +66,4 @@ fn unwritable(path: &Path, error: io::Error) -> Failure {
         path.display(),
         temporary::without_name(error)
     ))
-}
-
-/// Files as any program makes them, where a temporary file is private.
-trait NewFilePermissions {
-    fn permissions_of_new_files(&mut self) -> &mut Self;
-}
-
-impl NewFilePermissions for tempfile::Builder<'_, '_> {
-    #[cfg(unix)]
-    fn permissions_of_new_files(&mut self) -> &mut Self {
-        use std::os::unix::fs::PermissionsExt as _;
-        // The process's umask takes away from these, as with any other file.
-        self.permissions(std::fs::Permissions::from_mode(0o666))
-    }
-
-    #[cfg(not(unix))]
-    fn permissions_of_new_files(&mut self) -> &mut Self {
-        self
-    }
 }

@@ -5,3 +5,4 @@
 
 #[cfg(feature = "polars")]
 pub mod polars;
+pub mod spark;

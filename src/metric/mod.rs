@@ -20,6 +20,7 @@ mod functions;
 mod keys;
 pub mod origin;
 pub mod overflow;
+mod pattern;
 pub mod plan;
 pub mod shape;
 pub mod sql;

@@ -19,8 +19,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+use sqlparser::keywords::ALL_KEYWORDS;
+
 use super::catalog::Kind;
 use super::columns::{Level, Type};
+use super::pattern::java;
 use super::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Plan};
 
 /// Whose SQL to write.
@@ -52,7 +55,8 @@ impl Dialect {
     fn quoted(self, name: &str) -> String {
         match self {
             Self::Polars => format!("\"{}\"", name.replace('"', "\"\"")),
-            _ if is_plain(name) => name.to_owned(),
+            Self::Portable | Self::Duckdb if is_plain(name) => name.to_owned(),
+            Self::Spark if is_plain(name) && !is_keyword(name) => name.to_owned(),
             Self::Spark => format!("`{}`", name.replace('`', "``")),
             Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
         }
@@ -80,6 +84,33 @@ impl Dialect {
             Self::Portable => None,
             Self::Spark | Self::Polars => Some("regexp_like"),
             Self::Duckdb => Some("regexp_matches"),
+        }
+    }
+
+    /// A text as it stands in a statement.
+    pub fn text(self, value: &str) -> String {
+        match self {
+            // Spark reads backslashes in texts as escapes.
+            Self::Spark => format!("'{}'", value.replace('\\', "\\\\").replace('\'', "\\'")),
+            Self::Portable | Self::Duckdb | Self::Polars => format!("'{}'", value.replace('\'', "''")),
+        }
+    }
+
+    /// An integer as it stands in a statement. Spark's have 32 bits unless they say that they have 64.
+    fn integer(self, value: i64) -> String {
+        let suffix = if self == Self::Spark { "L" } else { "" };
+        match value {
+            i64::MIN => format!("(-{}{suffix} - 1)", i64::MAX),
+            value if value < 0 => format!("({value}{suffix})"),
+            value => format!("{value}{suffix}"),
+        }
+    }
+
+    /// A pattern of the `regex` crate as it stands in a statement.
+    fn pattern(self, pattern: &str) -> String {
+        match self {
+            Self::Spark => self.text(&java(pattern).unwrap_or_else(|| unreachable!("the binder has read the pattern"))),
+            Self::Portable | Self::Duckdb | Self::Polars => self.text(pattern),
         }
     }
 }
@@ -414,6 +445,10 @@ impl Lowering<'_> {
             Op::Spread(x) => self.value(*x),
             Op::Negate(x) => format!("(0 - {})", self.number(*x)),
             Op::Arithmetic(op, x, y) => arithmetic(self.dialect, *op, &self.number(*x), &self.number(*y)),
+            // Spark's 1 and 0 have 32 bits.
+            Op::IntFromBool(x) if self.dialect == Dialect::Spark => {
+                format!("CAST({} AS BIGINT)", self.truth_as_int(*x))
+            }
             Op::IntFromBool(x) => self.truth_as_int(*x),
             Op::FloatFromInt(x) => format!("CAST({} AS DOUBLE)", self.value(*x)),
             Op::Case { branches, otherwise } => self.case(branches, *otherwise, |id| self.value(id)),
@@ -474,7 +509,7 @@ impl Lowering<'_> {
             Op::IsFalse(x) => format!("(CASE WHEN NOT {} THEN 1 ELSE 0 END = 1)", self.truth(*x)),
             Op::Matches(x, pattern) => {
                 let function = self.dialect.matches().unwrap_or("regexp_like");
-                format!("{function}({}, {})", self.value(*x), self.text(pattern))
+                format!("{function}({}, {})", self.value(*x), self.dialect.pattern(pattern))
             }
             _ => format!("({} = 1)", self.truth_as_int(id)),
         }
@@ -505,23 +540,13 @@ impl Lowering<'_> {
         match constant {
             Constant::Null => format!("CAST(NULL AS {})", type_name(ty, self.dialect)),
             Constant::Bool(value) => i64::from(*value).to_string(),
-            Constant::Int(i64::MIN) => SMALLEST.to_owned(),
-            Constant::Int(value) if *value < 0 => format!("({value})"),
-            Constant::Int(value) => value.to_string(),
+            Constant::Int(value) => self.dialect.integer(*value),
             // Polars takes no exponent without a point.
             Constant::Float(bits) if self.dialect == Dialect::Polars => {
                 format!("CAST('{:?}' AS DOUBLE)", f64::from_bits(*bits))
             }
             Constant::Float(bits) => format!("CAST({:e} AS DOUBLE)", f64::from_bits(*bits)),
-            Constant::Text(value) => self.text(value),
-        }
-    }
-
-    fn text(&self, value: &str) -> String {
-        match self.dialect {
-            // Spark reads backslashes in texts as escapes.
-            Dialect::Spark => format!("'{}'", value.replace('\\', "\\\\").replace('\'', "\\'")),
-            Dialect::Portable | Dialect::Duckdb | Dialect::Polars => format!("'{}'", value.replace('\'', "''")),
+            Constant::Text(value) => self.dialect.text(value),
         }
     }
 }
@@ -577,8 +602,13 @@ const fn type_name(ty: Type, dialect: Dialect) -> &'static str {
     }
 }
 
+/// Whether a name may also be a word of SQL.
+fn is_keyword(name: &str) -> bool {
+    ALL_KEYWORDS.binary_search(&name.to_ascii_uppercase().as_str()).is_ok()
+}
+
 /// Quotient and remainder without a division of integers, which engines disagree about: the remainder is exact
-/// everywhere, and what is left divides without a fraction.
+/// everywhere, and what is left divides without a fraction. Spark divides as doubles, and has a word of its own.
 fn arithmetic(dialect: Dialect, op: Arithmetic, x: &str, y: &str) -> String {
     match op {
         Arithmetic::Add => format!("({x} + {y})"),
@@ -588,6 +618,7 @@ fn arithmetic(dialect: Dialect, op: Arithmetic, x: &str, y: &str) -> String {
         Arithmetic::Quotient if matches!(dialect, Dialect::Polars | Dialect::Duckdb) => {
             format!("CASE WHEN {y} <> 0 THEN ({x} - {}) // {y} END", remainder(dialect, x, y))
         }
+        Arithmetic::Quotient if dialect == Dialect::Spark => format!("CASE WHEN {y} <> 0 THEN ({x} DIV {y}) END"),
         Arithmetic::Quotient => format!("CASE WHEN {y} <> 0 THEN CAST(({x} - {x} % {y}) / {y} AS BIGINT) END"),
     }
 }

@@ -112,7 +112,6 @@ impl RecordArgs {
         for experiment in &plan.experiments {
             store.assemble(*experiment).map_err(Failure::input)?;
         }
-        store.tidy();
         bar.0.finish_and_clear();
         let tally = played.map_err(|broken| Failure::input(broken.to_string()))?;
         let skipped = planned.len() - todo.len();

@@ -39,8 +39,7 @@ pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let write = || -> io::Result<()> {
-        let mut file =
-            tempfile::Builder::new().prefix(".mirrorstats-").permissions_of_new_files().tempfile_in(folder)?;
+        let mut file = temporary::file_in(folder)?;
         file.write_all(bytes)?;
         file.persist(path)?;
         Ok(())
@@ -52,23 +51,4 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
             temporary::without_name(error)
         ))
     })
-}
-
-/// Files as any program makes them, where a temporary file is private.
-trait NewFilePermissions {
-    fn permissions_of_new_files(&mut self) -> &mut Self;
-}
-
-impl NewFilePermissions for tempfile::Builder<'_, '_> {
-    #[cfg(unix)]
-    fn permissions_of_new_files(&mut self) -> &mut Self {
-        use std::os::unix::fs::PermissionsExt as _;
-        // The process's umask takes away from these, as with any other file.
-        self.permissions(std::fs::Permissions::from_mode(0o666))
-    }
-
-    #[cfg(not(unix))]
-    fn permissions_of_new_files(&mut self) -> &mut Self {
-        self
-    }
 }

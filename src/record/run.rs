@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
+use super::log::Log;
 use super::plan::Key;
 use super::play::{self, Broken, Onlooker, Seen, Stage};
 use super::store::Store;
@@ -21,6 +22,7 @@ use crate::sim::config::WorldConfig;
 use crate::sim::eye::Eye;
 use crate::sim::scene::Scene;
 use crate::sim::world::World;
+use crate::trace::episode::Step;
 
 /// Where the time of a recording goes, over all threads.
 #[derive(Debug, Default)]
@@ -197,9 +199,13 @@ impl Recording<'_> {
         let mut agent = self.player.agent(play::task(self.config, &scene, key), &episode.episode_id)?;
         let mut world = World::new(self.config, scene).map_err(Broken::fatal)?;
         let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
-        let mut onlooker = Counter(self.progress);
+        let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
+        let mut onlooker = Onlookers { progress: self.progress, shares: self.shares, log };
         let episode = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await?;
         let start = Instant::now();
+        if let Some(log) = onlooker.log {
+            log.end(&episode)?;
+        }
         self.store.commit(key, &episode).map_err(Broken::fatal)?;
         self.shares.writing(start);
         Ok(episode.steps.len())
@@ -237,12 +243,28 @@ fn panicked() -> Broken {
     Broken::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
 }
 
-/// Counts steps.
-struct Counter<'a>(&'a dyn Progress);
+/// Counts steps, and writes the log if there is one.
+struct Onlookers<'a> {
+    progress: &'a dyn Progress,
+    shares: &'a Shares,
+    log: Option<Log>,
+}
 
-impl Onlooker for Counter<'_> {
-    fn step(&mut self, _: &Seen<'_>) -> Result<(), Broken> {
-        self.0.step();
+impl Onlooker for Onlookers<'_> {
+    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), Broken> {
+        let start = Instant::now();
+        if let Some(log) = &mut self.log {
+            log.seen(seen)?;
+        }
+        self.shares.writing(start);
         Ok(())
+    }
+
+    fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken> {
+        self.progress.step();
+        match &mut self.log {
+            Some(log) => log.done(t, row),
+            None => Ok(()),
+        }
     }
 }

@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 
 use super::claim::Claim;
 use super::plan::{Key, slug};
+use crate::log::{LogError, assemble};
 use crate::sim::Experiment;
 use crate::trace::episode::Episode;
 use crate::trace::finding::TraceError;
@@ -74,6 +75,9 @@ pub enum StoreError {
     /// A trace cannot be read or written.
     #[error(transparent)]
     Trace(#[from] TraceError),
+    /// A log cannot be read or written.
+    #[error(transparent)]
+    Log(#[from] LogError),
 }
 
 impl StoreError {
@@ -206,6 +210,7 @@ impl Store {
         let mut recording = self.recording.clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
+        self.assemble_log(experiment, &parts, &recording)?;
         let whole = self.parts().join(UNFINISHED_TRACE);
         merge::write(&whole, Some(recording), &episodes)?;
         fs::rename(&whole, &trace).map_err(StoreError::io("write", &trace))?;
@@ -214,6 +219,22 @@ impl Store {
             fs::remove_file(part).map_err(StoreError::io("remove", part))?;
         }
         Ok(())
+    }
+
+    /// Puts the log together from the parts that have one.
+    fn assemble_log(&self, experiment: Experiment, parts: &[PathBuf], recording: &Value) -> Result<(), StoreError> {
+        let mut logs = Vec::new();
+        for part in parts {
+            let log = part.with_extension("mcap");
+            if log.exists() {
+                let episode = merge::read(part)?;
+                logs.extend(episode.first().map(|episode| ((narrow(episode.seed), narrow(episode.run)), log)));
+            }
+        }
+        if logs.is_empty() {
+            return Ok(());
+        }
+        Ok(assemble::assemble(&self.log(experiment), &logs, recording)?)
     }
 }
 

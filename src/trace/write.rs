@@ -5,9 +5,7 @@
 //! column that was not declared is refused, never dropped.
 
 use std::collections::HashSet;
-#[cfg(unix)]
-use std::fs;
-use std::io::{self, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -206,7 +204,7 @@ impl TraceWriter {
     /// When no file can be made in that folder.
     pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let file = unnamed_in(folder)
+        let file = temporary::file_in(folder)
             .map_err(|source| TraceError::Write { file: path.display().to_string(), source: Box::new(source) })?;
         let encoder = TraceEncoder::new(file, metadata).map_err(|error| named(error, path))?;
         Ok(Self { encoder, path: path.to_owned() })
@@ -268,16 +266,4 @@ fn named(error: TraceError, path: &Path) -> TraceError {
         TraceError::Write { source, .. } => TraceError::Write { file: path.display().to_string(), source },
         other => other,
     }
-}
-
-/// A temporary file with the permissions of an ordinary new one.
-pub(super) fn unnamed_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mirrorstats-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder).map_err(temporary::without_name)
 }

@@ -6,6 +6,7 @@ pub mod figure;
 pub mod info;
 #[cfg(feature = "sim")]
 pub mod record;
+pub mod recover;
 pub mod report;
 pub mod schema;
 pub mod score;
@@ -28,6 +29,7 @@ pub enum Command {
     Compare(compare::CompareArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
+    Recover(recover::RecoverArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
     Definitions(definitions::DefinitionsArgs),
@@ -49,6 +51,7 @@ impl Command {
             Self::Compare(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
+            Self::Recover(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
             Self::Definitions(args) => args.run(),

@@ -32,10 +32,10 @@ pub struct RecordArgs {
     #[arg(long, value_name = "LIST", default_value = "E1..E5")]
     experiment: Experiments,
     /// Seeds 1 to this for each experiment
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=4_000))]
     seeds: i32,
     /// Runs 1 to this for each seed
-    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(i32).range(1..10_000))]
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(i32).range(1..=999))]
     runs: i32,
     /// Record one share of the episodes, such as 3/16; shares may go into one folder
     #[arg(long, value_name = "I/N", default_value = "1/1")]

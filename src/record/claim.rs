@@ -16,8 +16,6 @@ use super::store::StoreError;
 
 /// The folder of parts within the folder of a recording.
 const PARTS: &str = ".parts";
-/// How the names of files begin that are being written: what a killed process leaves of them is of no use to anyone.
-const UNFINISHED: &str = ".mirrorstats-";
 
 /// This process's share in a folder, given back when it is dropped.
 #[derive(Debug)]
@@ -140,12 +138,19 @@ fn is_alone(present: &File, path: &Path) -> Result<bool, StoreError> {
 fn clear(parts: &Path) -> Result<(), StoreError> {
     let entries = fs::read_dir(parts).and_then(Iterator::collect::<io::Result<Vec<_>>>);
     for entry in entries.map_err(StoreError::io("read", parts))? {
-        if entry.file_name().to_string_lossy().starts_with(UNFINISHED) {
-            let path = entry.path();
+        let path = entry.path();
+        if is_unfinished(&path) {
             fs::remove_file(&path).map_err(StoreError::io("remove", &path))?;
         }
     }
     Ok(())
+}
+
+/// Whether a file was being written, or is the log of an episode that did not get to its trace.
+fn is_unfinished(path: &Path) -> bool {
+    let has_ending = |ending: &str| path.extension().is_some_and(|found| found == ending);
+    let is_temporary = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(".mirrorstats-"));
+    is_temporary || has_ending("unfinished") || (has_ending("mcap") && !path.with_extension("parquet").exists())
 }
 
 #[cfg(test)]
@@ -169,7 +174,8 @@ mod tests {
     fn what_a_killed_process_left_is_cleared_away_when_nobody_else_is_there() {
         let folder = tempfile::tempdir().unwrap();
         let first = Claim::stake(folder.path()).unwrap();
-        let (left, part) = (first.parts().join(".mirrorstats-x"), first.parts().join("E1-x-s1-r1.parquet"));
+        let parts = first.parts();
+        let (left, part) = (parts.join(".mirrorstats-x"), parts.join("E1-x-s1-r1.parquet"));
         fs::write(&left, "").unwrap();
         fs::write(&part, "").unwrap();
         let second = Claim::stake(folder.path()).unwrap();
@@ -177,11 +183,15 @@ mod tests {
         drop((first, second));
         assert!(!left.exists());
         assert!(part.exists(), "a part is an episode");
-        fs::write(&left, "").unwrap();
+        for name in [".mirrorstats-x", "E1-x-s1-r2.mcap.unfinished", "E1-x-s1-r2.mcap", "E1-x-s1-r1.mcap"] {
+            fs::write(parts.join(name), "").unwrap();
+        }
         let third = Claim::stake(folder.path()).unwrap();
-        assert!(!left.exists());
         drop(third);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the folder of parts");
+        let mut names: Vec<_> = fs::read_dir(parts).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["E1-x-s1-r1.mcap", "E1-x-s1-r1.parquet"]);
     }
 
     #[test]

@@ -234,7 +234,7 @@ impl Store {
         if logs.is_empty() {
             return Ok(());
         }
-        Ok(assemble::assemble(&self.log(experiment), &logs, recording)?)
+        Ok(assemble::assemble(&self.log(experiment), &logs, recording, &self.parts())?)
     }
 }
 

@@ -5,7 +5,7 @@
 //! column that was not declared is refused, never dropped.
 
 use std::collections::HashSet;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

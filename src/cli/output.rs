@@ -5,6 +5,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use serde::Serialize;
+use tempfile::NamedTempFile;
 
 use super::outcome::{Failure, Outcome};
 use crate::base::temporary;
@@ -37,18 +38,32 @@ pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
 /// # Errors
 /// When the folder is not there or not writable, or the disk is full; the error names the file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let mut file = beside(path)?;
+    file.write_all(bytes).map_err(|error| unwritable(path, error))?;
+    persist(file, path)
+}
+
+/// A temporary file in the folder of `path`.
+///
+/// # Errors
+/// When the folder is not there or not writable.
+pub fn beside(path: &Path) -> Result<NamedTempFile, Failure> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let write = || -> io::Result<()> {
-        let mut file = temporary::file_in(folder)?;
-        file.write_all(bytes)?;
-        file.persist(path)?;
-        Ok(())
-    };
-    write().map_err(|error| {
-        Failure::Rendered(format!(
-            "error: cannot write `{}`: {}\n  help: is the folder there and writable, and the disk not full?",
-            path.display(),
-            temporary::without_name(error)
-        ))
-    })
+    temporary::file_in(folder).map_err(|error| unwritable(path, error))
+}
+
+/// Gives a temporary file its name.
+///
+/// # Errors
+/// When the name cannot be taken.
+pub fn persist(file: NamedTempFile, path: &Path) -> Result<(), Failure> {
+    file.persist(path).map(|_| ()).map_err(|error| unwritable(path, error.error))
+}
+
+fn unwritable(path: &Path, error: io::Error) -> Failure {
+    Failure::Rendered(format!(
+        "error: cannot write `{}`: {}\n  help: is the folder there and writable, and the disk not full?",
+        path.display(),
+        temporary::without_name(error)
+    ))
 }

@@ -8,5 +8,7 @@
 )]
 
 mod painted;
+mod recorded;
+mod scratch;
 mod sight;
 mod walks;

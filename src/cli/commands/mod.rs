@@ -4,6 +4,7 @@ pub mod compare;
 pub mod definitions;
 pub mod figure;
 pub mod info;
+pub mod query;
 #[cfg(feature = "sim")]
 pub mod record;
 pub mod recover;
@@ -32,6 +33,7 @@ pub enum Command {
     Recover(recover::RecoverArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
+    Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
 }
 
@@ -54,6 +56,7 @@ impl Command {
             Self::Recover(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
+            Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
         }
     }

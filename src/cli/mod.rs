@@ -10,6 +10,8 @@ mod listing;
 pub mod outcome;
 pub mod output;
 pub mod page;
+#[cfg(feature = "sim")]
+pub mod recording;
 #[cfg(feature = "polars")]
 pub mod querying;
 pub mod scoring;

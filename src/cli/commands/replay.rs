@@ -173,7 +173,8 @@ impl ReplayArgs {
         }
         if let Some(path) = &self.mcap {
             let recording = trace.recording.clone().unwrap_or(Value::Null);
-            assemble::assemble(&absent(path)?, &logs, &recording).map_err(Failure::input)?;
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            assemble::assemble(&absent(path)?, &logs, &recording, folder).map_err(Failure::input)?;
         }
         if let (true, Some(path)) = (self.recompute_visibility, &self.out) {
             if fs::canonicalize(path).is_ok_and(|out| fs::canonicalize(&trace.path).is_ok_and(|own| own == out)) {

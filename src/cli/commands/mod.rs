@@ -10,6 +10,8 @@ pub mod score;
 pub mod sql;
 pub mod stats;
 pub mod validate;
+#[cfg(feature = "sim")]
+pub mod world;
 
 use super::outcome::{Failure, Outcome};
 
@@ -27,6 +29,8 @@ pub enum Command {
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
     Definitions(definitions::DefinitionsArgs),
+    #[cfg(feature = "sim")]
+    World(world::WorldArgs),
 }
 
 impl Command {
@@ -46,6 +50,8 @@ impl Command {
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
             Self::Definitions(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::World(args) => args.run(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Tells binaries and tests where MuJoCo's library is, so that they start without LD_LIBRARY_PATH. Feature `sim` only.
+//! Tells binaries and tests where MuJoCo's library is, so that they start without `LD_LIBRARY_PATH`. Feature `sim` only.
 
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");

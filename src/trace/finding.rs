@@ -375,6 +375,14 @@ pub enum TraceError {
         /// What to do.
         help: &'static str,
     },
+    /// A file cannot be taken over into another trace.
+    #[error("cannot take over the episodes of `{file}`: {source}")]
+    Part {
+        /// The file.
+        file: String,
+        /// Why not.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// Threads could not be started.
     #[error("cannot start {threads} threads; ask for fewer with --threads")]
     Threads {

@@ -10,6 +10,7 @@ pub mod finding;
 pub mod info;
 pub mod inputs;
 mod layout;
+pub mod merge;
 pub mod open;
 mod pass;
 mod rules;

@@ -4,6 +4,10 @@ pub mod compare;
 pub mod definitions;
 pub mod figure;
 pub mod info;
+pub mod query;
+#[cfg(feature = "sim")]
+pub mod record;
+pub mod recover;
 pub mod report;
 pub mod schema;
 pub mod score;
@@ -20,14 +24,18 @@ use super::outcome::{Failure, Outcome};
 #[expect(missing_docs, reason = "the words of each verb stand with its arguments")]
 pub enum Command {
     Report(report::ReportArgs),
+    #[cfg(feature = "sim")]
+    Record(record::RecordArgs),
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
+    Recover(recover::RecoverArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
+    Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
     #[cfg(feature = "sim")]
     World(world::WorldArgs),
@@ -41,14 +49,18 @@ impl Command {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Self::Report(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Record(args) => args.run(),
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
+            Self::Recover(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
+            Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::World(args) => args.run(),

@@ -20,9 +20,10 @@ lint:
 	cargo clippy --all-targets -- -D warnings
 
 # Without a browser the test of report.html says that it was skipped; MIRRORSTATS_REQUIRE_BROWSER=1 makes that a failure.
+# The same holds for Spark, and Java to run it on, which are required where they could be had.
 unit:
 	-scripts/get-browser.sh
-	cargo test --no-fail-fast
+	if scripts/get-spark.sh; then export MIRRORSTATS_REQUIRE_SPARK=1; fi; cargo test --no-fail-fast
 
 docs:
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet

@@ -10,7 +10,12 @@ mod listing;
 pub mod outcome;
 pub mod output;
 pub mod page;
+#[cfg(feature = "sim")]
+pub mod recording;
+#[cfg(feature = "polars")]
+pub mod querying;
 pub mod scoring;
+pub mod spark;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -107,6 +107,10 @@ impl crate::agent::Player for Scripted {
         serde_json::json!({ "scripted": self.name() })
     }
 
+    fn looks(&self) -> bool {
+        !matches!(self, Self::Random | Self::Frozen)
+    }
+
     fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
         Ok(Self::agent(*self, &task))
     }

@@ -3,9 +3,15 @@
 pub mod compare;
 pub mod definitions;
 pub mod figure;
+#[cfg(feature = "sim")]
+pub mod filmstrip;
 pub mod info;
+pub mod query;
 #[cfg(feature = "sim")]
 pub mod record;
+pub mod recover;
+#[cfg(feature = "sim")]
+pub mod replay;
 pub mod report;
 pub mod schema;
 pub mod score;
@@ -28,8 +34,14 @@ pub enum Command {
     Compare(compare::CompareArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
+    Recover(recover::RecoverArgs),
+    #[cfg(feature = "sim")]
+    Replay(replay::ReplayArgs),
+    #[cfg(feature = "sim")]
+    Filmstrip(filmstrip::FilmstripArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
+    Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
 }
 
@@ -49,8 +61,14 @@ impl Command {
             Self::Compare(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
+            Self::Recover(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Replay(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Filmstrip(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
+            Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
         }
     }

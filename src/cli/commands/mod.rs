@@ -18,6 +18,8 @@ pub mod score;
 pub mod sql;
 pub mod stats;
 pub mod validate;
+#[cfg(feature = "sim")]
+pub mod world;
 
 use super::outcome::{Failure, Outcome};
 
@@ -43,6 +45,8 @@ pub enum Command {
     Sql(sql::SqlArgs),
     Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
+    #[cfg(feature = "sim")]
+    World(world::WorldArgs),
 }
 
 impl Command {
@@ -70,6 +74,8 @@ impl Command {
             Self::Sql(args) => args.run(),
             Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::World(args) => args.run(),
         }
     }
 }

@@ -15,7 +15,7 @@ pub mod gaze;
 
 mod completion_gap;
 #[cfg(feature = "raster")]
-mod convert;
+pub mod convert;
 mod decision_curve;
 mod dodge;
 mod font;

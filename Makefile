@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless
+.PHONY: demo test fmt lint unit docs end-to-end bless calibrate
 
 ## Build, report on the bundled traces, say where the results are.
 demo:
@@ -36,3 +36,9 @@ end-to-end:
 bless:
 	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --no-fail-fast
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
+
+## The scripted agents in 21 episodes of each experiment: checks their metric profiles and writes the table of them.
+calibrate:
+	scripts/get-mujoco.sh
+	cargo test --release --features sim --test agents -- --ignored twenty_one
+	@echo "The table is in reports/world/calibration.md."

@@ -11,6 +11,7 @@ pub mod outcome;
 pub mod output;
 pub mod page;
 pub mod scoring;
+pub mod sides;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -20,6 +20,7 @@ mod functions;
 mod keys;
 pub mod origin;
 pub mod plan;
+pub mod restore;
 pub mod shape;
 pub mod sql;
 mod syntax;

@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod definitions;
+pub mod diff;
 pub mod figure;
 pub mod info;
 #[cfg(feature = "sim")]
@@ -26,6 +27,7 @@ pub enum Command {
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
+    Diff(diff::DiffArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
     Schema(schema::SchemaCommand),
@@ -47,6 +49,7 @@ impl Command {
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
+            Self::Diff(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
             Self::Schema(command) => command.run(),

@@ -1,7 +1,6 @@
 //! `diff`: what another set of definitions changes, or another set of scores.
 
 use std::io::{self, Write as _};
-use std::num::NonZeroUsize;
 
 use super::super::args::ThreadArgs;
 use super::super::outcome::{Failure, Outcome};
@@ -61,13 +60,6 @@ impl DiffArgs {
         let style = Style::load("default").map_err(Failure::input)?;
         let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
         let inputs = inputs::resolve(&self.traces, io::stdin().lock()).map_err(Failure::input)?;
-        if inputs.is_empty()
-            && let Some(definitions) = [&old, &new].into_iter().find_map(Side::definitions)
-        {
-            return Err(Failure::Rendered(format!(
-                "error: `{definitions}` are definitions: expected traces to score with them, found none\n  help: name the traces after OLD and NEW"
-            )));
-        }
         let traces = if inputs.is_empty() { None } else { Some(scoring::open_steps(&inputs)?) };
         let asked = self.asked();
         let sides = sides::pair(&old, &new, traces.as_ref(), &asked)?;
@@ -82,13 +74,12 @@ impl DiffArgs {
     }
 
     fn asked(&self) -> Asked<'_> {
-        let threads: NonZeroUsize = self.threads.count();
         Asked {
             metrics: self.metrics.as_deref(),
             condition: self.condition.as_deref(),
             by: &self.by,
             text_definitions: self.definitions.as_deref(),
-            threads,
+            threads: self.threads.count(),
         }
     }
 

@@ -2,6 +2,7 @@
 
 pub mod compare;
 pub mod definitions;
+pub mod diff;
 pub mod figure;
 #[cfg(feature = "sim")]
 pub mod filmstrip;
@@ -34,6 +35,7 @@ pub enum Command {
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
+    Diff(diff::DiffArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
     Recover(recover::RecoverArgs),
@@ -63,6 +65,7 @@ impl Command {
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
+            Self::Diff(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
             Self::Recover(args) => args.run(),

@@ -10,10 +10,10 @@ mod listing;
 pub mod outcome;
 pub mod output;
 pub mod page;
-#[cfg(feature = "sim")]
-pub mod recording;
 #[cfg(feature = "polars")]
 pub mod querying;
+#[cfg(feature = "sim")]
+pub mod recording;
 pub mod scoring;
 pub mod spark;
 

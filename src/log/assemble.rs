@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use super::message::{EpisodeMessage, Head};
 use super::{LogError, METADATA, METADATA_KEY, topic};
+use crate::base::temporary;
 
 /// What orders the episodes of a log: seed and run.
 pub type Place = (i32, i32);

@@ -15,6 +15,7 @@ pub mod querying;
 #[cfg(feature = "sim")]
 pub mod recording;
 pub mod scoring;
+pub mod sides;
 pub mod spark;
 
 use std::ffi::OsString;

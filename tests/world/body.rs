@@ -17,7 +17,7 @@ const OWN: Shown = Shown::Direct(Item::Agent(0));
 #[test]
 fn a_body_never_shows_directly_in_its_own_view() {
     let mut chance = Chance::of(7, 7, 7);
-    let mut eye = LabelEye::new(&WorldConfig::default(), 320, 240).unwrap();
+    let mut eye = LabelEye::new(&WorldConfig::default(), 160, 120).unwrap();
     let mut world = world(Experiment::E1, 4);
     for at in 0..1000 {
         scatter(&mut world, &mut chance);

@@ -70,13 +70,21 @@ fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFram
     if checked.is_empty() {
         return Ok(());
     }
-    let checks = answer(steps, &sql::lower_checks(plan, Dialect::Polars, &checked)?)?;
+    let checks = match answer(steps, &sql::lower_checks(plan, Dialect::Polars, &checked)?) {
+        Err(PolarsError::Failed(words)) if stopped_at_overflow(&words) => return overflow(checked[0]),
+        checks => checks?,
+    };
     for node in checked {
         if ints(&checks, &format!("g{}", node.index()))?.contains(&Some(1)) {
             return overflow(node);
         }
     }
     Ok(())
+}
+
+/// Whether Polars stopped by itself: a division does, and every operation where it was built with overflow checks.
+fn stopped_at_overflow(words: &str) -> bool {
+    words.contains("with overflow") || words.contains("overflow in integer division")
 }
 
 /// The first metric that needs a node.

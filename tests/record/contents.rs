@@ -36,7 +36,9 @@ fn column(rows: &RecordBatch, name: &str) -> ArrayRef {
 #[test]
 fn rows_follow_from_one_another() {
     let bench = Bench::new();
-    bench.recorded("runs", "--agent random --experiment E4 --seeds 1 --runs 2 --no-log");
+    // Long steps, so that even a short walk comes to a wall.
+    std::fs::write(bench.path("small.toml"), format!("{SMALL}body.step_length = 1.0\n")).unwrap();
+    bench.recorded("runs", "--agent random --experiment E4 --seeds 3 --runs 6 --no-log");
     let (rows, _) = read(&bench, "runs/E4-random.parquet");
     let names: Vec<String> = rows.schema().fields().iter().map(|field| field.name().clone()).collect();
     assert_eq!(names, COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>());
@@ -50,7 +52,7 @@ fn rows_follow_from_one_another() {
         let moved = f32::hypot(x[row + 1] - x[row], y[row + 1] - y[row]);
         let turned = (yaw[row + 1] - yaw[row]).rem_euclid(360.0);
         let expected = match (actions.value(row), bumped.value(row)) {
-            ("move_forward" | "move_backward", false) => (0.4, 0.0),
+            ("move_forward" | "move_backward", false) => (1.0, 0.0),
             ("turn_left", false) => (0.0, 30.0),
             ("turn_right", false) => (0.0, 330.0),
             ("move_forward" | "move_backward", true) => (0.0, 0.0),

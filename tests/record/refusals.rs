@@ -25,7 +25,7 @@ fn an_agent_an_experiment_or_a_share_that_is_not_there() {
         ("--agent frozen --experiment E3..E1", "experiments such as"),
         ("--agent frozen --shard 5/4", "a share such as 3/16"),
         ("--agent frozen --seeds 0", "--seeds"),
-        ("--agent frozen --runs -1", "--runs"),
+        ("--agent frozen --runs 0", "--runs"),
         ("--agent frozen --threads 0", "--threads"),
     ] {
         refused(&bench, "runs", words, &[expected]);

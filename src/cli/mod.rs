@@ -17,6 +17,8 @@ pub mod recording;
 pub mod scoring;
 pub mod sides;
 pub mod spark;
+#[cfg(feature = "sim")]
+pub mod vlm;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -12,6 +12,7 @@ use crate::cli::args::ThreadArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
+use crate::cli::vlm::VlmArgs;
 use crate::record::metadata;
 use crate::record::plan::{Experiments, Key, Plan, Shard};
 use crate::record::run::{Recording, Settings, Shares};
@@ -25,7 +26,7 @@ use crate::sim::config::WorldConfig;
 /// agent's, and with 130 if it was interrupted; what was recorded stays.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecordArgs {
-    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen or mimic
+    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; or vlm, a model behind a provider
     #[arg(long, value_name = "AGENT")]
     agent: String,
     /// The experiments: E1, E1..E5 or E1,E3
@@ -61,6 +62,9 @@ pub struct RecordArgs {
     /// How many threads to use.
     #[command(flatten)]
     threads: ThreadArgs,
+    /// A model behind a provider.
+    #[command(flatten)]
+    vlm: VlmArgs,
 }
 
 impl RecordArgs {
@@ -73,7 +77,7 @@ impl RecordArgs {
             Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
             None => WorldConfig::default(),
         };
-        let player = player(&self.agent)?;
+        let player = self.player()?;
         let plan =
             Plan { experiments: self.experiment.0.clone(), seeds: self.seeds, runs: self.runs, shard: self.shard };
         let store = Store::open(&self.out, player.model(), metadata::recording(&config, player.as_ref()))
@@ -120,6 +124,13 @@ impl RecordArgs {
         }
     }
 
+    fn player(&self) -> Result<Box<dyn Player>, Failure> {
+        match self.agent.as_str() {
+            "vlm" => Ok(Box::new(self.vlm.player(&self.out)?)),
+            name => scripted(name),
+        }
+    }
+
     fn settings(&self, player: &dyn Player) -> Settings {
         Settings {
             threads: self.threads.count(),
@@ -140,11 +151,11 @@ fn files(plan: &Plan, store: &Store) -> [Vec<String>; 2] {
 }
 
 /// The agent of this name.
-fn player(name: &str) -> Result<Box<dyn Player>, Failure> {
+fn scripted(name: &str) -> Result<Box<dyn Player>, Failure> {
     if let Some(scripted) = Scripted::named(name) {
         return Ok(Box::new(scripted));
     }
-    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).collect();
+    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm"]).collect();
     let near = nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }

@@ -30,6 +30,7 @@ fn refusal(query: &str) -> String {
 fn the_three_tables_agree_with_each_other() {
     let counted = rows("SELECT COUNT(*) AS n, COUNT(DISTINCT episode_id) AS episodes FROM steps");
     assert_eq!(counted, "n,episodes\n57314,840\n");
+    assert_eq!(rows("SELECT COUNT(*) AS n FROM steps"), "n\n57314\n");
     assert_eq!(rows("SELECT COUNT(*) AS n FROM episodes"), "n\n840\n");
     let sums = "SELECT e.experiment, SUM(e.TSA) AS s FROM episodes e GROUP BY e.experiment ORDER BY e.experiment";
     let cells =

@@ -71,7 +71,7 @@ pub enum Engine {
     Native,
     /// The SQL statement of `mirrorstats sql` on Polars, in this process
     Polars,
-    /// The same statement on your own Spark: SPARK_HOME, `spark-submit` on PATH, or Python's package `pyspark`
+    /// The same statement on your own Spark: `SPARK_HOME`, `spark-submit` on PATH, or Python's package `pyspark`
     Spark,
 }
 

@@ -12,7 +12,10 @@ pub mod output;
 pub mod page;
 #[cfg(feature = "polars")]
 pub mod querying;
+#[cfg(feature = "sim")]
+pub mod recording;
 pub mod scoring;
+pub mod sides;
 pub mod spark;
 
 use std::ffi::OsString;

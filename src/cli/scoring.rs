@@ -74,7 +74,7 @@ pub fn table_on(
     match engine.engine {
         Engine::Native => table(inputs, scoring, labels, threads),
         Engine::Polars => polars_table(inputs, scoring, labels, threads),
-        Engine::Spark => spark::Asked::of_files(inputs, scoring, engine)?.score(labels),
+        Engine::Spark => spark::Asked::of_files(inputs, scoring, labels, engine)?.score(labels),
     }
 }
 

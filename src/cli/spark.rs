@@ -9,6 +9,7 @@ use crate::engine::spark::source::{Sources, is_uri};
 use crate::engine::spark::{self, Cluster, Job, SparkError, Written};
 use crate::metric::definitions::Definitions;
 use crate::score::format::Format;
+use crate::score::run;
 use crate::score::table::EpisodeTable;
 use crate::trace::inputs::Input;
 
@@ -49,7 +50,7 @@ impl Asked {
     /// Both at once; whatever is wrong with the footers of files, or with the definitions.
     pub fn of(traces: &TraceArgs, scoring_args: &ScoringArgs, engine: &EngineArgs) -> Result<Self, Failure> {
         match traces.traces.iter().filter(|argument| is_uri(argument)).count() {
-            0 => Self::of_files(&scoring::resolve(traces)?, scoring_args, engine),
+            0 => Self::of_files(&scoring::resolve(traces)?, scoring_args, &[], engine),
             all if all == traces.traces.len() => Ok(Self {
                 sources: Sources::Uris(traces.traces.clone()),
                 definitions: scoring::definitions_unopened(scoring_args)?,
@@ -66,8 +67,14 @@ impl Asked {
     ///
     /// # Errors
     /// Whatever is wrong with the footers of files, or with the definitions.
-    pub fn of_files(inputs: &[Input], scoring_args: &ScoringArgs, engine: &EngineArgs) -> Result<Self, Failure> {
+    pub fn of_files(
+        inputs: &[Input],
+        scoring_args: &ScoringArgs,
+        labels: &[String],
+        engine: &EngineArgs,
+    ) -> Result<Self, Failure> {
         let opened = scoring::open_steps(inputs)?;
+        labels.iter().try_for_each(|label| run::check_label(&opened, label)).map_err(scoring::score_failure)?;
         let definitions = scoring::definitions(&opened, scoring_args)?;
         let sources = Sources::files(inputs, &opened)
             .map_err(|source| SparkError::System { what: "name the traces for Spark".to_owned(), source })

@@ -12,6 +12,7 @@ use serde_json::Value;
 
 use super::message::{EpisodeMessage, Head};
 use super::{LogError, METADATA, METADATA_KEY, topic};
+use crate::base::temporary;
 
 /// What orders the episodes of a log: seed and run.
 pub type Place = (i32, i32);
@@ -35,14 +36,13 @@ pub(super) fn write_recording<W: Write + Seek>(out: &mut Writer<W>, recording: &
 }
 
 /// Puts the episodes of the log at `out`, if there is one, and of these logs of one episode each into one log, which
-/// replaces the one at `out` in one step. Of an episode that is there twice the one in the log counts.
+/// replaces the one at `out` in one step; it is written in `scratch`, a folder of the same disk. Of an episode that is
+/// there twice the one in the log counts.
 ///
 /// # Errors
 /// When a log cannot be read or is damaged, and whatever writing gives; the log at `out` is as it was then.
-pub fn assemble(out: &Path, parts: &[(Place, PathBuf)], recording: &Value) -> Result<(), LogError> {
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file =
-        tempfile::Builder::new().prefix(".mirrorstats-").tempfile_in(folder).map_err(LogError::io("write", out))?;
+pub fn assemble(out: &Path, parts: &[(Place, PathBuf)], recording: &Value, scratch: &Path) -> Result<(), LogError> {
+    let file = temporary::file_in(scratch).map_err(LogError::io("write", out))?;
     let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(out))?;
     write_recording(&mut log, recording).map_err(LogError::writing(out))?;
     let mut before = if out.exists() { Some(Source::open(out)?) } else { None };

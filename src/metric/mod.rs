@@ -22,6 +22,7 @@ pub mod origin;
 pub mod overflow;
 mod pattern;
 pub mod plan;
+pub mod restore;
 pub mod shape;
 pub mod sql;
 mod syntax;

@@ -29,7 +29,7 @@ fn write(hir: &Hir, text: &mut String) {
         HirKind::Class(Class::Unicode(class)) => class_of(class, text),
         // Only ASCII is left where Unicode is switched off and text must stay text.
         HirKind::Class(Class::Bytes(class)) => {
-            class_of(&class.to_unicode_class().unwrap_or_else(ClassUnicode::empty), text)
+            class_of(&class.to_unicode_class().unwrap_or_else(ClassUnicode::empty), text);
         }
         HirKind::Look(look) => text.push_str(&place(*look)),
         HirKind::Repetition(repetition) => repeated(repetition, text),

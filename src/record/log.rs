@@ -1,5 +1,6 @@
 //! What an episode's log is told: the world as shapes, the frame, the counts, the row.
 
+use std::path::Path;
 use std::sync::LazyLock;
 
 use schemars::schema_for;
@@ -28,7 +29,15 @@ impl Log {
     /// # Errors
     /// When it cannot be written.
     pub fn begin(store: &Store, key: Key, episode: &Episode) -> Result<Self, Broken> {
-        let log = EpisodeLog::create(&store.log_part(key), &Head::of(episode), &CENSUS, time(key, 0));
+        Self::begin_at(&store.log_part(key), key, episode)
+    }
+
+    /// Begins the log of an episode that will be at `path`.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn begin_at(path: &Path, key: Key, episode: &Episode) -> Result<Self, Broken> {
+        let log = EpisodeLog::create(path, &Head::of(episode), &CENSUS, time(key, 0));
         Ok(Self { key, log: log.map_err(Broken::fatal)? })
     }
 

@@ -9,10 +9,12 @@ use super::engine::{Batch, Engine, EngineError, Scores};
 use super::segments::Segments;
 use super::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 use crate::base::near::nearest;
+use crate::metric::catalog::Catalog;
 use crate::metric::columns::{Column, Columns, Level, Type};
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::Faults;
 use crate::metric::file::FileError;
+use crate::metric::restore::RestoreError;
 use crate::trace::finding::TraceError;
 use crate::trace::open::TraceSet;
 use crate::trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
@@ -45,6 +47,9 @@ pub enum ScoreError {
     /// The definition file is not.
     #[error(transparent)]
     Definitions(#[from] FileError),
+    /// The definitions that scores carry are not.
+    #[error(transparent)]
+    Carried(#[from] RestoreError),
     /// The condition on episodes is not.
     #[error(transparent)]
     Condition(#[from] Faults),
@@ -126,6 +131,17 @@ pub fn definitions(traces: &TraceSet, request: &Request) -> Result<Definitions, 
     if let Some(metrics) = &request.metrics {
         definitions.select(metrics)?;
     }
+    check_columns(traces, &definitions)?;
+    Ok(definitions)
+}
+
+/// These metrics of the definitions that scores carry, checked against the traces that they were computed from.
+///
+/// # Errors
+/// A catalog that is not what its hash says, an unknown metric, a column that a metric needs and the traces lack.
+pub fn restored(traces: &TraceSet, catalog: &Catalog, metrics: &[String]) -> Result<Definitions, ScoreError> {
+    let mut definitions = Definitions::of_catalog(catalog, &trace_columns(traces))?;
+    definitions.select(metrics)?;
     check_columns(traces, &definitions)?;
     Ok(definitions)
 }
@@ -245,7 +261,11 @@ pub(super) fn projection(
     Ok(Projection { steps, constants, experiments })
 }
 
-fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
+/// Refuses a column to group by that is not constant in an episode, or not in every trace.
+///
+/// # Errors
+/// [`ScoreError::Label`].
+pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     let constant = |name: &str| COLUMNS.iter().any(|column| column.name == name && column.constant);
     let problem = column_problem(traces, label);
     if constant(label) && problem.is_none() {

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{Array as _, AsArray as _, RecordBatch};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Int64Type, SchemaRef};
 use parquet::arrow::ArrowWriter;
@@ -18,6 +18,7 @@ use tempfile::NamedTempFile;
 use super::contain::contained;
 use super::episode::Episode;
 use super::finding::TraceError;
+use super::restore::{self, NotAnEpisode};
 use super::write::{self, OptionalColumns, ROW_GROUP_ROWS, TraceEncoder, TraceMetadata};
 use crate::base::temporary;
 
@@ -37,6 +38,31 @@ impl EpisodeRows {
     /// The number of steps.
     pub fn len(&self) -> usize {
         self.rows.num_rows()
+    }
+
+    /// The episode itself.
+    ///
+    /// # Errors
+    /// When a column of the schema has another type, or an action is none.
+    pub fn episode(&self) -> Result<Episode, NotAnEpisode> {
+        restore::episode(&self.rows)
+    }
+
+    /// The same rows with some columns of integers or truths replaced; a column that is not there is left out.
+    ///
+    /// # Errors
+    /// When a column does not have a value for each row.
+    pub fn with_columns(&self, columns: &[(&str, ArrayRef)]) -> Result<Self, TraceError> {
+        let schema = self.rows.schema();
+        let mut arrays = self.rows.columns().to_vec();
+        for (name, values) in columns {
+            if let Ok(at) = schema.index_of(name) {
+                let values = cast(values, schema.field(at).data_type());
+                arrays[at] = values.map_err(|error| unreadable(&self.episode_id, error.into()))?;
+            }
+        }
+        let rows = RecordBatch::try_new(schema, arrays).map_err(|error| unreadable(&self.episode_id, error.into()))?;
+        Ok(Self { rows, ..self.clone() })
     }
 
     /// Whether there is no step, which no episode of a file has.
@@ -128,7 +154,7 @@ pub fn write(path: &Path, recording: Option<serde_json::Value>, episodes: &[Epis
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
-    let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
+    let file = encode(file, &schema, recording.as_ref(), episodes).map_err(|error| failed(error.into()))?;
     file.as_file().sync_all().map_err(|error| failed(error.into()))?;
     file.persist(path).map(drop).map_err(|error| failed(error.error.into()))
 }
@@ -143,11 +169,11 @@ fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
 fn encode(
     file: NamedTempFile,
     schema: &SchemaRef,
-    recording: Option<serde_json::Value>,
+    recording: Option<&serde_json::Value>,
     episodes: &[EpisodeRows],
 ) -> parquet::errors::Result<NamedTempFile> {
     let options =
-        ArrowWriterOptions::new().with_properties(write::properties(recording.as_ref())).with_skip_arrow_metadata(true);
+        ArrowWriterOptions::new().with_properties(write::properties(recording)).with_skip_arrow_metadata(true);
     let mut parquet = ArrowWriter::try_new_with_options(file, Arc::clone(schema), options)?;
     let mut rows = 0;
     for episode in episodes {

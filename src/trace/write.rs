@@ -5,7 +5,7 @@
 //! column that was not declared is refused, never dropped.
 
 use std::collections::HashSet;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -223,11 +223,24 @@ impl TraceWriter {
     /// # Errors
     /// Whatever writing gives; nothing is left behind then.
     pub fn finish(self) -> Result<(), TraceError> {
+        self.persist(|_| Ok(()))
+    }
+
+    /// As [`finish`](Self::finish), with the rows on the disk before the file has its name: not even a loss of power
+    /// leaves a part of it. That the name itself is on the disk is for the caller to see to.
+    ///
+    /// # Errors
+    /// As [`finish`](Self::finish).
+    pub fn finish_durably(self) -> Result<(), TraceError> {
+        self.persist(|file| file.as_file().sync_all())
+    }
+
+    fn persist(self, before: impl FnOnce(&NamedTempFile) -> io::Result<()>) -> Result<(), TraceError> {
         let Self { encoder, path } = self;
+        let failed = |error: io::Error| TraceError::Write { file: path.display().to_string(), source: Box::new(error) };
         let file = encoder.finish().map_err(|error| named(error, &path))?;
-        file.persist(&path)
-            .map(drop)
-            .map_err(|error| TraceError::Write { file: path.display().to_string(), source: Box::new(error.error) })
+        before(&file).map_err(failed)?;
+        file.persist(&path).map(drop).map_err(|error| failed(error.error))
     }
 }
 

@@ -1,117 +1,70 @@
-//! Episodes of scripted agents in the world, as steps that can be scored.
+//! Episodes of scripted agents in the world, recorded as the recorder does it, and their metrics.
 
+use std::cell::RefCell;
 use std::num::NonZeroUsize;
-use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::agent::{Family, Observation, Reply, Task};
-use mirrorstats::base::frame::Frame;
-use mirrorstats::base::palette::Color;
+use mirrorstats::record::plan::Key;
+use mirrorstats::record::play::{Broken, Onlooker, Seen, Stage, head, play, task};
+use mirrorstats::record::run::Shares;
 use mirrorstats::score::run::{self, Request};
 use mirrorstats::score::table::EpisodeTable;
-use mirrorstats::sim::Experiment;
 use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::sim::eye::Eye;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::world::World;
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats::trace::episode::{Episode, Step};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 use crate::painted::ready;
 
-/// An agent in an experiment, by seed and run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Plan {
-    pub agent: Scripted,
-    pub experiment: Experiment,
-    pub seed: i32,
-    pub run: i32,
-}
+/// Nobody looks on.
+struct Nobody;
 
-impl Plan {
-    pub fn id(&self) -> String {
-        format!("{}-{}-s{}-r{}", self.experiment.name(), self.agent.name(), self.seed, self.run)
+impl Onlooker for Nobody {
+    fn seen(&mut self, _: &Seen<'_>) -> Result<(), Broken> {
+        Ok(())
     }
 
-    fn task(&self, scene: &Scene, config: &WorldConfig) -> Task {
-        let family = if self.experiment == Experiment::E5 { Family::Exploration } else { Family::CubeSelection };
-        Task {
-            family,
-            stated_color: scene.stated_color.map(|color| color.name().to_owned()),
-            step_budget: config.episode.steps as i32,
-            seed: (self.seed as u64) << 32 | (self.run as u64) << 8 | self.experiment as u64,
-        }
+    fn done(&mut self, _: i32, _: &Step) -> Result<(), Broken> {
+        Ok(())
     }
 }
 
-/// Records an episode; `look` gets every frame.
-pub fn record(
-    plan: Plan,
-    config: &WorldConfig,
-    eye: &mut Eye,
-    mut look: impl FnMut(i32, &World, &Frame, &Reply),
-) -> Episode {
-    let scene = Scene::draw(config, plan.experiment, plan.seed, plan.run).unwrap();
-    let task = plan.task(&scene, config);
-    let mut agent = plan.agent.agent(&task);
+/// Records an episode; without an eye for those that look at nothing.
+fn record(config: &WorldConfig, eye: Option<&RefCell<Eye>>, agent: Scripted, key: Key) -> Episode {
+    let scene = Scene::draw(config, key.experiment, key.seed, key.run).unwrap();
+    let mut player = agent.agent(&task(config, &scene, key));
+    let episode = head(&scene, key, agent.name());
     let mut world = World::new(config, scene).unwrap();
-    let mut steps = Vec::new();
-    let (mut bumped, mut history) = (false, None);
-    for t in 1..=task.step_budget {
-        let frame = Arc::new(eye.frame(&world).unwrap());
-        let pose = world.pose();
-        let observation = Observation {
-            t,
-            remaining: task.step_budget - t + 1,
-            x: pose.x as f32,
-            y: pose.y as f32,
-            yaw: pose.heading.degrees() as f32,
-            bumped,
-            history: history.take(),
-            frame: Arc::clone(&frame),
-        };
-        let reply = ready(agent.decide(&observation)).unwrap();
-        look(t, &world, &frame, &reply);
-        steps.push(step(&world, &reply));
-        if reply.action == Some(Action::Done) {
-            break;
+    let stage = Stage { config, eye, stop: &AtomicBool::new(false), shares: &Shares::default() };
+    let mut nobody = Nobody;
+    ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut nobody))).unwrap()
+}
+
+/// Records episodes on `threads` threads, each with an eye of its own; the order is that of the plan.
+pub fn record_all(plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
+    let config = WorldConfig::default();
+    let next = AtomicUsize::new(0);
+    let episodes = Mutex::new(vec![None; plan.len()]);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                let eye = RefCell::new(Eye::new(&config).unwrap());
+                while let Some((agent, key)) = plan.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let looks = !matches!(agent, Scripted::Frozen | Scripted::Random);
+                    let episode = record(&config, looks.then_some(&eye), *agent, *key);
+                    let at = plan.iter().position(|planned| planned == &(*agent, *key)).unwrap();
+                    episodes.lock().unwrap()[at] = Some(episode);
+                }
+            });
         }
-        bumped = world.act(reply.action).bumped;
-        history = Some((reply.action, reply.words.summary));
-    }
-    episode(plan, world.scene(), steps)
-}
-
-fn step(world: &World, reply: &Reply) -> Step {
-    let census = world.census();
-    let chosen = reply.selected_cube.as_deref().and_then(Color::named);
-    Step {
-        action: reply.action,
-        self_color: reply.self_color.clone(),
-        selected_cube: reply.selected_cube.clone(),
-        mirror_visible: world.is_mirror_visible(&census),
-        extra: Extra {
-            mirror_self_px: i32::try_from(census.self_px).ok(),
-            cube_distance: chosen.and_then(|color| world.distance_to_cube(color)).map(|metres| metres as f32),
-            ..Extra::default()
-        },
-    }
-}
-
-fn episode(plan: Plan, scene: &Scene, steps: Vec<Step>) -> Episode {
-    Episode {
-        episode_id: plan.id(),
-        model: plan.agent.name().to_owned(),
-        experiment: plan.experiment.name().to_owned(),
-        seed: plan.seed,
-        run: plan.run,
-        body_color: scene.body_color.name().to_owned(),
-        stated_color: scene.stated_color.map(|color| color.name().to_owned()),
-        distractors: i8::try_from(scene.others.len()).ok(),
-        steps,
-    }
+    });
+    episodes.into_inner().unwrap().into_iter().flatten().collect()
 }
 
 /// The paper's metrics of some episodes.

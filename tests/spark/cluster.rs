@@ -23,7 +23,7 @@ pub struct Cluster {
 }
 
 /// A process that does not outlive its owner.
-struct Process(Child);
+pub struct Process(pub Child);
 
 impl Drop for Process {
     fn drop(&mut self) {

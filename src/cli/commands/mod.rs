@@ -2,12 +2,17 @@
 
 pub mod compare;
 pub mod definitions;
+pub mod diff;
 pub mod figure;
+#[cfg(feature = "sim")]
+pub mod filmstrip;
 pub mod info;
 pub mod query;
 #[cfg(feature = "sim")]
 pub mod record;
 pub mod recover;
+#[cfg(feature = "sim")]
+pub mod replay;
 pub mod report;
 pub mod schema;
 pub mod score;
@@ -30,9 +35,14 @@ pub enum Command {
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
+    Diff(diff::DiffArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
     Recover(recover::RecoverArgs),
+    #[cfg(feature = "sim")]
+    Replay(replay::ReplayArgs),
+    #[cfg(feature = "sim")]
+    Filmstrip(filmstrip::FilmstripArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
     Query(query::QueryArgs),
@@ -55,9 +65,14 @@ impl Command {
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
+            Self::Diff(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
             Self::Recover(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Replay(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Filmstrip(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
             Self::Query(args) => args.run(),

@@ -8,8 +8,8 @@ use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use polars::prelude::{
-    AnyValue, CsvWriter, DataFrame, Engine, JsonFormat, JsonWriter, LazyFrame, ParquetWriter, PlanCallback, Schema,
-    SerWriter as _,
+    AnyValue, CsvWriter, DataFrame, Engine, JsonFormat, JsonWriter, LazyFrame, ParquetWriter, PlanCallback,
+    PolarsResult, Schema, SerWriter as _,
 };
 use polars::sql::SQLContext;
 
@@ -65,7 +65,7 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
     let mut columns = Vec::new();
     for (table, mut frame) in tables {
         let schema = frame.collect_schema().map_err(PolarsError::from)?;
-        columns.extend(schema.iter_names().map(|name| name.to_string()));
+        columns.extend(schema.iter_names().map(polars::prelude::PlSmallStr::to_string));
         context.register(table.name(), frame);
     }
     let planned = run::plan(&mut context, &query.text).and_then(|mut frame| {
@@ -161,7 +161,7 @@ fn each<T: Send + 'static>(
     work: impl Fn(&mut T, DataFrame) -> Result<(), PolarsError> + Send + Sync + 'static,
 ) -> Result<T, PolarsError> {
     let shared = Arc::new(Mutex::new((Some(into), None)));
-    let inner = Arc::clone(&shared);
+    let (inner, work) = (Arc::clone(&shared), Arc::new(work));
     let receive = move |batch: DataFrame| {
         let mut state = inner.lock().unwrap_or_else(PoisonError::into_inner);
         let (into, failed) = &mut *state;
@@ -170,15 +170,31 @@ fn each<T: Send + 'static>(
         }
         Ok(failed.is_some())
     };
-    let sink = frame.sink_batches(PlanCallback::new(receive), true, Some(BATCH))?;
-    let run = || sink.collect_with_engine(Engine::Streaming);
-    contained_on_all_threads(run).map_err(PolarsError::Failed)??;
+    match run_into(frame.clone(), receive.clone()) {
+        // `SELECT COUNT(*)` over several files, which Polars adds up in a type that it was not built with. It stops
+        // before the first batch; with every column read there is no such sum.
+        Err(PolarsError::Failed(words)) if words.contains("UInt128") => {
+            run_into(frame.with_projection_pushdown(false), receive)?;
+        }
+        other => other?,
+    }
     let mut state = shared.lock().unwrap_or_else(PoisonError::into_inner);
     match (state.0.take(), state.1.take()) {
         (_, Some(error)) => Err(error),
         (Some(into), None) => Ok(into),
         (None, None) => Err(PolarsError::Failed("its answer is gone".to_owned())),
     }
+}
+
+/// Runs a frame, its batches in order to `receive`, which says whether it has had enough.
+fn run_into(
+    frame: LazyFrame,
+    receive: impl Fn(DataFrame) -> PolarsResult<bool> + Send + Sync + 'static,
+) -> Result<(), PolarsError> {
+    let sink = frame.sink_batches(PlanCallback::new(receive), true, Some(BATCH))?;
+    let run = || sink.collect_with_engine(Engine::Streaming);
+    contained_on_all_threads(run).map_err(PolarsError::Failed)??;
+    Ok(())
 }
 
 /// The last step with what the batches went into.

@@ -60,7 +60,7 @@ fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
 fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFrame) -> Result<(), PolarsError> {
     let plan = &definitions.plan;
     let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
-    let rows = traces.files().iter().map(|file| file.rows()).sum();
+    let rows = traces.files().iter().map(crate::trace::open::TraceFile::rows).sum();
     let suspects = may_overflow(plan, &needed, rows, |name| schema::column(name)?.stored.range());
     let overflow = |node| Err(PolarsError::Overflow { metric: user_of(definitions, node) });
     if let Some(certain) = suspects.iter().find(|suspect| suspect.certain) {
@@ -70,13 +70,21 @@ fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFram
     if checked.is_empty() {
         return Ok(());
     }
-    let checks = answer(steps, &sql::lower_checks(plan, Dialect::Polars, &checked)?)?;
+    let checks = match answer(steps, &sql::lower_checks(plan, Dialect::Polars, &checked)?) {
+        Err(PolarsError::Failed(words)) if stopped_at_overflow(&words) => return overflow(checked[0]),
+        checks => checks?,
+    };
     for node in checked {
         if ints(&checks, &format!("g{}", node.index()))?.contains(&Some(1)) {
             return overflow(node);
         }
     }
     Ok(())
+}
+
+/// Whether Polars stopped by itself: a division does, and every operation where it was built with overflow checks.
+fn stopped_at_overflow(words: &str) -> bool {
+    words.contains("with overflow") || words.contains("overflow in integer division")
 }
 
 /// The first metric that needs a node.

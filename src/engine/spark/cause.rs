@@ -58,7 +58,7 @@ fn shortened(message: &str, settings: &[Setting]) -> String {
     let line = line.split("; line ").next().unwrap_or_default();
     let line = line.split(" SQLSTATE: ").next().unwrap_or_default();
     let line = without_class(line);
-    let mut words: Vec<String> = line.split(' ').map(|word| without_users(word)).collect();
+    let mut words: Vec<String> = line.split(' ').map(without_users).collect();
     for secret in settings.iter().filter(|setting| setting.is_secret() && !setting.value().is_empty()) {
         words = words.into_iter().map(|word| word.replace(secret.value(), "***")).collect();
     }

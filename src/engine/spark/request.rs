@@ -121,9 +121,10 @@ fn statement(job: Job<'_>) -> Result<String, SparkError> {
         "SELECT s.episode_id AS episode_id, {} FROM steps s GROUP BY s.episode_id",
         read.collect::<Vec<_>>().join(", ")
     );
-    let names = number.map(|at| format!(", labels.l{at}")).collect::<String>();
+    let names: Vec<String> = number.map(|at| format!("labels.l{at}")).collect();
+    let names = names.join(", ");
     Ok(format!(
-        "SELECT scores.*{names}\nFROM (\n{scores}) scores\nJOIN ({labels}) labels ON scores.episode_id = labels.episode_id\n"
+        "SELECT scores.*, {names}\nFROM (\n{scores}) scores\nJOIN ({labels}) labels ON scores.episode_id = labels.episode_id\n"
     ))
 }
 

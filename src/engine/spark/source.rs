@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use crate::trace::inputs::Input;
-use crate::trace::open::TraceSet;
+use crate::trace::open::{TraceFile, TraceSet};
 
 /// The traces.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,7 +50,7 @@ impl Sources {
         Ok(Self::Files {
             names: inputs.iter().map(|input| input.name.clone()).collect(),
             groups: groups.into_iter().map(|(void, paths)| Group { paths, void }).collect(),
-            rows: traces.files().iter().map(|file| file.rows()).sum(),
+            rows: traces.files().iter().map(TraceFile::rows).sum(),
         })
     }
 

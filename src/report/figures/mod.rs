@@ -10,6 +10,7 @@
 //! `convert` (PNG and PDF, feature `raster`).
 
 pub mod e5_outcomes;
+pub mod film_strip;
 pub mod gaze;
 
 mod completion_gap;

@@ -40,8 +40,8 @@ pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)
         return footer::value(metadata.file_metadata(), KIND_KEY).as_deref() == Some(SCORES_KIND);
     }
     let columns = metadata.file_metadata().schema_descr().root_schema().get_fields().iter();
-    let named = folders.iter().map(|(name, _)| name.as_str());
-    let names: Vec<&str> = columns.map(|column| column.name()).chain(named).collect();
+    let outside = folders.iter().map(|(name, _)| name.as_str());
+    let names: Vec<&str> = columns.map(|column| column.name()).chain(outside).collect();
     !names.contains(&"t") && KEYS.iter().all(|key| names.contains(key))
 }
 
@@ -188,7 +188,7 @@ fn column(batch: &RecordBatch, name: &str, ty: &DataType, expected: &'static str
 /// Whether all values are doubles that stand for one integer each.
 fn is_whole(column: &ArrayRef) -> bool {
     const EXACT: f64 = 9_007_199_254_740_992.0;
-    let whole = |value: f64| value.trunc() == value && value.abs() < EXACT;
+    let whole = |value: f64| value.fract().abs() <= 0.0 && value.abs() < EXACT;
     column.as_primitive_opt::<Float64Type>().is_some_and(|floats| floats.iter().flatten().all(whole))
 }
 

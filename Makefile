@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless calibrate
+.PHONY: demo test fmt lint unit docs end-to-end bless calibrate bench sheet
 
 ## Build, record a few episodes of scripted agents, report on them, say where the results are.
 demo:
@@ -53,3 +53,13 @@ calibrate:
 	scripts/get-mujoco.sh
 	cargo test --release --features sim --test agents -- --ignored twenty_one
 	@echo "The table is in reports/world/calibration.md."
+
+## How fast the world is: steps a second with and without frames, and where the time goes.
+bench:
+	scripts/get-mujoco.sh
+	cargo bench --features sim --bench world
+
+## The contact sheet of the five experiments anew.
+sheet:
+	scripts/get-mujoco.sh
+	cargo run --quiet --features sim -- world sheet --out reports/world

@@ -100,13 +100,12 @@ impl Quaternion {
     /// This rotation after `first`.
     #[must_use]
     pub fn after(self, first: Self) -> Self {
-        let [a, b, c, d] = self.0;
-        let [w, x, y, z] = first.0;
+        let (p, q) = (self.0, first.0);
         Self([
-            a * w - b * x - c * y - d * z,
-            a * x + b * w + c * z - d * y,
-            a * y - b * z + c * w + d * x,
-            a * z + b * y - c * x + d * w,
+            p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
+            p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
+            p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
+            p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0],
         ])
     }
 }

@@ -130,7 +130,7 @@ fn nothing_ever_goes_through_anything() {
                 assert!(step <= 0.4 + 1e-9, "{step}");
                 moved[at] += i32::from(step > 0.0);
                 // Halfway is as clear as both ends.
-                let [x, y] = [(from.pose.x + to.pose.x) / 2.0, (from.pose.y + to.pose.y) / 2.0];
+                let [x, y] = [f64::midpoint(from.pose.x, to.pose.x), f64::midpoint(from.pose.y, to.pose.y)];
                 assert!(world.floor_plan().admits([x, y], -1e-9));
             }
         }

@@ -6,6 +6,7 @@ use std::sync::LazyLock;
 use mirrorstats::base::hash;
 use mirrorstats::base::palette::Color;
 use mirrorstats::sim::Experiment;
+use mirrorstats::sim::body::Pose;
 use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::sim::floor::distance;
 use mirrorstats::sim::scene::Scene;
@@ -112,18 +113,16 @@ fn nothing_overlaps_at_the_start() {
     let config = WorldConfig::default();
     for scene in Experiment::ALL.into_iter().flat_map(scenes) {
         let plan = scene.floor_plan(&config);
-        let bodies: Vec<[f64; 2]> = std::iter::once(scene.start)
-            .chain(scene.others.iter().map(|other| other.start))
-            .map(|pose| pose.spot())
-            .collect();
+        let bodies: Vec<[f64; 2]> =
+            std::iter::once(scene.start).chain(scene.others.iter().map(|other| other.start)).map(Pose::spot).collect();
         for (at, body) in bodies.iter().enumerate() {
             assert!(plan.admits(*body, config.placement.clearance));
             assert!(bodies[at + 1..].iter().all(|other| distance(*body, *other) >= 2.0 * plan.radius));
         }
         for (at, cube) in scene.cubes.iter().enumerate() {
             assert!(cube.x.abs().max(cube.y.abs()) + cube.edge / 2.0 <= config.room.size / 2.0);
-            for other in scene.cubes[at + 1..].iter().filter(|other| other.base == cube.base) {
-                let gap = (cube.x - other.x).abs().max((cube.y - other.y).abs()) - (cube.edge + other.edge) / 2.0;
+            for other in scene.cubes[at + 1..].iter().filter(|other| other.base.total_cmp(&cube.base).is_eq()) {
+                let gap = (cube.x - other.x).abs().max((cube.y - other.y).abs()) - f64::midpoint(cube.edge, other.edge);
                 assert!(gap >= -1e-9, "{cube:?} {other:?}");
             }
         }

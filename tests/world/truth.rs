@@ -87,8 +87,7 @@ fn the_census_counts_the_labels() {
     for_scattered(&[Experiment::E4, Experiment::E5, Experiment::E2], 30, |world| {
         let census = world.census();
         let image = labels(world, 640, 480);
-        let count =
-            |shown: Shown| u32::try_from(image.codes.iter().filter(|code| **code == shown.code()).count()).unwrap();
+        let count = |shown: Shown| image.codes.iter().map(|code| u32::from(*code == shown.code())).sum::<u32>();
         assert_eq!(census.view_px, 640 * 480);
         assert_eq!(census.self_px, count(OWN));
         for (at, other) in census.others.iter().enumerate() {

@@ -35,7 +35,7 @@ pub(super) fn rows(world: &World, width: usize, height: usize, mut each: impl Fn
         if let Some(pass) = &mut reflected
             && row.contains(&mirror)
         {
-            pass.paint(y, &mut row, |part| part.code_reflected, |code| code >= mirror && is_of_mirror(code));
+            pass.paint(y, &mut row, |part| part.code_reflected, is_of_mirror);
         }
         each(&row);
     }
@@ -80,15 +80,14 @@ impl Pass {
         let view = self.view;
         let in_row = |candidate: &&Candidate| (candidate.rectangle.top..candidate.rectangle.bottom).contains(&y);
         for Candidate { part, rectangle } in self.candidates.iter().filter(in_row) {
-            for x in rectangle.left..rectangle.right {
-                if !is_open(row[x]) {
-                    continue;
-                }
-                if let Some(depth) = part.solid.meets(view.origin, view.ray(x, y))
-                    && depth < self.depths[x]
+            let columns = rectangle.left..rectangle.right;
+            let pixels = row[columns.clone()].iter_mut().zip(&mut self.depths[columns.clone()]);
+            for (x, (pixel, depth)) in columns.zip(pixels).filter(|(_, (pixel, _))| is_open(**pixel)) {
+                if let Some(met) = part.solid.meets(view.origin, view.ray(x, y))
+                    && met < *depth
                 {
-                    self.depths[x] = depth;
-                    row[x] = code(part);
+                    *depth = met;
+                    *pixel = code(part);
                 }
             }
         }

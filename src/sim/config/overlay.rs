@@ -51,6 +51,9 @@ fn lay(text: &str, under: &mut Table, over: &DeTable<'_>, path: &str) -> Result<
         };
         match (known, value.get_ref()) {
             (Value::Table(inner), DeValue::Table(values)) => lay(text, inner, values, &path)?,
+            (Value::Array(parts), DeValue::Array(values)) if name.ends_with("color") && parts.len() != values.len() => {
+                return Err(fault(format!("`{path}` is red, green and blue, but has {} parts", values.len())));
+            }
             (known, _) => *known = fitting(known, text, value).map_err(|words| fault(format!("`{path}` {words}")))?,
         }
     }
@@ -73,6 +76,9 @@ fn fitting(known: &Value, text: &str, value: &Spanned<DeValue<'_>>) -> Result<Va
         (Value::Float(_), Some(Value::Integer(whole))) => i32::try_from(whole)
             .map(|whole| Value::Float(f64::from(whole)))
             .map_err(|_| format!("is too large: {whole}")),
+        (Value::Integer(_), Some(Value::Integer(whole))) => {
+            u32::try_from(whole).map(|_| Value::Integer(whole)).map_err(|_| format!("counts something, but is {whole}"))
+        }
         (Value::Array(known), Some(Value::Array(values))) => numbers(known, values),
         (known, Some(found)) if known.same_type(&found) => Ok(found),
         _ => Err(format!("is {}, but found {written}", kind(known))),

@@ -46,8 +46,8 @@ fn faults_name_line_key_and_what_may_be() {
     check_fault("clutter.edges = [0.4, true]", "line 1: `clutter.edges` is a list of numbers");
     check_fault("clutter.edges = []", "line 1: `clutter.edges` may be 1 to 16, but is 0");
     check_fault("mirror.width = 7.9", "line 1: `mirror.width` may be 0.5 to 7.4, but is 7.9");
-    check_fault("others.most = -1", "invalid value: integer `-1`, expected u32");
-    check_fault("room.wall_color = [0.1, 0.2]", "invalid length 2, expected an array of length 3");
+    check_fault("others.most = -1", "line 1: `others.most` counts something, but is -1");
+    check_fault("room.wall_color = [0.1, 0.2]", "line 1: `room.wall_color` is red, green and blue, but has 2 parts");
 }
 
 #[test]

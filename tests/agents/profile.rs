@@ -66,7 +66,7 @@ impl Profiles {
     pub fn markdown(&self) -> String {
         const METRICS: [&str; 9] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "MGD", "SC", "AR_SC"];
         let mut text = format!("| experiment | agent | {} |\n", METRICS.join(" | "));
-        text += &format!("|---|---|{}\n", "--:|".repeat(METRICS.len()));
+        writeln!(text, "|---|---|{}", "--:|".repeat(METRICS.len())).unwrap();
         for (experiment, agent) in self.0.keys() {
             let shown = METRICS.map(|metric| shown(metric, self.get(experiment, agent, metric)));
             writeln!(text, "| {experiment} | {agent} | {} |", shown.join(" | ")).unwrap();

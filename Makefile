@@ -1,14 +1,11 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless calibrate
+.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate
 
-## Build, report on the bundled traces, say where the results are.
+## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
-	cargo run --quiet -- report fixtures/paper --out reports/latest
-	@echo
-	@echo "The tables are in reports/latest/tables, every cell in reports/latest/cells.csv."
-	@echo "The same in the paper's own layout: cargo run -- report fixtures/paper --style paper"
+	scripts/demo.sh
 
 ## Everything that CI checks.
 test: fmt lint unit docs end-to-end
@@ -41,6 +38,10 @@ end-to-end:
 bless:
 	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --all-features --no-fail-fast
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
+
+## The bundled recordings anew: fixtures/recorded.
+recorded:
+	scripts/record-fixtures.sh
 
 ## The scripted agents in 21 episodes of each experiment: checks their metric profiles and writes the table of them.
 calibrate:

@@ -1,20 +1,11 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless calibrate bench sheet
+.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench sheet
 
-## Build, record a few episodes of scripted agents, report on them, say where the results are.
+## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
-	scripts/get-mujoco.sh
-	scripts/get-egl.sh
-	cargo build --quiet --features sim
-	for agent in oracle guesser frozen; do \
-	  cargo run --quiet --features sim -- record --agent $$agent --experiment E1,E2 --seeds 1 --runs 2 --out runs/demo || exit; \
-	done
-	cargo run --quiet --features sim -- report runs/demo/*.parquet --out reports/latest
-	@echo
-	@echo "The traces and logs are in runs/demo, the page to explore is reports/latest/report.html."
-	@echo "The reconstructed episodes of the paper, in its own layout: cargo run -- report fixtures/paper --style paper"
+	scripts/demo.sh
 
 ## Everything that CI checks.
 test: fmt lint unit docs end-to-end
@@ -47,6 +38,10 @@ end-to-end:
 bless:
 	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --all-features --no-fail-fast
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
+
+## The bundled recordings anew: fixtures/recorded.
+recorded:
+	scripts/record-fixtures.sh
 
 ## The scripted agents in 21 episodes of each experiment: checks their metric profiles and writes the table of them.
 calibrate:

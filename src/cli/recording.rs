@@ -55,7 +55,7 @@ impl RecordAnswer {
 
 /// The progress bar, which a terminal alone shows.
 pub(super) struct Bar {
-    bar: ProgressBar,
+    line: ProgressBar,
     episodes: usize,
     ended: AtomicUsize,
     budget: u64,
@@ -67,39 +67,39 @@ impl Bar {
         let target =
             if io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let budget = u64::from(steps);
-        let bar = ProgressBar::with_draw_target(Some(episodes as u64 * budget), target);
+        let line = ProgressBar::with_draw_target(Some(episodes as u64 * budget), target);
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let bar = Self { bar, episodes, ended: AtomicUsize::new(0), budget };
+        line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let bar = Self { line, episodes, ended: AtomicUsize::new(0), budget };
         bar.tell();
         bar
     }
 
     /// Takes it off the terminal.
     pub(super) fn clear(&self) {
-        self.bar.finish_and_clear();
+        self.line.finish_and_clear();
     }
 
     fn tell(&self) {
-        self.bar.set_message(format!("{} of {} episodes", self.ended.load(Ordering::Relaxed), self.episodes));
+        self.line.set_message(format!("{} of {} episodes", self.ended.load(Ordering::Relaxed), self.episodes));
     }
 }
 
 impl Progress for Bar {
     fn step(&self) {
-        self.bar.inc(1);
+        self.line.inc(1);
     }
 
     fn episode(&self, _: &str, steps: usize) {
         self.ended.fetch_add(1, Ordering::Relaxed);
         // Steps that an early decision leaves unused are not still to come.
         let unused = self.budget.saturating_sub(steps as u64);
-        self.bar.set_length(self.bar.length().unwrap_or_default().saturating_sub(unused));
+        self.line.set_length(self.line.length().unwrap_or_default().saturating_sub(unused));
         self.tell();
     }
 
     fn lost(&self, id: &str, reason: &str) {
-        self.bar.suspend(|| {
+        self.line.suspend(|| {
             // With standard error closed there is nobody left to tell.
             let _ = writeln!(io::stderr(), "lost {}: {}", visible(id), visible(reason));
         });

@@ -212,7 +212,7 @@ impl Store {
         recording[SEEDS] = json!(seeds);
         self.assemble_log(experiment, &parts, &recording)?;
         let whole = self.parts().join(UNFINISHED_TRACE);
-        merge::write(&whole, Some(recording), &episodes)?;
+        merge::write(&whole, Some(&recording), &episodes)?;
         fs::rename(&whole, &trace).map_err(StoreError::io("write", &trace))?;
         synchronise(self.claim.folder())?;
         for part in parts.iter().chain(log_parts.iter().filter(|part| part.exists())) {

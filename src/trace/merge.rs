@@ -142,7 +142,7 @@ pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows,
 ///
 /// # Errors
 /// When the episodes do not have the same columns, or whatever writing gives.
-pub fn write(path: &Path, recording: Option<serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
+pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write {
         file: path.display().to_string(),
         source,

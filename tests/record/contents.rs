@@ -149,3 +149,15 @@ fn agents_that_look_are_shown_frames() {
     assert!(with_frames["E5-oracle.parquet"] == without["E5-oracle.parquet"]);
     assert!(count(&without) < count(&with_frames));
 }
+
+#[test]
+fn the_bundled_recordings_are_those_that_this_program_makes() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("small.toml"), "").unwrap();
+    bench.recorded("runs", "--agent random --experiment E1..E5 --seeds 1 --runs 2 --no-log");
+    bench.recorded("runs", "--agent frozen --experiment E1 --seeds 1 --runs 1 --no-log");
+    for (name, bytes) in bench.files("runs") {
+        let bundled = format!("{}/fixtures/recorded/{name}", env!("CARGO_MANIFEST_DIR"));
+        assert!(std::fs::read(bundled).unwrap() == bytes, "{name} is not current; `make recorded` writes it");
+    }
+}

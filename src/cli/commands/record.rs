@@ -22,8 +22,9 @@ use crate::sim::config::WorldConfig;
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
-/// The same command again continues where it stopped. Exits with 1 if episodes were lost to failures that are not the
-/// agent's, and with 130 if it was interrupted; what was recorded stays.
+/// The same command again continues where it stopped. Ctrl-C ends a recording when the steps under way are done, a
+/// second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's, and
+/// with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecordArgs {
     /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; or vlm, a model behind a provider

@@ -64,7 +64,7 @@ impl RecoverArgs {
             losses: recovered.losses,
         };
         if answer.written {
-            merge::write(&self.out, recovered.recording, &rows).map_err(Failure::input)?;
+            merge::write(&self.out, recovered.recording.as_ref(), &rows).map_err(Failure::input)?;
             self.check()?;
         }
         output::print(&answer, self.json)?;

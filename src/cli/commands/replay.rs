@@ -181,7 +181,7 @@ impl ReplayArgs {
             if fs::canonicalize(path).is_ok_and(|out| fs::canonicalize(&trace.path).is_ok_and(|own| own == out)) {
                 return Err(Failure::input("--out is the trace itself; name another file"));
             }
-            merge::write(path, Some(recounted(trace.recording.as_ref(), &eye)), &rewritten).map_err(Failure::input)?;
+            merge::write(path, Some(&recounted(trace.recording.as_ref(), &eye)), &rewritten).map_err(Failure::input)?;
         }
         Ok(())
     }

@@ -8,6 +8,7 @@ pub mod info;
 #[cfg(feature = "sim")]
 pub mod record;
 pub mod report;
+pub mod rescore;
 pub mod schema;
 pub mod score;
 pub mod sql;
@@ -28,6 +29,7 @@ pub enum Command {
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
     Diff(diff::DiffArgs),
+    Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
     Schema(schema::SchemaCommand),
@@ -50,6 +52,7 @@ impl Command {
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
             Self::Diff(args) => args.run(),
+            Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
             Self::Schema(command) => command.run(),

@@ -90,7 +90,7 @@ impl RescoreArgs {
         let report = self.report(&manifest, out, style);
         let (made, files) = report.make(inputs)?;
         let changes = match before {
-            Ok(before) => Some(self.changes(before, &made, &traces, &report.by)?),
+            Ok(before) => Some(self.changes(before, &made, &traces, &report)?),
             Err(reason) => {
                 writeln!(io::stderr(), "note: no comparison with the old report: {reason}")?;
                 None
@@ -161,11 +161,18 @@ impl RescoreArgs {
         Err(format!("{}: its definitions are not those of the manifest", path.display()))
     }
 
-    fn changes(&self, before: EpisodeTable, made: &Made, traces: &TraceSet, by: &[String]) -> Result<Changes, Failure> {
+    fn changes(
+        &self,
+        before: EpisodeTable,
+        made: &Made,
+        traces: &TraceSet,
+        report: &ReportArgs,
+    ) -> Result<Changes, Failure> {
         let names = |table: &EpisodeTable| table.metrics.iter().map(|metric| metric.name.clone()).collect();
-        let scored = |table: EpisodeTable| Scored { metrics: names(&table), table, definitions: None };
-        let sides = Sides { before: scored(before), after: scored(made.episodes.clone()) };
-        let mut changes = sides::changes(&sides, by)?;
+        let scored = |table: EpisodeTable, definitions| Scored { metrics: names(&table), table, definitions };
+        let definitions = scoring::definitions(traces, &report.scoring)?;
+        let sides = Sides { before: scored(before, None), after: scored(made.episodes.clone(), Some(definitions)) };
+        let mut changes = sides::changes(&sides, &report.by)?;
         TableOrder { catalog: &made.cells.catalog, style: &made.style }.sort(&mut changes);
         for note in sides::explain(&mut changes, traces, &sides, self.threads.count())? {
             writeln!(io::stderr(), "note: {note}")?;

@@ -24,7 +24,7 @@ fn a_flip_comes_with_the_timesteps_that_decided_it_on_both_sides() {
     let [before, after] = ["before", "after"].map(|side| &cell["numbers"][side]);
     assert_eq!([&before["n"], &before["sum"], &before["sum_sq"]], [3, 3, 5]);
     assert_eq!([&after["n"], &after["sum"], &after["sum_sq"]], [3, 2, 2]);
-    assert_eq!(changes["mean_change"], Value::Null);
+    assert_eq!(cell["mean_change"], json!(-1.0 / 3.0));
     assert_eq!(changes["cells_compared"], 1);
     assert_eq!(changes["rewritten"][0]["text"]["after"], "count(mirror_visible and t >= 2)");
 }
@@ -126,7 +126,7 @@ fn what_cannot_be_compared_is_refused() {
     let folder = folder();
     let at = folder.path();
     for (arguments, expected) in [
-        (&["all.toml", "late.toml"][..], "expected traces to score with these definitions"),
+        (&["all.toml", "late.toml"][..], "expected traces to score with them"),
         (&["a.parquet", "b.parquet"], "found a Parquet file that is no scores"),
         (&["papr", "paper", "a.parquet"], "did you mean the built-in `paper`?"),
         (&["all.toml", "late.toml", "a.parquet", "--metrics", "GAZ"], "did you mean `GAZE`?"),

@@ -84,6 +84,7 @@ fn traces_are_found_from_anywhere_by_what_they_are() {
     let at = folder.path();
     let elsewhere = tempfile::tempdir().unwrap();
     let report = at.join("old").display().to_string();
+    fs::copy(at.join("late.toml"), elsewhere.path().join("late.toml")).unwrap();
     let arguments = ["rescore", report.as_str(), "--definitions", "late.toml", "--out"];
     run(elsewhere.path(), &[&arguments[..], &["above"]].concat()).ends(0);
     fs::create_dir(at.join("moved")).unwrap();

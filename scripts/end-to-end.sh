@@ -30,3 +30,12 @@ packages=$target/python
   --target "$packages" duckdb==2.0.0
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper --where "seed <> 2 and TSA = 1"
+
+echo "end-to-end: the same scores from the SQL lowering on Polars, byte for byte"
+# Another feature set in a folder of its own, so that neither build makes the other one start anew.
+polars() { CARGO_TARGET_DIR=$target/polars cargo run --quiet --features polars -- "$@"; }
+mirrorstats score fixtures/paper >"$out/native.csv"
+polars score fixtures/paper --engine polars >"$out/polars.csv"
+cmp "$out/native.csv" "$out/polars.csv"
+polars report fixtures/paper --style paper --engine polars --out "$out/polars" >/dev/null
+diff -r reports/paper "$out/polars"

@@ -28,7 +28,7 @@ fn folder() -> PathBuf {
 
 /// Every file of the folder: what a person writes, what the program reads and prints as JSON.
 fn current() -> Vec<(&'static str, Value)> {
-    vec![
+    let mut schemas = vec![
         ("comparison", json!(schema_for!(Comparison))),
         ("definitions-check", json!(schema_for!(CheckAnswer))),
         ("definitions-explain", json!(schema_for!(Explanation))),
@@ -44,7 +44,14 @@ fn current() -> Vec<(&'static str, Value)> {
         ("style", json!(schema_for!(Sheet))),
         ("trace", json!(SchemaDocument::current())),
         ("validation", json!(schema_for!(Validation))),
-    ]
+    ];
+    #[cfg(feature = "sim")]
+    schemas.extend([
+        ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
+        ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
+        ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
+    ]);
+    schemas
 }
 
 #[test]

@@ -202,6 +202,11 @@ pub trait Player: Send + Sync {
     /// When it cannot be made; the episode is lost then.
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost>;
 
+    /// Whether the agent looks at frames; one that does not may be given empty ones.
+    fn looks(&self) -> bool {
+        true
+    }
+
     /// How many episodes of a thread are worth having under way at once; more than one where agents wait.
     fn in_flight(&self) -> usize {
         1

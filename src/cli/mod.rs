@@ -11,8 +11,13 @@ pub mod outcome;
 pub mod output;
 pub mod page;
 pub mod provenance;
+#[cfg(feature = "polars")]
+pub mod querying;
+#[cfg(feature = "sim")]
+pub mod recording;
 pub mod scoring;
 pub mod sides;
+pub mod spark;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

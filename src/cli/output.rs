@@ -5,6 +5,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use serde::Serialize;
+use tempfile::NamedTempFile;
 
 use super::outcome::{Failure, Outcome};
 use crate::base::temporary;
@@ -37,38 +38,32 @@ pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
 /// # Errors
 /// When the folder is not there or not writable, or the disk is full; the error names the file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let mut file = beside(path)?;
+    file.write_all(bytes).map_err(|error| unwritable(path, error))?;
+    persist(file, path)
+}
+
+/// A temporary file in the folder of `path`.
+///
+/// # Errors
+/// When the folder is not there or not writable.
+pub fn beside(path: &Path) -> Result<NamedTempFile, Failure> {
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let write = || -> io::Result<()> {
-        let mut file =
-            tempfile::Builder::new().prefix(".mirrorstats-").permissions_of_new_files().tempfile_in(folder)?;
-        file.write_all(bytes)?;
-        file.persist(path)?;
-        Ok(())
-    };
-    write().map_err(|error| {
-        Failure::Rendered(format!(
-            "error: cannot write `{}`: {}\n  help: is the folder there and writable, and the disk not full?",
-            path.display(),
-            temporary::without_name(error)
-        ))
-    })
+    temporary::file_in(folder).map_err(|error| unwritable(path, error))
 }
 
-/// Files as any program makes them, where a temporary file is private.
-trait NewFilePermissions {
-    fn permissions_of_new_files(&mut self) -> &mut Self;
+/// Gives a temporary file its name.
+///
+/// # Errors
+/// When the name cannot be taken.
+pub fn persist(file: NamedTempFile, path: &Path) -> Result<(), Failure> {
+    file.persist(path).map(|_| ()).map_err(|error| unwritable(path, error.error))
 }
 
-impl NewFilePermissions for tempfile::Builder<'_, '_> {
-    #[cfg(unix)]
-    fn permissions_of_new_files(&mut self) -> &mut Self {
-        use std::os::unix::fs::PermissionsExt as _;
-        // The process's umask takes away from these, as with any other file.
-        self.permissions(std::fs::Permissions::from_mode(0o666))
-    }
-
-    #[cfg(not(unix))]
-    fn permissions_of_new_files(&mut self) -> &mut Self {
-        self
-    }
+fn unwritable(path: &Path, error: io::Error) -> Failure {
+    Failure::Rendered(format!(
+        "error: cannot write `{}`: {}\n  help: is the folder there and writable, and the disk not full?",
+        path.display(),
+        temporary::without_name(error)
+    ))
 }

@@ -19,6 +19,8 @@ pub mod file;
 mod functions;
 mod keys;
 pub mod origin;
+pub mod overflow;
+mod pattern;
 pub mod plan;
 pub mod restore;
 pub mod shape;

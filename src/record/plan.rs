@@ -53,7 +53,7 @@ impl Key {
     /// When a step's frame was seen, ns: no clock, but a place of its own on the time line of the log.
     pub fn frame_time(self, t: i32) -> i64 {
         const SECOND: i64 = 1_000_000_000;
-        let episode = i64::from(self.seed) * 10_000 + i64::from(self.run);
+        let episode = i64::from(self.seed) * 1_000 + i64::from(self.run);
         (episode * 1_000 + i64::from(t)) * SECOND
     }
 }

@@ -43,11 +43,17 @@ impl Broken {
 
 /// Who looks on while an episode is played: writes a log, counts steps.
 pub trait Onlooker {
-    /// A step was decided, and is about to be done.
+    /// Something was seen, and nothing is done yet.
     ///
     /// # Errors
     /// When it cannot be written down.
-    fn step(&mut self, seen: &Seen<'_>) -> Result<(), Broken>;
+    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), Broken>;
+
+    /// The step was decided and done; this is its row.
+    ///
+    /// # Errors
+    /// When it cannot be written down.
+    fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken>;
 }
 
 /// A step as an onlooker sees it.
@@ -61,8 +67,6 @@ pub struct Seen<'a> {
     pub frame: Option<&'a Arc<Frame>>,
     /// What could be seen.
     pub census: &'a Census,
-    /// The row of the trace; `bumped` is not known yet.
-    pub row: &'a Step,
 }
 
 /// What an episode is played with, besides its key.
@@ -141,11 +145,12 @@ pub async fn play(
         let action = reply.action;
         history = Some((action, reply.words.summary.clone()));
         let mut row = row(world, key, t, &census, reply);
-        onlooker.step(&Seen { t, world, frame: frame.as_ref(), census: &census, row: &row })?;
+        onlooker.seen(&Seen { t, world, frame: frame.as_ref(), census: &census })?;
         let start = Instant::now();
         bumped = world.act(action).bumped;
         stage.shares.census(start);
         row.extra.bumped = Some(bumped);
+        onlooker.done(t, &row)?;
         episode.steps.push(row);
         if action == Some(crate::trace::episode::Action::Done) {
             break;

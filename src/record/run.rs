@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
+use super::log::Log;
 use super::plan::Key;
 use super::play::{self, Broken, Onlooker, Seen, Stage};
 use super::store::Store;
@@ -21,6 +22,7 @@ use crate::sim::config::WorldConfig;
 use crate::sim::eye::Eye;
 use crate::sim::scene::Scene;
 use crate::sim::world::World;
+use crate::trace::episode::Step;
 
 /// Where the time of a recording goes, over all threads.
 #[derive(Debug, Default)]
@@ -95,7 +97,7 @@ pub struct Settings {
     pub threads: NonZeroUsize,
     /// Episodes under way at once, over all threads.
     pub in_flight: NonZeroUsize,
-    /// Whether pictures are drawn.
+    /// Whether frames are drawn for agents that do not look, and are kept in the log.
     pub frames: bool,
     /// Whether a log is written.
     pub log: bool,
@@ -167,10 +169,8 @@ impl Recording<'_> {
     }
 
     fn episodes(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
-        let eye = match self.settings.frames {
-            true => Some(RefCell::new(Eye::new(self.config).map_err(Broken::fatal)?)),
-            false => None,
-        };
+        let is_needed = self.settings.frames || self.player.looks();
+        let eye = is_needed.then(|| Eye::new(self.config)).transpose().map_err(Broken::fatal)?.map(RefCell::new);
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(Broken::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
@@ -186,7 +186,7 @@ impl Recording<'_> {
             }
             Ok::<(), Broken>(())
         })?;
-        tally.stopped = self.stop.load(Ordering::Relaxed);
+        tally.stopped |= has_more(queue);
         Ok(tally)
     }
 
@@ -197,9 +197,14 @@ impl Recording<'_> {
         let mut agent = self.player.agent(play::task(self.config, &scene, key), &episode.episode_id)?;
         let mut world = World::new(self.config, scene).map_err(Broken::fatal)?;
         let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
-        let mut onlooker = Counter(self.progress);
+        let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
+        let frames = self.settings.frames;
+        let mut onlooker = Onlookers { progress: self.progress, shares: self.shares, frames, log };
         let episode = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await?;
         let start = Instant::now();
+        if let Some(log) = onlooker.log {
+            log.end(&episode)?;
+        }
         self.store.commit(key, &episode).map_err(Broken::fatal)?;
         self.shares.writing(start);
         Ok(episode.steps.len())
@@ -214,7 +219,7 @@ impl Recording<'_> {
                 tally.steps += steps as u64;
                 self.progress.episode(&id, steps);
             }
-            Err(Broken::Stopped) => {}
+            Err(Broken::Stopped) => tally.stopped = true,
             Err(Broken::Lost(lost)) => {
                 self.progress.lost(&id, &lost.0);
                 tally.lost.push((id, lost.0));
@@ -233,16 +238,39 @@ fn next(queue: &Mutex<VecDeque<Key>>) -> Option<Key> {
     queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
 }
 
+/// Whether episodes were left unplayed.
+fn has_more(queue: &Mutex<VecDeque<Key>>) -> bool {
+    !queue.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
+}
+
 fn panicked() -> Broken {
     Broken::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
 }
 
-/// Counts steps.
-struct Counter<'a>(&'a dyn Progress);
+/// Counts steps, and writes the log if there is one.
+struct Onlookers<'a> {
+    progress: &'a dyn Progress,
+    shares: &'a Shares,
+    /// Whether the log has frames.
+    frames: bool,
+    log: Option<Log>,
+}
 
-impl Onlooker for Counter<'_> {
-    fn step(&mut self, _: &Seen<'_>) -> Result<(), Broken> {
-        self.0.step();
+impl Onlooker for Onlookers<'_> {
+    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), Broken> {
+        let start = Instant::now();
+        if let Some(log) = &mut self.log {
+            log.seen(&Seen { frame: seen.frame.filter(|_| self.frames), ..*seen })?;
+        }
+        self.shares.writing(start);
         Ok(())
+    }
+
+    fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken> {
+        self.progress.step();
+        match &mut self.log {
+            Some(log) => log.done(t, row),
+            None => Ok(()),
+        }
     }
 }

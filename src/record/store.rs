@@ -4,7 +4,6 @@
 //! OUT/E1-oracle.parquet            the trace of a model and an experiment, made of whole episodes
 //! OUT/E1-oracle.mcap               its log
 //! OUT/.parts/E1-oracle-s1-r3.*     episodes that are whole, and not in the trace yet
-//! OUT/.lock                        held while a trace is put together
 //! ```
 //!
 //! Rule: an episode is written under a temporary name, synchronised, and renamed, its trace last: it is there whole or
@@ -18,7 +17,9 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
+use super::claim::Claim;
 use super::plan::{Key, slug};
+use crate::log::{LogError, assemble};
 use crate::sim::Experiment;
 use crate::trace::episode::Episode;
 use crate::trace::finding::TraceError;
@@ -30,11 +31,13 @@ use crate::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 /// The key of the recording's metadata that grows with its episodes.
 const SEEDS: &str = "seeds";
+/// A trace that is being put together; by its name it is cleared away if that is not brought to an end.
+const UNFINISHED_TRACE: &str = ".mirrorstats-assembled";
 
 /// The folder of a recording, for one model.
 #[derive(Debug)]
 pub struct Store {
-    folder: PathBuf,
+    claim: Claim,
     model: String,
     recording: Value,
     columns: OptionalColumns,
@@ -72,10 +75,13 @@ pub enum StoreError {
     /// A trace cannot be read or written.
     #[error(transparent)]
     Trace(#[from] TraceError),
+    /// A log cannot be read or written.
+    #[error(transparent)]
+    Log(#[from] LogError),
 }
 
 impl StoreError {
-    fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+    pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { doing, path: path.to_owned(), source: crate::base::temporary::without_name(source) }
     }
 }
@@ -86,22 +92,17 @@ impl Store {
     /// # Errors
     /// When it cannot be made or written to.
     pub fn open(folder: &Path, model: &str, recording: Value) -> Result<Self, StoreError> {
-        let parts = folder.join(".parts");
-        fs::create_dir_all(&parts).map_err(StoreError::io("make the folder", &parts))?;
-        let probe = tempfile::Builder::new().prefix(".mirrorstats-").tempfile_in(&parts);
-        drop(probe.map_err(StoreError::io("write into", &parts))?);
         let columns = OptionalColumns::all();
-        Ok(Self { folder: folder.to_owned(), model: model.to_owned(), recording, columns })
+        Ok(Self { claim: Claim::stake(folder)?, model: model.to_owned(), recording, columns })
     }
 
-    /// Where the parts are.
-    pub fn parts(&self) -> PathBuf {
-        self.folder.join(".parts")
+    fn parts(&self) -> PathBuf {
+        self.claim.parts()
     }
 
     /// The trace of an experiment.
     pub fn trace(&self, experiment: Experiment) -> PathBuf {
-        self.folder.join(format!("{}-{}.parquet", experiment.name(), slug(&self.model)))
+        self.claim.folder().join(format!("{}-{}.parquet", experiment.name(), slug(&self.model)))
     }
 
     /// The log of an experiment.
@@ -123,6 +124,8 @@ impl Store {
     /// # Errors
     /// When a trace or part cannot be read, or was recorded differently.
     pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError> {
+        // A part that another process is taking over into the trace is in neither for a moment.
+        let _lock = self.claim.lock()?;
         let mut found = BTreeSet::new();
         let trace = self.trace(experiment);
         let parts = self.part_files(experiment)?;
@@ -179,8 +182,7 @@ impl Store {
         let metadata = TraceMetadata { recording: Some(self.recording.clone()), columns: self.columns.clone() };
         let mut writer = TraceWriter::create(&path, &metadata)?;
         writer.write(episode)?;
-        writer.finish()?;
-        synchronise(&path)?;
+        writer.finish_durably()?;
         synchronise(&self.parts())
     }
 
@@ -189,7 +191,7 @@ impl Store {
     /// # Errors
     /// Whatever reading and writing give; the parts stay then.
     pub fn assemble(&self, experiment: Experiment) -> Result<(), StoreError> {
-        let _lock = self.lock()?;
+        let _lock = self.claim.lock()?;
         let parts = self.part_files(experiment)?;
         if parts.is_empty() {
             return Ok(());
@@ -197,6 +199,7 @@ impl Store {
         let trace = self.trace(experiment);
         let mut episodes = if trace.exists() { merge::read(&trace)? } else { Vec::new() };
         for part in &parts {
+            self.check_recording(part)?;
             episodes.extend(merge::read(part)?);
         }
         // An episode that was committed and is in the trace already is the same one: the trace was put together, and the
@@ -207,27 +210,31 @@ impl Store {
         let mut recording = self.recording.clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
-        merge::write(&trace, Some(recording), &episodes)?;
-        synchronise(&self.folder)?;
+        self.assemble_log(experiment, &parts, &recording)?;
+        let whole = self.parts().join(UNFINISHED_TRACE);
+        merge::write(&whole, Some(recording), &episodes)?;
+        fs::rename(&whole, &trace).map_err(StoreError::io("write", &trace))?;
+        synchronise(self.claim.folder())?;
         for part in parts.iter().chain(log_parts.iter().filter(|part| part.exists())) {
             fs::remove_file(part).map_err(StoreError::io("remove", part))?;
         }
         Ok(())
     }
 
-    /// Removes the folder of parts if it is empty, and the lock.
-    pub fn tidy(&self) {
-        // Another process may be recording into it: then it is not empty, and stays.
-        if fs::remove_dir(self.parts()).is_ok() {
-            let _ = fs::remove_file(self.folder.join(".lock"));
+    /// Puts the log together from the parts that have one.
+    fn assemble_log(&self, experiment: Experiment, parts: &[PathBuf], recording: &Value) -> Result<(), StoreError> {
+        let mut logs = Vec::new();
+        for part in parts {
+            let log = part.with_extension("mcap");
+            if log.exists() {
+                let episode = merge::read(part)?;
+                logs.extend(episode.first().map(|episode| ((narrow(episode.seed), narrow(episode.run)), log)));
+            }
         }
-    }
-
-    fn lock(&self) -> Result<File, StoreError> {
-        let path = self.folder.join(".lock");
-        let file = File::create(&path).map_err(StoreError::io("make", &path))?;
-        file.lock().map_err(StoreError::io("lock", &path))?;
-        Ok(file)
+        if logs.is_empty() {
+            return Ok(());
+        }
+        Ok(assemble::assemble(&self.log(experiment), &logs, recording, &self.parts())?)
     }
 }
 

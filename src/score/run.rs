@@ -204,6 +204,35 @@ pub fn score(
     Ok(rows.sorted(definitions))
 }
 
+/// The episodes of some traces without a metric: keys and labels, the traces checked as [`score`] checks them.
+///
+/// For engines that read the traces by themselves and check nothing.
+///
+/// # Errors
+/// As [`score`], save that no number is computed.
+pub fn unscored(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, ScoreError> {
+    let projection = projection(traces, definitions, &Engine::new(&definitions.plan), labels)?;
+    let mut rows = Rows { metrics: Vec::new(), ..Rows::new(definitions, labels) };
+    traces.scan(
+        &projection,
+        threads,
+        |batch| -> Result<Part, ScoreError> {
+            let kept = (0..batch.episodes.num_rows()).collect();
+            Ok(Part::of(&batch.episodes, Scores { kept, metrics: Vec::new() }, labels))
+        },
+        |part: Part| {
+            rows.append(part);
+            Ok(())
+        },
+    )?;
+    Ok(rows.sorted(definitions))
+}
+
 /// A batch as the engine takes it.
 pub(super) fn view(batch: &EpisodeBatch) -> Batch<'_> {
     Batch { segments: Segments::new(&batch.offsets), steps: &batch.steps, episodes: &batch.episodes }
@@ -232,7 +261,11 @@ pub(super) fn projection(
     Ok(Projection { steps, constants, experiments })
 }
 
-fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
+/// Refuses a column to group by that is not constant in an episode, or not in every trace.
+///
+/// # Errors
+/// [`ScoreError::Label`].
+pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     let constant = |name: &str| COLUMNS.iter().any(|column| column.name == name && column.constant);
     let problem = column_problem(traces, label);
     if constant(label) && problem.is_none() {

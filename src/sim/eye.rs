@@ -10,7 +10,8 @@ use mujoco_rs::renderer::MjRenderer;
 
 use super::census::{LabelImage, Shown};
 use super::config::WorldConfig;
-use super::model::{EYE_CAMERA, Item, ModelError, Paint, Stage, TOP_CAMERA, compile, labelled};
+use super::model::{EYE_CAMERA, Item, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled};
+use super::scene::Scene;
 use super::world::World;
 use crate::base::frame::Frame;
 
@@ -36,6 +37,9 @@ pub enum EyeError {
         reason: String,
     },
 }
+
+/// The ceiling's place among the groups of a picture.
+const CEILING: usize = group::CEILING as usize;
 
 /// One renderer.
 pub struct Eye {
@@ -99,6 +103,7 @@ impl Eye {
         self.data.forward();
         let id = stage.model().name_to_id(MjtObjBase::mjOBJ_CAMERA, camera).expect("every model has this camera");
         *self.renderer.camera_mut() = MjvCamera::new_fixed(id);
+        self.renderer.opts_mut().geomgroup[CEILING] = u8::from(camera == EYE_CAMERA);
         let failed = |error: RendererError| EyeError::Failed { reason: reason(&error) };
         self.renderer.sync_data(&mut self.data).map_err(failed)?;
         self.renderer.render().map_err(failed)?;
@@ -109,7 +114,11 @@ impl Eye {
 
 /// An eye for labels: it draws every pixel in the colour that names what is there, through the mirror too.
 #[derive(Debug)]
-pub struct LabelEye(Eye);
+pub struct LabelEye {
+    eye: Eye,
+    /// The world drawn last, painted in labels.
+    painted: Option<(Scene, Stage)>,
+}
 
 impl LabelEye {
     /// An eye for labels of views of some size.
@@ -117,7 +126,7 @@ impl LabelEye {
     /// # Errors
     /// As [`Eye::new`].
     pub fn new(config: &WorldConfig, width: usize, height: usize) -> Result<Self, EyeError> {
-        Ok(Self(Eye::painted(config, Paint::Labels, width, height)?))
+        Ok(Self { eye: Eye::painted(config, Paint::Labels, width, height)?, painted: None })
     }
 
     /// What every pixel shows, as drawn; a colour that names nothing counts as the room.
@@ -125,9 +134,13 @@ impl LabelEye {
     /// # Errors
     /// When drawing fails.
     pub fn labels(&mut self, world: &World) -> Result<LabelImage, EyeError> {
-        let mut stage = Stage::new(world.config(), Paint::Labels, world.scene())?;
+        let mut stage = match self.painted.take() {
+            Some((scene, stage)) if scene == *world.scene() => stage,
+            _ => Stage::new(world.config(), Paint::Labels, world.scene())?,
+        };
         stage.pose(world.config(), &world.figures());
-        let frame = self.0.draw(&stage, EYE_CAMERA)?;
+        let frame = self.eye.draw(&stage, EYE_CAMERA)?;
+        self.painted = Some((world.scene().clone(), stage));
         let shown = |pixel: &[u8]| match (labelled(pixel[0]).unwrap_or(Item::Room), pixel[1] > 0) {
             (item, false) => Shown::Direct(item),
             (item, true) => Shown::Reflected(item),

@@ -21,6 +21,8 @@ pub mod floor;
 pub mod model;
 pub mod placement;
 pub mod scene;
+#[cfg(feature = "raster")]
+pub mod sheet;
 pub mod snapshot;
 pub mod walker;
 pub mod world;

@@ -28,12 +28,14 @@ pub const TOP_CAMERA: &str = "top";
 
 /// Groups that MuJoCo's pictures and rays tell apart.
 pub mod group {
-    /// Walls, floor, ceiling and the mirror.
+    /// Walls, floor and the mirror.
     pub const ROOM: i32 = 0;
     /// Cubes and other agents.
     pub const THINGS: i32 = 1;
     /// The agent's own body.
     pub const EGO: i32 = 2;
+    /// The ceiling, through which the view from above looks.
+    pub const CEILING: i32 = 3;
     /// What a scene has not; by MuJoCo's default not drawn.
     pub const HIDDEN: i32 = 5;
 }
@@ -210,6 +212,9 @@ fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
         let geom = spec.geom_mut(name).expect("the room has this plane");
         *geom.size_mut() = size;
         *geom.pos_mut() = place;
+        if name == "ceiling" {
+            geom.set_group(group::CEILING);
+        }
         if name != "mirror" {
             *geom.rgba_mut() = rgba(color);
         }
@@ -218,9 +223,9 @@ fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
     *tiles.rgb1_mut() = room.floor_color;
     *tiles.rgb2_mut() = room.tile_color;
     let material = spec.material_mut("floor").expect("the room has this material");
-    // A texture is two tiles wide.
+    // MuJoCo lays a texture of two by two tiles over twice this size.
     #[expect(clippy::cast_possible_truncation, reason = "a size of the room")]
-    let repeats = (0.5 / room.tile_size) as f32;
+    let repeats = (1.0 / room.tile_size) as f32;
     *material.texrepeat_mut() = [repeats, repeats];
     if paint == Paint::Labels {
         spec.geom_mut("floor").expect("the room has this plane").set_material("");

@@ -141,7 +141,7 @@ impl Drawing<'_> {
         while cubes.len() < count {
             let color = self.chance.one_of(&Color::ALL);
             let edge = self.chance.one_of(&config.edges);
-            let is_before_mirror = self.chance.happens(config.before_mirror_percent);
+            let is_before_mirror = self.chance.happens(config.before_mirror_percent) || cubes.is_empty();
             let cube =
                 self.clutter_cube(mirror, is_before_mirror, Cube { color, x: 0.0, y: 0.0, base: 0.0, edge }, &cubes)?;
             cubes.push(cube);

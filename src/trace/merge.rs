@@ -6,17 +6,21 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{Array as _, AsArray as _, RecordBatch};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Int64Type, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
+use parquet::file::reader::ChunkReader;
 use tempfile::NamedTempFile;
 
 use super::contain::contained;
+use super::episode::Episode;
 use super::finding::TraceError;
-use super::write::{self, ROW_GROUP_ROWS};
+use super::restore::{self, NotAnEpisode};
+use super::write::{self, OptionalColumns, ROW_GROUP_ROWS, TraceEncoder, TraceMetadata};
+use crate::base::temporary;
 
 /// The rows of one episode, with what it is ordered and found by.
 #[derive(Clone, Debug)]
@@ -36,6 +40,31 @@ impl EpisodeRows {
         self.rows.num_rows()
     }
 
+    /// The episode itself.
+    ///
+    /// # Errors
+    /// When a column of the schema has another type, or an action is none.
+    pub fn episode(&self) -> Result<Episode, NotAnEpisode> {
+        restore::episode(&self.rows)
+    }
+
+    /// The same rows with some columns of integers or truths replaced; a column that is not there is left out.
+    ///
+    /// # Errors
+    /// When a column does not have a value for each row.
+    pub fn with_columns(&self, columns: &[(&str, ArrayRef)]) -> Result<Self, TraceError> {
+        let schema = self.rows.schema();
+        let mut arrays = self.rows.columns().to_vec();
+        for (name, values) in columns {
+            if let Ok(at) = schema.index_of(name) {
+                let values = cast(values, schema.field(at).data_type());
+                arrays[at] = values.map_err(|error| unreadable(&self.episode_id, error.into()))?;
+            }
+        }
+        let rows = RecordBatch::try_new(schema, arrays).map_err(|error| unreadable(&self.episode_id, error.into()))?;
+        Ok(Self { rows, ..self.clone() })
+    }
+
     /// Whether there is no step, which no episode of a file has.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -47,11 +76,16 @@ impl EpisodeRows {
 /// # Errors
 /// When the file cannot be read, is damaged, or lacks the columns that tell episodes apart.
 pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
-    let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(path, source);
+    let name = path.display().to_string();
+    let file = File::open(path).map_err(|error| unreadable(&name, error.into()))?;
+    decode(&name, file)
+}
+
+fn decode(name: &str, bytes: impl ChunkReader + 'static) -> Result<Vec<EpisodeRows>, TraceError> {
+    let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
     contained(|| {
-        let file = File::open(path).map_err(|error| failed(error.into()))?;
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let reader = ParquetRecordBatchReaderBuilder::try_new_with_options(file, options)
+        let reader = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options)
             .and_then(ParquetRecordBatchReaderBuilder::build)
             .map_err(|error| failed(error.into()))?;
         let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| failed(error.into()))?;
@@ -62,8 +96,8 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     .unwrap_or_else(|fault| Err(failed(fault.into())))
 }
 
-fn unreadable(path: &Path, source: Box<dyn std::error::Error + Send + Sync>) -> TraceError {
-    TraceError::Part { file: path.display().to_string(), source }
+fn unreadable(name: &str, source: Box<dyn std::error::Error + Send + Sync>) -> TraceError {
+    TraceError::Part { file: name.to_owned(), source }
 }
 
 fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
@@ -91,6 +125,19 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
     Ok(found)
 }
 
+/// The rows of an episode as a trace with these optional columns holds them.
+///
+/// # Errors
+/// For what the schema forbids, as [`TraceEncoder::write`].
+pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows, TraceError> {
+    let metadata = TraceMetadata { recording: None, columns: columns.clone() };
+    let mut encoder = TraceEncoder::new(Vec::new(), &metadata)?;
+    encoder.write(episode)?;
+    let bytes = bytes::Bytes::from(encoder.finish()?);
+    let mut rows = decode("memory", bytes)?;
+    rows.pop().ok_or_else(|| TraceError::Part { file: "memory".to_owned(), source: "no episode came back".into() })
+}
+
 /// Writes these episodes, in this order, as the trace at `path`, which appears whole or not at all.
 ///
 /// # Errors
@@ -106,7 +153,7 @@ pub fn write(path: &Path, recording: Option<serde_json::Value>, episodes: &[Epis
         return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = write::unnamed_in(folder).map_err(|error| failed(error.into()))?;
+    let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
     let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
     file.as_file().sync_all().map_err(|error| failed(error.into()))?;
     file.persist(path).map(drop).map_err(|error| failed(error.error.into()))

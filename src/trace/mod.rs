@@ -13,6 +13,7 @@ mod layout;
 pub mod merge;
 pub mod open;
 mod pass;
+pub mod restore;
 mod rules;
 pub mod scan;
 pub mod schema;

@@ -5,8 +5,6 @@
 //! column that was not declared is refused, never dropped.
 
 use std::collections::HashSet;
-#[cfg(unix)]
-use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -206,7 +204,7 @@ impl TraceWriter {
     /// When no file can be made in that folder.
     pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let file = unnamed_in(folder)
+        let file = temporary::file_in(folder)
             .map_err(|source| TraceError::Write { file: path.display().to_string(), source: Box::new(source) })?;
         let encoder = TraceEncoder::new(file, metadata).map_err(|error| named(error, path))?;
         Ok(Self { encoder, path: path.to_owned() })
@@ -225,11 +223,24 @@ impl TraceWriter {
     /// # Errors
     /// Whatever writing gives; nothing is left behind then.
     pub fn finish(self) -> Result<(), TraceError> {
+        self.persist(|_| Ok(()))
+    }
+
+    /// As [`finish`](Self::finish), with the rows on the disk before the file has its name: not even a loss of power
+    /// leaves a part of it. That the name itself is on the disk is for the caller to see to.
+    ///
+    /// # Errors
+    /// As [`finish`](Self::finish).
+    pub fn finish_durably(self) -> Result<(), TraceError> {
+        self.persist(|file| file.as_file().sync_all())
+    }
+
+    fn persist(self, before: impl FnOnce(&NamedTempFile) -> io::Result<()>) -> Result<(), TraceError> {
         let Self { encoder, path } = self;
+        let failed = |error: io::Error| TraceError::Write { file: path.display().to_string(), source: Box::new(error) };
         let file = encoder.finish().map_err(|error| named(error, &path))?;
-        file.persist(&path)
-            .map(drop)
-            .map_err(|error| TraceError::Write { file: path.display().to_string(), source: Box::new(error.error) })
+        before(&file).map_err(failed)?;
+        file.persist(&path).map(drop).map_err(|error| failed(error.error))
     }
 }
 
@@ -255,16 +266,4 @@ fn named(error: TraceError, path: &Path) -> TraceError {
         TraceError::Write { source, .. } => TraceError::Write { file: path.display().to_string(), source },
         other => other,
     }
-}
-
-/// A temporary file with the permissions of an ordinary new one.
-pub(super) fn unnamed_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mirrorstats-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder).map_err(temporary::without_name)
 }

@@ -4,9 +4,12 @@
 #![expect(
     clippy::cast_possible_truncation,
     clippy::cast_precision_loss,
-    reason = "a picture is small and a colour a byte"
+    reason = "a picture is small, a colour a byte"
 )]
 
+mod calibration;
 mod painted;
+mod profile;
+mod recorded;
 mod sight;
 mod walks;

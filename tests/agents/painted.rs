@@ -174,5 +174,5 @@ fn body(from: Point, ray: Point, color: Color, place: Place) -> Option<(f64, [u8
         (root > 0.0 && far > 1e-9 && high_enough).then_some(far)
     };
     let trunk = cylinder(0.2, 0.0, 1.38).map(|far| (far, lit(color)));
-    trunk.or_else(|| cylinder(0.1, 1.38, 1.62).map(|far| (far, [140, 140, 140])))
+    trunk.or_else(|| cylinder(0.1, 1.38, 1.62).map(|far| (far, [50, 50, 52])))
 }

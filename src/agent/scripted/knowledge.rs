@@ -24,6 +24,8 @@ const AROUND_CUBE: f64 = 0.73;
 const AROUND_BODY: f64 = 0.9;
 /// From how near other bodies are walked around, m.
 const NEAR_BODY: f64 = 2.5;
+/// Steps for which a body is supposed to be where it was seen.
+const MEMORY_OF_BODY: i32 = 2;
 /// Where, after a bump, the cause is supposed to be: so far ahead, so wide, for so many steps.
 const BUMP: (f64, f64, i32) = (0.7, 0.55, 6);
 
@@ -43,8 +45,8 @@ pub struct Knowledge {
     /// How far one step leads, m.
     pub step: f64,
     landmarks: Landmarks,
-    bumps: Vec<(Obstacle, i32)>,
-    t: i32,
+    /// What was in the way lately, and until when that counts.
+    passing: Vec<(Obstacle, i32)>,
 }
 
 impl Knowledge {
@@ -58,8 +60,7 @@ impl Knowledge {
             cubes_in_view: Vec::new(),
             step: STEP,
             landmarks: Landmarks::default(),
-            bumps: Vec::new(),
-            t: 0,
+            passing: Vec::new(),
         }
     }
 
@@ -70,6 +71,7 @@ impl Knowledge {
         self.room.see(&view);
         self.landmarks.see(&view.cubes, view.camera.eye());
         self.reflection.see(&view, &self.room);
+        self.notice(&view.bodies, observation.t);
         self.bodies = view.bodies;
         self.cubes_in_view = view.cubes;
     }
@@ -81,12 +83,11 @@ impl Knowledge {
         if moved > 0.05 && last == Some(Action::MoveForward) {
             self.step = moved;
         }
-        self.t = observation.t;
-        self.bumps.retain(|(_, until)| *until >= observation.t);
+        self.passing.retain(|(_, until)| *until >= observation.t);
         if observation.bumped {
             let way = if last == Some(Action::MoveBackward) { -BUMP.0 } else { BUMP.0 };
             let obstacle = Obstacle { place: pose.place.ahead(pose.heading, way), radius: BUMP.1 };
-            self.bumps.push((obstacle, observation.t + BUMP.2));
+            self.passing.push((obstacle, observation.t + BUMP.2));
         }
         self.pose = pose;
     }
@@ -109,13 +110,22 @@ impl Knowledge {
         self.room.holds(place, GIRTH)
     }
 
-    /// What stands, what was bumped into, and bodies near by.
-    pub fn obstacles(&self) -> Vec<Obstacle> {
+    /// Remembers bodies near by; a cube that is cut off by the edge of the view may look like one, and is none.
+    fn notice(&mut self, bodies: &[Thing], t: i32) {
+        let cubes = self.cubes();
+        let is_cube =
+            |body: &Thing| cubes.iter().any(|cube| cube.color == body.color && cube.place.distance(body.place) < 1.0);
         let is_near =
-            |body: &&Thing| body.place.distance(self.pose.place) < NEAR_BODY && self.room.holds(body.place, 0.0);
-        let bodies = self.bodies.iter().filter(is_near).map(|body| Obstacle { place: body.place, radius: AROUND_BODY });
-        let bumps = self.bumps.iter().map(|(obstacle, _)| *obstacle);
-        self.standing().into_iter().chain(bodies).chain(bumps).collect()
+            |body: &Thing| body.place.distance(self.pose.place) < NEAR_BODY && self.room.holds(body.place, 0.0);
+        let near = bodies.iter().filter(|body| is_near(body) && !is_cube(body));
+        let obstacles: Vec<_> =
+            near.map(|body| (Obstacle { place: body.place, radius: AROUND_BODY }, t + MEMORY_OF_BODY)).collect();
+        self.passing.extend(obstacles);
+    }
+
+    /// What stands, and what passes by.
+    pub fn obstacles(&self) -> Vec<Obstacle> {
+        self.standing().into_iter().chain(self.passing.iter().map(|(obstacle, _)| *obstacle)).collect()
     }
 
     /// What stands: the cubes.

@@ -94,7 +94,7 @@ impl Scripted {
             Self::Frozen => Box::new(frozen::Frozen),
             Self::Mimic => Box::new(seeker::Seeker::new(task, mimic::Mimic::default())),
         };
-        Box::new(Player { script, family: task.family })
+        Box::new(Puppet { script, family: task.family })
     }
 }
 
@@ -105,6 +105,10 @@ impl crate::agent::Player for Scripted {
 
     fn description(&self) -> serde_json::Value {
         serde_json::json!({ "scripted": self.name() })
+    }
+
+    fn looks(&self) -> bool {
+        !matches!(self, Self::Random | Self::Frozen)
     }
 
     fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
@@ -132,12 +136,12 @@ pub trait Script {
 }
 
 /// A script as an agent.
-struct Player {
+struct Puppet {
     script: Box<dyn Script>,
     family: Family,
 }
 
-impl Agent for Player {
+impl Agent for Puppet {
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
         let Move { action, claim, selected, words } = self.script.decide(observation);
         let name = |color: Option<Color>, none: &'static str| color.map_or(none, Color::name).to_owned();

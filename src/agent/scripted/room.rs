@@ -117,7 +117,7 @@ impl Room {
     pub fn is_mirror(&self, side: Side, along: f64) -> bool {
         let votes = &self.votes[side as usize];
         let at = piece(along);
-        let around = at.checked_sub(1).and_then(|first| votes.get(first..at + 2));
+        let around = at.checked_sub(1).and_then(|first| votes.get(first..)?.get(..3));
         around.is_some_and(|around| around[1] >= 0 && around.iter().sum::<i32>() > 2)
     }
 

@@ -53,6 +53,8 @@ pub trait Creed {
 const NEAR: f64 = 1.0;
 /// Steps that are left when an agent that is not settled chooses by chance.
 const RESERVE: i32 = 32;
+/// Turns on the spot after which it no longer minds who passes by.
+const PATIENCE: u32 = 9;
 /// How far before a mirror one sees oneself well, m.
 const BEFORE_MIRROR: (f64, f64) = (0.9, 2.8);
 /// How far from one another the places are from which one looks into the mirror, m.
@@ -71,6 +73,8 @@ pub struct Seeker<C> {
     guess: Option<Color>,
     /// Whether it had made up its mind before this step.
     has_claimed: bool,
+    /// Turns since it last changed its place.
+    turns: u32,
 }
 
 impl<C: Creed> Seeker<C> {
@@ -85,6 +89,7 @@ impl<C: Creed> Seeker<C> {
             looked_from: Vec::new(),
             guess: None,
             has_claimed: false,
+            turns: 0,
         }
     }
 
@@ -98,7 +103,7 @@ impl<C: Creed> Seeker<C> {
                 Some(color) => match known.cube(color) {
                     None => (self.look_around(known), None),
                     Some(cube) if self.has_claimed && is_near(known, cube) => (Action::Done, Some(color)),
-                    Some(cube) => (approach(known, cube), None),
+                    Some(cube) => (self.approach(known, cube), None),
                 },
             },
         }
@@ -144,6 +149,14 @@ impl<C: Creed> Seeker<C> {
         go(known, &known.obstacles(), &is_goal, &far).unwrap_or_else(|| self.look_around(known))
     }
 
+    /// One step nearer to a cube; where no way is known, or much turning led nowhere, without regard to what passes by.
+    fn approach(&self, known: &Knowledge, cube: Landmark) -> Action {
+        let is_goal = |pose: Pose| pose.place.distance(cube.place) <= NEAR;
+        let far = |place: Place| place.distance(cube.place) - NEAR;
+        let careful = if self.turns > PATIENCE { None } else { go(known, &known.obstacles(), &is_goal, &far) };
+        careful.or_else(|| go(known, &known.standing(), &is_goal, &far)).unwrap_or(Action::TurnLeft)
+    }
+
     /// Looks round; once everything has been seen, again.
     fn look_around(&mut self, known: &Knowledge) -> Action {
         self.lookouts.action(known).unwrap_or(Action::TurnLeft)
@@ -153,7 +166,9 @@ impl<C: Creed> Seeker<C> {
 impl<C: Creed> Script for Seeker<C> {
     fn decide(&mut self, observation: &Observation) -> Move {
         let mut known = self.known.take().unwrap_or_else(|| Knowledge::new(observation));
+        let before = known.pose.place;
         known.see(observation);
+        self.turns = if known.pose.place == before { self.turns + 1 } else { 0 };
         let belief = self.creed.belief(&known);
         let (action, selected) = self.act(&known, belief, observation.remaining);
         self.has_claimed |= belief.settled || self.guess.is_some();
@@ -179,15 +194,6 @@ fn metres_to_mirror(known: &Knowledge, place: Place) -> f64 {
 
 fn is_near(known: &Knowledge, cube: Landmark) -> bool {
     known.pose.place.distance(cube.place) <= NEAR
-}
-
-/// One step nearer to a cube; where no way is known, without regard to what moves, and else a turn.
-fn approach(known: &Knowledge, cube: Landmark) -> Action {
-    let is_goal = |pose: Pose| pose.place.distance(cube.place) <= NEAR;
-    let far = |place: Place| place.distance(cube.place) - NEAR;
-    go(known, &known.obstacles(), &is_goal, &far)
-        .or_else(|| go(known, &known.standing(), &is_goal, &far))
-        .unwrap_or(Action::TurnLeft)
 }
 
 fn go(

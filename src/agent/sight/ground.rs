@@ -12,8 +12,8 @@ use crate::base::frame::Frame;
 use super::camera::{Camera, Place};
 use super::paint;
 
-/// How much a channel may differ within one shade.
-const SAME_SHADE: i16 = 4;
+/// How much a channel may differ within one shade. The light is even, and a floor may be nearly as grey as a wall.
+const SAME_SHADE: i16 = 1;
 /// Columns from one foot to the next that is looked for.
 const STRIDE: usize = 4;
 

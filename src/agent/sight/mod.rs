@@ -54,7 +54,7 @@ impl View {
             pose,
             camera,
             cubes: things::cubes(&patches, &camera, frame.width, frame.height),
-            bodies: things::bodies(&patches, &camera, frame.height),
+            bodies: things::bodies(&patches, &camera, frame.width, frame.height),
             feet: ground::feet(&frame, &camera),
             frame,
         }

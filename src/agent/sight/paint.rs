@@ -1,8 +1,8 @@
 //! What colour a pixel shows.
 //!
 //! Light scales a paint: it keeps the ratio of red, green and blue and takes brightness away. So a pixel has the colour of
-//! the palette that some light turns into it most nearly; what grey light on grey explains better has none. White is the
-//! grey that is brighter than any wall.
+//! the palette that some light turns into it most nearly; what grey light on grey explains better has none. White paint
+//! and grey walls differ in brightness, which is a matter of light, and in that walls are never quite without a tint.
 //!
 //! Rule: a pixel alone decides. Edges between two things are mixtures and may get any colour; they are few, and whoever
 //! counts pixels asks for more than a few.
@@ -13,8 +13,10 @@ use crate::base::palette::Color;
 
 /// The least and the most light that falls on what stands in a lit room.
 const LIGHT: (f64, f64) = (0.50, 1.05);
-/// The brightest that a wall, a floor or a face is, of 255.
-const GREY: f64 = 172.0;
+/// From this brightness on, of 255, what has no tint is white.
+const WHITE: u8 = 128;
+/// How much the channels of white paint differ at most.
+const TINT: u8 = 3;
 /// How much nearer a colour must be than grey, so that a tinted wall is not taken for paint.
 const FAVOR_OF_GREY: f64 = 14.0;
 /// Bits of a channel that decide.
@@ -26,6 +28,10 @@ const NONE: u8 = u8::MAX;
 
 /// The colour of the palette that a pixel (red, green, blue) shows; `None` where it is grey.
 pub fn color(pixel: &[u8]) -> Option<Color> {
+    let (least, most) = (pixel[..3].iter().min()?, pixel[..3].iter().max()?);
+    if most - least <= TINT {
+        return (*least >= WHITE).then_some(Color::White);
+    }
     let step = |channel: u8| usize::from(channel >> (8 - BITS));
     let at = pixel[..3].iter().fold(0, |at, &channel| (at << BITS) | step(channel));
     Color::ALL.get(usize::from(TABLE[at])).copied()
@@ -42,10 +48,10 @@ fn table() -> Vec<u8> {
 
 fn nearest(pixel: [f64; 3]) -> u8 {
     let grey = pixel.iter().sum::<f64>() / 3.0;
-    let mut best = (distance(pixel, [grey.min(GREY); 3]) - FAVOR_OF_GREY, NONE);
+    let mut best = (distance(pixel, [grey; 3]) - FAVOR_OF_GREY, NONE);
     for (color, index) in Color::ALL.into_iter().zip(0_u8..) {
         let away = unexplained(pixel, color.rgb().map(f64::from));
-        if away < best.0 {
+        if color != Color::White && away < best.0 {
             best = (away, index);
         }
     }
@@ -77,10 +83,6 @@ mod tests {
     fn every_paint_is_named_in_dim_and_in_full_light() {
         for paint in Color::ALL {
             for percent in (60..=100).step_by(5) {
-                // White in dim light is grey: nobody could tell.
-                if paint == Color::White && percent < 75 {
-                    continue;
-                }
                 let pixel = paint.rgb().map(|channel| u8::try_from(u16::from(channel) * percent / 100).unwrap());
                 assert_eq!(color(&pixel), Some(paint), "{paint:?} at {percent} %: {pixel:?}");
             }
@@ -89,9 +91,10 @@ mod tests {
 
     #[test]
     fn greys_and_tinted_greys_have_no_color() {
-        for level in 0..=165_u8 {
-            assert_eq!(color(&[level, level, level]), None, "{level}");
-            assert_eq!(color(&[level, level.saturating_add(4), level.saturating_add(10)]), None, "{level}, bluish");
+        for level in 0..=250_u8 {
+            assert_eq!(color(&[level, level.saturating_add(2), level.saturating_add(5)]), None, "{level}, bluish");
+            let dark = level / 2;
+            assert_eq!(color(&[dark, dark, dark]), None, "{dark}");
         }
     }
 }

@@ -85,7 +85,7 @@ pub fn patches(frame: &Frame, least: usize) -> Vec<Patch> {
 
 fn runs(frame: &Frame) -> Vec<Run> {
     let mut runs: Vec<Run> = Vec::new();
-    for (row, line) in frame.rgb.chunks_exact(3 * frame.width).enumerate() {
+    for (row, line) in frame.rgb.chunks_exact(3 * frame.width.max(1)).enumerate() {
         let mut open: Option<Run> = None;
         for (column, pixel) in line.chunks_exact(3).enumerate() {
             let color = paint::color(pixel);

@@ -41,8 +41,12 @@ const HALF_BODY: f64 = 0.12;
 
 /// The cubes of a picture of `width` x `height` pixels.
 pub fn cubes(patches: &[Patch], camera: &Camera, width: usize, height: usize) -> Vec<Thing> {
-    let whole = |patch: &&Patch| patch.left > 0 && patch.right + 1 < width && patch.bottom + 1 < height;
-    patches.iter().filter(whole).filter_map(|patch| cube(patch, camera)).collect()
+    patches.iter().filter(|patch| is_whole(patch, width, height)).filter_map(|patch| cube(patch, camera)).collect()
+}
+
+/// Whether nothing of a patch is cut off by an edge of the picture.
+const fn is_whole(patch: &Patch, width: usize, height: usize) -> bool {
+    patch.left > 0 && patch.right + 1 < width && patch.bottom + 1 < height
 }
 
 #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
@@ -63,10 +67,10 @@ fn cube(patch: &Patch, camera: &Camera) -> Option<Thing> {
     })
 }
 
-/// The bodies of a picture `height` pixels high: limbs and trunk are joined where their columns touch.
-pub fn bodies(patches: &[Patch], camera: &Camera, height: usize) -> Vec<Thing> {
+/// The bodies of a picture of `width` x `height` pixels: what is no cube, limbs and trunk joined where their columns touch.
+pub fn bodies(patches: &[Patch], camera: &Camera, width: usize, height: usize) -> Vec<Thing> {
     let mut wholes: Vec<Patch> = Vec::new();
-    for patch in patches {
+    for patch in patches.iter().filter(|patch| !is_whole(patch, width, height) || cube(patch, camera).is_none()) {
         let mut whole = *patch;
         // Joining widens a whole, so that it may touch others.
         while let Some(at) = wholes.iter().position(|other| of_one_body(other, &whole)) {
@@ -78,7 +82,7 @@ pub fn bodies(patches: &[Patch], camera: &Camera, height: usize) -> Vec<Thing> {
 }
 
 fn of_one_body(one: &Patch, other: &Patch) -> bool {
-    let slack = 2 + one.width().max(other.width()) / 8;
+    let slack = 2 + one.width().min(other.width()) / 2;
     one.color == other.color && one.left <= other.right + slack && other.left <= one.right + slack
 }
 

@@ -4,9 +4,15 @@ pub mod compare;
 pub mod definitions;
 pub mod diff;
 pub mod figure;
+#[cfg(feature = "sim")]
+pub mod filmstrip;
 pub mod info;
+pub mod query;
 #[cfg(feature = "sim")]
 pub mod record;
+pub mod recover;
+#[cfg(feature = "sim")]
+pub mod replay;
 pub mod report;
 pub mod rescore;
 pub mod schema;
@@ -14,6 +20,8 @@ pub mod score;
 pub mod sql;
 pub mod stats;
 pub mod validate;
+#[cfg(feature = "sim")]
+pub mod world;
 
 use super::outcome::{Failure, Outcome};
 
@@ -32,9 +40,17 @@ pub enum Command {
     Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
+    Recover(recover::RecoverArgs),
+    #[cfg(feature = "sim")]
+    Replay(replay::ReplayArgs),
+    #[cfg(feature = "sim")]
+    Filmstrip(filmstrip::FilmstripArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
+    Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
+    #[cfg(feature = "sim")]
+    World(world::WorldArgs),
 }
 
 impl Command {
@@ -55,9 +71,17 @@ impl Command {
             Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
+            Self::Recover(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Replay(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Filmstrip(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
+            Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::World(args) => args.run(),
         }
     }
 }

@@ -1,22 +1,22 @@
 //! `mirrorstats record`: agents in the mirror world, one trace and one log a model and experiment.
 
-use std::io::{self, IsTerminal as _, Write as _};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
-
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::time::Instant;
 
 use crate::agent::Player;
 use crate::agent::scripted::Scripted;
 use crate::base::near::nearest;
 use crate::cli::args::ThreadArgs;
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::record::metadata;
 use crate::record::plan::{Experiments, Key, Plan, Shard};
-use crate::record::run::{Progress, Recording, Settings, Shares, Spent, Tally};
+use crate::record::run::{Recording, Settings, Shares};
 use crate::record::store::Store;
+use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
@@ -32,10 +32,10 @@ pub struct RecordArgs {
     #[arg(long, value_name = "LIST", default_value = "E1..E5")]
     experiment: Experiments,
     /// Seeds 1 to this for each experiment
-    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=4_000))]
     seeds: i32,
     /// Runs 1 to this for each seed
-    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(i32).range(1..10_000))]
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(i32).range(1..=999))]
     runs: i32,
     /// Record one share of the episodes, such as 3/16; shares may go into one folder
     #[arg(long, value_name = "I/N", default_value = "1/1")]
@@ -52,9 +52,12 @@ pub struct RecordArgs {
     /// Write no log
     #[arg(long)]
     no_log: bool,
-    /// Draw no pictures: only for agents that look at none, such as frozen and random
+    /// Leave the frames out of the log, and draw none for agents that do not look (random, frozen)
     #[arg(long)]
     no_frames: bool,
+    /// Print what became of the episodes as JSON
+    #[arg(long)]
+    json: bool,
     /// How many threads to use.
     #[command(flatten)]
     threads: ThreadArgs,
@@ -93,39 +96,47 @@ impl RecordArgs {
         let bar = Bar::new(todo.len(), config.episode.steps);
         let shares = Shares::default();
         let start = Instant::now();
-        let in_flight = self.in_flight.map_or_else(|| player.in_flight(), NonZeroUsize::get);
-        let recording = Recording {
-            config,
-            player,
-            store,
-            progress: &bar,
-            stop,
-            shares: &shares,
-            settings: Settings {
-                threads: self.threads.count(),
-                in_flight: NonZeroUsize::new(in_flight).unwrap_or(NonZeroUsize::MIN),
-                frames: !self.no_frames,
-                log: !self.no_log,
-            },
-        };
+        let recording =
+            Recording { config, player, store, progress: &bar, stop, shares: &shares, settings: self.settings(player) };
         let played = recording.run(&todo);
-        for experiment in &plan.experiments {
-            store.assemble(*experiment).map_err(Failure::input)?;
-        }
-        store.tidy();
-        bar.0.finish_and_clear();
+        // What is whole is put together whatever ended the recording.
+        let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
+        bar.clear();
         let tally = played.map_err(|broken| Failure::input(broken.to_string()))?;
-        let skipped = planned.len() - todo.len();
-        say(&tally, skipped, start.elapsed(), shares.spent())?;
+        assembled.map_err(Failure::input)?;
+        let answer =
+            RecordAnswer::of(tally, player.model(), planned.len(), planned.len() - todo.len(), files(plan, store));
+        recording::say(&answer, start.elapsed(), shares.spent())?;
+        if self.json {
+            output::print_json(&answer)?;
+        }
         if let Some(reason) = player.stopped() {
             return Err(Failure::input(reason));
         }
-        match (tally.stopped, tally.lost.is_empty()) {
+        match (answer.stopped, answer.lost.is_empty()) {
             (true, _) => Ok(Outcome::Interrupted),
             (false, true) => Ok(Outcome::Done),
             (false, false) => Ok(Outcome::CheckFailed),
         }
     }
+
+    fn settings(&self, player: &dyn Player) -> Settings {
+        Settings {
+            threads: self.threads.count(),
+            in_flight: self.in_flight.or(NonZeroUsize::new(player.in_flight())).unwrap_or(NonZeroUsize::MIN),
+            frames: !self.no_frames,
+            log: !self.no_log,
+        }
+    }
+}
+
+/// The traces of a plan, and its logs, as far as they are there.
+fn files(plan: &Plan, store: &Store) -> [Vec<String>; 2] {
+    let those = |path: &dyn Fn(Experiment) -> PathBuf| {
+        let paths = plan.experiments.iter().map(|experiment| path(*experiment));
+        paths.filter(|path| path.exists()).map(|path| path.display().to_string()).collect()
+    };
+    [those(&|experiment| store.trace(experiment)), those(&|experiment| store.log(experiment))]
 }
 
 /// The agent of this name.
@@ -157,67 +168,4 @@ fn stop_at_interrupt(stop: &'static AtomicBool) -> Result<(), Failure> {
         }
     })
     .map_err(|error| Failure::input(format!("cannot listen for Ctrl-C: {error}")))
-}
-
-/// The progress bar, which a terminal alone shows.
-struct Bar(ProgressBar);
-
-impl Bar {
-    fn new(episodes: usize, steps: u32) -> Self {
-        let most = episodes as u64 * u64::from(steps);
-        let target =
-            if io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let bar = ProgressBar::with_draw_target(Some(most), target);
-        let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} at most");
-        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        bar.set_message(format!("{episodes} episodes"));
-        Self(bar)
-    }
-}
-
-impl Progress for Bar {
-    fn step(&self) {
-        self.0.inc(1);
-    }
-
-    fn episode(&self, id: &str, steps: usize) {
-        self.0.set_message(format!("{id}: {steps} steps"));
-    }
-
-    fn lost(&self, id: &str, reason: &str) {
-        self.0.suspend(|| {
-            let _ = writeln!(io::stderr(), "lost {id}: {}", crate::base::visible::visible(reason));
-        });
-    }
-}
-
-fn say(tally: &Tally, skipped: usize, elapsed: Duration, spent: Spent) -> io::Result<()> {
-    let mut out = io::stderr().lock();
-    let seconds = elapsed.as_secs_f64();
-    #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
-    let rate = if seconds > 0.0 { tally.steps as f64 / seconds } else { 0.0 };
-    write!(
-        out,
-        "recorded {} episodes, {} steps in {seconds:.1} s ({rate:.0} steps a second)",
-        tally.recorded, tally.steps
-    )?;
-    writeln!(out, "{}", if skipped > 0 { format!("; {skipped} episodes were there already") } else { String::new() })?;
-    let parts = [
-        ("rendering", spent.rendering),
-        ("world and census", spent.census),
-        ("agents", spent.agent),
-        ("writing", spent.writing),
-    ];
-    let total: f64 = parts.iter().map(|(_, time)| time.as_secs_f64()).sum();
-    if total > 0.0 {
-        let words = parts.map(|(name, time)| format!("{name} {:.0} %", 100.0 * time.as_secs_f64() / total));
-        writeln!(out, "of the work: {}", words.join(", "))?;
-    }
-    if !tally.lost.is_empty() {
-        writeln!(out, "lost {} episodes; they are in no trace, the same command records them again", tally.lost.len())?;
-    }
-    if tally.stopped {
-        writeln!(out, "stopped; the same command continues")?;
-    }
-    Ok(())
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::args::{ScoringArgs, TraceArgs};
+use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
 use super::super::{output, scoring};
@@ -20,7 +20,7 @@ use crate::score::format;
 use crate::trace::inputs::Input;
 use crate::trace::schema::SCHEMA_VERSION;
 
-/// Compute the tables of traces, print the main one, write all of them
+/// Compute the tables and figures of traces, print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
 pub struct ReportArgs {
     /// Traces, or files of scores in their place.
@@ -29,6 +29,9 @@ pub struct ReportArgs {
     /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
+    /// What computes it.
+    #[command(flatten)]
+    pub engine: EngineArgs,
     /// The folder to write
     #[arg(long, value_name = "DIR", default_value = "reports/latest")]
     pub out: PathBuf,
@@ -83,7 +86,7 @@ impl ReportArgs {
         // Small files first: a slip in the style should not cost a pass over the traces.
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let labels = scoring::labels(&self.by);
-        let episodes = scoring::table(&inputs, &self.scoring, &labels, self.traces.threads.count())?;
+        let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &labels, self.traces.threads.count())?;
         let cells = group(&episodes, &self.by).map_err(Failure::input)?;
         let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
         let condition = self.scoring.condition.clone();

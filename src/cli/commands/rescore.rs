@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::args::{ScoringArgs, ThreadArgs, TraceArgs};
+use super::super::args::{EngineArgs, ScoringArgs, ThreadArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::page::Made;
 use super::super::provenance;
@@ -142,6 +142,7 @@ impl RescoreArgs {
         ReportArgs {
             traces: TraceArgs { traces: Vec::new(), threads: self.threads },
             scoring,
+            engine: EngineArgs::default(),
             out,
             style,
             by: manifest.by.clone(),

@@ -15,6 +15,7 @@ use super::font::{self, Weight};
 use super::frame::{Frame, Point};
 use super::ink::{Ink, UNITS_PER_PX, escaped};
 use super::mark::Mark;
+use crate::base::base64::base64;
 
 /// How a line looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -163,6 +164,17 @@ impl Sheet {
         let at = if lettering.upwards { (at.0 + drop, at.1) } else { (at.0, at.1 + drop) };
         let style = text_style(lettering);
         self.put(&Text::new(font::drawable(text), lattice(at), style), String::new());
+    }
+
+    /// A picture that fills a frame; it is carried along in the file.
+    pub fn picture(&mut self, frame: Frame, png: &[u8]) {
+        let Frame { left, top, width, height } = frame;
+        let _ = writeln!(
+            self.ink.borrow_mut().body,
+            "<image x=\"{left:.2}\" y=\"{top:.2}\" width=\"{width:.2}\" height=\"{height:.2}\" \
+             preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
+            base64(png)
+        );
     }
 
     /// What `draw` draws, as one group that carries the mark's title and values.

@@ -2,11 +2,14 @@
 //!
 //! Columns are `episode_id, model, experiment, seed, run`, then the labels, then the metrics by name;
 //! rates are 0 and 1; undefined is null or empty. Parquet carries the definitions in its footer; the
-//! two text formats cannot, so whoever reads them back names the definitions.
+//! two text formats cannot, nor can the SQL lowering run by hand on another engine, so whoever reads those back names
+//! the definitions.
 
 mod csv;
+mod footer;
 mod jsonl;
 mod parquet;
+mod surroundings;
 
 use std::collections::HashSet;
 use std::io::{Read, Write};
@@ -16,7 +19,8 @@ use ::parquet::file::reader::ChunkReader;
 use super::table::EpisodeTable;
 use crate::metric::catalog::{Catalog, Kind};
 
-pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_scores};
+pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
+pub use self::surroundings::Surroundings;
 
 /// A format of episode tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -126,12 +130,15 @@ pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<
     })
 }
 
-/// Reads a table and the definitions that it carries.
+/// Reads a table and the definitions that it carries, or those of its surroundings.
 ///
 /// # Errors
 /// A file that is not Parquet, or not one of scores; scores that its definitions cannot have given.
-pub fn read_parquet(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
-    checked(parquet::read(input)?)
+pub fn read_parquet(
+    input: impl ChunkReader + 'static,
+    surroundings: &Surroundings<'_>,
+) -> Result<EpisodeTable, FormatError> {
+    checked(parquet::read(input, surroundings)?)
 }
 
 /// A table as scoring gives it: each episode once, of a known experiment, rates 0 and 1.

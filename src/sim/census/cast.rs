@@ -3,7 +3,7 @@
 use super::super::model::{Item, Stage};
 use super::super::world::World;
 use super::shape::{Part, Rectangle, Solid, solid};
-use super::view::{Shown, View, dot, minus, plus};
+use super::view::{Shown, View, dot, minus};
 
 /// A part and where it can be seen.
 struct Candidate {
@@ -93,9 +93,4 @@ impl Pass {
             }
         }
     }
-}
-
-#[expect(dead_code, reason = "for the faster forms")]
-fn unused() {
-    let _ = plus;
 }

@@ -16,7 +16,7 @@ mod view;
 pub use count::{Census, CubeSighting, Sighting};
 pub use view::Shown;
 
-use super::model::Stage;
+use super::model::{ModelError, Paint, Stage};
 use super::world::World;
 
 /// What every pixel shows, row by row from the top.
@@ -57,6 +57,11 @@ pub fn labels(world: &World, width: usize, height: usize) -> LabelImage {
 }
 
 /// The same with a loop over MuJoCo's own rays, which takes fifty times as long: what the census is tested against.
-pub fn labels_by_mujoco(world: &World, stage: &mut Stage, width: usize, height: usize) -> LabelImage {
-    view::by_mujoco(world, stage, width, height)
+///
+/// # Errors
+/// When MuJoCo refuses the model.
+pub fn labels_by_mujoco(world: &World, width: usize, height: usize) -> Result<LabelImage, ModelError> {
+    let mut stage = Stage::new(world.config(), Paint::Lit, world.scene())?;
+    stage.pose(world.config(), &world.figures());
+    Ok(view::by_mujoco(world, &mut stage, width, height))
 }

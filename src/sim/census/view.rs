@@ -135,7 +135,7 @@ impl View {
 /// Labels by MuJoCo's own rays, the mirror by a second ray from where the first met it.
 pub(super) fn by_mujoco(world: &World, stage: &mut Stage, width: usize, height: usize) -> LabelImage {
     let view = View::of_eye(world, width, height);
-    let all = groups(&[group::ROOM, group::THINGS, group::EGO]);
+    let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
     let mut codes = Vec::with_capacity(width * height);
     for y in 0..height {
         for x in 0..width {
@@ -157,7 +157,7 @@ fn beyond(stage: &mut Stage, mirror: usize, view: &View, ray: Vector, distance: 
     let normal = [rotation[2], rotation[5], rotation[8]];
     let from = plus(view.origin, distance, ray);
     let onwards = plus(ray, -2.0 * dot(ray, normal), normal);
-    let all = groups(&[group::ROOM, group::THINGS, group::EGO]);
+    let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
     let from = plus(from, 1e-9, onwards);
     let (geom, _) = stage.data.ray(&from, &onwards, Some(&all), true, None, None);
     geom.map_or(Item::Room, |geom| stage.items()[geom])

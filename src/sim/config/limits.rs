@@ -74,7 +74,7 @@ fn relations(config: &WorldConfig) -> Vec<Limit> {
         ("others.least", f64::from(others.least), 1.0, f64::from(others.most)),
         ("clutter.least", f64::from(clutter.least), 0.0, f64::from(clutter.most)),
         ("clutter.edges", count(&clutter.edges), 1.0, 16.0),
-        ("cubes.spacing", cubes.spacing, 1.5 * cubes.edge, room.size / 3.0),
+        ("cubes.spacing", cubes.spacing, 1.5 * cubes.edge, (room.size / 3.0 * 100.0).floor() / 100.0),
         ("cubes.mirror_distance", cubes.mirror_distance, cubes.edge / 2.0 + placement.wall_margin, room.size / 2.0),
         ("clutter.mirror_distance", clutter.mirror_distance, 1.0, room.size / 2.0),
     ]

@@ -7,7 +7,7 @@ use super::super::floor::FloorPlan;
 use super::super::scene::{Cube, Scene};
 
 /// Between two points of the lattice that stands for the floor, m.
-const LATTICE: f64 = 0.2;
+const LATTICE: f64 = 0.4;
 
 /// A body sees itself well from no further than this from the mirror, m.
 const NEAR_ENOUGH: f64 = 3.0;
@@ -48,7 +48,8 @@ fn lengths(scene: &Scene, plan: &FloorPlan) -> Vec<([f64; 2], f64)> {
     while let Some(at) = queue.pop_front() {
         let (from, length) = found[at];
         for to in [[1, 0], [-1, 0], [0, 1], [0, -1]].map(|[right, up]| [from[0] + right, from[1] + up]) {
-            if plan.is_passable(spot(from), spot(to)) && seen.insert(to) {
+            if !seen.contains(&to) && plan.is_passable(spot(from), spot(to)) {
+                seen.insert(to);
                 queue.push_back(found.len());
                 found.push((to, length + LATTICE));
             }

@@ -127,7 +127,7 @@ fn what_cannot_be_compared_is_refused() {
     let at = folder.path();
     for (arguments, expected) in [
         (&["all.toml", "late.toml"][..], "expected traces to score with them"),
-        (&["a.parquet", "b.parquet"], "found a Parquet file that is no scores"),
+        (&["a.parquet", "b.parquet"], "found no scores in it"),
         (&["papr", "paper", "a.parquet"], "did you mean the built-in `paper`?"),
         (&["all.toml", "late.toml", "a.parquet", "--metrics", "GAZ"], "did you mean `GAZE`?"),
         (&["all.toml", "late.toml", "a.parquet", "--by", "modell"], "did you mean `model`?"),

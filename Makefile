@@ -3,12 +3,18 @@
 .DELETE_ON_ERROR:
 .PHONY: demo test fmt lint unit docs end-to-end bless calibrate
 
-## Build, report on the bundled traces, say where the results are.
+## Build, record a few episodes of scripted agents, report on them, say where the results are.
 demo:
-	cargo run --quiet -- report fixtures/paper --out reports/latest
+	scripts/get-mujoco.sh
+	scripts/get-egl.sh
+	cargo build --quiet --features sim
+	for agent in oracle guesser frozen; do \
+	  cargo run --quiet --features sim -- record --agent $$agent --experiment E1,E2 --seeds 1 --runs 2 --out runs/demo || exit; \
+	done
+	cargo run --quiet --features sim -- report runs/demo/*.parquet --out reports/latest
 	@echo
-	@echo "The tables are in reports/latest/tables, every cell in reports/latest/cells.csv."
-	@echo "The same in the paper's own layout: cargo run -- report fixtures/paper --style paper"
+	@echo "The traces and logs are in runs/demo, the page to explore is reports/latest/report.html."
+	@echo "The reconstructed episodes of the paper, in its own layout: cargo run -- report fixtures/paper --style paper"
 
 ## Everything that CI checks.
 test: fmt lint unit docs end-to-end

@@ -28,9 +28,9 @@ const NULL: &str = "NULL";
 pub fn run(args: &QueryArgs) -> Result<Outcome, Failure> {
     let format = format(args)?;
     // A slip in the query should not cost a look at the traces.
-    let query = statement::check(&args.query).map_err(faults)?;
+    let query = statement::check(&args.query).map_err(|found| faults(&found))?;
     let frame = answer::plan(&query, load(args, &query)?).map_err(|error| match error {
-        QueryError::Faults(found) => faults(found),
+        QueryError::Faults(found) => faults(&found),
         QueryError::Polars(error) => failed(error),
     })?;
     let Some(format) = format else {
@@ -50,7 +50,7 @@ pub fn run(args: &QueryArgs) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-fn faults(faults: Faults) -> Failure {
+fn faults(faults: &Faults) -> Failure {
     Failure::Faults(faults.render(scoring::colored()))
 }
 
@@ -60,7 +60,7 @@ fn failed(error: PolarsError) -> Failure {
 
 /// The format asked for; `None` for a table.
 fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
-    let ending = args.output.as_deref().and_then(Path::extension).map(|ending| ending.to_ascii_lowercase());
+    let ending = args.output.as_deref().and_then(Path::extension).map(std::ffi::OsStr::to_ascii_lowercase);
     let ending = ending.as_deref().and_then(std::ffi::OsStr::to_str);
     let by_ending = match (ending, &args.output) {
         (_, None) | (Some("txt"), _) => AnswerFormat::Table,

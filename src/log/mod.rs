@@ -50,7 +50,7 @@ pub mod topic {
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
     /// The operating system refuses.
-    #[error("cannot {doing} the log `{file}`: {source}")]
+    #[error("cannot {doing} the log `{file}`: {source}\n  help: is the folder there and writable, and the disk not full?")]
     Io {
         /// What was being done.
         doing: &'static str,

@@ -54,11 +54,10 @@ impl Dialect {
     /// A name as it stands in a statement.
     fn quoted(self, name: &str) -> String {
         match self {
-            Self::Polars => format!("\"{}\"", name.replace('"', "\"\"")),
             Self::Portable | Self::Duckdb if is_plain(name) => name.to_owned(),
             Self::Spark if is_plain(name) && !is_keyword(name) => name.to_owned(),
             Self::Spark => format!("`{}`", name.replace('`', "``")),
-            Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
+            Self::Polars | Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
         }
     }
 

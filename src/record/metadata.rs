@@ -17,7 +17,7 @@ pub fn recording(config: &WorldConfig, player: &dyn Player) -> Value {
         "agent": player.description(),
         "view": { "width": config.eye.width, "height": config.eye.height_px, "fov_y": config.eye.fovy },
         "visibility_threshold_px": config.evidence.mirror_self_px,
-        "world_hash": config.hash(),
         "world": config,
+        "world_hash": config.hash(),
     })
 }

@@ -415,7 +415,7 @@ pub enum TraceError {
         found: String,
     },
     /// The trace could not be written; no file was left behind.
-    #[error("cannot write the trace {file}; no file was left behind")]
+    #[error("cannot write the trace {file}, and left no file behind: is the folder writable, and the disk not full?")]
     Write {
         /// The file, as named.
         file: String,

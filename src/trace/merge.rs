@@ -154,7 +154,7 @@ pub fn write(path: &Path, recording: Option<serde_json::Value>, episodes: &[Epis
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
-    let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
+    let file = encode(file, &schema, recording.as_ref(), episodes).map_err(|error| failed(error.into()))?;
     file.as_file().sync_all().map_err(|error| failed(error.into()))?;
     file.persist(path).map(drop).map_err(|error| failed(error.error.into()))
 }
@@ -169,11 +169,11 @@ fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
 fn encode(
     file: NamedTempFile,
     schema: &SchemaRef,
-    recording: Option<serde_json::Value>,
+    recording: Option<&serde_json::Value>,
     episodes: &[EpisodeRows],
 ) -> parquet::errors::Result<NamedTempFile> {
     let options =
-        ArrowWriterOptions::new().with_properties(write::properties(recording.as_ref())).with_skip_arrow_metadata(true);
+        ArrowWriterOptions::new().with_properties(write::properties(recording)).with_skip_arrow_metadata(true);
     let mut parquet = ArrowWriter::try_new_with_options(file, Arc::clone(schema), options)?;
     let mut rows = 0;
     for episode in episodes {

@@ -15,7 +15,7 @@ use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::sim::eye::Eye;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::world::World;
-use mirrorstats::trace::episode::Episode;
+use mirrorstats::trace::episode::{Episode, Step};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
@@ -26,7 +26,11 @@ use crate::painted::ready;
 struct Nobody;
 
 impl Onlooker for Nobody {
-    fn step(&mut self, _: &Seen<'_>) -> Result<(), Broken> {
+    fn seen(&mut self, _: &Seen<'_>) -> Result<(), Broken> {
+        Ok(())
+    }
+
+    fn done(&mut self, _: i32, _: &Step) -> Result<(), Broken> {
         Ok(())
     }
 }

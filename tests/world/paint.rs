@@ -64,7 +64,9 @@ fn the_ten_colours_are_told_apart_directly_and_in_the_mirror() {
                 };
                 // A head has no colour of the palette and is darker than the room.
                 let is_head = pixel.iter().all(|part| *part < 70) && pixel[0].abs_diff(pixel[2]) < 10;
-                if is_inner(&image, x, y) && !(kind == 0 && is_head) {
+                // Most of a picture is the room, of which a part will do.
+                let is_asked = expected.is_some() || at % 41 == 0;
+                if is_asked && is_inner(&image, x, y) && !(kind == 0 && is_head) {
                     let found = nearest([pixel[0], pixel[1], pixel[2]].map(f64::from));
                     tally[kind][usize::from(found != expected)] += 1;
                 }

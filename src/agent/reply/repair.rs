@@ -31,6 +31,9 @@ impl Repair {
     }
 }
 
+/// The changed text; `None` where there is nothing to repair.
+type Change = fn(&str) -> Option<String>;
+
 /// The object in a reply, and what had to be repaired to read it; else what the strict parser said of the text as it came.
 pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), String> {
     let first = match Object::parse(raw.trim()) {
@@ -39,7 +42,7 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), String> {
     };
     let mut text = raw.trim().to_owned();
     let mut repairs = Vec::new();
-    let steps: [(Repair, fn(&str) -> Option<String>); 4] = [
+    let steps: [(Repair, Change); 4] = [
         (Repair::CodeFence, without_fence),
         (Repair::SurroundingText, without_surroundings),
         (Repair::TrailingComma, without_trailing_commas),

@@ -378,20 +378,20 @@ impl Step {
         }
         self.vlm.account.request().map_err(|reached| Ended::Stopped(self.vlm.halt(&reached.to_string())))?;
         let (t, question) = (self.t, self.question.clone());
-        self.write(Entry::Request { t, attempt, question: question.clone(), frame: self.frame.clone() })?;
+        self.write(&Entry::Request { t, attempt, question: question.clone(), frame: self.frame.clone() })?;
         match provider.ask(&self.body).await {
             Ok(received) => {
                 let cost = self.vlm.read(&received.body).and_then(|(_, cost)| cost);
                 self.vlm.account.answer(tokens(&received.answer), cost);
                 let latency_ms = i32::try_from(received.latency.as_millis()).unwrap_or(i32::MAX);
                 let (body, answered) = (received.body, question.clone());
-                self.write(Entry::Answer { t, attempt, question, latency_ms, body: body.clone() })?;
+                self.write(&Entry::Answer { t, attempt, question, latency_ms, body: body.clone() })?;
                 Ok(Recorded::Answer { question: answered, latency_ms, body })
             }
             Err(failure) => {
                 let status = failure.kind.status().name().to_owned();
                 let detail = failure.detail.clone();
-                self.write(Entry::Failure { t, attempt, status, detail, is_final: false, question })?;
+                self.write(&Entry::Failure { t, attempt, status, detail, is_final: false, question })?;
                 Err(Ended::Failed(failure))
             }
         }
@@ -411,7 +411,7 @@ impl Step {
             is_final: true,
             question: self.question.clone(),
         };
-        match self.write(entry) {
+        match self.write(&entry) {
             Ok(()) => Ok(Recorded::GivenUp { question: self.question.clone(), status }),
             Err(Ended::Stopped(lost)) => Err(lost),
             Err(Ended::Failed(failure)) => Err(Lost(failure.detail)),
@@ -419,8 +419,8 @@ impl Step {
     }
 
     /// A journal that cannot be written ends the run: going on would ask, and pay, twice.
-    fn write(&self, entry: Entry) -> Result<(), Ended> {
-        let written = tokio::task::block_in_place(|| locked(&self.journal).append(&entry));
+    fn write(&self, entry: &Entry) -> Result<(), Ended> {
+        let written = tokio::task::block_in_place(|| locked(&self.journal).append(entry));
         written.map_err(|error| Ended::Stopped(self.vlm.halt(&error.to_string())))
     }
 }

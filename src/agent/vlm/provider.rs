@@ -37,11 +37,11 @@ impl Default for Patience {
     fn default() -> Self {
         Self {
             attempts: 6,
-            timeout: Duration::from_secs(180),
+            timeout: Duration::from_mins(3),
             connect_timeout: Duration::from_secs(15),
             first_delay: Duration::from_secs(1),
-            longest_delay: Duration::from_secs(60),
-            longest_asked_delay: Duration::from_secs(600),
+            longest_delay: Duration::from_mins(1),
+            longest_asked_delay: Duration::from_mins(10),
             largest_answer: 4 * 1024 * 1024,
         }
     }

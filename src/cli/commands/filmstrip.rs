@@ -90,10 +90,10 @@ impl FilmstripArgs {
                 return Ok(reel);
             }
         }
-        if !traces.is_empty() {
-            if let Some(reel) = self.in_traces(&traces)? {
-                return Ok(reel);
-            }
+        if !traces.is_empty()
+            && let Some(reel) = self.in_traces(&traces)?
+        {
+            return Ok(reel);
         }
         let places = self.recordings.join(", ");
         Err(Failure::input(format!(
@@ -189,8 +189,8 @@ fn title(episode: &Episode) -> String {
 fn still(t: i32, step: &Step, png: &[u8], moments: Vec<&'static str>) -> Result<Still, Failure> {
     let fault = || Failure::input(format!("the frame of step {t} is no PNG"));
     // Width and height stand at fixed places behind the signature.
-    let side = |at: usize| png.get(at..at + 4).and_then(|bytes| Some(u32::from_be_bytes(bytes.try_into().ok()?)));
-    let size = (side(16).ok_or_else(fault)?, side(20).ok_or_else(fault)?);
+    let pixels = |at: usize| png.get(at..at + 4).and_then(|bytes| Some(u32::from_be_bytes(bytes.try_into().ok()?)));
+    let size = (pixels(16).ok_or_else(fault)?, pixels(20).ok_or_else(fault)?);
     let action = step.action.map_or("no action", crate::trace::episode::Action::name).replace('_', " ");
     let action = match step.selected_cube.as_deref() {
         Some(cube) if cube != "none" => format!("{action}, takes {cube}"),

@@ -98,11 +98,11 @@ impl RecordArgs {
         let start = Instant::now();
         let recording =
             Recording { config, player, store, progress: &bar, stop, shares: &shares, settings: self.settings(player) };
-        let played = recording.run(&todo);
+        let outcome = recording.run(&todo);
         // What is whole is put together whatever ended the recording.
         let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
         bar.clear();
-        let tally = played.map_err(|broken| Failure::input(broken.to_string()))?;
+        let tally = outcome.map_err(|broken| Failure::input(broken.to_string()))?;
         assembled.map_err(Failure::input)?;
         let answer =
             RecordAnswer::of(tally, player.model(), planned.len(), planned.len() - todo.len(), files(plan, store));

@@ -86,9 +86,10 @@ impl fmt::Display for RecoverAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let episodes = counted(self.episodes as u64, "episode");
         let steps = counted(self.steps as u64, "step");
-        match self.written {
-            true => writeln!(f, "recovered {episodes}, {steps}")?,
-            false => writeln!(f, "recovered no episode; no trace was written")?,
+        if self.written {
+            writeln!(f, "recovered {episodes}, {steps}")?
+        } else {
+            writeln!(f, "recovered no episode; no trace was written")?
         }
         for lost in &self.losses.episodes {
             let rows = counted(lost.rows as u64, "row");

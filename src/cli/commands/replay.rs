@@ -151,9 +151,10 @@ impl ReplayArgs {
 
     fn replay(&self, trace: &Trace, answer: &mut ReplayAnswer) -> Result<(), Failure> {
         let eye = self.eye(&trace.recipe);
-        let mut renderer = match self.frames.is_some() || self.mcap.is_some() {
-            true => Some(Eye::new(&trace.recipe.config).map_err(Failure::input)?),
-            false => None,
+        let mut renderer = if self.frames.is_some() || self.mcap.is_some() {
+            Some(Eye::new(&trace.recipe.config).map_err(Failure::input)?)
+        } else {
+            None
         };
         let parts = tempfile::tempdir().map_err(Failure::Output)?;
         let (mut logs, mut rewritten) = (Vec::new(), Vec::new());
@@ -305,7 +306,7 @@ impl fmt::Display for ReplayAnswer {
         write!(f, "{}, {} replayed", counted(self.episodes as u64, "episode"), counted(self.steps as u64, "step"))?;
         match self.divergences.len() {
             0 => write!(f, ": all match")?,
-            parted => write!(f, ": {} of the episodes part from the trace", parted)?,
+            parted => write!(f, ": {parted} of the episodes part from the trace")?,
         }
         match self.flipped {
             Some(flipped) => writeln!(f, "; mirror_visible is another at {}", counted(flipped as u64, "step")),

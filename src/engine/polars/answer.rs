@@ -65,7 +65,7 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
     let mut columns = Vec::new();
     for (table, mut frame) in tables {
         let schema = frame.collect_schema().map_err(PolarsError::from)?;
-        columns.extend(schema.iter_names().map(|name| name.to_string()));
+        columns.extend(schema.iter_names().map(polars::prelude::PlSmallStr::to_string));
         context.register(table.name(), frame);
     }
     let planned = run::plan(&mut context, &query.text).and_then(|mut frame| {

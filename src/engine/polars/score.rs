@@ -60,7 +60,7 @@ fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
 fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFrame) -> Result<(), PolarsError> {
     let plan = &definitions.plan;
     let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
-    let rows = traces.files().iter().map(|file| file.rows()).sum();
+    let rows = traces.files().iter().map(crate::trace::open::TraceFile::rows).sum();
     let suspects = may_overflow(plan, &needed, rows, |name| schema::column(name)?.stored.range());
     let overflow = |node| Err(PolarsError::Overflow { metric: user_of(definitions, node) });
     if let Some(certain) = suspects.iter().find(|suspect| suspect.certain) {

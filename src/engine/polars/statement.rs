@@ -114,7 +114,7 @@ fn parse(source: &Arc<Source>) -> Result<Statement, Box<Fault>> {
     if text.len() > LONGEST {
         return Err(refuse(format!("a query of {} bytes is too long: the most is {LONGEST}", text.len())));
     }
-    let words = |error: &ParserError| grammar_fault(source, error);
+    let words = |error: &ParserError| Box::new(grammar_fault(source, error));
     let dialect = GenericDialect {};
     let tokens = Tokenizer::new(&dialect, text).tokenize_with_location().map_err(|error| words(&error.into()))?;
     let count = tokens.iter().filter(|token| !matches!(token.token, Token::Whitespace(_))).count();
@@ -136,7 +136,7 @@ fn parse(source: &Arc<Source>) -> Result<Statement, Box<Fault>> {
     }
 }
 
-fn grammar_fault(source: &Arc<Source>, error: &ParserError) -> Box<Fault> {
+fn grammar_fault(source: &Arc<Source>, error: &ParserError) -> Fault {
     let message = match error {
         ParserError::ParserError(message) | ParserError::TokenizerError(message) => message.as_str(),
         ParserError::RecursionLimitExceeded => "it is nested too deeply",
@@ -149,7 +149,7 @@ fn grammar_fault(source: &Arc<Source>, error: &ParserError) -> Box<Fault> {
         None => (message, 0..source.text.len()),
     };
     let words = words.replace("EOF", "the end of the query");
-    Box::new(Fault::new(Place { source: Arc::clone(source), span }, format!("not a query: {words}")))
+    Fault::new(Place { source: Arc::clone(source), span }, format!("not a query: {words}"))
 }
 
 /// `1, Column: 2`
@@ -218,21 +218,18 @@ impl Reader<'_> {
         if parts.len() == 1 && self.ctes.contains(&word) {
             return;
         }
-        match Table::of_name(&word).filter(|_| parts.len() == 1) {
-            Some(table) => {
-                self.tables.insert(table);
-                if let Some(alias) = alias.filter(|alias| alias.name.value != word) {
-                    self.check_name(&alias.name);
-                }
+        if let Some(table) = Table::of_name(&word).filter(|_| parts.len() == 1) {
+            self.tables.insert(table);
+            if let Some(alias) = alias.filter(|alias| alias.name.value != word) {
+                self.check_name(&alias.name);
             }
-            None => {
-                let near = nearest(&word, Table::ALL.map(Table::name)).filter(|_| parts.len() == 1);
-                let help = match near {
-                    Some(near) => format!("did you mean `{near}`?"),
-                    None => "tables are steps, episodes, cells".to_owned(),
-                };
-                self.refuse(name.span(), format!("unknown table `{name}`"), Some(help));
-            }
+        } else {
+            let near = nearest(&word, Table::ALL.map(Table::name)).filter(|_| parts.len() == 1);
+            let help = match near {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => "tables are steps, episodes, cells".to_owned(),
+            };
+            self.refuse(name.span(), format!("unknown table `{name}`"), Some(help));
         }
     }
 }

@@ -132,7 +132,7 @@ fn tangents(aside: f64, ahead: f64, radius: f64) -> [f64; 2] {
 fn pixels(from: f64, to: f64, count: usize) -> Option<[usize; 2]> {
     #[expect(clippy::cast_precision_loss, reason = "a number of pixels")]
     let size = count as f64;
-    let place = |at: f64| (at.clamp(-1.0, 1.0) + 1.0) / 2.0 * size;
+    let place = |at: f64| f64::midpoint(at.clamp(-1.0, 1.0), 1.0) * size;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the view")]
     let [first, last] = [(place(from) - 0.51).max(0.0) as usize, (place(to) + 1.51) as usize];
     let last = last.min(count);

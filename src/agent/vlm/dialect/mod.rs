@@ -16,7 +16,7 @@ use crate::agent::reply::Ending;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Dialect {
-    /// OpenAI's chat completions.
+    /// `OpenAI`'s chat completions.
     OpenaiChat,
     /// The same as other servers take it: with the older name of the limit of tokens.
     OpenaiCompatible,

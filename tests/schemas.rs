@@ -3,8 +3,10 @@
 use std::fs;
 use std::path::PathBuf;
 
+use mirrorstats::cells::changes::Changes;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
 use mirrorstats::cli::commands::report::ReportAnswer;
+use mirrorstats::cli::commands::rescore::RescoreAnswer;
 use mirrorstats::metric::explain::Explanation;
 use mirrorstats::metric::shape::DefinitionFile;
 use mirrorstats::report::bundle::Manifest;
@@ -31,10 +33,12 @@ fn current() -> Vec<(&'static str, Value)> {
         ("definitions-check", json!(schema_for!(CheckAnswer))),
         ("definitions-explain", json!(schema_for!(Explanation))),
         ("definitions", json!(schema_for!(DefinitionFile))),
+        ("diff", json!(schema_for!(Changes))),
         ("errata", json!(schema_for!(Errata))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
         ("report", json!(schema_for!(ReportAnswer))),
+        ("rescore", json!(schema_for!(RescoreAnswer))),
         ("score-explain", json!(schema_for!(Evidence))),
         ("stats", json!(schema_for!(Statistics))),
         ("style", json!(schema_for!(Sheet))),

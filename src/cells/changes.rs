@@ -361,6 +361,8 @@ impl Numbers {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::{Changes, Evidence};
     use crate::metric::definitions::Definitions;
     use crate::score::evidence::MetricEvidence;
@@ -439,6 +441,25 @@ mod tests {
         let changes = changes(&table(RATE, 0, &[Some(1)]), &other);
         assert_eq!((changes.metrics.only_before, changes.metrics.only_after), (vec!["R".into()], vec!["S".into()]));
         assert_eq!(changes.cells_compared, 0);
+    }
+
+    proptest! {
+        #[test]
+        fn flips_lead_from_one_scoring_to_the_other(
+            values in proptest::collection::vec((proptest::option::of(0..2i64), proptest::option::of(0..2i64)), 0..9),
+        ) {
+            let (before, after): (Vec<_>, Vec<_>) = values.into_iter().unzip();
+            let (mut old, new) = (table(RATE, 0, &before), table(RATE, 0, &after));
+            let changes = changes(&old, &new);
+            for flip in &changes.flips {
+                let row = old.keys.iter().position(|key| key.episode_id == flip.episode.episode_id).unwrap();
+                prop_assert_eq!(old.metrics[0].values[row], flip.value.before);
+                prop_assert_ne!(flip.value.before, flip.value.after);
+                old.metrics[0].values[row] = flip.value.after;
+            }
+            prop_assert_eq!(&old.metrics, &new.metrics);
+            prop_assert_eq!(changes.is_empty(), before == after);
+        }
     }
 
     #[test]

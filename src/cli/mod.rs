@@ -10,6 +10,7 @@ mod listing;
 pub mod outcome;
 pub mod output;
 pub mod page;
+pub mod provenance;
 #[cfg(feature = "polars")]
 pub mod querying;
 #[cfg(feature = "sim")]

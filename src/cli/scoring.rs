@@ -23,7 +23,6 @@ use crate::score::select;
 use crate::score::table::EpisodeTable;
 use crate::trace::inputs::{self, Input};
 use crate::trace::open::TraceSet;
-use crate::trace::schema::SCHEMA_VERSION;
 
 /// The files named on the command line.
 ///
@@ -328,9 +327,4 @@ pub fn provenance(inputs: &[Input]) -> Result<Vec<bundle::Input>, Failure> {
         Ok(bundle::Input::new(input.name.as_ref(), hash::of_reader(file)?, bytes))
     };
     inputs.iter().map(|input| one(input).map_err(|error: io::Error| at(input, error))).collect()
-}
-
-/// The version of the trace schema, for manifests.
-pub const fn schema_version() -> u32 {
-    SCHEMA_VERSION
 }

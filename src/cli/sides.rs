@@ -4,6 +4,7 @@
 //! Rule: only metrics that both sides have are scored, so that a side may have others that these traces do not bear.
 
 use std::collections::BTreeMap;
+use std::io;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
@@ -16,7 +17,7 @@ use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::score::evidence;
 use crate::score::run::{self, ScoreError};
 use crate::score::table::EpisodeTable;
-use crate::trace::inputs::Input;
+use crate::trace::inputs::{self, Input};
 use crate::trace::open::TraceSet;
 
 /// What stands on one side.
@@ -24,8 +25,8 @@ use crate::trace::open::TraceSet;
 pub enum Side {
     /// Definitions by name or path.
     Definitions(String),
-    /// A file of scores.
-    Scores(Input),
+    /// Files of scores, the parts of one table.
+    Scores(Vec<Input>),
 }
 
 /// What to compare of the two.
@@ -67,17 +68,21 @@ impl Side {
     /// What an argument names.
     ///
     /// # Errors
-    /// A Parquet file that holds no scores.
+    /// A folder or a Parquet file that holds no scores.
     pub fn of(argument: &str) -> Result<Self, Failure> {
-        let inside = Path::new(argument).join("episodes.parquet");
-        let input = if inside.is_file() { Input::new(inside) } else { Input::new(argument) };
-        if scoring::are_scores(std::slice::from_ref(&input)) {
-            return Ok(Self::Scores(input));
+        let path = Path::new(argument);
+        let inside = path.join("episodes.parquet");
+        if inside.is_file() {
+            return Ok(Self::Scores(vec![Input::new(inside)]));
         }
-        if input.name.ends_with(".parquet") && input.path.exists() {
+        // A folder of parts, as a cluster writes them, is one table.
+        let inputs = if path.is_dir() { folder(argument)? } else { vec![Input::new(argument)] };
+        if scoring::are_scores(&inputs) {
+            return Ok(Self::Scores(inputs));
+        }
+        if path.is_dir() || (argument.ends_with(".parquet") && path.exists()) {
             return Err(Failure::Rendered(format!(
-                "error: {}: expected definitions, scores or a report's folder, found a Parquet file that is no scores\n  help: OLD and NEW come first, the traces after them",
-                input.name
+                "error: {argument}: expected definitions, scores or a report's folder, found no scores in it\n  help: OLD and NEW come first, the traces after them"
             )));
         }
         Ok(Self::Definitions(argument.to_owned()))
@@ -99,14 +104,14 @@ impl Side {
                 let definitions = Definitions::load(name, &columns).map_err(scoring::definition_failure)?;
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
-            Self::Scores(input) => {
-                let is_text = !input.name.ends_with(".parquet");
+            Self::Scores(inputs) => {
+                let is_text = inputs.iter().all(|input| !input.name.ends_with(".parquet"));
                 let scoring = ScoringArgs {
                     definitions: asked.text_definitions.filter(|_| is_text).map(str::to_owned),
                     metrics: None,
                     condition: asked.condition.map(str::to_owned),
                 };
-                let table = scoring::table(std::slice::from_ref(input), &scoring, &[], asked.threads)?;
+                let table = scoring::table(inputs, &scoring, &[], asked.threads)?;
                 Ok((table.metrics.iter().map(|metric| metric.name.clone()).collect(), Some(table)))
             }
         }
@@ -136,9 +141,15 @@ impl Side {
                 table.metrics.retain(|metric| common.contains(&metric.name));
                 Ok((table, None))
             }
-            (Self::Definitions(name) | Self::Scores(Input { name, .. }), None, _) => Err(no_traces(name)),
+            (Self::Definitions(name), None, None) => Err(no_traces(name)),
+            (Self::Scores(_), None, _) => unreachable!("scores are read before"),
         }
     }
+}
+
+/// The files of a folder.
+fn folder(argument: &str) -> Result<Vec<Input>, Failure> {
+    inputs::resolve(&[argument.to_owned()], io::empty()).map_err(Failure::input)
 }
 
 /// Definitions alone score nothing.

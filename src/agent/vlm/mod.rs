@@ -31,6 +31,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use backon::{ExponentialBuilder, Retryable as _};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use serde_json::Value;
 use tokio::runtime::Handle;
 
@@ -42,7 +44,6 @@ use self::provider::{Failure, FailureKind, Provider};
 use super::prompt::Prompt;
 use super::reply;
 use super::{Agent, Decision, Family, Lost, Observation, Reply, Status, Task, Usage, Words};
-use crate::base::base64::base64;
 use crate::base::hash;
 
 /// The sampling temperature (paper, Panel A).
@@ -268,7 +269,7 @@ impl VlmAgent {
             journal: Arc::clone(&self.journal),
             t: observation.t,
             frame: hash::of_bytes(&png),
-            body: dialect.body(&self.vlm.question(&words, &schema, &base64(&png))),
+            body: dialect.body(&self.vlm.question(&words, &schema, &STANDARD.encode(&png))),
             question: question.clone(),
         };
         let recorded =

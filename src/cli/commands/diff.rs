@@ -2,7 +2,7 @@
 
 use std::io::{self, Write as _};
 
-use super::super::args::ThreadArgs;
+use super::super::args::{ThreadArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::sides::{self, Asked, Side};
 use super::super::{output, scoring};
@@ -11,7 +11,6 @@ use crate::cells::group::DEFAULT_BY;
 use crate::report::changes::{self, Limit};
 use crate::report::order::TableOrder;
 use crate::report::style::Style;
-use crate::trace::inputs;
 
 /// Tell which cells and episodes change between two sets of definitions, or of scores
 #[derive(Clone, Debug, clap::Args)]
@@ -59,7 +58,7 @@ impl DiffArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let style = Style::load("default").map_err(Failure::input)?;
         let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
-        let inputs = inputs::resolve(&self.traces, io::stdin().lock()).map_err(Failure::input)?;
+        let inputs = scoring::resolve(&TraceArgs { traces: self.traces.clone(), threads: self.threads })?;
         let traces = if inputs.is_empty() { None } else { Some(scoring::open_steps(&inputs)?) };
         let asked = self.asked();
         let sides = sides::pair(&old, &new, traces.as_ref(), &asked)?;

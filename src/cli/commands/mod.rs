@@ -14,6 +14,7 @@ pub mod recover;
 #[cfg(feature = "sim")]
 pub mod replay;
 pub mod report;
+pub mod rescore;
 pub mod schema;
 pub mod score;
 pub mod sql;
@@ -36,6 +37,7 @@ pub enum Command {
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
     Diff(diff::DiffArgs),
+    Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
     Recover(recover::RecoverArgs),
@@ -66,6 +68,7 @@ impl Command {
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
             Self::Diff(args) => args.run(),
+            Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
             Self::Recover(args) => args.run(),

@@ -4,6 +4,8 @@ use std::cell::RefCell;
 use std::fmt::Write as _;
 use std::rc::Rc;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, Drawable, PathElement, PointCollection, Polygon, Rectangle, Text};
@@ -15,7 +17,6 @@ use super::font::{self, Weight};
 use super::frame::{Frame, Point};
 use super::ink::{Ink, UNITS_PER_PX, escaped};
 use super::mark::Mark;
-use crate::base::base64::base64;
 
 /// How a line looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -173,7 +174,7 @@ impl Sheet {
             self.ink.borrow_mut().body,
             "<image x=\"{left:.2}\" y=\"{top:.2}\" width=\"{width:.2}\" height=\"{height:.2}\" \
              preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
-            base64(png)
+            STANDARD.encode(png)
         );
     }
 

@@ -13,13 +13,13 @@
 //! | [`log`] | what an episode's log is told, step by step |
 //! | [`metadata`] | what a trace says of how it was recorded |
 //! | [`store`] | the folder: what is done, how an episode commits, how the final files are made |
-//! | `claim` | who else records into the folder |
+//! | [`claim`] | who else records into the folder |
 //! | [`run`] | threads, episodes under way, stopping, what took the time |
 //!
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
 //! shards, interruptions and their order change nothing in a trace. Nothing here knows a metric.
 
-mod claim;
+pub mod claim;
 pub mod log;
 pub mod metadata;
 pub mod plan;

@@ -1,4 +1,4 @@
-//! What every room stands on: exact numbers and their text, hashes, base64, near names.
+//! What every room stands on: exact numbers and their text, hashes, base64, near names, sorted runs.
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
@@ -10,5 +10,6 @@ pub mod near;
 pub mod number;
 pub mod palette;
 pub mod ratio;
+pub mod runs;
 pub mod temporary;
 pub mod visible;

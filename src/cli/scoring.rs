@@ -5,6 +5,8 @@ use std::fs::File;
 use std::io;
 use std::num::NonZeroUsize;
 
+use parquet::errors::ParquetError;
+
 use super::args::{ScoringArgs, TraceArgs};
 use super::outcome::Failure;
 use crate::base::hash;
@@ -13,7 +15,7 @@ use crate::cells::losses::INFRASTRUCTURE;
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
-use crate::score::format::{self, Format};
+use crate::score::format::{self, Format, FormatError};
 use crate::score::run::{self, Request, ScoreError};
 use crate::score::select;
 use crate::score::table::EpisodeTable;
@@ -47,6 +49,43 @@ pub fn table(
             "error: expected traces or files of scores, found both: `{}` holds scores\n  help: score the traces first, or leave one kind out",
             scores[0].name
         ))),
+    }
+}
+
+/// Writes the episode table; memory does not grow with the traces.
+///
+/// # Errors
+/// Whatever is wrong with the files, the definitions, the condition or the output.
+pub fn write(
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    threads: NonZeroUsize,
+    format: Format,
+    out: impl io::Write + Send,
+) -> Result<(), Failure> {
+    if are_scores(inputs) {
+        let table = table(inputs, scoring, &[], threads)?;
+        return format::write(&table, format, out).map_err(unwritten);
+    }
+    let traces = open(inputs)?;
+    let definitions = definitions(&traces, scoring)?;
+    let mut rows = run::rows(&traces, &definitions, &[], threads).map_err(score_failure)?;
+    let mut writer = format::Writer::new(rows.header().clone(), format, out).map_err(unwritten)?;
+    while let Some(row) = rows.next().map_err(ScoreError::Spill).map_err(score_failure)? {
+        writer.write(row).map_err(unwritten)?;
+    }
+    writer.finish().map_err(unwritten)
+}
+
+/// A table that was not written, mostly for want of space or of a reader.
+fn unwritten(error: FormatError) -> Failure {
+    match error {
+        FormatError::Io(error) => Failure::Output(error),
+        FormatError::Parquet(ParquetError::External(error)) => match error.downcast::<io::Error>() {
+            Ok(error) => Failure::Output(*error),
+            Err(error) => Failure::Input(error),
+        },
+        other => Failure::input(other),
     }
 }
 

@@ -1,13 +1,13 @@
 //! `score`: the episode table of traces, or the evidence for one episode.
 
-use std::io::{self, Write as _};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use super::super::args::{ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, scoring};
 use crate::score::evidence;
-use crate::score::format::{self, Format};
+use crate::score::format::Format;
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -48,13 +48,12 @@ impl ScoreArgs {
             })?;
             return output::print(&found, self.json);
         }
-        let table = scoring::table(&inputs, &self.scoring, &[], threads)?;
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
-        let mut bytes = Vec::new();
-        format::write(&table, format, &mut bytes).map_err(Failure::input)?;
         match &self.output {
-            Some(path) => output::write_file(path, &bytes)?,
-            None => io::stdout().lock().write_all(&bytes)?,
+            Some(path) => output::write_file_with(path, |file| {
+                scoring::write(&inputs, &self.scoring, threads, format, BufWriter::new(file))
+            })?,
+            None => scoring::write(&inputs, &self.scoring, threads, format, BufWriter::new(io::stdout()))?,
         }
         Ok(Outcome::Done)
     }

@@ -1,14 +1,11 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless
+.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench sheet
 
-## Build, report on the bundled traces, say where the results are.
+## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
-	cargo run --quiet -- report fixtures/paper --out reports/latest
-	@echo
-	@echo "The tables are in reports/latest/tables, every cell in reports/latest/cells.csv."
-	@echo "The same in the paper's own layout: cargo run -- report fixtures/paper --style paper"
+	scripts/demo.sh
 
 ## Everything that CI checks.
 test: fmt lint unit docs end-to-end
@@ -16,16 +13,22 @@ test: fmt lint unit docs end-to-end
 fmt:
 	cargo fmt --check
 
+# Once as most people build it, and once with everything: Polars, and the world on MuJoCo's library.
 lint:
+	scripts/get-mujoco.sh
 	cargo clippy --all-targets -- -D warnings
+	cargo clippy --all-targets --all-features -- -D warnings
 
 # Without a browser the test of report.html says that it was skipped; MIRRORSTATS_REQUIRE_BROWSER=1 makes that a failure.
+# The same holds for Spark, and Java to run it on, which are required where they could be had.
 unit:
 	-scripts/get-browser.sh
-	cargo test --no-fail-fast
+	-scripts/get-egl.sh
+	scripts/get-mujoco.sh
+	if scripts/get-spark.sh; then export MIRRORSTATS_REQUIRE_SPARK=1; fi; cargo test --all-features --no-fail-fast
 
 docs:
-	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --quiet
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --all-features --quiet
 
 ## The main job from outside: the committed report again byte for byte, the published tables cell by cell.
 end-to-end:
@@ -33,5 +36,25 @@ end-to-end:
 
 ## Write generated files anew: JSON Schemas, snapshots, the committed report.
 bless:
-	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --no-fail-fast
+	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --all-features --no-fail-fast
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
+
+## The bundled recordings anew: fixtures/recorded.
+recorded:
+	scripts/record-fixtures.sh
+
+## The scripted agents in 21 episodes of each experiment: checks their metric profiles and writes the table of them.
+calibrate:
+	scripts/get-mujoco.sh
+	cargo test --release --features sim --test agents -- --ignored twenty_one
+	@echo "The table is in reports/world/calibration.md."
+
+## How fast the world is: steps a second with and without frames, and where the time goes.
+bench:
+	scripts/get-mujoco.sh
+	cargo bench --features sim --bench world
+
+## The contact sheet of the five experiments anew.
+sheet:
+	scripts/get-mujoco.sh
+	cargo run --quiet --features sim -- world sheet --out reports/world

@@ -68,7 +68,21 @@ fn only_the_command_line_prints_and_scoring_opens_no_file() {
     );
 }
 
+/// Files that may look at a clock: what they learn from it goes to standard error, into a wait, or into the latency of a
+/// reply, and nowhere else.
+const MAY_LOOK_AT_A_CLOCK: [&str; 7] = [
+    "src/agent/vlm/provider.rs",
+    "src/cli/commands/record.rs",
+    "src/cli/recording.rs",
+    "src/engine/spark/submit.rs",
+    "src/record/play.rs",
+    "src/record/run.rs",
+    "src/record/log.rs",
+];
+
 #[test]
 fn no_clock_reaches_an_output() {
-    assert_eq!(offenders(&ROOMS, &["SystemTime", "Instant::now", "chrono::"]), Vec::<String>::new());
+    let mut found = offenders(&ROOMS, &["SystemTime", "Instant::now", "chrono::"]);
+    found.retain(|offender| !MAY_LOOK_AT_A_CLOCK.iter().any(|file| offender.contains(file)));
+    assert_eq!(found, Vec::<String>::new());
 }

@@ -1,11 +1,12 @@
 //! The files of `schemas/` are what the types say. `MIRRORSTATS_WRITE_SCHEMAS=1 cargo test --test schemas` writes them.
 
-use std::collections::BTreeSet;
 use std::fs;
 use std::path::PathBuf;
 
+use mirrorstats::cells::changes::Changes;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
 use mirrorstats::cli::commands::report::ReportAnswer;
+use mirrorstats::cli::commands::rescore::RescoreAnswer;
 use mirrorstats::metric::explain::Explanation;
 use mirrorstats::metric::shape::DefinitionFile;
 use mirrorstats::report::bundle::Manifest;
@@ -26,21 +27,32 @@ fn folder() -> PathBuf {
 
 /// Every file of the folder: what a person writes, what the program reads and prints as JSON.
 fn current() -> Vec<(&'static str, Value)> {
-    vec![
+    #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
+    let mut schemas = vec![
         ("comparison", json!(schema_for!(Comparison))),
         ("definitions-check", json!(schema_for!(CheckAnswer))),
         ("definitions-explain", json!(schema_for!(Explanation))),
         ("definitions", json!(schema_for!(DefinitionFile))),
+        ("diff", json!(schema_for!(Changes))),
         ("errata", json!(schema_for!(Errata))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
         ("report", json!(schema_for!(ReportAnswer))),
+        ("rescore", json!(schema_for!(RescoreAnswer))),
         ("score-explain", json!(schema_for!(Evidence))),
         ("stats", json!(schema_for!(Statistics))),
         ("style", json!(schema_for!(Sheet))),
         ("trace", json!(SchemaDocument::current())),
         ("validation", json!(schema_for!(Validation))),
-    ]
+    ];
+    #[cfg(feature = "sim")]
+    schemas.extend([
+        ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
+        ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
+        ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
+        ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
+    ]);
+    schemas
 }
 
 #[test]
@@ -58,7 +70,10 @@ fn the_files_are_what_the_types_say() {
 
 #[test]
 fn the_folder_holds_nothing_else() {
-    let expected: BTreeSet<String> = current().iter().map(|(name, _)| format!("{name}.schema.json")).collect();
+    // Their types are there with the feature `sim` alone, their files always.
+    let of_worlds = ["census", "scene", "world-config"];
+    let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
+    let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
     let found =
         fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
     assert_eq!(expected, found);

@@ -5,6 +5,16 @@
 //!
 //! Rule: an agent is a function of its task and its observations (and, for a model behind a network, of what that said).
 
+pub mod identification;
+pub mod prompt;
+pub mod reply;
+#[cfg(feature = "sim")]
+pub mod scripted;
+#[cfg(feature = "sim")]
+pub mod sight;
+#[cfg(feature = "sim")]
+pub mod vlm;
+
 use std::future::Future;
 use std::pin::Pin;
 use std::sync::Arc;
@@ -126,6 +136,25 @@ pub enum Status {
 }
 
 impl Status {
+    /// All of them, in the order of the schema.
+    pub const ALL: [Self; 10] = [
+        Self::Ok,
+        Self::Repaired,
+        Self::ParseFailed,
+        Self::SchemaInvalid,
+        Self::Refusal,
+        Self::Truncated,
+        Self::Empty,
+        Self::RateLimited,
+        Self::ServerError,
+        Self::Timeout,
+    ];
+
+    /// The status of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|status| status.name() == name)
+    }
+
     /// The name in the `reply_status` column.
     pub const fn name(self) -> &'static str {
         match self {
@@ -156,4 +185,35 @@ pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
 pub trait Agent {
     /// Decides the next action.
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
+}
+
+/// Who plays: makes the agent of each episode.
+pub trait Player: Send + Sync {
+    /// The name shown in tables.
+    fn model(&self) -> &str;
+
+    /// What goes into recordings: everything that shapes the agent's decisions, and nothing that differs from one start of
+    /// the same recording to the next.
+    fn description(&self) -> serde_json::Value;
+
+    /// The agent of one episode.
+    ///
+    /// # Errors
+    /// When it cannot be made; the episode is lost then.
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost>;
+
+    /// Whether the agent looks at frames; one that does not may be given empty ones.
+    fn looks(&self) -> bool {
+        true
+    }
+
+    /// How many episodes of a thread are worth having under way at once; more than one where agents wait.
+    fn in_flight(&self) -> usize {
+        1
+    }
+
+    /// Why no further episode makes sense, once there is such a reason.
+    fn stopped(&self) -> Option<String> {
+        None
+    }
 }

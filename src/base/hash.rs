@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 use std::io::{self, Read};
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use sha2::{Digest, Sha256};
-
-use super::base64::base64;
 
 /// The hash of some bytes, 64 hexadecimal digits.
 pub fn of_bytes(bytes: &[u8]) -> String {
@@ -14,7 +14,7 @@ pub fn of_bytes(bytes: &[u8]) -> String {
 
 /// The hash of some bytes as a web page names it: `sha256-` and base64.
 pub fn integrity_of_bytes(bytes: &[u8]) -> String {
-    format!("sha256-{}", base64(&Sha256::digest(bytes)))
+    format!("sha256-{}", STANDARD.encode(Sha256::digest(bytes)))
 }
 
 /// The hash of everything that `reader` still gives.

@@ -1,8 +1,7 @@
-//! What every room stands on: exact numbers and their text, hashes, base64, near names, sorted runs.
+//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs.
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
-pub mod base64;
 pub mod estimate;
 pub mod frame;
 pub mod hash;

@@ -5,6 +5,7 @@
 pub mod bootstrap;
 pub mod cell;
 pub mod chance;
+pub mod changes;
 pub mod clustered;
 pub mod contrast;
 pub mod detectable;

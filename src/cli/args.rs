@@ -1,6 +1,9 @@
 //! What was typed, where several verbs share it.
 
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
+use std::path::PathBuf;
+
+use crate::engine::spark::setting::Setting;
 
 /// The traces to read.
 #[derive(Clone, Debug, clap::Args)]
@@ -47,4 +50,44 @@ impl ScoringArgs {
     pub fn definitions_name(&self) -> &str {
         self.definitions.as_deref().unwrap_or("paper")
     }
+}
+
+/// What computes the episode table.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct EngineArgs {
+    /// What computes the scores; the result is the same
+    #[arg(long, value_enum, default_value_t)]
+    pub engine: Engine,
+    /// The cluster.
+    #[command(flatten)]
+    pub spark: SparkArgs,
+}
+
+/// The engines by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Engine {
+    /// The program's own kernels
+    #[default]
+    Native,
+    /// The SQL statement of `mirrorstats sql` on Polars, in this process
+    Polars,
+    /// The same statement on your own Spark: `SPARK_HOME`, `spark-submit` on PATH, or Python's package `pyspark`
+    Spark,
+}
+
+/// How to submit to Spark.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct SparkArgs {
+    /// The master of --engine spark: spark://HOST:PORT, yarn, local[2], ... [default: what your Spark is configured for]
+    #[arg(long, value_name = "URL")]
+    pub master: Option<String>,
+    /// A setting for --engine spark, as often as needed
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub spark_conf: Vec<Setting>,
+    /// Give up on Spark after so many seconds [default: never]
+    #[arg(long, value_name = "SECONDS")]
+    pub spark_timeout: Option<NonZeroU32>,
+    /// Keep Spark's own log in this file
+    #[arg(long, value_name = "FILE")]
+    pub spark_log: Option<PathBuf>,
 }

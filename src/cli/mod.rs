@@ -10,7 +10,16 @@ mod listing;
 pub mod outcome;
 pub mod output;
 pub mod page;
+pub mod provenance;
+#[cfg(feature = "polars")]
+pub mod querying;
+#[cfg(feature = "sim")]
+pub mod recording;
 pub mod scoring;
+pub mod sides;
+pub mod spark;
+#[cfg(feature = "sim")]
+pub mod vlm;
 
 use std::ffi::OsString;
 use std::process::ExitCode;

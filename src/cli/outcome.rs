@@ -5,6 +5,8 @@
 //! | 0 | done |
 //! | 1 | a check that was asked for did not hold (`validate`, `compare`) |
 //! | 2 | bad usage, input or definition |
+//! | 3 | something of the input is lost (`recover`); the rest was saved |
+//! | 130 | interrupted (`record`); what was done stays |
 
 use std::error::Error;
 use std::fmt::Write as _;
@@ -20,6 +22,10 @@ pub enum Outcome {
     Done,
     /// The check that was asked for did not hold; what did not is on standard output.
     CheckFailed,
+    /// Something of the input is lost; the rest was saved.
+    Lossy,
+    /// Ctrl-C ended it; what was done until then stays, and the same command continues.
+    Interrupted,
 }
 
 /// A command that could not run to its end.
@@ -54,6 +60,8 @@ pub fn exit_code(result: Result<Outcome, Failure>) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::CheckFailed) => ExitCode::from(1),
+        Ok(Outcome::Lossy) => ExitCode::from(3),
+        Ok(Outcome::Interrupted) => ExitCode::from(130),
         // The reader of a pipe has seen enough (`| head`): not an error.
         Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
         Err(Failure::Usage) => ExitCode::from(2),

@@ -6,6 +6,7 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use serde::Serialize;
+use tempfile::NamedTempFile;
 
 use super::outcome::{Failure, Outcome};
 use crate::base::temporary;
@@ -46,44 +47,35 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 /// # Errors
 /// When the folder is not there or not writable, or the disk is full; the error names the file. What `write` gives.
 pub fn write_file_with(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut builder = tempfile::Builder::new();
-    let mut file = builder
-        .prefix(".mirrorstats-")
-        .permissions_of_new_files()
-        .tempfile_in(folder)
-        .map_err(|error| unwritten(path, error))?;
+    let mut file = beside(path)?;
     write(file.as_file_mut()).map_err(|failure| match failure {
-        Failure::Output(error) => unwritten(path, error),
+        Failure::Output(error) => unwritable(path, error),
         other => other,
     })?;
-    file.persist(path).map(drop).map_err(|error| unwritten(path, error.error))
+    persist(file, path)
 }
 
-/// That a file could not be written.
-fn unwritten(path: &Path, error: io::Error) -> Failure {
+/// A temporary file in the folder of `path`.
+///
+/// # Errors
+/// When the folder is not there or not writable.
+pub fn beside(path: &Path) -> Result<NamedTempFile, Failure> {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    temporary::file_in(folder).map_err(|error| unwritable(path, error))
+}
+
+/// Gives a temporary file its name.
+///
+/// # Errors
+/// When the name cannot be taken.
+pub fn persist(file: NamedTempFile, path: &Path) -> Result<(), Failure> {
+    file.persist(path).map(|_| ()).map_err(|error| unwritable(path, error.error))
+}
+
+fn unwritable(path: &Path, error: io::Error) -> Failure {
     Failure::Rendered(format!(
         "error: cannot write `{}`: {}\n  help: is the folder there and writable, and the disk not full?",
         path.display(),
         temporary::without_name(error)
     ))
-}
-
-/// Files as any program makes them, where a temporary file is private.
-trait NewFilePermissions {
-    fn permissions_of_new_files(&mut self) -> &mut Self;
-}
-
-impl NewFilePermissions for tempfile::Builder<'_, '_> {
-    #[cfg(unix)]
-    fn permissions_of_new_files(&mut self) -> &mut Self {
-        use std::os::unix::fs::PermissionsExt as _;
-        // The process's umask takes away from these, as with any other file.
-        self.permissions(std::fs::Permissions::from_mode(0o666))
-    }
-
-    #[cfg(not(unix))]
-    fn permissions_of_new_files(&mut self) -> &mut Self {
-        self
-    }
 }

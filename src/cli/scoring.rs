@@ -5,29 +5,35 @@ use std::fs::File;
 use std::io;
 use std::num::NonZeroUsize;
 
-use parquet::errors::ParquetError;
-
-use super::args::{ScoringArgs, TraceArgs};
+use super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::outcome::Failure;
+use super::spark;
 use crate::base::hash;
 use crate::cells::group::KEY_COLUMNS;
 use crate::cells::losses::INFRASTRUCTURE;
+#[cfg(feature = "polars")]
+use crate::engine::polars::{self, run::PolarsError};
+use crate::engine::spark::source::is_uri;
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
-use crate::score::format::{self, Format, FormatError};
+use crate::score::format::{self, Format, FormatError, Surroundings};
 use crate::score::run::{self, Request, ScoreError};
 use crate::score::select;
 use crate::score::table::EpisodeTable;
 use crate::trace::inputs::{self, Input};
 use crate::trace::open::TraceSet;
-use crate::trace::schema::SCHEMA_VERSION;
 
 /// The files named on the command line.
 ///
 /// # Errors
 /// When an argument names none, or the list on standard input cannot be read.
 pub fn resolve(arguments: &TraceArgs) -> Result<Vec<Input>, Failure> {
+    if let Some(uri) = arguments.traces.iter().find(|argument| is_uri(argument)) {
+        return Err(Failure::Rendered(format!(
+            "error: `{uri}`: expected files of this machine, found a URI, which Spark alone can read\n  help: `mirrorstats score --engine spark {uri} -o scores.parquet`, then give the scores"
+        )));
+    }
     inputs::resolve(&arguments.traces, io::stdin().lock()).map_err(Failure::input)
 }
 
@@ -64,8 +70,7 @@ pub fn write(
     out: impl io::Write + Send,
 ) -> Result<(), Failure> {
     if are_scores(inputs) {
-        let table = table(inputs, scoring, &[], threads)?;
-        return format::write(&table, format, out).map_err(unwritten);
+        return write_table(&table(inputs, scoring, &[], threads)?, format, out);
     }
     let traces = open(inputs)?;
     let definitions = definitions(&traces, scoring)?;
@@ -77,16 +82,75 @@ pub fn write(
     writer.finish().map_err(unwritten)
 }
 
-/// A table that was not written, mostly for want of space or of a reader.
+/// Writes a table.
+///
+/// # Errors
+/// Whatever writing gives.
+pub fn write_table(table: &EpisodeTable, format: Format, out: impl io::Write + Send) -> Result<(), Failure> {
+    format::write(table, format, out).map_err(unwritten)
+}
+
 fn unwritten(error: FormatError) -> Failure {
+    match error.into_io() {
+        Ok(error) => Failure::Output(error),
+        Err(other) => Failure::input(other),
+    }
+}
+
+/// The same table, computed by the engine asked for.
+///
+/// # Errors
+/// As [`table`]; an engine that this build has not; files of scores, of which there is nothing to compute.
+pub fn table_on(
+    engine: &EngineArgs,
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, Failure> {
+    engine.check()?;
+    match engine.engine {
+        Engine::Native => table(inputs, scoring, labels, threads),
+        Engine::Polars => polars_table(inputs, scoring, labels, threads),
+        Engine::Spark => spark::Asked::of_files(inputs, scoring, labels, engine)?.score(labels),
+    }
+}
+
+/// The table out of the SQL lowering on Polars.
+#[cfg(feature = "polars")]
+fn polars_table(
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, Failure> {
+    let traces = open_steps(inputs)?;
+    let definitions = definitions(&traces, scoring)?;
+    polars::score::score(&traces, &definitions, labels, threads).map_err(polars_failure)
+}
+
+/// Faults of definitions have their own layout.
+#[cfg(feature = "polars")]
+pub fn polars_failure(error: PolarsError) -> Failure {
     match error {
-        FormatError::Io(error) => Failure::Output(error),
-        FormatError::Parquet(ParquetError::External(error)) => match error.downcast::<io::Error>() {
-            Ok(error) => Failure::Output(*error),
-            Err(error) => Failure::Input(error),
-        },
+        PolarsError::Score(error) => score_failure(error),
+        PolarsError::ReaderGone => Failure::Output(io::ErrorKind::BrokenPipe.into()),
         other => Failure::input(other),
     }
+}
+
+/// The refusal of a build without Polars.
+#[cfg(not(feature = "polars"))]
+fn polars_table(_: &[Input], _: &ScoringArgs, _: &[String], _: NonZeroUsize) -> Result<EpisodeTable, Failure> {
+    Err(without_polars("--engine polars"))
+}
+
+/// What to say where a build has no Polars.
+#[cfg(not(feature = "polars"))]
+pub fn without_polars(what: &str) -> Failure {
+    Failure::Rendered(format!(
+        "error: `{what}` needs Polars, which this build has not\n  help: build with it: cargo build --release --features polars"
+    ))
 }
 
 /// Scores traces.
@@ -136,6 +200,25 @@ pub fn definitions(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Definitio
     run::definitions(traces, &request).map_err(score_failure)
 }
 
+/// The definitions over the columns of the schema, for traces that are not opened here.
+///
+/// # Errors
+/// Every fault of the definitions and the condition; an unknown metric.
+pub fn definitions_unopened(scoring: &ScoringArgs) -> Result<Definitions, Failure> {
+    let columns = run::schema_columns();
+    let name = scoring.definitions_name();
+    let mut definitions = Definitions::load(name, &columns).map_err(definition_failure)?;
+    if let Some(condition) = &scoring.condition {
+        definitions = definitions
+            .filtered("--where", condition, &columns)
+            .map_err(|faults| Failure::Faults(faults.render(colored())))?;
+    }
+    if let Some(metrics) = &scoring.metrics {
+        definitions.select(metrics).map_err(Failure::input)?;
+    }
+    Ok(definitions)
+}
+
 /// Faults of definitions have their own layout.
 pub fn score_failure(error: ScoreError) -> Failure {
     match error {
@@ -154,7 +237,7 @@ pub fn definition_failure(error: FileError) -> Failure {
 }
 
 /// Whether standard error shows colours.
-fn colored() -> bool {
+pub fn colored() -> bool {
     io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }
 
@@ -166,7 +249,10 @@ pub fn are_scores(inputs: &[Input]) -> bool {
 fn is_scores(input: &Input) -> bool {
     match Format::of_name(&input.name) {
         Ok(Format::Csv | Format::JsonLines) => true,
-        Ok(Format::Parquet) | Err(_) => File::open(&input.path).is_ok_and(|file| format::holds_scores(&file)),
+        Ok(Format::Parquet) | Err(_) => {
+            let folders = inputs::folder_values(&input.path);
+            File::open(&input.path).is_ok_and(|file| format::holds_scores(&file, &folders))
+        }
     }
 }
 
@@ -189,14 +275,16 @@ fn read_scores(inputs: &[&Input], scoring: &ScoringArgs) -> Result<EpisodeTable,
 
 fn read_one(input: &Input, scoring: &ScoringArgs) -> Result<EpisodeTable, Failure> {
     let file = File::open(&input.path).map_err(|error| at(input, error))?;
+    let named = || Definitions::load(scoring.definitions_name(), &run::schema_columns()).map_err(definition_failure);
     match Format::of_name(&input.name) {
         Ok(text @ (Format::Csv | Format::JsonLines)) => {
-            let definitions =
-                Definitions::load(scoring.definitions_name(), &run::schema_columns()).map_err(definition_failure)?;
-            format::read_text(text, &definitions.catalog, file).map_err(|error| at(input, error))
+            format::read_text(text, &named()?.catalog, file).map_err(|error| at(input, error))
         }
         Ok(Format::Parquet) | Err(_) => {
-            let table = format::read_parquet(file).map_err(|error| at(input, error))?;
+            let named = if format::holds_definitions(&file) { None } else { Some(named()?.catalog) };
+            let folders = inputs::folder_values(&input.path);
+            let surroundings = Surroundings { folders: &folders, definitions: named.as_ref() };
+            let table = format::read_parquet(file, &surroundings).map_err(|error| at(input, error))?;
             match &scoring.definitions {
                 Some(name) => check_hash(name, input, table),
                 None => Ok(table),
@@ -278,9 +366,4 @@ pub fn provenance(inputs: &[Input]) -> Result<Vec<bundle::Input>, Failure> {
         Ok(bundle::Input::new(input.name.as_ref(), hash::of_reader(file)?, bytes))
     };
     inputs.iter().map(|input| one(input).map_err(|error: io::Error| at(input, error))).collect()
-}
-
-/// The version of the trace schema, for manifests.
-pub const fn schema_version() -> u32 {
-    SCHEMA_VERSION
 }

@@ -95,6 +95,16 @@ pub enum StandardError {
     Population,
 }
 
+impl StandardError {
+    /// As a definition file writes it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sample => "sample",
+            Self::Population => "population",
+        }
+    }
+}
+
 /// One experiment that a definition file knows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Experiment {

@@ -1,1 +1,28 @@
 //! Runs episodes: a world, an agent, and a trace and a log at the end.
+//!
+//! ```text
+//! Plan ──► episodes still to do ──► threads, each with one eye ──► play ──► part ──► assembled: trace, log
+//!  (which)    (store knows)          (several under way where       (one      (one episode,
+//!                                     agents wait)                   episode)   whole)
+//! ```
+//!
+//! | file | what it knows |
+//! |---|---|
+//! | [`plan`] | which episodes, their names, and which of them a shard has |
+//! | [`play`] | one episode, from the first frame to the last step |
+//! | [`log`] | what an episode's log is told, step by step |
+//! | [`metadata`] | what a trace says of how it was recorded |
+//! | [`store`] | the folder: what is done, how an episode commits, how the final files are made |
+//! | [`claim`] | who else records into the folder |
+//! | [`run`] | threads, episodes under way, stopping, what took the time |
+//!
+//! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
+//! shards, interruptions and their order change nothing in a trace. Nothing here knows a metric.
+
+pub mod claim;
+pub mod log;
+pub mod metadata;
+pub mod plan;
+pub mod play;
+pub mod run;
+pub mod store;

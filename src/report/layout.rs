@@ -6,6 +6,7 @@
 use crate::cells::cell::{Cells, Group, KeyValue};
 use crate::metric::catalog::{Catalog, Metric};
 use crate::report::emphasis::emphasise;
+use crate::report::order::{TableOrder, row_key};
 use crate::report::style::{MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
 use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 use crate::report::value;
@@ -109,7 +110,8 @@ impl<'a> Layout<'a> {
     /// The rows in order, cut where a key that heads groups changes.
     fn groups(&self, sheet: &TableSheet) -> Vec<RowGroup> {
         let mut ordered: Vec<&Group> = self.cells.groups.iter().collect();
-        ordered.sort_by_cached_key(|group| self.rank(group));
+        let order = TableOrder { catalog: &self.cells.catalog, style: self.style };
+        ordered.sort_by_cached_key(|group| order.of_key(&self.cells.by, &group.key));
         let runs = ordered.chunk_by(|a, b| self.heading_keys(a).eq(self.heading_keys(b)));
         runs.map(|run| RowGroup {
             heading: self.heading(run[0]),
@@ -121,24 +123,6 @@ impl<'a> Layout<'a> {
     fn heading_keys<'g>(&self, group: &'g Group) -> impl Iterator<Item = (usize, &'g KeyValue)> {
         let row_key = self.row_key;
         group.key.iter().enumerate().filter(move |(at, _)| *at != row_key)
-    }
-
-    /// Heading keys before the row's own: experiments as the definitions order them, models as the style does,
-    /// then by value.
-    fn rank(&self, group: &Group) -> Vec<(usize, KeyValue)> {
-        let own = group.key.get(self.row_key).map(|value| (self.row_key, value));
-        self.heading_keys(group).chain(own).map(|(at, value)| (self.place(at, value), value.clone())).collect()
-    }
-
-    fn place(&self, key: usize, value: &KeyValue) -> usize {
-        match (self.cells.by[key].as_str(), value) {
-            ("experiment", KeyValue::Text(name)) => self.cells.catalog.experiment_rank(name),
-            ("model", KeyValue::Text(name)) => {
-                let order = &self.style.sheet.row_order;
-                order.iter().position(|model| model == name).unwrap_or(order.len())
-            }
-            _ => 0,
-        }
     }
 
     fn heading(&self, group: &Group) -> Option<String> {
@@ -202,11 +186,6 @@ fn experiment(catalog: &Catalog, name: &str) -> String {
         None | Some("") => name.to_owned(),
         Some(title) => format!("{name}: {title}"),
     }
-}
-
-/// Which key names the rows: the model where it is one, else the last.
-pub(super) fn row_key(by: &[String]) -> usize {
-    by.iter().position(|key| key == "model").unwrap_or(by.len().saturating_sub(1))
 }
 
 fn words(key: &str) -> String {

@@ -5,12 +5,14 @@
 //! of it, [`bundle`] writes the folder.
 
 pub mod bundle;
+pub mod changes;
 pub mod comparison;
 pub mod emphasis;
 pub mod errata;
 pub mod figures;
 pub mod html;
 pub mod layout;
+pub mod order;
 pub mod published;
 pub mod statistics;
 pub mod style;

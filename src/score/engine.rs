@@ -398,7 +398,7 @@ impl Evaluation<'_, '_> {
             (Aggregate::Max, _) => {
                 Values::new(segments.fold(values.ints(), |a, b| Ok::<_, ArrowError>(a.max(b)))?, Type::Int)
             }
-            (Aggregate::Sum, _) => Values::new(segments.fold(values.ints(), add)?, Type::Int),
+            (Aggregate::Sum, _) => Values::new(segments.sums(values.ints())?, Type::Int),
         })
     }
 
@@ -442,10 +442,6 @@ fn numbers(array: ArrayRef, ty: Type) -> Values {
         Type::Float => Values::new(array.as_primitive::<Float64Type>().unary::<_, Float64Type>(canonical), ty),
         _ => Values::shared(array, ty),
     }
-}
-
-fn add(a: i64, b: i64) -> Result<i64, ArrowError> {
-    a.checked_add(b).ok_or_else(|| ArrowError::ArithmeticOverflow(format!("overflow happened on: {a} + {b}")))
 }
 
 #[expect(clippy::unnecessary_wraps, reason = "a fold of the kernels")]

@@ -14,7 +14,7 @@
 //!
 //! Where nothing holds, nothing decided: the list is empty.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::num::NonZeroUsize;
 
@@ -99,9 +99,7 @@ pub fn explain(
     episode_id: &str,
     threads: NonZeroUsize,
 ) -> Result<Evidence, EvidenceError> {
-    let plan = &definitions.plan;
-    let outputs = plan.outputs.iter().map(|output| output.node);
-    let engine = Engine::for_nodes(plan, plan.needed_by(outputs));
+    let engine = engine(definitions);
     let projection = projection(traces, definitions, &engine, &[])?;
     let (mut found, mut names) = (None, Vec::new());
     let summary = traces.scan(
@@ -126,6 +124,43 @@ pub fn explain(
         episodes: summary.episodes,
         near: nearest(episode_id, names.iter().map(String::as_str)).map(str::to_owned),
     })
+}
+
+/// Explains every episode of these names that the traces hold, in one pass; `--where` does not count.
+///
+/// # Errors
+/// When the traces are not as they must be.
+pub fn explain_each(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    wanted: &BTreeSet<String>,
+    threads: NonZeroUsize,
+) -> Result<BTreeMap<String, Evidence>, ScoreError> {
+    let engine = engine(definitions);
+    let projection = projection(traces, definitions, &engine, &[])?;
+    let mut found = BTreeMap::new();
+    traces.scan(
+        &projection,
+        threads,
+        |batch| -> Result<Vec<Evidence>, ScoreError> {
+            let ids = episode_ids(&batch);
+            let wanted = ids.iter().enumerate().filter(|(_, id)| wanted.contains(*id));
+            let explained = wanted.map(|(at, id)| of_episode(&engine, definitions, &batch, at, id));
+            let file = || traces.files()[batch.origin.file].name().to_owned();
+            explained.collect::<Result<_, _>>().map_err(|source| ScoreError::Engine { file: file(), source })
+        },
+        |explained| {
+            found.extend(explained.into_iter().map(|evidence| (evidence.episode_id.clone(), evidence)));
+            Ok(())
+        },
+    )?;
+    Ok(found)
+}
+
+/// What computes the metrics asked for, and keeps the values that they build on.
+fn engine(definitions: &Definitions) -> Engine<'_> {
+    let plan = &definitions.plan;
+    Engine::for_nodes(plan, plan.needed_by(plan.outputs.iter().map(|output| output.node)))
 }
 
 fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
@@ -245,7 +280,7 @@ fn as_t(row: usize) -> i64 {
 }
 
 /// Timesteps as ranges: `3-7, 9`.
-fn ranges(timesteps: &[i64]) -> String {
+pub fn ranges(timesteps: &[i64]) -> String {
     let mut runs: Vec<(i64, i64)> = Vec::new();
     for &t in timesteps {
         match runs.last_mut() {

@@ -3,15 +3,17 @@
 use std::io;
 use std::num::NonZeroUsize;
 
-use super::engine::{Batch, Engine, EngineError};
+use super::engine::{Batch, Engine, EngineError, Scores};
 use super::rows::{RowSorter, Rows, SortedRows};
 use super::segments::Segments;
 use super::table::{EpisodeTable, Header};
 use crate::base::near::nearest;
+use crate::metric::catalog::Catalog;
 use crate::metric::columns::{Column, Columns, Level, Type};
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::Faults;
 use crate::metric::file::FileError;
+use crate::metric::restore::RestoreError;
 use crate::trace::finding::TraceError;
 use crate::trace::open::TraceSet;
 use crate::trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
@@ -44,6 +46,9 @@ pub enum ScoreError {
     /// The definition file is not.
     #[error(transparent)]
     Definitions(#[from] FileError),
+    /// The definitions that scores carry are not.
+    #[error(transparent)]
+    Carried(#[from] RestoreError),
     /// The condition on episodes is not.
     #[error(transparent)]
     Condition(#[from] Faults),
@@ -132,6 +137,17 @@ pub fn definitions(traces: &TraceSet, request: &Request) -> Result<Definitions, 
     Ok(definitions)
 }
 
+/// These metrics of the definitions that scores carry, checked against the traces that they were computed from.
+///
+/// # Errors
+/// A catalog that is not what its hash says, an unknown metric, a column that a metric needs and the traces lack.
+pub fn restored(traces: &TraceSet, catalog: &Catalog, metrics: &[String]) -> Result<Definitions, ScoreError> {
+    let mut definitions = Definitions::of_catalog(catalog, &trace_columns(traces))?;
+    definitions.select(metrics)?;
+    check_columns(traces, &definitions)?;
+    Ok(definitions)
+}
+
 /// Every column that is read must be in every file, with one type.
 fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(), ScoreError> {
     let plan = &definitions.plan;
@@ -169,12 +185,7 @@ pub fn score(
     labels: &[String],
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, ScoreError> {
-    let mut rows = rows(traces, definitions, labels, threads)?;
-    let mut table = EpisodeTable::empty(rows.header().clone());
-    while let Some(row) = rows.next().map_err(ScoreError::Spill)? {
-        table.push(row.clone());
-    }
-    Ok(table)
+    table(rows(traces, definitions, labels, threads)?)
 }
 
 /// Scores all episodes of some traces and gives the rows of the table one by one: memory does not grow with them.
@@ -195,20 +206,58 @@ pub fn rows(
         labels: labels.to_vec(),
         metrics: outputs.map(|output| output.name.clone()).collect(),
     };
+    sorted(traces, &projection, header, threads, |batch| engine.score(&view(batch)))
+}
+
+/// The episodes of some traces without a metric: keys and labels, the traces checked as [`score`] checks them.
+///
+/// For engines that read the traces by themselves and check nothing.
+///
+/// # Errors
+/// As [`score`], save that no number is computed.
+pub fn unscored(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, ScoreError> {
+    let projection = projection(traces, definitions, &Engine::new(&definitions.plan), labels)?;
+    let header = Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics: Vec::new() };
+    let all = |batch: &EpisodeBatch| Ok(Scores { kept: (0..batch.episodes.num_rows()).collect(), metrics: Vec::new() });
+    table(sorted(traces, &projection, header, threads, all)?)
+}
+
+/// The rows that `score` gives for each batch, in the order of the table.
+fn sorted(
+    traces: &TraceSet,
+    projection: &Projection,
+    header: Header,
+    threads: NonZeroUsize,
+    score: impl Fn(&EpisodeBatch) -> Result<Scores, EngineError> + Sync,
+) -> Result<SortedRows, ScoreError> {
+    let labels = header.labels.clone();
     let mut sorter = RowSorter::new(header);
     traces.scan(
-        &projection,
+        projection,
         threads,
         |batch| -> Result<Rows, ScoreError> {
-            let scores = engine.score(&view(&batch)).map_err(|source| ScoreError::Engine {
+            let scores = score(&batch).map_err(|source| ScoreError::Engine {
                 file: traces.files()[batch.origin.file].name().to_owned(),
                 source,
             })?;
-            Ok(Rows::of(&batch.episodes, &scores, labels))
+            Ok(Rows::of(&batch.episodes, &scores, &labels))
         },
         |rows: Rows| sorter.add(&rows).map_err(ScoreError::Spill),
     )?;
     sorter.finish().map_err(ScoreError::Spill)
+}
+
+fn table(mut rows: SortedRows) -> Result<EpisodeTable, ScoreError> {
+    let mut table = EpisodeTable::empty(rows.header().clone());
+    while let Some(row) = rows.next().map_err(ScoreError::Spill)? {
+        table.push(row.clone());
+    }
+    Ok(table)
 }
 
 /// A batch as the engine takes it.
@@ -239,7 +288,11 @@ pub(super) fn projection(
     Ok(Projection { steps, constants, experiments })
 }
 
-fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
+/// Refuses a column to group by that is not constant in an episode, or not in every trace.
+///
+/// # Errors
+/// [`ScoreError::Label`].
+pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     let constant = |name: &str| COLUMNS.iter().any(|column| column.name == name && column.constant);
     let problem = column_problem(traces, label);
     if constant(label) && problem.is_none() {

@@ -7,6 +7,7 @@ use arrow::array::{
     Array, ArrowPrimitiveType, BooleanArray, BooleanBufferBuilder, Int64Array, PrimitiveArray, UInt32Array,
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
+use arrow::error::ArrowError;
 use arrow::util::bit_chunk_iterator::UnalignedBitChunk;
 
 use super::values::{nulls_of, truths};
@@ -145,6 +146,23 @@ impl<'a> Segments<'a> {
             valid.try_fold(first, &fold).map(Some)
         });
         folded.collect()
+    }
+
+    /// The sums of each episode's values that are not null; null where there is none. What counts is the sum as a
+    /// whole: on the way to it no order of the steps can overflow.
+    ///
+    /// # Errors
+    /// For a sum beyond 64 bits.
+    pub(super) fn sums(self, values: &Int64Array) -> Result<Int64Array, ArrowError> {
+        let sum = |(start, length)| {
+            let valid = (start..start + length).filter(|&row| values.is_valid(row));
+            let sum = valid.map(|row| i128::from(values.value(row))).reduce(|a, b| a + b);
+            let fit = |sum: i128| {
+                i64::try_from(sum).map_err(|_| ArrowError::ArithmeticOverflow(format!("a sum comes to {sum}")))
+            };
+            sum.map(fit).transpose()
+        };
+        self.each().map(sum).collect()
     }
 
     /// The rows of the timesteps asked for; `None` where there is no such step.

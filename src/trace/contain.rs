@@ -3,10 +3,14 @@
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
 use std::sync::Once;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 thread_local! {
     static CONTAINING: Cell<bool> = const { Cell::new(false) };
 }
+
+/// How many calls are under way that contain the panics of all threads.
+static EVERYWHERE: AtomicUsize = AtomicUsize::new(0);
 
 /// What `decode` gives, or the message of the panic it ended in; nothing is printed for that panic.
 ///
@@ -22,12 +26,21 @@ pub(crate) fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
     })
 }
 
+/// As [`contained`], for a library that has threads of its own: nothing is printed for a panic on any thread.
+#[cfg(feature = "polars")]
+pub(crate) fn contained_on_all_threads<R>(run: impl FnOnce() -> R) -> Result<R, String> {
+    EVERYWHERE.fetch_add(1, Ordering::SeqCst);
+    let result = contained(run);
+    EVERYWHERE.fetch_sub(1, Ordering::SeqCst);
+    result
+}
+
 fn silence_contained_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
         let report = panic::take_hook();
         panic::set_hook(Box::new(move |info| {
-            if !CONTAINING.get() {
+            if !CONTAINING.get() && EVERYWHERE.load(Ordering::SeqCst) == 0 {
                 report(info);
             }
         }));

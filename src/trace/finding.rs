@@ -375,6 +375,14 @@ pub enum TraceError {
         /// What to do.
         help: &'static str,
     },
+    /// A file cannot be taken over into another trace.
+    #[error("cannot take over the episodes of `{file}`: {source}")]
+    Part {
+        /// The file.
+        file: String,
+        /// Why not.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
     /// Threads could not be started.
     #[error("cannot start {threads} threads; ask for fewer with --threads")]
     Threads {
@@ -410,7 +418,7 @@ pub enum TraceError {
         found: String,
     },
     /// The trace could not be written; no file was left behind.
-    #[error("cannot write the trace {file}; no file was left behind")]
+    #[error("cannot write the trace {file}, and left no file behind: is the folder writable, and the disk not full?")]
     Write {
         /// The file, as named.
         file: String,

@@ -2,7 +2,8 @@
 //!
 //! An argument is a file, a folder (every `*.parquet` in it and below it), a glob that the shell did not expand, or
 //! `-` for a list of the first two on standard input, one a line. A name that exists is itself, whatever characters
-//! it has. Inside a folder, links to folders are not followed and reports are passed over.
+//! it has. Inside a folder, links to folders are not followed, and reports and names that begin with `_` or `.` are
+//! passed over: what other programs leave beside their Parquet.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -126,6 +127,9 @@ fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
     for entry in fs::read_dir(path).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let below = entry.path();
+        if is_left_over(&entry.file_name()) {
+            continue;
+        }
         if entry.file_type().map_err(failed)?.is_dir() {
             if !is_report(&below) {
                 traces.extend(traces_at(&below)?);
@@ -140,6 +144,37 @@ fn traces_at(path: &Path) -> Result<Vec<PathBuf>, TraceError> {
 /// Whether a folder is what `mirrorstats report` writes: its Parquet file holds scores, no steps.
 fn is_report(folder: &Path) -> bool {
     ["manifest.json", "cells.csv", "episodes.parquet"].iter().all(|name| folder.join(name).is_file())
+}
+
+/// Whether a name is that of a note or of something unfinished: `_SUCCESS`, `_temporary`, `.part-0.parquet.crc`.
+fn is_left_over(name: &OsStr) -> bool {
+    name.to_string_lossy().starts_with(['_', '.'])
+}
+
+/// The columns that stand in the names of a path's folders, as Spark and others divide a table: `experiment=E1`.
+///
+/// `None` is the null of such a table. Characters that a file system might not take are spelled `%41`.
+pub fn folder_values(path: &Path) -> Vec<(String, Option<String>)> {
+    const NULL: &str = "__HIVE_DEFAULT_PARTITION__";
+    let folders = path.parent().into_iter().flat_map(Path::components);
+    let pair = |folder: Component| {
+        let (name, value) = folder.as_os_str().to_str()?.split_once('=')?;
+        Some((unescaped(name), (value != NULL).then(|| unescaped(value))))
+    };
+    folders.filter_map(pair).collect()
+}
+
+/// `%41` as `A`; what is no such spelling stays.
+fn unescaped(text: &str) -> String {
+    let mut bytes = Vec::with_capacity(text.len());
+    let mut rest = text.as_bytes();
+    while let Some((&first, others)) = rest.split_first() {
+        let digits = others.get(..2).filter(|digits| first == b'%' && digits.iter().all(u8::is_ascii_hexdigit));
+        let spelled = digits.and_then(|digits| u8::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok());
+        bytes.push(spelled.unwrap_or(first));
+        rest = if spelled.is_some() { &others[2..] } else { others };
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
 }
 
 fn display_name(path: &Path) -> String {
@@ -188,6 +223,25 @@ mod tests {
         let expected = ["a.parquet", "b.parquet", "c.parquet", "x[1].parquet"].map(String::from).to_vec();
         assert_eq!(names(&[&at], ""), Ok(expected.clone()));
         assert_eq!(names(&["-"], &format!("{at}\n\n")), Ok(expected));
+    }
+
+    #[test]
+    fn what_other_programs_leave_in_a_folder_is_passed_over() {
+        let (_keep, at) = folder();
+        fs::create_dir_all(format!("{at}/_temporary/0")).unwrap();
+        for name in ["_temporary/0/part.parquet", "_notes.parquet", ".a.parquet", "_SUCCESS"] {
+            fs::write(format!("{at}/{name}"), "").unwrap();
+        }
+        assert_eq!(names(&[&at], "").unwrap().len(), 4);
+        assert_eq!(names(&[&format!("{at}/_notes.parquet")], ""), Ok(vec!["_notes.parquet".into()]));
+    }
+
+    #[test]
+    fn folders_may_name_columns() {
+        let path = Path::new("out/experiment=E1/model=a%2Fb%25 50%/run=__HIVE_DEFAULT_PARTITION__/x=1.parquet");
+        let pair = |name: &str, value: Option<&str>| (name.to_owned(), value.map(str::to_owned));
+        let expected = [pair("experiment", Some("E1")), pair("model", Some("a/b% 50%")), pair("run", None)];
+        assert_eq!(folder_values(path), expected);
     }
 
     #[test]

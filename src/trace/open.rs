@@ -5,7 +5,7 @@
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::datatypes::{DataType, Schema};
@@ -154,6 +154,11 @@ impl TraceFile {
     /// Whatever the operating system says.
     pub fn reader(&self) -> io::Result<File> {
         File::open(&self.path)
+    }
+
+    /// Where it is, for an engine that reads files by itself.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// The size in bytes.

@@ -5,8 +5,6 @@
 //! column that was not declared is refused, never dropped.
 
 use std::collections::HashSet;
-#[cfg(unix)]
-use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -73,7 +71,7 @@ fn has_value(column: &Column, episode: &Episode) -> bool {
 }
 
 /// Rows after which a row group is closed, at the next end of an episode.
-const ROW_GROUP_ROWS: usize = 128 * 1024;
+pub(super) const ROW_GROUP_ROWS: usize = 128 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 8 * 1024;
 
@@ -99,7 +97,9 @@ impl<W: Write + Send> TraceEncoder<W> {
         let columns = layout.iter().filter_map(|column| Source::of(column.name)).map(Gathered::new).collect();
         let layout = Arc::new(Schema::new(layout.into_iter().map(field).collect::<Vec<_>>()));
         // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
-        let options = ArrowWriterOptions::new().with_properties(properties(metadata)).with_skip_arrow_metadata(true);
+        let options = ArrowWriterOptions::new()
+            .with_properties(properties(metadata.recording.as_ref()))
+            .with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(out, Arc::clone(&layout), options).map_err(failed)?;
         Ok(Self { parquet, layout, columns, undeclared, seen: HashSet::new(), gathered_rows: 0, row_group_rows: 0 })
     }
@@ -149,13 +149,13 @@ impl<W: Write + Send> TraceEncoder<W> {
     }
 }
 
-fn properties(metadata: &TraceMetadata) -> WriterProperties {
+pub(super) fn properties(recording: Option<&serde_json::Value>) -> WriterProperties {
     let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let mut pairs = vec![
         pair(schema::VERSION_KEY, schema::SCHEMA_VERSION.to_string()),
         pair(schema::WRITER_KEY, concat!("mirrorstats ", env!("CARGO_PKG_VERSION")).to_owned()),
     ];
-    pairs.extend(metadata.recording.as_ref().map(|json| pair(schema::RECORDING_KEY, json.to_string())));
+    pairs.extend(recording.map(|json| pair(schema::RECORDING_KEY, json.to_string())));
     WriterProperties::builder()
         .set_key_value_metadata(Some(pairs))
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
@@ -204,7 +204,7 @@ impl TraceWriter {
     /// When no file can be made in that folder.
     pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let file = unnamed_in(folder)
+        let file = temporary::file_in(folder)
             .map_err(|source| TraceError::Write { file: path.display().to_string(), source: Box::new(source) })?;
         let encoder = TraceEncoder::new(file, metadata).map_err(|error| named(error, path))?;
         Ok(Self { encoder, path: path.to_owned() })
@@ -223,11 +223,24 @@ impl TraceWriter {
     /// # Errors
     /// Whatever writing gives; nothing is left behind then.
     pub fn finish(self) -> Result<(), TraceError> {
+        self.persist(|_| Ok(()))
+    }
+
+    /// As [`finish`](Self::finish), with the rows on the disk before the file has its name: not even a loss of power
+    /// leaves a part of it. That the name itself is on the disk is for the caller to see to.
+    ///
+    /// # Errors
+    /// As [`finish`](Self::finish).
+    pub fn finish_durably(self) -> Result<(), TraceError> {
+        self.persist(|file| file.as_file().sync_all())
+    }
+
+    fn persist(self, before: impl FnOnce(&NamedTempFile) -> io::Result<()>) -> Result<(), TraceError> {
         let Self { encoder, path } = self;
+        let failed = |error: io::Error| TraceError::Write { file: path.display().to_string(), source: Box::new(error) };
         let file = encoder.finish().map_err(|error| named(error, &path))?;
-        file.persist(&path)
-            .map(drop)
-            .map_err(|error| TraceError::Write { file: path.display().to_string(), source: Box::new(error.error) })
+        before(&file).map_err(failed)?;
+        file.persist(&path).map(drop).map_err(|error| failed(error.error))
     }
 }
 
@@ -253,16 +266,4 @@ fn named(error: TraceError, path: &Path) -> TraceError {
         TraceError::Write { source, .. } => TraceError::Write { file: path.display().to_string(), source },
         other => other,
     }
-}
-
-/// A temporary file with the permissions of an ordinary new one.
-fn unnamed_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mirrorstats-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        builder.permissions(fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder).map_err(temporary::without_name)
 }

@@ -105,3 +105,16 @@ fn any_grouping_and_no_episode_at_all_make_a_page() {
 fn rows(report: &Report) -> usize {
     report.tables.len() * report.cells.groups.len()
 }
+
+#[test]
+fn a_cell_is_quiet_where_it_shows_no_value_and_not_where_a_style_prints_zero() {
+    let page = Report::of(PAPER.clone(), &["experiment", "model"], "paper").render().unwrap();
+    let tables = &page[page.find("<table class=\"results\"").unwrap()..];
+    let undefined: Vec<&str> = tables.split("<td ").skip(1).filter(|cell| cell.contains(" data-mean=\"\"")).collect();
+    let zero = |cell: &&&str| cell.contains(">0.00 ± 0.00</");
+    assert!(undefined.iter().any(|cell| zero(&cell)) && undefined.iter().any(|cell| !zero(&cell)));
+    for cell in &undefined {
+        assert_eq!(cell.contains(" class=\"undefined\""), !zero(&cell), "{cell}");
+    }
+    assert!(page.contains(".results td.undefined { color"));
+}

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::ValueEnum;
 
-use crate::cli::args::{ScoringArgs, TraceArgs};
+use crate::cli::args::{EngineArgs, ScoringArgs, TraceArgs};
 use crate::cli::drawing::Sources;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
@@ -26,6 +26,9 @@ pub struct FigureArgs {
     /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
+    /// What computes it.
+    #[command(flatten)]
+    pub engine: EngineArgs,
     /// The style whose order of models is taken: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: String,
@@ -92,7 +95,7 @@ impl FigureArgs {
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let inputs = scoring::resolve(&self.traces)?;
         let threads = self.traces.threads.count();
-        let episodes = scoring::table(&inputs, &self.scoring, &[], threads)?;
+        let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
         let sources = Sources::of(&inputs, &self.scoring, &episodes, &style, threads)?;
         self.write(&sources.input())
     }

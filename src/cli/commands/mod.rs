@@ -2,14 +2,26 @@
 
 pub mod compare;
 pub mod definitions;
+pub mod diff;
 pub mod figure;
+#[cfg(feature = "sim")]
+pub mod filmstrip;
 pub mod info;
+pub mod query;
+#[cfg(feature = "sim")]
+pub mod record;
+pub mod recover;
+#[cfg(feature = "sim")]
+pub mod replay;
 pub mod report;
+pub mod rescore;
 pub mod schema;
 pub mod score;
 pub mod sql;
 pub mod stats;
 pub mod validate;
+#[cfg(feature = "sim")]
+pub mod world;
 
 use super::outcome::{Failure, Outcome};
 
@@ -18,15 +30,27 @@ use super::outcome::{Failure, Outcome};
 #[expect(missing_docs, reason = "the words of each verb stand with its arguments")]
 pub enum Command {
     Report(report::ReportArgs),
+    #[cfg(feature = "sim")]
+    Record(record::RecordArgs),
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
+    Diff(diff::DiffArgs),
+    Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
+    Recover(recover::RecoverArgs),
+    #[cfg(feature = "sim")]
+    Replay(replay::ReplayArgs),
+    #[cfg(feature = "sim")]
+    Filmstrip(filmstrip::FilmstripArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
+    Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
+    #[cfg(feature = "sim")]
+    World(world::WorldArgs),
 }
 
 impl Command {
@@ -37,15 +61,27 @@ impl Command {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Self::Report(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Record(args) => args.run(),
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
+            Self::Diff(args) => args.run(),
+            Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
+            Self::Recover(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Replay(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::Filmstrip(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
+            Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
+            #[cfg(feature = "sim")]
+            Self::World(args) => args.run(),
         }
     }
 }

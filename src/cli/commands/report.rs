@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::args::{ScoringArgs, TraceArgs};
+use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
 use super::super::{output, scoring};
@@ -17,8 +17,10 @@ use crate::report::style::{MAIN_TABLE, Style};
 use crate::report::table::Table;
 use crate::report::tables::terminal::{self, Marks, Terminal};
 use crate::score::format;
+use crate::trace::inputs::Input;
+use crate::trace::schema::SCHEMA_VERSION;
 
-/// Compute the tables of traces, print the main one, write all of them
+/// Compute the tables and figures of traces, print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
 pub struct ReportArgs {
     /// Traces, or files of scores in their place.
@@ -27,6 +29,9 @@ pub struct ReportArgs {
     /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
+    /// What computes it.
+    #[command(flatten)]
+    pub engine: EngineArgs,
     /// The folder to write
     #[arg(long, value_name = "DIR", default_value = "reports/latest")]
     pub out: PathBuf,
@@ -63,24 +68,32 @@ impl ReportArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions, the style or the folder.
     pub fn run(self) -> Result<Outcome, Failure> {
-        // Small files first: a slip in the style should not cost a pass over the traces.
-        let style = Style::load(&self.style).map_err(Failure::input)?;
         let inputs = scoring::resolve(&self.traces)?;
-        let labels = scoring::labels(&self.by);
-        let episodes = scoring::table(&inputs, &self.scoring, &labels, self.traces.threads.count())?;
-        let cells = group(&episodes, &self.by).map_err(Failure::input)?;
-        let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
-        let condition = self.scoring.condition.clone();
-        let manifest =
-            Manifest::new(&cells, &style, scoring::schema_version(), condition, scoring::provenance(&inputs)?);
-        let made = Made { inputs, episodes, cells, tables, manifest, style };
-        let files = self.write(&made)?;
+        let (made, files) = self.make(inputs)?;
         if self.json {
             let out = self.out.display().to_string();
             let Made { episodes, manifest, .. } = made;
             return output::print_json(&ReportAnswer { out, files, episodes: episodes.len(), manifest });
         }
         self.print(&made.tables, made.episodes.len())
+    }
+
+    /// Makes the report of these files and writes its folder; returns what was made and the files written.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces, the definitions, the style or the folder.
+    pub fn make(&self, inputs: Vec<Input>) -> Result<(Made, Vec<String>), Failure> {
+        // Small files first: a slip in the style should not cost a pass over the traces.
+        let style = Style::load(&self.style).map_err(Failure::input)?;
+        let labels = scoring::labels(&self.by);
+        let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &labels, self.traces.threads.count())?;
+        let cells = group(&episodes, &self.by).map_err(Failure::input)?;
+        let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
+        let condition = self.scoring.condition.clone();
+        let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, condition, scoring::provenance(&inputs)?);
+        let made = Made { inputs, episodes, cells, tables, manifest, style };
+        let files = self.write(&made)?;
+        Ok((made, files))
     }
 
     fn write(&self, made: &Made) -> Result<Vec<String>, Failure> {

@@ -3,9 +3,9 @@
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use super::super::args::{ScoringArgs, TraceArgs};
+use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
-use super::super::{output, scoring};
+use super::super::{output, scoring, spark};
 use crate::score::evidence;
 use crate::score::format::Format;
 
@@ -18,7 +18,11 @@ pub struct ScoreArgs {
     /// How it is defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    /// Write the episode table here: a name that ends in .parquet, .csv or .jsonl [default: CSV on standard output]
+    /// What computes it.
+    #[command(flatten)]
+    pub engine: EngineArgs,
+    /// Write the episode table here: a name that ends in .parquet, .csv or .jsonl; with --engine spark any other name or
+    /// a URI is a folder of Parquet, written by Spark [default: CSV on standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
     /// Show one episode's scores and the timesteps that decided them
@@ -35,6 +39,10 @@ impl ScoreArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions or the output.
     pub fn run(self) -> Result<Outcome, Failure> {
+        self.engine.check()?;
+        if self.engine.engine == Engine::Spark {
+            return self.run_on_spark();
+        }
         // An output name of no known format should not cost a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
         let inputs = scoring::resolve(&self.traces)?;
@@ -48,12 +56,41 @@ impl ScoreArgs {
             })?;
             return output::print(&found, self.json);
         }
+        if self.engine.engine == Engine::Native {
+            return self.deliver(format, |format, out| scoring::write(&inputs, &self.scoring, threads, format, out));
+        }
+        let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
+    }
+
+    fn run_on_spark(&self) -> Result<Outcome, Failure> {
+        if self.explain.is_some() {
+            let words =
+                "error: --explain looks into the steps, which Spark keeps to itself\n  help: leave --engine out";
+            return Err(Failure::Rendered(words.to_owned()));
+        }
+        let asked = || spark::Asked::of(&self.traces, &self.scoring, &self.engine);
+        if let Some(folder) = self.output.as_deref().filter(|output| spark::is_folder(output)) {
+            let name = folder.to_string_lossy();
+            let written = asked()?.write(&name)?;
+            writeln!(io::stderr(), "{} episodes; `mirrorstats report {name}` goes on from here", written.episodes)?;
+            return Ok(Outcome::Done);
+        }
+        let format = self.output.as_deref().map(format_of).transpose()?;
+        let table = asked()?.score(&[])?;
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
+    }
+
+    /// Writes the table to where it was asked for.
+    fn deliver(
+        &self,
+        format: Option<Format>,
+        write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<(), Failure>,
+    ) -> Result<Outcome, Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
         match &self.output {
-            Some(path) => output::write_file_with(path, |file| {
-                scoring::write(&inputs, &self.scoring, threads, format, BufWriter::new(file))
-            })?,
-            None => scoring::write(&inputs, &self.scoring, threads, format, BufWriter::new(io::stdout()))?,
+            Some(path) => output::write_file_with(path, |file| write(format, &mut BufWriter::new(file)))?,
+            None => write(format, &mut BufWriter::new(io::stdout()))?,
         }
         Ok(Outcome::Done)
     }

@@ -5,9 +5,7 @@ use std::io::{self, Write as _};
 use super::super::args::ScoringArgs;
 use super::super::outcome::{Failure, Outcome};
 use super::super::scoring;
-use crate::metric::definitions::Definitions;
 use crate::metric::sql::{self, Dialect};
-use crate::score::run;
 
 /// Print the SQL statement that computes the episode table from a table `steps`
 #[derive(Clone, Debug, clap::Args)]
@@ -47,15 +45,7 @@ impl SqlArgs {
     /// # Errors
     /// Faults of the definitions; a construct that the dialect cannot say.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let columns = run::schema_columns();
-        let name = self.scoring.definitions_name();
-        let mut definitions = Definitions::load(name, &columns).map_err(scoring::definition_failure)?;
-        if let Some(condition) = &self.scoring.condition {
-            definitions = definitions.filtered("--where", condition, &columns).map_err(Failure::input)?;
-        }
-        if let Some(metrics) = &self.scoring.metrics {
-            definitions.select(metrics).map_err(Failure::input)?;
-        }
+        let definitions = scoring::definitions_unopened(&self.scoring)?;
         let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
         io::stdout().lock().write_all(statement.as_bytes())?;
         Ok(Outcome::Done)

@@ -5,9 +5,9 @@
 
 use std::sync::LazyLock;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use ttf_parser::Face;
-
-use crate::base::base64::base64;
 
 /// The family's name: private, so that no installed font is taken in its place.
 pub const FAMILY: &str = "Mirrorstats Sans";
@@ -88,7 +88,7 @@ pub fn style_sheet() -> String {
             format!(
                 "@font-face{{font-family:'{FAMILY}';font-weight:{weight};\
                  src:url(data:font/woff2;base64,{}) format('woff2')}}",
-                base64(data)
+                STANDARD.encode(data)
             )
         })
         .concat()

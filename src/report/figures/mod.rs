@@ -10,11 +10,12 @@
 //! `convert` (PNG and PDF, feature `raster`).
 
 pub mod e5_outcomes;
+pub mod film_strip;
 pub mod gaze;
 
 mod completion_gap;
 #[cfg(feature = "raster")]
-mod convert;
+pub mod convert;
 mod decision_curve;
 mod dodge;
 mod font;

@@ -4,6 +4,8 @@ use std::cell::RefCell;
 use std::fmt::Write as _;
 use std::rc::Rc;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use plotters::coord::Shift;
 use plotters::drawing::DrawingArea;
 use plotters::element::{Circle, Drawable, PathElement, PointCollection, Polygon, Rectangle, Text};
@@ -163,6 +165,17 @@ impl Sheet {
         let at = if lettering.upwards { (at.0 + drop, at.1) } else { (at.0, at.1 + drop) };
         let style = text_style(lettering);
         self.put(&Text::new(font::drawable(text), lattice(at), style), String::new());
+    }
+
+    /// A picture that fills a frame; it is carried along in the file.
+    pub fn picture(&mut self, frame: Frame, png: &[u8]) {
+        let Frame { left, top, width, height } = frame;
+        let _ = writeln!(
+            self.ink.borrow_mut().body,
+            "<image x=\"{left:.2}\" y=\"{top:.2}\" width=\"{width:.2}\" height=\"{height:.2}\" \
+             preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
+            STANDARD.encode(png)
+        );
     }
 
     /// What `draw` draws, as one group that carries the mark's title and values.

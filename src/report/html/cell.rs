@@ -22,6 +22,8 @@ pub(super) struct CellView {
     estimate: String,
     /// The part that says how sure it is; empty for none.
     detail: String,
+    /// Whether it shows that there is no value; a zero that a style prints in its place is no such cell.
+    is_undefined: bool,
     /// Whether emphasis covers the detail too.
     is_whole: bool,
     /// The element that spells its emphasis.
@@ -65,6 +67,7 @@ impl CellView {
             metric: visible(name),
             estimate,
             detail: detail.unwrap_or_default(),
+            is_undefined: cell.value == Value::Undefined,
             is_whole: matches!(cell.value, Value::MeanSe { .. }),
             element: element(cell.emphasis),
             mark: if cell.is_marked { DAGGER.to_string() } else { String::new() },

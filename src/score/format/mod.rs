@@ -2,21 +2,26 @@
 //!
 //! Columns are `episode_id, model, experiment, seed, run`, then the labels, then the metrics by name;
 //! rates are 0 and 1; undefined is null or empty. Parquet carries the definitions in its footer; the
-//! two text formats cannot, so whoever reads them back names the definitions.
+//! two text formats cannot, nor can the SQL lowering run by hand on another engine, so whoever reads those back names
+//! the definitions.
 
 mod csv;
+mod footer;
 mod jsonl;
 mod parquet;
+mod surroundings;
 
 use std::collections::HashSet;
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 
+use ::parquet::errors::ParquetError;
 use ::parquet::file::reader::ChunkReader;
 
 use super::table::{EpisodeRow, EpisodeTable, Header};
 use crate::metric::catalog::{Catalog, Kind};
 
-pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_scores};
+pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
+pub use self::surroundings::Surroundings;
 
 /// A format of episode tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,6 +108,23 @@ pub enum FormatError {
     Definitions(String),
 }
 
+impl FormatError {
+    /// What the system said, if it is what failed: mostly for want of space or of a reader.
+    ///
+    /// # Errors
+    /// This error, if it is another one.
+    pub fn into_io(self) -> Result<io::Error, Self> {
+        match self {
+            Self::Io(error) => Ok(error),
+            Self::Parquet(ParquetError::External(error)) => match error.downcast::<io::Error>() {
+                Ok(error) => Ok(*error),
+                Err(error) => Err(Self::Parquet(ParquetError::External(error))),
+            },
+            other => Err(other),
+        }
+    }
+}
+
 /// Writes a table.
 ///
 /// # Errors
@@ -171,12 +193,15 @@ pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<
     })
 }
 
-/// Reads a table and the definitions that it carries.
+/// Reads a table and the definitions that it carries, or those of its surroundings.
 ///
 /// # Errors
 /// A file that is not Parquet, or not one of scores; scores that its definitions cannot have given.
-pub fn read_parquet(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
-    checked(parquet::read(input)?)
+pub fn read_parquet(
+    input: impl ChunkReader + 'static,
+    surroundings: &Surroundings<'_>,
+) -> Result<EpisodeTable, FormatError> {
+    checked(parquet::read(input, surroundings)?)
 }
 
 /// A table as scoring gives it: each episode once, of a known experiment, rates 0 and 1.

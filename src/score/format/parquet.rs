@@ -7,7 +7,7 @@ use arrow::array::{
     Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Builder, RecordBatch, StringBuilder,
 };
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Int64Type, Schema, SchemaRef};
+use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, ZstdLevel};
@@ -18,6 +18,8 @@ use parquet::file::reader::ChunkReader;
 
 use super::FormatError;
 use super::csv::{KEYS, check_unique};
+use super::footer;
+use super::surroundings::Surroundings;
 use crate::metric::catalog::Catalog;
 use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
 use crate::trace::contain::contained;
@@ -31,12 +33,25 @@ pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 /// The footer key of the definitions' hash.
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 
-/// Whether a file is Parquet with the footer of scores.
-pub fn holds_scores(file: &impl ChunkReader) -> bool {
+/// Whether a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
+///
+/// `folders` are columns that stand in the names of the file's folders.
+pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
     let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
     let Ok(Ok(metadata)) = footer else { return false };
-    let pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
-    pairs.into_iter().any(|pair| pair.key == KIND_KEY && pair.value.as_deref() == Some(SCORES_KIND))
+    if footer::value(metadata.file_metadata(), KIND_KEY).is_some() {
+        return footer::value(metadata.file_metadata(), KIND_KEY).as_deref() == Some(SCORES_KIND);
+    }
+    let columns = metadata.file_metadata().schema_descr().root_schema().get_fields().iter();
+    let outside = folders.iter().map(|(name, _)| name.as_str());
+    let names: Vec<&str> = columns.map(|column| column.name()).chain(outside).collect();
+    !names.contains(&"t") && KEYS.iter().all(|key| names.contains(key))
+}
+
+/// Whether a file of scores carries the definitions that gave them.
+pub fn holds_definitions(file: &impl ChunkReader) -> bool {
+    let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
+    matches!(footer, Ok(Ok(metadata)) if footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
 }
 
 /// Rows after which a row group is closed: what is encoded and not yet written stays small.
@@ -146,28 +161,34 @@ impl Gathered {
     }
 }
 
-pub(super) fn read(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
-    contained(|| decode(input)).unwrap_or_else(|panic| Err(FormatError::Parquet(ParquetError::General(panic))))
+pub(super) fn read(
+    input: impl ChunkReader + 'static,
+    surroundings: &Surroundings<'_>,
+) -> Result<EpisodeTable, FormatError> {
+    contained(|| decode(input, surroundings))
+        .unwrap_or_else(|panic| Err(FormatError::Parquet(ParquetError::General(panic))))
 }
 
-fn decode(input: impl ChunkReader + 'static) -> Result<EpisodeTable, FormatError> {
+fn decode(input: impl ChunkReader + 'static, surroundings: &Surroundings<'_>) -> Result<EpisodeTable, FormatError> {
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
-    let catalog = catalog(builder.metadata().file_metadata().key_value_metadata().into_iter().flatten())?;
+    let catalog = match (footer::value(builder.metadata().file_metadata(), DEFINITIONS_KEY), surroundings.definitions) {
+        (Some(text), _) => serde_json::from_str(&text).map_err(|error| FormatError::Definitions(error.to_string()))?,
+        (None, Some(named)) => named.clone(),
+        (None, None) => return Err(FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`"))),
+    };
     let names: Vec<&str> = builder.schema().fields().iter().map(|field| field.name().as_str()).collect();
     check_unique(&names)?;
     let mut table = EpisodeTable { catalog, keys: Vec::new(), labels: Vec::new(), metrics: Vec::new() };
+    // A part without rows has its columns all the same.
+    let none = surroundings.complete(&RecordBatch::new_empty(builder.schema().clone()), &table.catalog)?;
+    append(&mut table, &none)?;
     for batch in builder.build()? {
         let batch = batch.map_err(|error| FormatError::Parquet(error.into()))?;
+        let batch = surroundings.complete(&batch, &table.catalog)?;
         append(&mut table, &batch)?;
     }
     Ok(table.sorted())
-}
-
-fn catalog<'a>(metadata: impl IntoIterator<Item = &'a KeyValue>) -> Result<Catalog, FormatError> {
-    let text = metadata.into_iter().find(|pair| pair.key == DEFINITIONS_KEY).and_then(|pair| pair.value.as_deref());
-    let text = text.ok_or_else(|| FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`")))?;
-    serde_json::from_str(text).map_err(|error| FormatError::Definitions(error.to_string()))
 }
 
 fn append(table: &mut EpisodeTable, batch: &RecordBatch) -> Result<(), FormatError> {
@@ -214,13 +235,21 @@ fn column(batch: &RecordBatch, name: &str, ty: &DataType, expected: &'static str
     let fault = |found: String| FormatError::Column { column: name.to_owned(), expected, found };
     let column = batch.column_by_name(name).ok_or_else(|| fault("no such column".to_owned()))?;
     let fits = match ty {
-        DataType::Int64 => column.data_type().is_integer(),
+        // Some engines widen a sum of integers until Parquet has no integer for it.
+        DataType::Int64 => column.data_type().is_integer() || is_whole(column),
         _ => column.data_type().is_string(),
     };
     if !fits {
         return Err(fault(column.data_type().to_string()));
     }
     cast(column, ty).map_err(|error| fault(error.to_string()))
+}
+
+/// Whether all values are doubles that stand for one integer each.
+fn is_whole(column: &ArrayRef) -> bool {
+    const EXACT: f64 = 9_007_199_254_740_992.0;
+    let whole = |value: f64| value.fract().abs() <= 0.0 && value.abs() < EXACT;
+    column.as_primitive_opt::<Float64Type>().is_some_and(|floats| floats.iter().flatten().all(whole))
 }
 
 fn texts(batch: &RecordBatch, name: &str) -> Result<Vec<Option<String>>, FormatError> {

@@ -1,0 +1,132 @@
+//! How fast the world is: `make bench` prints steps a second with and without frames, and where the time goes.
+//!
+//! E5 with six others, seven humanoids in all, the agent walking about. One world after the other on one thread, then
+//! on as many threads as there are cores.
+
+use std::num::NonZeroUsize;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use mirrorstats::sim::Experiment;
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::eye::Eye;
+use mirrorstats::sim::scene::Scene;
+use mirrorstats::sim::world::World;
+use mirrorstats::trace::episode::Action;
+
+const EPISODES: i32 = 4;
+const STEPS: i32 = 100;
+
+/// Where the time of some steps went.
+#[derive(Clone, Copy, Default)]
+struct Spent {
+    steps: u32,
+    motion: Duration,
+    census: Duration,
+    drawing: Duration,
+}
+
+impl Spent {
+    fn all(&self) -> Duration {
+        self.motion + self.census + self.drawing
+    }
+
+    fn per_second(&self) -> f64 {
+        f64::from(self.steps) / self.all().as_secs_f64()
+    }
+
+    fn share_of_drawing(&self) -> f64 {
+        100.0 * self.drawing.as_secs_f64() / self.all().as_secs_f64()
+    }
+}
+
+/// Adds the time that `work` takes to `spent`.
+fn timed<T>(spent: &mut Duration, work: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let made = work();
+    *spent += start.elapsed();
+    made
+}
+
+/// Some episodes of E5 with six others; with an eye, every step is drawn.
+fn walk(config: &WorldConfig, first: i32, mut eye: Option<Eye>) -> Spent {
+    let mut spent = Spent::default();
+    for seed in first..first + EPISODES {
+        let scene = Scene::draw(config, Experiment::E5, seed, 0).expect("the default has room for all");
+        let mut world = World::new(config, scene).expect("the default is a world");
+        for t in 0..STEPS {
+            if let Some(eye) = &mut eye {
+                timed(&mut spent.drawing, || eye.frame(&world)).expect("there is something to draw with");
+            }
+            std::hint::black_box(timed(&mut spent.census, || world.census()));
+            let action = if t % 4 == 3 { Action::TurnLeft } else { Action::MoveForward };
+            timed(&mut spent.motion, || world.act(Some(action)));
+            spent.steps += 1;
+        }
+    }
+    spent
+}
+
+/// What switching between worlds costs an eye: the same frames of one world and of eight by turns.
+fn switching(config: &WorldConfig) -> [Duration; 2] {
+    const FRAMES: usize = 64;
+    let mut eye = Eye::new(config).expect("there is something to draw with");
+    let worlds: Vec<World> = (0..8)
+        .map(|_| Scene::draw(config, Experiment::E5, 1, 0).expect("the default has room for all"))
+        .map(|scene| World::new(config, scene).expect("the default is a world"))
+        .collect();
+    [1, worlds.len()].map(|count| {
+        let mut spent = Duration::ZERO;
+        for at in 0..FRAMES + 8 {
+            let mut took = Duration::ZERO;
+            timed(&mut took, || eye.frame(&worlds[at % count])).expect("there is something to draw with");
+            spent += if at < 8 { Duration::ZERO } else { took };
+        }
+        spent / u32::try_from(FRAMES).expect("it is small")
+    })
+}
+
+fn main() {
+    // `cargo test` runs benches too, with nothing to measure.
+    if std::env::args().any(|argument| argument == "--test") {
+        return;
+    }
+    let config = WorldConfig::from_toml("others.least = 6").expect("six others are allowed");
+    let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+
+    let alone = walk(&config, 0, None);
+    let [motion, census] = [alone.motion, alone.census].map(|part| part.as_secs_f64() * 1e3 / f64::from(alone.steps));
+    println!("E5, seven humanoids, 640 x 480, one thread");
+    println!(
+        "  census, no frames   {:6.0} steps/s   ({census:.2} ms census, {motion:.3} ms motion a step)",
+        alone.per_second()
+    );
+
+    let start = Instant::now();
+    let steps: u32 = thread::scope(|scope| {
+        let config = &config;
+        let workers: Vec<_> = (0..threads)
+            .map(|at| scope.spawn(move || walk(config, 100 * i32::try_from(at).expect("few threads"), None).steps))
+            .collect();
+        workers.into_iter().map(|worker| worker.join().expect("a worker does not panic")).sum()
+    });
+    println!("  the same on {threads} threads {:6.0} steps/s", f64::from(steps) / start.elapsed().as_secs_f64());
+
+    match Eye::new(&config) {
+        Err(error) => println!("  frames: {error}"),
+        Ok(eye) => {
+            let drawn = walk(&config, 0, Some(eye));
+            println!(
+                "  census and frames   {:6.0} steps/s   ({:.0} % of the time is drawing)",
+                drawn.per_second(),
+                drawn.share_of_drawing()
+            );
+            let [one, many] = switching(&config);
+            println!(
+                "  a frame of one world {:.2} ms, of eight worlds by turns {:.2} ms",
+                one.as_secs_f64() * 1e3,
+                many.as_secs_f64() * 1e3
+            );
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! The words that go with a frame: the paper's two prompt families (appendix, "Prompt Templates").
+//!
+//! The templates are files in `assets/prompts`; those of the paper are word for word, the three of the dynamic context
+//! (history of one step, position, warning) are ours, since the paper says what they hold but not how they read.
+//!
+//! Rule: the same task and observation give the same words, and [`Prompt::hash`] changes with any word of them.
+
+use minijinja::{Environment, Error, UndefinedBehavior, context};
+
+use super::{Family, Observation, Task};
+use crate::base::hash;
+use crate::base::number::Decimal;
+use crate::trace::episode::Action;
+
+/// The templates of one family.
+#[derive(Debug)]
+pub struct Prompt {
+    environment: Environment<'static>,
+    hash: String,
+}
+
+/// What a model is sent beside the frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rendered {
+    /// The system prompt.
+    pub system: String,
+    /// The user prompt: task, history, position, warning.
+    pub user: String,
+}
+
+/// A template by the name of its file and its text.
+type Source = (&'static str, &'static str);
+
+const CUBE_SELECTION: [Source; 2] = [
+    ("system", include_str!("../../assets/prompts/cube-selection.system.txt")),
+    ("user", include_str!("../../assets/prompts/cube-selection.user.txt")),
+];
+const EXPLORATION: [Source; 2] = [
+    ("system", include_str!("../../assets/prompts/exploration.system.txt")),
+    ("user", include_str!("../../assets/prompts/exploration.user.txt")),
+];
+const CONTEXT: [Source; 3] = [
+    ("history", include_str!("../../assets/prompts/history.txt")),
+    ("position", include_str!("../../assets/prompts/position.txt")),
+    ("warning", include_str!("../../assets/prompts/warning.txt")),
+];
+
+impl Prompt {
+    /// The prompt of a family.
+    ///
+    /// # Errors
+    /// A built-in template does not parse, which a test rules out.
+    pub fn of(family: Family) -> Result<Self, Error> {
+        let own = match family {
+            Family::CubeSelection => CUBE_SELECTION,
+            Family::Exploration => EXPLORATION,
+        };
+        let mut environment = Environment::new();
+        environment.set_undefined_behavior(UndefinedBehavior::Strict);
+        let mut text = String::new();
+        for (name, source) in own.into_iter().chain(CONTEXT) {
+            environment.add_template(name, source)?;
+            text.extend([name, "\n", source]);
+        }
+        Ok(Self { environment, hash: hash::of_bytes(text.as_bytes()) })
+    }
+
+    /// SHA-256 of the templates, 64 hexadecimal digits.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// The words for one step.
+    ///
+    /// # Errors
+    /// A template names what there is not, which a test rules out.
+    pub fn render(&self, task: &Task, observation: &Observation) -> Result<Rendered, Error> {
+        let system = self.fill("system", context! { stated_color => task.stated_color.as_deref() })?;
+        let history = observation.history.as_ref();
+        let history_text = self.fill(
+            "history",
+            context! {
+                first => history.is_none(),
+                action => history.and_then(|(action, _)| action.map(letter)),
+                thought => history.and_then(|(_, thought)| thought.as_deref().map(one_line)),
+            },
+        )?;
+        let position_text = self.fill(
+            "position",
+            context! {
+                x => rounded(observation.x, 2),
+                y => rounded(observation.y, 2),
+                yaw => rounded(observation.yaw, 0),
+                remaining => observation.remaining,
+                budget => task.step_budget,
+            },
+        )?;
+        let warning = self.fill("warning", context! {})?;
+        let user = self.fill(
+            "user",
+            context! { history_text, position_text, bumped => observation.bumped, warning_if_bumped_wall => warning },
+        )?;
+        Ok(Rendered { system, user })
+    }
+
+    fn fill(&self, name: &str, values: minijinja::Value) -> Result<String, Error> {
+        self.environment.get_template(name)?.render(values).map(|text| text.trim_end().to_owned())
+    }
+}
+
+/// The letter by which the prompt names an action.
+pub const fn letter(action: Action) -> &'static str {
+    match action {
+        Action::MoveForward => "w",
+        Action::MoveBackward => "s",
+        Action::TurnLeft => "a",
+        Action::TurnRight => "d",
+        Action::Done => "done",
+    }
+}
+
+/// The action of a letter, exactly as the prompt spells it.
+pub fn action(letter_of_action: &str) -> Option<Action> {
+    Action::ALL.into_iter().find(|action| letter(*action) == letter_of_action)
+}
+
+/// A thought keeps to its line, so that it cannot pass for another part of the prompt.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Rounded to so many digits behind the point; a position that is no number is said to be unknown.
+fn rounded(value: f32, places: u32) -> String {
+    Decimal::of_float(f64::from(value), places).map_or_else(|| "unknown".to_owned(), |number| number.to_string())
+}

@@ -1,0 +1,204 @@
+//! From the text of a reply to a decision.
+//!
+//! ```text
+//! raw text ──► object (strict JSON, then named repairs) ──► the keys of the prompt ──► Reading
+//! ```
+//!
+//! Rule: nothing is made up. A reply is taken as it is, or after a repair that has a name, or it is no decision: then
+//! action, cube and attribution are absent, and the raw text is all there is.
+//!
+//! A `selected_cube` other than `none` beside another action than `done` breaks a rule of the prompt, but not the
+//! shape of the object: it is kept as replied, and the metrics look at the cube of the `done` step alone.
+
+mod object;
+mod repair;
+
+use serde_json::{Value, json};
+
+pub use repair::Repair;
+
+use super::{Family, Reply, Status, Usage, Words, identification, prompt};
+use crate::base::palette::Color;
+use crate::trace::episode::Action;
+
+/// How a provider says that a reply ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Ending {
+    /// The model was done.
+    Whole,
+    /// The limit of tokens cut it off.
+    Truncated,
+    /// The model, or a filter around it, declined.
+    Refused,
+}
+
+/// What a reply's text says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// The outcome; `Ok` or `Repaired` where there is a decision.
+    pub status: Status,
+    /// What had to be repaired, in order; empty unless `Repaired`.
+    pub repairs: Vec<Repair>,
+    /// Why there is no decision, for people; `None` where there is one.
+    pub fault: Option<String>,
+    /// The action.
+    pub action: Option<Action>,
+    /// The cube of the cube-selection family: a colour or `none`.
+    pub selected_cube: Option<String>,
+    /// The attribution: the normal form of the identification.
+    pub self_color: Option<String>,
+    /// The free text.
+    pub words: Words,
+}
+
+impl Reading {
+    fn without_decision(status: Status, fault: Option<String>) -> Self {
+        Self {
+            status,
+            repairs: Vec::new(),
+            fault,
+            action: None,
+            selected_cube: None,
+            self_color: None,
+            words: Words::default(),
+        }
+    }
+
+    /// The reply of an agent: this reading, the text it was read from, and what that cost.
+    pub fn into_reply(self, raw: String, usage: Usage) -> Reply {
+        Reply {
+            status: self.status,
+            action: self.action,
+            self_color: self.self_color,
+            selected_cube: self.selected_cube,
+            words: self.words,
+            raw: Some(raw),
+            usage,
+        }
+    }
+}
+
+/// Reads the text of a reply.
+pub fn read(raw: &str, family: Family, ending: Ending) -> Reading {
+    match ending {
+        Ending::Refused => return Reading::without_decision(Status::Refusal, None),
+        Ending::Truncated => return Reading::without_decision(Status::Truncated, None),
+        Ending::Whole if raw.trim().is_empty() => return Reading::without_decision(Status::Empty, None),
+        Ending::Whole => {}
+    }
+    let (object, repairs) = match repair::object(raw) {
+        Ok(found) => found,
+        Err(fault) => return Reading::without_decision(Status::ParseFailed, Some(fault)),
+    };
+    match decision(&object, family) {
+        Ok(reading) if repairs.is_empty() => reading,
+        Ok(reading) => Reading { status: Status::Repaired, repairs, ..reading },
+        Err(fault) => Reading::without_decision(Status::SchemaInvalid, Some(fault)),
+    }
+}
+
+/// The keys of a family, in the order of the prompt.
+fn keys(family: Family) -> &'static [&'static str] {
+    match family {
+        Family::CubeSelection => {
+            &["view-description", "reasoning", "action", "summary", "selected_cube", "identification"]
+        }
+        Family::Exploration => &["view-description", "reasoning", "action", "summary", "identification"],
+    }
+}
+
+/// The decision in an object that has exactly the keys of its family.
+fn decision(object: &object::Object, family: Family) -> Result<Reading, String> {
+    let expected = keys(family);
+    if let Some(key) = object.repeated_key() {
+        return Err(format!("the key \"{key}\" stands twice"));
+    }
+    if let Some(key) = object.keys().find(|key| !expected.contains(key)) {
+        return Err(format!("the key \"{key}\" is none of {}", listed(expected)));
+    }
+    let text = |key: &str| match object.get(key) {
+        None => Err(format!("the key \"{key}\" is missing")),
+        Some(Value::String(text)) => Ok(text.clone()),
+        Some(other) => Err(format!("\"{key}\" is {}, expected a string", kind(other))),
+    };
+    let action = text("action")?;
+    let action = prompt::action(&action)
+        .ok_or_else(|| format!("\"action\" is \"{action}\", expected one of w, s, a, d, done"))?;
+    let selected_cube = match family {
+        Family::CubeSelection => Some(cube(text("selected_cube")?)?),
+        Family::Exploration => None,
+    };
+    let identification = text("identification")?;
+    Ok(Reading {
+        status: Status::Ok,
+        repairs: Vec::new(),
+        fault: None,
+        action: Some(action),
+        selected_cube,
+        self_color: identification::normal_form(&identification).map(str::to_owned),
+        words: Words {
+            view_description: Some(text("view-description")?),
+            reasoning: Some(text("reasoning")?),
+            summary: Some(text("summary")?),
+            identification: Some(identification),
+        },
+    })
+}
+
+fn cube(name: String) -> Result<String, String> {
+    if name == "none" || Color::named(&name).is_some() {
+        return Ok(name);
+    }
+    Err(format!("\"selected_cube\" is \"{name}\", expected a colour of the palette or none"))
+}
+
+fn listed(names: &[&str]) -> String {
+    names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+}
+
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Null => "null",
+        Value::Bool(_) => "a boolean",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a string",
+        Value::Array(_) => "an array",
+        Value::Object(_) => "an object",
+    }
+}
+
+/// The JSON Schema of a family's reply: what providers are asked to enforce where they can.
+pub fn schema(family: Family) -> Value {
+    let description = |key: &str| match key {
+        "view-description" => "What the image shows.",
+        "reasoning" => "Why this action.",
+        "action" => "w = forward, s = backward, a = left by 30 degrees, d = right by 30 degrees, done = task complete.",
+        "summary" => "The thought that comes back as the history of the next step.",
+        "selected_cube" => "A colour when the action is done, otherwise none.",
+        _ => "The colour of one's own body as far as it is known.",
+    };
+    let mut properties = serde_json::Map::new();
+    for key in keys(family) {
+        let mut property = json!({ "type": "string", "description": description(key) });
+        match *key {
+            "action" => property["enum"] = json!(["w", "s", "a", "d", "done"]),
+            "selected_cube" => {
+                let colors = Color::ALL.iter().map(|color| color.name());
+                property["enum"] = colors.chain(["none"]).collect();
+            }
+            _ => {}
+        }
+        properties.insert((*key).to_owned(), property);
+    }
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": match family {
+            Family::CubeSelection => "Reply in E1 to E4",
+            Family::Exploration => "Reply in E5",
+        },
+        "type": "object",
+        "properties": properties,
+        "required": keys(family),
+        "additionalProperties": false,
+    })
+}

@@ -1,0 +1,59 @@
+//! A JSON object with its keys as they came, repeated ones included.
+
+use std::fmt;
+
+use serde::de::{Deserialize, Deserializer, Error as _, MapAccess, Visitor};
+use serde_json::Value;
+
+/// The members of an object, in order.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Object(Vec<(String, Value)>);
+
+impl Object {
+    /// The object that is all of this text.
+    pub(super) fn parse(text: &str) -> serde_json::Result<Self> {
+        serde_json::from_str(text)
+    }
+
+    pub(super) fn keys(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(|(key, _)| key.as_str())
+    }
+
+    pub(super) fn get(&self, key: &str) -> Option<&Value> {
+        self.0.iter().find(|(own, _)| own == key).map(|(_, value)| value)
+    }
+
+    /// The first key that stands more than once.
+    pub(super) fn repeated_key(&self) -> Option<&str> {
+        let mut keys = self.keys().enumerate();
+        keys.find(|(at, key)| self.keys().take(*at).any(|earlier| earlier == *key)).map(|(_, key)| key)
+    }
+}
+
+impl<'de> Deserialize<'de> for Object {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Members;
+        impl<'de> Visitor<'de> for Members {
+            type Value = Object;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a JSON object")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Object, A::Error> {
+                let mut members = Vec::new();
+                while let Some(member) = map.next_entry()? {
+                    members.push(member);
+                    if members.len() > MOST_MEMBERS {
+                        return Err(A::Error::custom("an object with more than 1000 keys"));
+                    }
+                }
+                Ok(Object(members))
+            }
+        }
+        deserializer.deserialize_map(Members)
+    }
+}
+
+/// Far more than any reply has; finding repeated keys takes the square of it.
+const MOST_MEMBERS: usize = 1000;

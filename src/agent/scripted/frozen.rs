@@ -1,0 +1,30 @@
+//! `frozen`: does nothing until the budget ends.
+//!
+//! It gives no action, so the body stands still, and claims `unknown` at every step.
+//!
+//! | metric | everywhere |
+//! |---|---|
+//! | TSA, CAAL, CR | 0 |
+//! | TTD | the whole budget |
+//! | MTATO | undefined |
+//! | MCR | 1 where an episode begins before the mirror, else 0 |
+
+use crate::agent::{Observation, Words};
+
+use super::{Move, Script, words};
+
+/// Stands still.
+#[derive(Clone, Copy, Debug)]
+pub struct Frozen;
+
+impl Script for Frozen {
+    fn decide(&mut self, _: &Observation) -> Move {
+        let words = Words {
+            view_description: Some("I did not look.".to_owned()),
+            reasoning: Some("I do nothing.".to_owned()),
+            summary: Some("Nothing happened.".to_owned()),
+            identification: Some(words::identification(None)),
+        };
+        Move { action: None, claim: None, selected: None, words }
+    }
+}

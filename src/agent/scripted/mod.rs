@@ -1,0 +1,160 @@
+//! Scripted agents: seven known minds that calibrate the benchmark.
+//!
+//! Each has a metric profile that its name predicts; its module says which, and a test records it and looks. If a profile
+//! is off, the world or a metric is.
+//!
+//! ```text
+//! oracle, gullible, confabulator, mimic ── a creed each ──► seeker ──► lookout, route
+//! random, guesser, frozen                                     │
+//!                                                         knowledge ──► room, landmarks, reflection ──► agent::sight
+//! ```
+//!
+//! Rule: a scripted agent perceives what a model would get and no more, the frame and the words around it, and is a function
+//! of its task's seed and of that. It knows the protocol (the field of view, turns of 30 degrees, one mirror at most on a
+//! wall of a rectangular room) and its own body (where its eye is, how stout it is), but not where anything stands.
+
+pub mod chance;
+pub mod confabulator;
+pub mod frozen;
+pub mod guesser;
+pub mod gullible;
+pub mod knowledge;
+pub mod landmarks;
+pub mod lookout;
+pub mod mimic;
+pub mod oracle;
+pub mod random;
+pub mod reflection;
+pub mod room;
+pub mod route;
+pub mod seeker;
+pub mod words;
+
+use crate::agent::{Agent, Decision, Family, Observation, Reply, Status, Task, Usage, Words};
+use crate::base::palette::Color;
+use crate::trace::episode::Action;
+
+/// The scripted agents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "each is described in the module of its name")]
+pub enum Scripted {
+    Oracle,
+    Random,
+    Guesser,
+    Gullible,
+    Confabulator,
+    Frozen,
+    Mimic,
+}
+
+impl Scripted {
+    /// All of them, in the order of the documentation.
+    pub const ALL: [Self; 7] =
+        [Self::Oracle, Self::Random, Self::Guesser, Self::Gullible, Self::Confabulator, Self::Frozen, Self::Mimic];
+
+    /// The name on the command line and in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Oracle => "oracle",
+            Self::Random => "random",
+            Self::Guesser => "guesser",
+            Self::Gullible => "gullible",
+            Self::Confabulator => "confabulator",
+            Self::Frozen => "frozen",
+            Self::Mimic => "mimic",
+        }
+    }
+
+    /// What it does, in a line.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Oracle => "finds the mirror, recognises itself, acts on it",
+            Self::Random => "leaves everything to chance",
+            Self::Guesser => "takes any cube at once, without looking into the mirror",
+            Self::Gullible => "believes the colour that the prompt states",
+            Self::Confabulator => "claims a colour at once, corrects itself before the mirror",
+            Self::Frozen => "does nothing until the budget ends",
+            Self::Mimic => "takes the first body that it sees for itself",
+        }
+    }
+
+    /// The agent of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|agent| agent.name() == name)
+    }
+
+    /// The agent at the start of an episode.
+    pub fn agent(self, task: &Task) -> Box<dyn Agent> {
+        let script: Box<dyn Script> = match self {
+            Self::Oracle => Box::new(seeker::Seeker::new(task, oracle::Oracle)),
+            Self::Random => Box::new(random::Random::new(task)),
+            Self::Guesser => Box::new(guesser::Guesser::new(task)),
+            Self::Gullible => Box::new(seeker::Seeker::new(task, gullible::Gullible::new(task))),
+            Self::Confabulator => Box::new(seeker::Seeker::new(task, confabulator::Confabulator::new(task))),
+            Self::Frozen => Box::new(frozen::Frozen),
+            Self::Mimic => Box::new(seeker::Seeker::new(task, mimic::Mimic::default())),
+        };
+        Box::new(Puppet { script, family: task.family })
+    }
+}
+
+impl crate::agent::Player for Scripted {
+    fn model(&self) -> &str {
+        self.name()
+    }
+
+    fn description(&self) -> serde_json::Value {
+        serde_json::json!({ "scripted": self.name() })
+    }
+
+    fn looks(&self) -> bool {
+        !matches!(self, Self::Random | Self::Frozen)
+    }
+
+    fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
+        Ok(Self::agent(*self, &task))
+    }
+}
+
+/// What a script decides for a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Move {
+    /// `None` stands still.
+    pub action: Option<Action>,
+    /// `None` is `unknown`.
+    pub claim: Option<Color>,
+    /// `None` is `none`.
+    pub selected: Option<Color>,
+    /// The words around it.
+    pub words: Words,
+}
+
+/// A mind that is ready with its decision at once.
+pub trait Script {
+    /// Decides the next action.
+    fn decide(&mut self, observation: &Observation) -> Move;
+}
+
+/// A script as an agent.
+struct Puppet {
+    script: Box<dyn Script>,
+    family: Family,
+}
+
+impl Agent for Puppet {
+    fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
+        let Move { action, claim, selected, words } = self.script.decide(observation);
+        let name = |color: Option<Color>, none: &'static str| color.map_or(none, Color::name).to_owned();
+        let reply = Reply {
+            status: Status::Ok,
+            action,
+            self_color: Some(name(claim, "unknown")),
+            // The exploration prompt has no such key.
+            selected_cube: (self.family == Family::CubeSelection).then(|| name(selected, "none")),
+            words,
+            raw: None,
+            usage: Usage::default(),
+        };
+        Box::pin(std::future::ready(Ok(reply)))
+    }
+}

@@ -1,0 +1,43 @@
+//! Anthropic's Messages.
+
+use serde_json::{Value, json};
+
+use super::{Answer, Question, text, tokens};
+use crate::agent::reply::Ending;
+
+pub(super) fn body(question: &Question<'_>) -> Value {
+    let source = json!({ "type": "base64", "media_type": "image/png", "data": question.png_base64 });
+    let mut body = json!({
+        "model": question.model,
+        "max_tokens": question.max_output_tokens,
+        "temperature": question.temperature,
+        "system": question.system,
+        "messages": [{ "role": "user", "content": [
+            { "type": "image", "source": source },
+            { "type": "text", "text": question.user },
+        ] }],
+    });
+    if let Some(schema) = question.schema {
+        body["output_config"] = json!({ "format": { "type": "json_schema", "schema": schema } });
+    }
+    body
+}
+
+pub(super) fn answer(body: &Value) -> Option<Answer> {
+    let blocks = body.get("content")?.as_array()?;
+    let words = blocks.iter().filter(|block| block["type"] == "text").filter_map(|block| block["text"].as_str());
+    let ending = match body["stop_reason"].as_str() {
+        Some("max_tokens" | "model_context_window_exceeded") => Ending::Truncated,
+        Some("refusal") => Ending::Refused,
+        _ => Ending::Whole,
+    };
+    let usage = &body["usage"];
+    Some(Answer {
+        text: words.collect(),
+        ending,
+        prompt_tokens: tokens(&usage["input_tokens"]),
+        completion_tokens: tokens(&usage["output_tokens"]),
+        cost_usd: None,
+        model: text(&body["model"]),
+    })
+}

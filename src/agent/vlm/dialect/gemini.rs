@@ -1,0 +1,63 @@
+//! Google's `generateContent`.
+
+use serde_json::{Value, json};
+
+use super::{Answer, Question, text, tokens};
+use crate::agent::reply::Ending;
+
+pub(super) fn body(question: &Question<'_>) -> Value {
+    let mut body = json!({
+        "contents": [{ "role": "user", "parts": [
+            { "text": question.user },
+            { "inlineData": { "data": question.png_base64, "mimeType": "image/png" } },
+        ] }],
+        "systemInstruction": { "parts": [{ "text": question.system }], "role": "user" },
+        "generationConfig": {
+            "temperature": question.temperature,
+            "maxOutputTokens": question.max_output_tokens,
+        },
+    });
+    if let Some(schema) = question.schema {
+        body["generationConfig"]["responseMimeType"] = json!("application/json");
+        body["generationConfig"]["responseJsonSchema"] = schema.clone();
+    }
+    body
+}
+
+pub(super) fn answer(body: &Value) -> Option<Answer> {
+    let blocked = body["promptFeedback"]["blockReason"].as_str();
+    let candidates = body.get("candidates").map(|candidates| candidates.as_array());
+    let first = match (candidates, blocked) {
+        (Some(candidates), _) => candidates?.first(),
+        (None, Some(_)) => None,
+        // A whole answer without candidates has at least its usage.
+        (None, None) => body.get("usageMetadata").map(|_| None)?,
+    };
+    let ending = match (blocked, first.and_then(|candidate| candidate["finishReason"].as_str())) {
+        (Some(_), _) => Ending::Refused,
+        (None, Some("MAX_TOKENS")) => Ending::Truncated,
+        (None, Some("SAFETY" | "RECITATION" | "BLOCKLIST" | "PROHIBITED_CONTENT" | "SPII" | "IMAGE_SAFETY")) => {
+            Ending::Refused
+        }
+        (None, _) => Ending::Whole,
+    };
+    let usage = &body["usageMetadata"];
+    let completion = [&usage["candidatesTokenCount"], &usage["thoughtsTokenCount"]].map(tokens);
+    Some(Answer {
+        text: first.map(words).unwrap_or_default(),
+        ending,
+        prompt_tokens: tokens(&usage["promptTokenCount"]),
+        completion_tokens: match completion {
+            [None, None] => None,
+            [candidates, thoughts] => Some(candidates.unwrap_or(0).saturating_add(thoughts.unwrap_or(0))),
+        },
+        cost_usd: None,
+        model: text(&body["modelVersion"]),
+    })
+}
+
+/// The text of a candidate, its thoughts left out.
+fn words(candidate: &Value) -> String {
+    let parts = candidate["content"]["parts"].as_array().map(Vec::as_slice).unwrap_or_default();
+    parts.iter().filter(|part| part["thought"] != true).filter_map(|part| part["text"].as_str()).collect()
+}

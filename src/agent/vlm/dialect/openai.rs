@@ -1,0 +1,63 @@
+//! `OpenAI`'s chat completions.
+
+use serde_json::{Value, json};
+
+use super::{Answer, Question, text, tokens};
+use crate::agent::reply::Ending;
+
+pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
+    let image = format!("data:image/png;base64,{}", question.png_base64);
+    let mut body = json!({
+        "model": question.model,
+        "messages": [
+            { "role": "system", "content": question.system },
+            { "role": "user", "content": [
+                { "type": "text", "text": question.user },
+                { "type": "image_url", "image_url": { "url": image } },
+            ] },
+        ],
+        "temperature": question.temperature,
+    });
+    body[limit] = json!(question.max_output_tokens);
+    if let Some(schema) = question.schema {
+        body["response_format"] = json!({
+            "type": "json_schema",
+            "json_schema": { "name": "reply", "strict": true, "schema": schema },
+        });
+    }
+    body
+}
+
+pub(super) fn answer(body: &Value) -> Option<Answer> {
+    let choices = body.get("choices")?.as_array()?;
+    let usage = &body["usage"];
+    let (reply, ending) = choices.first().map_or((String::new(), Ending::Whole), reply);
+    Some(Answer {
+        text: reply,
+        ending,
+        prompt_tokens: tokens(&usage["prompt_tokens"]),
+        completion_tokens: tokens(&usage["completion_tokens"]),
+        cost_usd: usage["cost"].as_f64().filter(|cost| *cost >= 0.0),
+        model: text(&body["model"]),
+    })
+}
+
+fn reply(choice: &Value) -> (String, Ending) {
+    let message = &choice["message"];
+    let refusal = message["refusal"].as_str().filter(|words| !words.is_empty());
+    let ending = match (refusal, choice["finish_reason"].as_str()) {
+        (Some(_), _) | (None, Some("content_filter")) => Ending::Refused,
+        (None, Some("length")) => Ending::Truncated,
+        _ => Ending::Whole,
+    };
+    (content(&message["content"]).or_else(|| refusal.map(str::to_owned)).unwrap_or_default(), ending)
+}
+
+/// Some servers give the text in parts.
+fn content(content: &Value) -> Option<String> {
+    match content {
+        Value::String(text) => Some(text.clone()),
+        Value::Array(parts) => Some(parts.iter().filter_map(|part| part["text"].as_str()).collect()),
+        _ => None,
+    }
+}

@@ -1,0 +1,189 @@
+//! Which models there are, who serves them, and what they cost.
+//!
+//! The paper's eight are built in (`assets/models.toml`); a user's file adds to them. A model is named by its name in
+//! tables or by the provider's id; an id that no file knows needs `--base-url` or `--backend`.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::dialect::Dialect;
+use crate::base::near::nearest;
+
+const BUILT_IN: &str = include_str!("../../../assets/models.toml");
+
+/// A file of models.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Models {
+    /// Backends by name.
+    #[serde(default)]
+    pub backend: BTreeMap<String, Backend>,
+    /// Models by their name in tables.
+    #[serde(default)]
+    pub model: BTreeMap<String, Model>,
+}
+
+/// Who serves models.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Backend {
+    /// The language it speaks.
+    #[schemars(with = "String")]
+    pub dialect: Dialect,
+    /// Where its paths begin; `--base-url` replaces it.
+    pub base_url: Option<String>,
+    /// The environment variable with the key.
+    pub key: String,
+}
+
+/// A model of a backend.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Model {
+    /// Who made it.
+    pub vendor: Option<String>,
+    /// The backend's name.
+    pub backend: String,
+    /// The backend's id of the model.
+    pub id: String,
+    /// What it costs; without prices nothing is known of the cost.
+    pub prices: Option<Prices>,
+    /// Whether the backend is asked to enforce the reply's schema, or the prompt alone has to do.
+    #[serde(default)]
+    pub contract: Contract,
+}
+
+/// US dollars for a million tokens.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Prices {
+    /// Of the request.
+    pub input: f64,
+    /// Of the reply.
+    pub output: f64,
+}
+
+impl Prices {
+    /// What so many tokens cost, US dollars.
+    pub fn cost_usd(self, prompt_tokens: u32, completion_tokens: u32) -> f64 {
+        (f64::from(prompt_tokens) * self.input + f64::from(completion_tokens) * self.output) / 1e6
+    }
+}
+
+/// How a reply is held to its shape.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Contract {
+    /// The provider enforces the schema.
+    #[default]
+    Schema,
+    /// The prompt asks for it.
+    Prompt,
+}
+
+impl Contract {
+    /// The name in recordings.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Schema => "schema",
+            Self::Prompt => "prompt",
+        }
+    }
+}
+
+/// A model that was chosen, with its backend.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Choice {
+    /// The name in tables.
+    pub name: String,
+    /// The model.
+    pub model: Model,
+    /// Who serves it.
+    pub backend: Backend,
+}
+
+/// What is wrong with a file of models, or with a choice from it.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum ModelsError {
+    #[error("cannot read the models in `{}`: {source}", path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
+    #[error("the models in `{file}` cannot be used: {fault}")]
+    Invalid { file: String, fault: String },
+    #[error(
+        "no model is called `{name}`{near}; expected the name or the id of one of: {known}\n  help: `--models FILE` adds models, `--backend NAME` or `--base-url URL` takes any id"
+    )]
+    Unknown { name: String, near: String, known: String },
+    #[error("no backend is called `{name}`; expected one of: {known}")]
+    UnknownBackend { name: String, known: String },
+}
+
+impl Models {
+    /// The built-in models, and those of a user's file over them.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is not of this shape, and a model whose backend is not there.
+    pub fn load(file: Option<&Path>) -> Result<Self, ModelsError> {
+        let mut models = parse("assets/models.toml", BUILT_IN)?;
+        if let Some(path) = file {
+            let text =
+                fs::read_to_string(path).map_err(|source| ModelsError::Unreadable { path: path.to_owned(), source })?;
+            let own = parse(&path.display().to_string(), &text)?;
+            models.backend.extend(own.backend);
+            models.model.extend(own.model);
+        }
+        for (name, model) in &models.model {
+            if !models.backend.contains_key(&model.backend) {
+                let fault = format!("the backend `{}` of the model `{name}` is not there", model.backend);
+                let file = file.map_or("assets/models.toml".to_owned(), |path| path.display().to_string());
+                return Err(ModelsError::Invalid { file, fault });
+            }
+        }
+        Ok(models)
+    }
+
+    /// The model of this name or id; with a backend, any id is one.
+    ///
+    /// # Errors
+    /// A name that is not known, with the nearest that is.
+    pub fn choose(&self, name: &str, backend: Option<&str>) -> Result<Choice, ModelsError> {
+        let known = self.model.iter().find(|(own, model)| *own == name || model.id == name);
+        let (title, mut model) = match (known, backend) {
+            (Some((title, model)), _) => (title.clone(), model.clone()),
+            (None, Some(backend)) => (
+                name.to_owned(),
+                Model {
+                    vendor: None,
+                    backend: backend.to_owned(),
+                    id: name.to_owned(),
+                    prices: None,
+                    contract: Contract::default(),
+                },
+            ),
+            (None, None) => return Err(self.unknown(name)),
+        };
+        if let Some(backend) = backend {
+            backend.clone_into(&mut model.backend);
+        }
+        let backend = self.backend.get(&model.backend).cloned().ok_or_else(|| ModelsError::UnknownBackend {
+            name: model.backend.clone(),
+            known: self.backend.keys().cloned().collect::<Vec<_>>().join(", "),
+        })?;
+        Ok(Choice { name: title, model, backend })
+    }
+
+    fn unknown(&self, name: &str) -> ModelsError {
+        let names = self.model.iter().flat_map(|(title, model)| [title.as_str(), model.id.as_str()]);
+        let near = nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        let known = self.model.keys().map(|title| format!("`{title}`")).collect::<Vec<_>>().join(", ");
+        ModelsError::Unknown { name: name.to_owned(), near, known }
+    }
+}
+
+fn parse(file: &str, text: &str) -> Result<Models, ModelsError> {
+    toml::from_str(text).map_err(|fault| ModelsError::Invalid { file: file.to_owned(), fault: fault.to_string() })
+}

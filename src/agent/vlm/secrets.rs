@@ -1,0 +1,77 @@
+//! A key, and the words without it.
+//!
+//! A provider may say a key back, in an error or a header. Everything that is written, printed or kept goes through
+//! [`Secret::without`] first.
+
+use secrecy::{ExposeSecret as _, SecretString};
+
+/// What stands where a key stood.
+const PLACEHOLDER: &str = "[key]";
+
+/// A key from the environment; it does not print.
+#[derive(Clone, Debug)]
+pub struct Secret(SecretString);
+
+/// A key that is not there.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the environment variable {0} is not set; it holds the key of the provider\n  help: export {0}=... and run the command again"
+)]
+pub struct NoKey(pub String);
+
+impl Secret {
+    /// The key in an environment variable.
+    ///
+    /// # Errors
+    /// When the variable is not set, empty, or not text.
+    pub fn from_environment(variable: &str) -> Result<Self, NoKey> {
+        let value = std::env::var(variable).unwrap_or_default();
+        let value = value.trim();
+        if value.is_empty() { Err(NoKey(variable.to_owned())) } else { Ok(Self(value.to_owned().into())) }
+    }
+
+    /// A key as given.
+    pub fn new(key: String) -> Self {
+        Self(key.into())
+    }
+
+    /// The text without the key, plain or percent-encoded.
+    pub fn without(&self, text: &str) -> String {
+        let key = self.0.expose_secret();
+        if key.is_empty() {
+            return text.to_owned();
+        }
+        let encoded: String = key
+            .bytes()
+            .map(|byte| match byte {
+                b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' => char::from(byte).to_string(),
+                other => format!("%{other:02X}"),
+            })
+            .collect();
+        let escaped = serde_json::Value::from(key).to_string();
+        [key, escaped.trim_matches('"'), &encoded]
+            .iter()
+            .fold(text.to_owned(), |text, form| text.replace(form, PLACEHOLDER))
+    }
+
+    /// The value of a header that carries the key; marked so that no client prints it.
+    pub(super) fn header(&self, prefix: &str) -> Option<reqwest::header::HeaderValue> {
+        let value = format!("{prefix}{}", self.0.expose_secret());
+        let mut value = reqwest::header::HeaderValue::from_str(&value).ok()?;
+        value.set_sensitive(true);
+        Some(value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Secret;
+
+    #[test]
+    fn no_form_of_a_key_stays() {
+        let secret = Secret::new("sk/a+\"b".to_owned());
+        let said = r#"got sk/a+"b, as "sk/a+\"b", as sk%2Fa%2B%22b"#;
+        assert_eq!(secret.without(said), r#"got [key], as "[key]", as [key]"#);
+        assert!(!format!("{secret:?}").contains("sk/a"));
+    }
+}

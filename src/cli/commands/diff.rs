@@ -1,0 +1,94 @@
+//! `diff`: what another set of definitions changes, or another set of scores.
+
+use std::io::{self, Write as _};
+
+use super::super::args::{ThreadArgs, TraceArgs};
+use super::super::outcome::{Failure, Outcome};
+use super::super::sides::{self, Asked, Side};
+use super::super::{output, scoring};
+use crate::cells::changes::Changes;
+use crate::cells::group::DEFAULT_BY;
+use crate::report::changes::{self, Limit};
+use crate::report::order::TableOrder;
+use crate::report::style::Style;
+
+/// Tell which cells and episodes change between two sets of definitions, or of scores
+#[derive(Clone, Debug, clap::Args)]
+pub struct DiffArgs {
+    /// The definitions before: `paper`, `extended`, or a TOML file; or a file of scores, or a report's folder
+    #[arg(value_name = "OLD")]
+    pub old: String,
+    /// The definitions after, or scores
+    #[arg(value_name = "NEW")]
+    pub new: String,
+    /// The traces to score; between two files of scores, those that tell which timesteps decided
+    #[arg(value_name = "TRACES")]
+    pub traces: Vec<String>,
+    /// Only these metrics, separated by commas [default: all]
+    #[arg(long, value_name = "METRICS", value_delimiter = ',')]
+    pub metrics: Option<Vec<String>>,
+    /// Only episodes where this holds on both sides, in the language of definitions, such as "seed = 1"
+    #[arg(long = "where", value_name = "EXPR")]
+    pub condition: Option<String>,
+    /// Group episodes by these columns, separated by commas [default: experiment,model]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY, hide_default_value = true)]
+    pub by: Vec<String>,
+    /// What scores as CSV or JSON lines were computed with; Parquet says it itself [default: paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub definitions: Option<String>,
+    /// The most lines of each list on the terminal; --json has all
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub limit: usize,
+    /// Exit with 1 if a cell moved, a value flipped, or one side lacks a metric or an episode
+    #[arg(long)]
+    pub fail_on_change: bool,
+    /// Print the answer as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// How many threads to use.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+impl DiffArgs {
+    /// Compares.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the definitions, the scores or the traces.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let style = Style::load("default").map_err(Failure::input)?;
+        let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
+        let inputs = scoring::resolve(&TraceArgs { traces: self.traces.clone(), threads: self.threads })?;
+        let traces = if inputs.is_empty() { None } else { Some(scoring::open_steps(&inputs)?) };
+        let asked = self.asked();
+        let sides = sides::pair(&old, &new, traces.as_ref(), &asked)?;
+        let mut changes = sides::changes(&sides, &self.by)?;
+        TableOrder { catalog: &sides.after.table.catalog, style: &style }.sort(&mut changes);
+        if let Some(traces) = &traces {
+            for note in sides::explain(&mut changes, traces, &sides, asked.threads)? {
+                writeln!(io::stderr(), "note: {note}")?;
+            }
+        }
+        self.print(&changes)
+    }
+
+    fn asked(&self) -> Asked<'_> {
+        Asked {
+            metrics: self.metrics.as_deref(),
+            condition: self.condition.as_deref(),
+            by: &self.by,
+            text_definitions: self.definitions.as_deref(),
+            threads: self.threads.count(),
+        }
+    }
+
+    fn print(&self, changes: &Changes) -> Result<Outcome, Failure> {
+        if self.json {
+            output::print_json(changes)?;
+        } else {
+            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit)).as_bytes())?;
+        }
+        let failed = self.fail_on_change && !changes.is_empty();
+        Ok(if failed { Outcome::CheckFailed } else { Outcome::Done })
+    }
+}

@@ -1,0 +1,183 @@
+//! `mirrorstats record`: agents in the mirror world, one trace and one log a model and experiment.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use crate::agent::Player;
+use crate::agent::scripted::Scripted;
+use crate::base::near::nearest;
+use crate::cli::args::ThreadArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::recording::{self, Bar, RecordAnswer};
+use crate::cli::vlm::VlmArgs;
+use crate::record::metadata;
+use crate::record::plan::{Experiments, Key, Plan, Shard};
+use crate::record::run::{Recording, Settings, Shares};
+use crate::record::store::Store;
+use crate::sim::Experiment;
+use crate::sim::config::WorldConfig;
+
+/// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
+///
+/// The same command again continues where it stopped. Ctrl-C ends a recording when the steps under way are done, a
+/// second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's, and
+/// with 130 if it was interrupted.
+#[derive(Clone, Debug, clap::Args)]
+pub struct RecordArgs {
+    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; or vlm, a model behind a provider
+    #[arg(long, value_name = "AGENT")]
+    agent: String,
+    /// The experiments: E1, E1..E5 or E1,E3
+    #[arg(long, value_name = "LIST", default_value = "E1..E5")]
+    experiment: Experiments,
+    /// Seeds 1 to this for each experiment
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=4_000))]
+    seeds: i32,
+    /// Runs 1 to this for each seed
+    #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(i32).range(1..=999))]
+    runs: i32,
+    /// Record one share of the episodes, such as 3/16; shares may go into one folder
+    #[arg(long, value_name = "I/N", default_value = "1/1")]
+    shard: Shard,
+    /// The folder for traces and logs
+    #[arg(long, value_name = "DIR", default_value = "runs")]
+    out: PathBuf,
+    /// A world configuration in TOML over the built-in one
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Episodes under way at once [default: as many as the agent makes worth while]
+    #[arg(long, value_name = "N")]
+    in_flight: Option<NonZeroUsize>,
+    /// Write no log
+    #[arg(long)]
+    no_log: bool,
+    /// Leave the frames out of the log, and draw none for agents that do not look (random, frozen)
+    #[arg(long)]
+    no_frames: bool,
+    /// Print what became of the episodes as JSON
+    #[arg(long)]
+    json: bool,
+    /// How many threads to use.
+    #[command(flatten)]
+    threads: ThreadArgs,
+    /// A model behind a provider.
+    #[command(flatten)]
+    vlm: VlmArgs,
+}
+
+impl RecordArgs {
+    /// Records.
+    ///
+    /// # Errors
+    /// For an agent or a configuration that cannot be used, and whatever the world, the eye or the disk refuse.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let config = match &self.config {
+            Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
+            None => WorldConfig::default(),
+        };
+        let player = self.player()?;
+        let plan =
+            Plan { experiments: self.experiment.0.clone(), seeds: self.seeds, runs: self.runs, shard: self.shard };
+        let store = Store::open(&self.out, player.model(), metadata::recording(&config, player.as_ref()))
+            .map_err(Failure::input)?;
+        let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
+        stop_at_interrupt(stop)?;
+        self.record(&config, player.as_ref(), &plan, &store, stop)
+    }
+
+    fn record(
+        &self,
+        config: &WorldConfig,
+        player: &dyn Player,
+        plan: &Plan,
+        store: &Store,
+        stop: &AtomicBool,
+    ) -> Result<Outcome, Failure> {
+        let planned = plan.keys();
+        let todo = unrecorded(plan, &planned, store)?;
+        let bar = Bar::new(todo.len(), config.episode.steps);
+        let shares = Shares::default();
+        let start = Instant::now();
+        let recording =
+            Recording { config, player, store, progress: &bar, stop, shares: &shares, settings: self.settings(player) };
+        let outcome = recording.run(&todo);
+        // What is whole is put together whatever ended the recording.
+        let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
+        bar.clear();
+        let tally = outcome.map_err(|broken| Failure::input(broken.to_string()))?;
+        assembled.map_err(Failure::input)?;
+        let answer =
+            RecordAnswer::of(tally, player.model(), planned.len(), planned.len() - todo.len(), files(plan, store));
+        recording::say(&answer, start.elapsed(), shares.spent())?;
+        if self.json {
+            output::print_json(&answer)?;
+        }
+        if let Some(reason) = player.stopped() {
+            return Err(Failure::input(reason));
+        }
+        match (answer.stopped, answer.lost.is_empty()) {
+            (true, _) => Ok(Outcome::Interrupted),
+            (false, true) => Ok(Outcome::Done),
+            (false, false) => Ok(Outcome::CheckFailed),
+        }
+    }
+
+    fn player(&self) -> Result<Box<dyn Player>, Failure> {
+        match self.agent.as_str() {
+            "vlm" => Ok(Box::new(self.vlm.player(&self.out)?)),
+            name => scripted(name),
+        }
+    }
+
+    fn settings(&self, player: &dyn Player) -> Settings {
+        Settings {
+            threads: self.threads.count(),
+            in_flight: self.in_flight.or(NonZeroUsize::new(player.in_flight())).unwrap_or(NonZeroUsize::MIN),
+            frames: !self.no_frames,
+            log: !self.no_log,
+        }
+    }
+}
+
+/// The traces of a plan, and its logs, as far as they are there.
+fn files(plan: &Plan, store: &Store) -> [Vec<String>; 2] {
+    let those = |path: &dyn Fn(Experiment) -> PathBuf| {
+        let paths = plan.experiments.iter().map(|experiment| path(*experiment));
+        paths.filter(|path| path.exists()).map(|path| path.display().to_string()).collect()
+    };
+    [those(&|experiment| store.trace(experiment)), those(&|experiment| store.log(experiment))]
+}
+
+/// The agent of this name.
+fn scripted(name: &str) -> Result<Box<dyn Player>, Failure> {
+    if let Some(scripted) = Scripted::named(name) {
+        return Ok(Box::new(scripted));
+    }
+    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm"]).collect();
+    let near = nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
+}
+
+/// Those that are not recorded yet.
+fn unrecorded(plan: &Plan, planned: &[Key], store: &Store) -> Result<Vec<Key>, Failure> {
+    let mut todo = Vec::with_capacity(planned.len());
+    for experiment in &plan.experiments {
+        let done = store.recorded(*experiment).map_err(Failure::input)?;
+        let own = planned.iter().filter(|key| key.experiment == *experiment);
+        todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run))));
+    }
+    Ok(todo)
+}
+
+/// The first Ctrl-C stops at the next step of each episode, the second at once.
+fn stop_at_interrupt(stop: &'static AtomicBool) -> Result<(), Failure> {
+    ctrlc::set_handler(move || {
+        if stop.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    })
+    .map_err(|error| Failure::input(format!("cannot listen for Ctrl-C: {error}")))
+}

@@ -1,0 +1,109 @@
+//! `mirrorstats recover`: a trace out of a log, also of a cut one.
+
+use std::fmt;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::cli::listing::counted;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::log::recover::{Losses, recover};
+use crate::trace::finding::Severity;
+use crate::trace::inputs::Input;
+use crate::trace::merge;
+use crate::trace::validate::validate;
+use crate::trace::write::OptionalColumns;
+
+/// Make a trace of a log, also of one that was cut off or damaged
+///
+/// Every episode whose end is in the log is in the trace, which is checked against every rule. Exits with 3 if anything
+/// of the log is lost.
+#[derive(Clone, Debug, clap::Args)]
+pub struct RecoverArgs {
+    /// The log
+    #[arg(value_name = "LOG.mcap")]
+    log: PathBuf,
+    /// The trace to write
+    #[arg(short, long, value_name = "TRACE.parquet")]
+    out: PathBuf,
+    /// Answer as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RecoverAnswer {
+    /// Episodes in the trace.
+    pub episodes: usize,
+    /// Their rows.
+    pub steps: usize,
+    /// Whether a trace was written; not so without an episode.
+    pub written: bool,
+    /// What is lost.
+    pub losses: Losses,
+}
+
+impl RecoverArgs {
+    /// Recovers.
+    ///
+    /// # Errors
+    /// When the log cannot be read or is none, the trace cannot be written, or what was written breaks a rule.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let recovered = recover(&self.log).map_err(Failure::input)?;
+        let columns = OptionalColumns::all();
+        let rows = recovered.episodes.iter().map(|episode| merge::rows(episode, &columns));
+        let rows = rows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+        let answer = RecoverAnswer {
+            episodes: rows.len(),
+            steps: rows.iter().map(merge::EpisodeRows::len).sum(),
+            written: !rows.is_empty(),
+            losses: recovered.losses,
+        };
+        if answer.written {
+            merge::write(&self.out, recovered.recording.as_ref(), &rows).map_err(Failure::input)?;
+            self.check()?;
+        }
+        output::print(&answer, self.json)?;
+        Ok(if answer.losses.is_any() { Outcome::Lossy } else { Outcome::Done })
+    }
+
+    /// Holds the trace that was written against every rule of the schema.
+    fn check(&self) -> Result<(), Failure> {
+        let input = Input { name: self.out.display().to_string(), path: self.out.clone() };
+        let report = validate(&[input], None, NonZeroUsize::MIN).map_err(Failure::input)?;
+        match report.findings.iter().find(|finding| finding.severity == Severity::Error) {
+            None => Ok(()),
+            Some(finding) => Err(Failure::input(format!("the recovered trace breaks a rule: {finding}"))),
+        }
+    }
+}
+
+impl fmt::Display for RecoverAnswer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let episodes = counted(self.episodes as u64, "episode");
+        let steps = counted(self.steps as u64, "step");
+        if self.written {
+            writeln!(f, "recovered {episodes}, {steps}")?;
+        } else {
+            writeln!(f, "recovered no episode; no trace was written")?;
+        }
+        for lost in &self.losses.episodes {
+            let rows = counted(lost.rows as u64, "row");
+            writeln!(f, "lost {}: {}; {rows} of it are there", lost.episode_id, lost.reason)?;
+        }
+        if self.losses.stray_rows > 0 {
+            writeln!(f, "lost {} of no known episode", counted(self.losses.stray_rows as u64, "row"))?;
+        }
+        if self.losses.damaged_chunks > 0 {
+            writeln!(f, "{} damaged", counted(self.losses.damaged_chunks as u64, "chunk"))?;
+        }
+        match &self.losses.cut {
+            Some(cut) => writeln!(f, "not read to its end: {cut}"),
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,92 @@
+//! `mirrorstats world`: what the experiments are made of, without running any.
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+use crate::cli::outcome::{Failure, Outcome};
+#[cfg(feature = "raster")]
+use crate::cli::output;
+use crate::sim::Experiment;
+use crate::sim::config::WorldConfig;
+use crate::sim::scene::Scene;
+#[cfg(feature = "raster")]
+use crate::sim::sheet;
+
+/// Show what worlds are made of: the configuration, a scene, a contact sheet of pictures
+#[derive(Clone, Debug, clap::Args)]
+pub struct WorldArgs {
+    #[command(subcommand)]
+    verb: WorldVerb,
+}
+
+/// What to show.
+#[derive(Clone, Debug, clap::Subcommand)]
+enum WorldVerb {
+    /// Print the built-in configuration: every size, speed, light and threshold, as TOML for --config
+    Config,
+    /// Print the scene of one episode as JSON
+    Scene(SceneArgs),
+    /// Draw the contact sheet: every experiment from above and as the agent sees it
+    #[cfg(feature = "raster")]
+    Sheet(SheetArgs),
+}
+
+/// Which scene.
+#[derive(Clone, Debug, clap::Args)]
+struct SceneArgs {
+    /// Which experiment: E1, E2, E3, E4 or E5
+    experiment: Experiment,
+    /// The seed of the block of runs
+    #[arg(long, default_value_t = 0)]
+    seed: i32,
+    /// The run within its seed
+    #[arg(long, default_value_t = 0)]
+    run: i32,
+    /// A TOML file whose values lie over the built-in configuration
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+/// Where the sheet goes.
+#[cfg(feature = "raster")]
+#[derive(Clone, Debug, clap::Args)]
+struct SheetArgs {
+    /// The folder for `sheet.png`
+    #[arg(long, value_name = "DIR", default_value = "reports/world")]
+    out: PathBuf,
+    /// The seed of the scenes
+    #[arg(long, default_value_t = 0)]
+    seed: i32,
+    /// A TOML file whose values lie over the built-in configuration
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
+    path.map_or_else(|| Ok(WorldConfig::default()), |path| WorldConfig::load(path)).map_err(Failure::input)
+}
+
+impl WorldArgs {
+    /// Shows it.
+    ///
+    /// # Errors
+    /// When the configuration is at fault, nothing can be drawn, or the output cannot be written.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self.verb {
+            WorldVerb::Config => io::stdout().lock().write_all(WorldConfig::default_text().as_bytes())?,
+            WorldVerb::Scene(args) => {
+                let config = configured(args.config.as_ref())?;
+                let scene = Scene::draw(&config, args.experiment, args.seed, args.run).map_err(Failure::input)?;
+                writeln!(io::stdout().lock(), "{:#}", serde_json::json!(scene))?;
+            }
+            #[cfg(feature = "raster")]
+            WorldVerb::Sheet(args) => {
+                let config = configured(args.config.as_ref())?;
+                let png = sheet::png(&config, args.seed).map_err(Failure::input)?;
+                std::fs::create_dir_all(&args.out)?;
+                output::write_file(&args.out.join("sheet.png"), &png)?;
+            }
+        }
+        Ok(Outcome::Done)
+    }
+}

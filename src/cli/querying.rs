@@ -1,0 +1,137 @@
+//! From a query as typed to its rows on standard output or in a file.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write as _};
+use std::path::Path;
+
+use polars::prelude::LazyFrame;
+
+use super::commands::query::{AnswerFormat, QueryArgs};
+use super::listing::listing;
+use super::outcome::{Failure, Outcome};
+use super::{output, scoring};
+use crate::base::visible::visible;
+use crate::cells::group::{DEFAULT_BY, group};
+use crate::engine::polars::answer::{self, Excerpt, Format, QueryError};
+use crate::engine::polars::run::PolarsError;
+use crate::engine::polars::statement::{self, Checked, Table};
+use crate::engine::polars::tables;
+use crate::metric::fault::Faults;
+
+/// What stands for null in a table.
+const NULL: &str = "NULL";
+
+/// Runs a query.
+///
+/// # Errors
+/// Whatever is wrong with the query, the traces, the definitions or the output.
+pub fn run(args: &QueryArgs) -> Result<Outcome, Failure> {
+    let format = format(args)?;
+    // A slip in the query should not cost a look at the traces.
+    let query = statement::check(&args.query).map_err(|found| faults(&found))?;
+    let frame = answer::plan(&query, load(args, &query)?).map_err(|error| match error {
+        QueryError::Faults(found) => faults(&found),
+        QueryError::Polars(error) => failed(error),
+    })?;
+    let Some(format) = format else {
+        let most = (args.rows > 0).then_some(args.rows);
+        let excerpt = answer::excerpt(frame, most).map_err(failed)?;
+        let text = render(&excerpt);
+        match &args.output {
+            Some(path) => output::write_file(path, text.as_bytes())?,
+            None => io::stdout().lock().write_all(text.as_bytes())?,
+        }
+        return Ok(Outcome::Done);
+    };
+    match &args.output {
+        Some(path) => write_file(frame, format, path)?,
+        None => answer::write(frame, format, io::stdout()).map_err(failed)?,
+    }
+    Ok(Outcome::Done)
+}
+
+fn faults(faults: &Faults) -> Failure {
+    Failure::Faults(faults.render(scoring::colored()))
+}
+
+fn failed(error: PolarsError) -> Failure {
+    scoring::polars_failure(error)
+}
+
+/// The format asked for; `None` for a table.
+fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
+    let ending = args.output.as_deref().and_then(Path::extension).map(std::ffi::OsStr::to_ascii_lowercase);
+    let ending = ending.as_deref().and_then(std::ffi::OsStr::to_str);
+    let by_ending = match (ending, &args.output) {
+        (_, None) | (Some("txt"), _) => AnswerFormat::Table,
+        (Some("csv"), _) => AnswerFormat::Csv,
+        (Some("jsonl" | "ndjson"), _) => AnswerFormat::Jsonl,
+        (Some("parquet"), _) => AnswerFormat::Parquet,
+        (_, Some(path)) if args.format.is_none() => {
+            return Err(Failure::Rendered(format!(
+                "error: `{}`: expected a name that ends in .csv, .jsonl, .parquet or .txt\n  help: or say which format with --format",
+                path.display()
+            )));
+        }
+        _ => AnswerFormat::Table,
+    };
+    match args.format.unwrap_or(by_ending) {
+        AnswerFormat::Table => Ok(None),
+        AnswerFormat::Csv => Ok(Some(Format::Csv)),
+        AnswerFormat::Jsonl => Ok(Some(Format::JsonLines)),
+        AnswerFormat::Parquet if args.output.is_none() => Err(Failure::Rendered(
+            "error: Parquet is no text for standard output\n  help: name a file with -o".to_owned(),
+        )),
+        AnswerFormat::Parquet => Ok(Some(Format::Parquet)),
+    }
+}
+
+/// The tables that the query names; the others are not computed.
+fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Failure> {
+    let inputs = scoring::resolve(&args.traces)?;
+    let mut loaded = Vec::new();
+    if query.tables.contains(&Table::Steps) {
+        let traces = scoring::open_steps(&inputs)?;
+        loaded.push((Table::Steps, tables::steps(&traces).map_err(failed)?));
+    }
+    if query.tables.contains(&Table::Episodes) || query.tables.contains(&Table::Cells) {
+        let scores = scoring::table(&inputs, &args.scoring, &[], args.traces.threads.count())?;
+        loaded.push((Table::Episodes, tables::episodes(&scores).map_err(failed)?));
+        if query.tables.contains(&Table::Cells) {
+            let by = DEFAULT_BY.map(str::to_owned);
+            let cells = group(&scores, &by).map_err(Failure::input)?;
+            loaded.push((Table::Cells, tables::cells(&cells).map_err(failed)?));
+        }
+    }
+    Ok(loaded)
+}
+
+/// Writes a file that appears whole or not at all.
+fn write_file(frame: LazyFrame, format: Format, path: &Path) -> Result<(), Failure> {
+    let temporary = output::beside(path)?;
+    let file: File = temporary.reopen().map_err(Failure::Output)?;
+    answer::write(frame, format, BufWriter::new(file)).map_err(failed)?;
+    output::persist(temporary, path)
+}
+
+/// The rows for people: names, types, rows, how many there are.
+fn render(excerpt: &Excerpt) -> String {
+    let mut table = listing(excerpt.columns.iter().map(|(name, _)| visible(name)));
+    table.add_row(excerpt.columns.iter().map(|(_, ty)| ty.clone()).collect::<Vec<_>>());
+    let shown = |row: &Vec<Option<String>>| -> Vec<String> {
+        row.iter().map(|cell| cell.as_deref().map_or_else(|| NULL.to_owned(), visible)).collect()
+    };
+    for row in &excerpt.head {
+        table.add_row(shown(row));
+    }
+    let left_out = excerpt.rows - excerpt.head.len() - excerpt.tail.len();
+    if left_out > 0 {
+        table.add_row(excerpt.columns.iter().map(|_| "·").collect::<Vec<_>>());
+    }
+    for row in &excerpt.tail {
+        table.add_row(shown(row));
+    }
+    let count = if excerpt.rows == 1 { "1 row".to_owned() } else { format!("{} rows", excerpt.rows) };
+    let note = if left_out > 0 { format!(" ({} shown)", excerpt.rows - left_out) } else { String::new() };
+    format!("{}\n{count}{note}\n", table.trim_fmt())
+}

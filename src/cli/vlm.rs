@@ -1,0 +1,167 @@
+//! What was typed about a model behind a provider, and the player that it comes to.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::runtime::Runtime;
+
+use super::outcome::Failure;
+use crate::agent::vlm::dialect::Dialect;
+use crate::agent::vlm::limits::{Account, Limits, Spend};
+use crate::agent::vlm::models::{Choice, Contract, Models};
+use crate::agent::vlm::provider::{Patience, Provider};
+use crate::agent::vlm::secrets::Secret;
+use crate::agent::vlm::{OnOutage, Vlm, spent};
+use crate::agent::{Agent, Lost, Player, Task};
+
+/// A model, who serves it, and what a recording with it may spend.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "With --agent vlm")]
+pub struct VlmArgs {
+    /// The model: a name of the paper's table, an id, or one of --models
+    #[arg(long, value_name = "NAME|ID")]
+    model: Option<String>,
+    /// A file with more models, in the shape of assets/models.toml
+    #[arg(long, value_name = "FILE")]
+    models: Option<PathBuf>,
+    /// Who serves the model, instead of what the models' file says: openai, openrouter, google, anthropic, compatible
+    #[arg(long, value_name = "NAME")]
+    backend: Option<String>,
+    /// The address of a server that takes OpenAI's chat completions, such as <http://localhost:8000/v1>
+    #[arg(long, value_name = "URL")]
+    base_url: Option<String>,
+    /// Let the prompt alone ask for the reply's shape, and not the provider enforce it
+    #[arg(long)]
+    prompt_only: bool,
+    /// Stop before more US dollars are spent, over all starts of this recording
+    #[arg(long, value_name = "USD")]
+    max_cost: Option<f64>,
+    /// Stop before more tokens are used, over all starts of this recording
+    #[arg(long, value_name = "N")]
+    max_tokens: Option<u64>,
+    /// Stop before more requests are sent, over all starts of this recording
+    #[arg(long, value_name = "N")]
+    max_requests: Option<u64>,
+    /// The most tokens of a reply
+    #[arg(long, value_name = "N", default_value_t = 2_048)]
+    max_output_tokens: u32,
+    /// Requests that are out at once, at most; fewer where the provider says that it gets too many
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    at_once: usize,
+    /// Attempts for one step
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
+    attempts: u32,
+    /// Seconds for one answer
+    #[arg(long, value_name = "SECONDS", default_value_t = 180, value_parser = clap::value_parser!(u64).range(1..=3_600))]
+    timeout: u64,
+    /// Count a step whose attempts are used up as one without a decision, rather than lose its episode
+    #[arg(long)]
+    stand_still_on_outage: bool,
+    /// Play the answers of an earlier recording's journals; nothing is sent
+    #[arg(long, value_name = "DIR")]
+    cassette: Option<PathBuf>,
+}
+
+/// The folder of journals in the folder of a recording.
+const JOURNALS: &str = "journal";
+
+impl VlmArgs {
+    /// The player, whose journals are in the folder of the recording.
+    ///
+    /// # Errors
+    /// For a model, backend or address that is none, a key that is not there, and journals that cannot be read.
+    pub fn player(&self, out: &Path) -> Result<VlmPlayer, Failure> {
+        let choice = self.choice()?;
+        if let Some(folder) = &self.cassette {
+            let vlm = Arc::new(Vlm::cassette(choice, folder.clone(), self.max_output_tokens));
+            return Ok(VlmPlayer { vlm, at_once: 1, network: None });
+        }
+        let network = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .map_err(|error| Failure::input(format!("cannot start the network's thread: {error}")))?;
+        let provider = self.provider(&choice)?;
+        let journals = out.join(JOURNALS);
+        let reader = Vlm::cassette(choice.clone(), journals.clone(), self.max_output_tokens);
+        let spend: Spend = spent(&reader, &journals).map_err(Failure::input)?;
+        let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
+        let on_outage = if self.stand_still_on_outage { OnOutage::StandStill } else { OnOutage::Lose };
+        let vlm = Vlm::online(
+            choice,
+            provider,
+            network.handle().clone(),
+            journals,
+            Arc::new(Account::new(limits, spend)),
+            on_outage,
+            self.max_output_tokens,
+        );
+        Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network) })
+    }
+
+    fn choice(&self) -> Result<Choice, Failure> {
+        let Some(name) = &self.model else {
+            return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
+        };
+        let models = Models::load(self.models.as_deref()).map_err(Failure::input)?;
+        let backend = self.backend.as_deref().or(self.base_url.is_some().then_some("compatible"));
+        let mut choice = models.choose(name, backend).map_err(Failure::input)?;
+        if let Some(url) = &self.base_url {
+            choice.backend.base_url = Some(url.clone());
+        }
+        if self.prompt_only {
+            choice.model.contract = Contract::Prompt;
+        }
+        Ok(choice)
+    }
+
+    fn provider(&self, choice: &Choice) -> Result<Provider, Failure> {
+        let Some(url) = &choice.backend.base_url else {
+            return Err(Failure::input(format!("the backend of `{}` has no address; give --base-url", choice.name)));
+        };
+        let secret = Secret::from_environment(&choice.backend.key);
+        let secret = match (secret, choice.backend.dialect) {
+            (Ok(secret), _) => Some(secret),
+            // Servers of one's own mostly ask for no key.
+            (Err(_), Dialect::OpenaiCompatible) if self.base_url.is_some() => None,
+            (Err(missing), _) => return Err(Failure::input(missing)),
+        };
+        let patience =
+            Patience { attempts: self.attempts, timeout: Duration::from_secs(self.timeout), ..Patience::default() };
+        Provider::new(url, choice.backend.dialect, &choice.model.id, secret, patience, self.at_once)
+            .map_err(Failure::input)
+    }
+}
+
+/// A model as a player.
+pub struct VlmPlayer {
+    vlm: Arc<Vlm>,
+    at_once: usize,
+    /// Requests run on it; it ends with the player.
+    #[expect(dead_code, reason = "held for as long as requests may be under way")]
+    network: Option<Runtime>,
+}
+
+impl Player for VlmPlayer {
+    fn model(&self) -> &str {
+        &self.vlm.choice().name
+    }
+
+    fn description(&self) -> serde_json::Value {
+        self.vlm.description()
+    }
+
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
+        let agent = self.vlm.agent(task, &episode_id.replace('/', "-"));
+        Ok(Box::new(agent.map_err(|error| Lost(error.to_string()))?))
+    }
+
+    fn in_flight(&self) -> usize {
+        self.at_once
+    }
+
+    fn stopped(&self) -> Option<String> {
+        self.vlm.stopped().map(str::to_owned)
+    }
+}

@@ -1,0 +1,120 @@
+//! The tables of a query: steps as they lie in the files, episodes and cells as the native engine computes them.
+
+use polars::prelude::{Column, DataFrame, IntoLazy as _, LazyFrame};
+
+use super::frame::{self, FrameColumn};
+use super::run::PolarsError;
+use crate::cells::cell::{Cells, KeyValue};
+use crate::cells::interval::{Interval, student_t, wilson};
+use crate::cells::moments::Moments;
+use crate::metric::catalog::{Kind, Metric};
+use crate::score::table::{EpisodeKey, EpisodeTable};
+use crate::trace::open::TraceSet;
+
+/// The confidence of the intervals of `cells`.
+const CONFIDENCE: f64 = 0.95;
+
+/// The steps of all files with all their columns; a file without a column has nulls there.
+///
+/// # Errors
+/// When a file is gone; when two files disagree on the type of a column.
+pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
+    let mut columns = Vec::new();
+    for name in traces.column_names() {
+        let Some(found) = traces.column(name) else { continue };
+        if let Some([(first, a), (second, b)]) = found.conflict {
+            let problem = format!("`{name}` is {} in `{first}` and {} in `{second}`", a.name(), b.name());
+            return Err(PolarsError::Failed(format!("{problem}; write it with one type in all traces")));
+        }
+        columns.extend(FrameColumn::natural(name, found.kind));
+    }
+    frame::steps(traces, &columns)
+}
+
+/// The episode table: the keys, then the metrics.
+///
+/// # Errors
+/// What Polars says of the columns.
+pub fn episodes(table: &EpisodeTable) -> Result<LazyFrame, PolarsError> {
+    let text = |name: &str, of: fn(&EpisodeKey) -> &str| {
+        Column::new(name.into(), table.keys.iter().map(of).collect::<Vec<_>>())
+    };
+    let int = |name: &str, of: fn(&EpisodeKey) -> i32| {
+        Column::new(name.into(), table.keys.iter().map(of).collect::<Vec<_>>())
+    };
+    let mut columns = vec![
+        text("episode_id", |key| &key.episode_id),
+        text("model", |key| &key.model),
+        text("experiment", |key| &key.experiment),
+        int("seed", |key| key.seed),
+        int("run", |key| key.run),
+    ];
+    columns.extend(table.metrics.iter().map(|metric| Column::new(metric.name.as_str().into(), &metric.values)));
+    Ok(DataFrame::new(table.len(), columns)?.lazy())
+}
+
+/// The cells: the keys, then `metric, n, sum, sum_sq, mean, se, ci_low, ci_high`, a row a group and metric.
+///
+/// # Errors
+/// A sum beyond 64 bits; what Polars says of the columns.
+pub fn cells(cells: &Cells) -> Result<LazyFrame, PolarsError> {
+    let rows: Vec<Row> = rows(cells);
+    let mut columns = Vec::new();
+    for (at, name) in cells.by.iter().enumerate() {
+        let texts: Vec<Option<String>> = rows.iter().map(|row| text_of(&row.key[at])).collect();
+        columns.push(Column::new(name.as_str().into(), texts));
+    }
+    let int = |name: &str, of: fn(&Moments) -> i128| {
+        let values: Result<Vec<i64>, _> = rows.iter().map(|row| i64::try_from(of(row.moments))).collect();
+        let values = values.map_err(|_| PolarsError::Failed(format!("the column `{name}` of cells leaves 64 bits")))?;
+        Ok::<_, PolarsError>(Column::new(name.into(), values))
+    };
+    let float =
+        |name: &str, of: fn(&Row) -> Option<f64>| Column::new(name.into(), rows.iter().map(of).collect::<Vec<_>>());
+    columns.push(Column::new("metric".into(), rows.iter().map(|row| row.metric).collect::<Vec<_>>()));
+    columns.push(int("n", |moments| moments.n.into())?);
+    columns.push(int("sum", |moments| moments.sum)?);
+    columns.push(int("sum_sq", |moments| moments.sum_sq)?);
+    columns.push(float("mean", |row| row.moments.mean()));
+    columns.push(float("se", |row| row.moments.se(row.definition.se)));
+    columns.push(float("ci_low", |row| row.interval().map(|interval| interval.low)));
+    columns.push(float("ci_high", |row| row.interval().map(|interval| interval.high)));
+    Ok(DataFrame::new(rows.len(), columns)?.lazy())
+}
+
+/// One cell.
+struct Row<'c> {
+    key: &'c [KeyValue],
+    metric: &'c str,
+    definition: &'c Metric,
+    moments: &'c Moments,
+}
+
+impl Row<'_> {
+    /// Wilson's for a rate, Student's for a quantity.
+    fn interval(&self) -> Option<Interval> {
+        match self.definition.kind {
+            Kind::Rate => wilson(u64::try_from(self.moments.sum).ok()?, self.moments.n, CONFIDENCE),
+            Kind::Quantity => student_t(self.moments, self.definition.se, CONFIDENCE),
+        }
+    }
+}
+
+fn rows(cells: &Cells) -> Vec<Row<'_>> {
+    let mut rows = Vec::new();
+    for group in &cells.groups {
+        for (metric, moments) in cells.metrics.iter().zip(&group.moments) {
+            if let Some(definition) = cells.catalog.metric.get(metric) {
+                rows.push(Row { key: &group.key, metric, definition, moments });
+            }
+        }
+    }
+    rows
+}
+
+fn text_of(key: &KeyValue) -> Option<String> {
+    match key {
+        KeyValue::Missing => None,
+        other => Some(other.to_string()),
+    }
+}

@@ -1,0 +1,140 @@
+//! What the driver answers, and the table that it brings.
+
+use std::fs::File;
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::Value;
+
+use super::{Job, SparkError, cause, check, request, source};
+use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use crate::trace::finding::{Code, Finding};
+
+/// What happened.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Answer {
+    /// The results are where they were asked for.
+    Done(Done),
+    /// Something about the traces.
+    Refused(Refused),
+    /// Spark raised an error.
+    Failed(Failed),
+    /// The time was up.
+    Late {},
+}
+
+/// A job that ran to its end.
+#[derive(Debug, Deserialize)]
+pub(super) struct Done {
+    pub(super) episodes: u64,
+}
+
+/// What is wrong with the traces.
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Refused {
+    Rows { expected: u64, found: u64 },
+    Empty(String),
+    Column { file: String, column: String, expected: String, found: Option<String> },
+    Rule { fault: Option<Fault>, faults: u64 },
+}
+
+/// The first episode that breaks a rule.
+#[derive(Debug, Deserialize)]
+pub(super) struct Fault {
+    episode: Option<String>,
+    /// The place in [`check::rules`].
+    rule: usize,
+    found: String,
+}
+
+/// An error of Spark, by its name and in its words.
+#[derive(Debug, Deserialize)]
+pub(super) struct Failed {
+    pub(super) name: String,
+    pub(super) message: String,
+}
+
+impl Refused {
+    pub(super) fn error(self, job: Job<'_>) -> SparkError {
+        match self {
+            Self::Rows { expected, found } => SparkError::Rows { expected, found },
+            Self::Empty(uri) => SparkError::Empty { uri: source::without_user(&uri) },
+            Self::Column { file, column, expected, found } => SparkError::Column {
+                file: source::without_user(&file),
+                column,
+                expected: cause::kind(&expected).to_owned(),
+                found: found.map_or_else(|| "no such column".to_owned(), |found| format!("the type `{found}`")),
+            },
+            Self::Rule { fault: None, .. } => SparkError::Rule { finding: Box::new(no_episodes(job)), more: 0 },
+            Self::Rule { fault: Some(fault), faults } => match finding(fault, job) {
+                Some(finding) => SparkError::Rule { finding: Box::new(finding), more: faults.saturating_sub(1) },
+                None => SparkError::Answer { words: "a rule that was not asked for".into() },
+            },
+        }
+    }
+}
+
+fn no_episodes(job: Job<'_>) -> Finding {
+    Finding::new(Code::NoEpisodes, job.sources.name(), "at least one row", "none")
+}
+
+fn finding(fault: Fault, job: Job<'_>) -> Option<Finding> {
+    let columns = request::columns(&job.definitions.plan, job.labels);
+    let mut rules = check::rules(columns.iter().map(|(name, _)| name.as_str()), &job.definitions.catalog);
+    let rule = (fault.rule < rules.len()).then(|| rules.swap_remove(fault.rule))?;
+    let finding = Finding::new(rule.code, job.sources.name(), rule.expected, fault.found).in_column(rule.column);
+    Some(match fault.episode {
+        Some(episode) => finding.in_episode(episode),
+        None => finding,
+    })
+}
+
+/// Reads the table that the driver has written: a line an episode, an array of keys, metrics, labels.
+pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkError> {
+    let fault = |words: String| SparkError::Answer { words };
+    let file = File::open(path).map_err(|error| fault(error.to_string()))?;
+    let outputs = &job.definitions.plan.outputs;
+    let mut table = EpisodeTable {
+        catalog: job.definitions.catalog.clone(),
+        keys: Vec::new(),
+        labels: job.labels.iter().map(|name| LabelColumn { name: name.clone(), values: Vec::new() }).collect(),
+        metrics: outputs.iter().map(|output| MetricColumn { name: output.name.clone(), values: Vec::new() }).collect(),
+    };
+    for line in BufReader::new(file).lines() {
+        let line = line.map_err(|error| fault(error.to_string()))?;
+        let row: Vec<Value> = serde_json::from_str(&line).map_err(|error| fault(error.to_string()))?;
+        append(&mut table, row).ok_or_else(|| fault(format!("an episode that is none: {line}")))?;
+    }
+    Ok(table.sorted())
+}
+
+fn append(table: &mut EpisodeTable, row: Vec<Value>) -> Option<()> {
+    let mut cells = row.into_iter();
+    let [episode_id, model, experiment] = [text(cells.next()?)?, text(cells.next()?)?, text(cells.next()?)?];
+    let mut number = || i32::try_from(cells.next()?.as_i64()?).ok();
+    let (seed, run) = (number()?, number()?);
+    table.keys.push(EpisodeKey { experiment: experiment?, model: model?, seed, run, episode_id: episode_id? });
+    for metric in &mut table.metrics {
+        metric.values.push(match cells.next()? {
+            Value::Null => None,
+            value => Some(value.as_i64()?),
+        });
+    }
+    for label in &mut table.labels {
+        label.values.push(text(cells.next()?)?);
+    }
+    cells.next().is_none().then_some(())
+}
+
+/// A text or null; nothing for any other value.
+#[expect(clippy::option_option, reason = "null is a text's value here, and not the same as a value that is no text")]
+fn text(value: Value) -> Option<Option<String>> {
+    match value {
+        Value::Null => Some(None),
+        Value::String(text) => Some(Some(text)),
+        _ => None,
+    }
+}

@@ -1,0 +1,117 @@
+//! The rules of traces as one aggregation over `steps`: what the native scan finds row by row.
+//!
+//! A rule is an aggregate over an episode's rows that is null where the rule holds, and what was found where it does
+//! not. Rules hold for the columns that are read, as in the native scan. Not checked are the rules about the place of
+//! rows in files: rows of an episode may lie anywhere, as long as each t of 1..T is there once.
+
+use std::fmt::Write as _;
+
+use crate::metric::catalog::Catalog;
+use crate::metric::sql::Dialect;
+use crate::trace::finding::Code;
+use crate::trace::schema::{self, Column, Kind};
+
+/// One rule for one column.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Rule {
+    pub(super) code: Code,
+    pub(super) column: String,
+    pub(super) expected: String,
+    found: String,
+}
+
+/// The rules for some columns, in the order of the columns.
+pub(super) fn rules<'a>(columns: impl IntoIterator<Item = &'a str>, catalog: &Catalog) -> Vec<Rule> {
+    let known = columns.into_iter().filter_map(schema::column);
+    known.flat_map(|column| rules_of(column, catalog)).collect()
+}
+
+fn rules_of(column: &Column, catalog: &Catalog) -> Vec<Rule> {
+    let x = format!("s.{}", column.name);
+    let mut rules = Vec::new();
+    let mut rule = |code, expected: String, found: String| {
+        rules.push(Rule { code, column: column.name.to_owned(), expected, found });
+    };
+    let first_bad = |bad: String| format!("MIN(CASE WHEN {bad} THEN CONCAT('`', CAST({x} AS STRING), '`') END)");
+    if !column.nullable {
+        let found = format!("CASE WHEN COUNT({x}) < COUNT(*) THEN 'null' END");
+        rule(Code::NullInRequired, "a value in every row".into(), found);
+    }
+    if column.names() {
+        rule(Code::EmptyString, "a name".into(), first_bad(format!("{x} = ''")));
+    }
+    if let Some((min, max)) = column.stored.range().filter(|(min, _)| *min != i64::MIN) {
+        let expected = format!("an integer from {min} to {max}");
+        rule(Code::OutOfRange, expected, first_bad(format!("{x} < {min} OR {x} > {max}")));
+    }
+    if column.counts() {
+        let nan = if column.stored.kind() == Kind::Float { format!(" OR ISNAN({x})") } else { String::new() };
+        rule(Code::NegativeCount, "0 or more".into(), first_bad(format!("{x} < 0{nan}")));
+    }
+    if !column.values.is_empty() {
+        let found = first_bad(format!("{x} NOT IN ({})", texts(column.values.iter().copied())));
+        let code = if column.name == "action" { Code::UnknownAction } else { Code::UnknownReplyStatus };
+        rule(code, column.values.join(", "), found);
+    }
+    if column.name == "experiment" && !catalog.open {
+        let known: Vec<&str> = catalog.experiment.keys().map(String::as_str).collect();
+        let unknown =
+            if known.is_empty() { "TRUE".to_owned() } else { format!("{x} NOT IN ({})", texts(known.clone())) };
+        rule(Code::UnknownExperiment, format!("one of {}", known.join(", ")), first_bad(unknown));
+    }
+    if column.constant && column.name != "episode_id" {
+        let some = if column.nullable { format!(" OR COUNT({x}) BETWEEN 1 AND COUNT(*) - 1") } else { String::new() };
+        let found = format!("CASE WHEN MIN({x}) <> MAX({x}){some} THEN {} END", extent(&x, column.nullable));
+        rule(Code::InconsistentConstant, "one value in all rows of the episode".into(), found);
+    }
+    if column.name == "t" {
+        rules.extend(sequence(&x));
+    }
+    rules
+}
+
+/// t is 1..T, each once.
+fn sequence(t: &str) -> [Rule; 3] {
+    let rule = |code, expected: &str, found| Rule { code, column: "t".into(), expected: expected.into(), found };
+    let distinct = format!("SIZE(COLLECT_SET({t}))");
+    let start = format!("CASE WHEN MIN({t}) <> 1 THEN CONCAT('t = ', MIN({t})) END");
+    let twice =
+        format!("CASE WHEN COUNT({t}) > {distinct} THEN CONCAT(COUNT({t}), ' rows of ', {distinct}, ' timesteps') END");
+    let gap = format!(
+        "CASE WHEN MAX({t}) - MIN({t}) + 1 > {distinct} THEN CONCAT({distinct}, ' timesteps up to t = ', MAX({t})) END"
+    );
+    [
+        rule(Code::TStart, "t = 1 in the episode's first row", start),
+        rule(Code::TDuplicate, "every t once, in one file", twice),
+        rule(Code::TGap, "every t up to the last", gap),
+    ]
+}
+
+fn extent(x: &str, nullable: bool) -> String {
+    let nulls = if nullable {
+        format!(", CASE WHEN COUNT({x}) < COUNT(*) THEN ' and null' ELSE '' END")
+    } else {
+        String::new()
+    };
+    format!("CONCAT('`', CAST(MIN({x}) AS STRING), '` to `', CAST(MAX({x}) AS STRING), '`'{nulls})")
+}
+
+fn texts<'a>(values: impl IntoIterator<Item = &'a str>) -> String {
+    values.into_iter().map(|value| Dialect::Spark.text(value)).collect::<Vec<_>>().join(", ")
+}
+
+/// The statement: one row of `steps`, `episodes`, `faults` (episodes that break a rule), and `fault`, the first by id:
+/// its `episode`, the place of its `rule`, and what was `found`.
+pub(super) fn statement(rules: &[Rule]) -> String {
+    let mut text = "WITH episodes AS (\n  SELECT s.episode_id AS episode_id,\n    COUNT(*) AS steps".to_owned();
+    for (at, rule) in rules.iter().enumerate() {
+        let _ = write!(text, ",\n    {} AS r{at}", rule.found);
+    }
+    text.push_str("\n  FROM steps s\n  GROUP BY s.episode_id\n),\nfaults AS (\n  SELECT steps,\n    CASE");
+    for at in 0..rules.len() {
+        let fault = format!("NAMED_STRUCT('episode', episode_id, 'rule', {at}, 'found', r{at})");
+        let _ = write!(text, "\n      WHEN r{at} IS NOT NULL THEN {fault}");
+    }
+    text.push_str("\n    END AS fault\n  FROM episodes\n)\n");
+    text + "SELECT COALESCE(SUM(steps), 0) AS steps, COUNT(*) AS episodes, COUNT(fault) AS faults, MIN(fault) AS fault\nFROM faults\n"
+}

@@ -1,0 +1,79 @@
+//! Whose Spark: the one of `SPARK_HOME`, else the `spark-submit` on `PATH`, else Python's package `pyspark`.
+
+use std::env;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use super::SparkError;
+
+/// A Spark to submit with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Spark {
+    /// The program `spark-submit`.
+    pub(super) program: PathBuf,
+    /// What `SPARK_HOME` must be for it, where that is not known to it.
+    pub(super) home: Option<PathBuf>,
+}
+
+/// Where `spark-submit` is below the folder of a Spark.
+const PROGRAM: &str = "bin/spark-submit";
+
+/// The first of the three that there is.
+pub(super) fn locate() -> Result<Spark, SparkError> {
+    if let Some(home) = env::var_os("SPARK_HOME").filter(|home| !home.is_empty()) {
+        let program = Path::new(&home).join(PROGRAM);
+        return if program.is_file() {
+            Ok(Spark { program, home: None })
+        } else {
+            Err(SparkError::Home { home: home.to_string_lossy().into_owned() })
+        };
+    }
+    if let Some(program) = on_path(&env::var_os("PATH").unwrap_or_default()) {
+        return Ok(Spark { program, home: None });
+    }
+    let python = python();
+    package(&python).ok_or(SparkError::NoSpark { python })
+}
+
+fn on_path(path: &OsStr) -> Option<PathBuf> {
+    env::split_paths(path).map(|folder| folder.join("spark-submit")).find(|program| program.is_file())
+}
+
+/// The Python that Spark would take.
+fn python() -> String {
+    let chosen = ["PYSPARK_DRIVER_PYTHON", "PYSPARK_PYTHON"].into_iter().find_map(|name| env::var(name).ok());
+    chosen.unwrap_or_else(|| "python3".to_owned())
+}
+
+/// The Spark inside of the package `pyspark`, which is not imported for that.
+fn package(python: &str) -> Option<Spark> {
+    let ask =
+        "import importlib.util as u; s = u.find_spec('pyspark'); print(s.submodule_search_locations[0] if s else '')";
+    let asked = Command::new(python).args(["-c", ask]).stdin(Stdio::null()).stderr(Stdio::null()).output().ok()?;
+    let home = PathBuf::from(String::from_utf8(asked.stdout).ok()?.trim());
+    let program = home.join(PROGRAM);
+    program.is_file().then_some(Spark { program, home: Some(home) })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::env::join_paths;
+    use std::fs;
+
+    use super::on_path;
+
+    #[test]
+    fn the_first_on_the_path_is_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let [none, first, second] = ["none", "first", "second"].map(|name| folder.path().join(name));
+        for place in [&none, &first, &second] {
+            fs::create_dir(place).unwrap();
+        }
+        for place in [&first, &second] {
+            fs::write(place.join("spark-submit"), "").unwrap();
+        }
+        assert_eq!(on_path(&join_paths([&none, &first, &second]).unwrap()), Some(first.join("spark-submit")));
+        assert_eq!(on_path(&join_paths([&none]).unwrap()), None);
+    }
+}

@@ -1,0 +1,145 @@
+//! One log out of several: episodes in the order of the trace, each in chunks of its own.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use mcap::io::MessageReader;
+use mcap::records::Metadata;
+use mcap::{Compression, Message, WriteOptions, Writer};
+use serde_json::Value;
+
+use super::message::{EpisodeMessage, Head};
+use super::{LogError, METADATA, METADATA_KEY, topic};
+use crate::base::temporary;
+
+/// What orders the episodes of a log: seed and run.
+pub type Place = (i32, i32);
+
+/// A writer whose bytes depend on nothing but what is written.
+pub(super) fn writer<W: Write + Seek>(out: W) -> mcap::McapResult<Writer<W>> {
+    WriteOptions::new()
+        .profile("")
+        .library(concat!("mirrorstats ", env!("CARGO_PKG_VERSION")))
+        .compression(Some(Compression::Zstd))
+        .compression_threads(0)
+        // Chunks end where an episode does, never at a number of bytes.
+        .chunk_size(None)
+        .create(out)
+}
+
+/// Writes the metadata record.
+pub(super) fn write_recording<W: Write + Seek>(out: &mut Writer<W>, recording: &Value) -> mcap::McapResult<()> {
+    let metadata = BTreeMap::from([(METADATA_KEY.to_owned(), recording.to_string())]);
+    out.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })
+}
+
+/// Puts the episodes of the log at `out`, if there is one, and of these logs of one episode each into one log, which
+/// replaces the one at `out` in one step; it is written in `scratch`, a folder of the same disk. Of an episode that is
+/// there twice the one in the log counts.
+///
+/// # Errors
+/// When a log cannot be read or is damaged, and whatever writing gives; the log at `out` is as it was then.
+pub fn assemble(out: &Path, parts: &[(Place, PathBuf)], recording: &Value, scratch: &Path) -> Result<(), LogError> {
+    let file = temporary::file_in(scratch).map_err(LogError::io("write", out))?;
+    let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(out))?;
+    write_recording(&mut log, recording).map_err(LogError::writing(out))?;
+    let mut before = if out.exists() { Some(Source::open(out)?) } else { None };
+    let mut parts = parts.to_vec();
+    parts.sort();
+    for (place, part) in &parts {
+        while let Some(earlier) = before.as_ref().and_then(Source::place).filter(|earlier| earlier <= place) {
+            if let Some(source) = &mut before {
+                source.copy_episode(&mut log, out)?;
+            }
+            if earlier == *place {
+                break;
+            }
+        }
+        if !is_written(before.as_ref(), *place) {
+            let mut source = Source::open(part)?;
+            source.copy_episode(&mut log, out)?;
+        }
+    }
+    while let Some(source) = before.as_mut().filter(|source| source.place().is_some()) {
+        source.copy_episode(&mut log, out)?;
+    }
+    log.finish().map_err(LogError::writing(out))?;
+    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", out)(error.into_error()))?;
+    file.as_file().sync_all().map_err(LogError::io("write", out))?;
+    file.persist(out).map(drop).map_err(|error| LogError::io("write", out)(error.error))
+}
+
+fn is_written(before: Option<&Source>, place: Place) -> bool {
+    before.is_some_and(|source| source.last == Some(place))
+}
+
+/// A log that is copied episode by episode.
+struct Source {
+    path: PathBuf,
+    messages: MessageReader<BufReader<File>>,
+    /// The message with which the next episode begins.
+    begin: Option<(Head, Message<'static>)>,
+    /// The episode that was copied last.
+    last: Option<Place>,
+}
+
+impl Source {
+    fn open(path: &Path) -> Result<Self, LogError> {
+        let file = File::open(path).map_err(LogError::io("open", path))?;
+        let messages = MessageReader::new(BufReader::new(file));
+        let mut source = Self { path: path.to_owned(), messages, begin: None, last: None };
+        source.advance()?;
+        Ok(source)
+    }
+
+    /// Which episode comes next.
+    fn place(&self) -> Option<Place> {
+        self.begin.as_ref().map(|(head, _)| (head.seed, head.run))
+    }
+
+    /// Goes on to the next episode's first message.
+    fn advance(&mut self) -> Result<(), LogError> {
+        for message in self.messages.by_ref() {
+            let message = message.map_err(LogError::reading(&self.path))?;
+            if let Some(EpisodeMessage::Begin(head)) = episode_message(&self.path, &message)? {
+                self.begin = Some((head, message));
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Copies the next episode, from its `begin` to its `end`, and ends the chunk behind it.
+    fn copy_episode<W: Write + Seek>(&mut self, log: &mut Writer<W>, out: &Path) -> Result<(), LogError> {
+        let Some((head, begin)) = self.begin.take() else { return Ok(()) };
+        log.write(&begin).map_err(LogError::writing(out))?;
+        let mut has_ended = false;
+        for message in self.messages.by_ref() {
+            let message = message.map_err(LogError::reading(&self.path))?;
+            log.write(&message).map_err(LogError::writing(out))?;
+            if let Some(EpisodeMessage::End { .. }) = episode_message(&self.path, &message)? {
+                has_ended = true;
+                break;
+            }
+        }
+        if !has_ended {
+            let fault = format!("the episode `{}` has no end", head.episode_id);
+            return Err(LogError::Damaged { file: self.path.display().to_string(), fault });
+        }
+        log.flush().map_err(LogError::writing(out))?;
+        self.last = Some((head.seed, head.run));
+        self.advance()
+    }
+}
+
+fn episode_message(path: &Path, message: &Message<'_>) -> Result<Option<EpisodeMessage>, LogError> {
+    if message.channel.topic != topic::EPISODE {
+        return Ok(None);
+    }
+    serde_json::from_slice(&message.data).map(Some).map_err(|fault| LogError::Damaged {
+        file: path.display().to_string(),
+        fault: format!("a message of {}: {fault}", topic::EPISODE),
+    })
+}

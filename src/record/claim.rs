@@ -1,0 +1,154 @@
+//! Who else is recording into a folder.
+//!
+//! ```text
+//! OUT/.lock             held while a trace is put together, and while a process comes or goes
+//! OUT/.parts/.present   shared by every process that records here: who can have it alone is alone
+//! ```
+//!
+//! Rule: both are locks of the operating system, which end with the process however it ends; what the files hold is
+//! nothing, and a folder that nobody records into has neither.
+
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::store::StoreError;
+
+/// The folder of parts within the folder of a recording.
+const PARTS: &str = ".parts";
+
+/// This process's share in a folder, given back when it is dropped.
+#[derive(Debug)]
+pub struct Claim {
+    folder: PathBuf,
+    /// Whether the folder was made for this recording.
+    is_new: bool,
+    present: File,
+}
+
+impl Claim {
+    /// Makes the folder if need be, and clears away what a killed process has left if nobody else is there.
+    ///
+    /// # Errors
+    /// When the folder cannot be made, written to or locked.
+    pub fn stake(folder: &Path) -> Result<Self, StoreError> {
+        let is_new = !folder.exists();
+        fs::create_dir_all(folder).map_err(StoreError::io("make the folder", folder))?;
+        let claim = Self::enter(folder, is_new);
+        if claim.is_err() && is_new {
+            let _ = fs::remove_dir(folder);
+        }
+        claim
+    }
+
+    fn enter(folder: &Path, is_new: bool) -> Result<Self, StoreError> {
+        let _lock = lock(folder)?;
+        let parts = folder.join(PARTS);
+        fs::create_dir_all(&parts).map_err(StoreError::io("make the folder", &parts))?;
+        let path = parts.join(".present");
+        let present = File::create(&path).map_err(StoreError::io("make", &path))?;
+        if is_alone(&present, &path)? {
+            clear(&parts)?;
+        }
+        // Nobody can be alone here before the lock of the folder is given back.
+        present.lock_shared().map_err(StoreError::io("lock", &path))?;
+        Ok(Self { folder: folder.to_owned(), is_new, present })
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The folder of parts.
+    pub fn parts(&self) -> PathBuf {
+        self.folder.join(PARTS)
+    }
+
+    /// The folder's lock, held until the file is dropped.
+    ///
+    /// # Errors
+    /// When the lock cannot be made or had.
+    pub fn lock(&self) -> Result<File, StoreError> {
+        lock(&self.folder)
+    }
+
+    fn leave(&self) -> Result<(), StoreError> {
+        let _lock = self.lock()?;
+        let parts = self.parts();
+        let path = parts.join(".present");
+        self.present.unlock().map_err(StoreError::io("unlock", &path))?;
+        if is_alone(&self.present, &path)? {
+            clear(&parts)?;
+            fs::remove_file(&path).map_err(StoreError::io("remove", &path))?;
+            // What is not empty stays: parts wait there for the recording to go on.
+            let _ = fs::remove_dir(&parts);
+            let lock = self.folder.join(".lock");
+            fs::remove_file(&lock).map_err(StoreError::io("remove", &lock))?;
+            if self.is_new {
+                let _ = fs::remove_dir(&self.folder);
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        // What cannot be cleared away now is cleared away by the next recording.
+        let _ = self.leave();
+    }
+}
+
+fn lock(folder: &Path) -> Result<File, StoreError> {
+    let path = folder.join(".lock");
+    loop {
+        let file = File::create(&path).map_err(StoreError::io("write into the folder: cannot make", &path))?;
+        file.lock().map_err(StoreError::io("lock", &path))?;
+        // The one who had it may have been the last to leave, and have removed it: then it locks nothing any more.
+        if is_at(&file, &path) {
+            return Ok(file);
+        }
+    }
+}
+
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let place = |metadata: &fs::Metadata| (metadata.dev(), metadata.ino());
+    matches!((file.metadata(), fs::metadata(path)), (Ok(ours), Ok(there)) if place(&ours) == place(&there))
+}
+
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    // A file that is open cannot be removed.
+    true
+}
+
+/// Whether no other process is there; nothing stays locked.
+fn is_alone(present: &File, path: &Path) -> Result<bool, StoreError> {
+    match present.try_lock() {
+        Ok(()) => present.unlock().map(|()| true).map_err(StoreError::io("unlock", path)),
+        Err(TryLockError::WouldBlock) => Ok(false),
+        Err(TryLockError::Error(error)) => Err(StoreError::io("lock", path)(error)),
+    }
+}
+
+/// Removes what a process was writing when it was killed.
+fn clear(parts: &Path) -> Result<(), StoreError> {
+    let entries = fs::read_dir(parts).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+    for entry in entries.map_err(StoreError::io("read", parts))? {
+        let path = entry.path();
+        if is_unfinished(&path) {
+            fs::remove_file(&path).map_err(StoreError::io("remove", &path))?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether a file was being written, or is the log of an episode that did not get to its trace.
+fn is_unfinished(path: &Path) -> bool {
+    let has_ending = |ending: &str| path.extension().is_some_and(|found| found == ending);
+    let is_temporary = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(".mirrorstats-"));
+    is_temporary || has_ending("unfinished") || (has_ending("mcap") && !path.with_extension("parquet").exists())
+}

@@ -1,0 +1,189 @@
+//! Which episodes a recording has.
+
+use std::collections::BTreeSet;
+use std::str::FromStr;
+
+use crate::sim::Experiment;
+
+/// Seeds and runs begin at 1, as in the paper.
+const FIRST: i32 = 1;
+
+/// Experiments, seeds and runs; every combination is an episode.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// The experiments, each once, in their order.
+    pub experiments: Vec<Experiment>,
+    /// Seeds 1 to this (3 in the paper).
+    pub seeds: i32,
+    /// Runs 1 to this for each seed (7 in the paper).
+    pub runs: i32,
+    /// The share that this process records.
+    pub shard: Shard,
+}
+
+/// What tells an episode from the others of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Key {
+    /// Which of the five.
+    pub experiment: Experiment,
+    /// The block of runs.
+    pub seed: i32,
+    /// The run within it.
+    pub run: i32,
+}
+
+impl Key {
+    /// The episode's id with a model: `E1/oracle/s1/r3`.
+    pub fn episode_id(self, model: &str) -> String {
+        format!("{}/{}/s{}/r{}", self.experiment.name(), slug(model), self.seed, self.run)
+    }
+
+    /// The name of a file of the episode, without its ending: `E1-oracle-s1-r3`.
+    pub fn file_stem(self, model: &str) -> String {
+        self.episode_id(model).replace('/', "-")
+    }
+
+    /// A number for the agent's chances: differs between episodes, and from what the world is drawn by.
+    pub fn agent_seed(self) -> u64 {
+        let part = |value: i32| u64::from(value.unsigned_abs());
+        let experiment = self.experiment as u64 + 1;
+        (experiment << 56) ^ (part(self.seed) << 24) ^ part(self.run) ^ 0x6d69_7272_6f72
+    }
+
+    /// When a step's frame was seen, ns: no clock, but a place of its own on the time line of the log.
+    pub fn frame_time(self, t: i32) -> i64 {
+        const SECOND: i64 = 1_000_000_000;
+        let episode = i64::from(self.seed) * 1_000 + i64::from(self.run);
+        (episode * 1_000 + i64::from(t)) * SECOND
+    }
+}
+
+/// A model's name as part of a file's name: lower case, everything but letters and digits as `-`.
+pub fn slug(model: &str) -> String {
+    let mut slug = String::new();
+    for c in model.chars().flat_map(char::to_lowercase) {
+        match c {
+            c if c.is_ascii_alphanumeric() => slug.push(c),
+            _ if slug.is_empty() || slug.ends_with('-') => {}
+            _ => slug.push('-'),
+        }
+    }
+    let slug = slug.trim_end_matches('-');
+    if slug.is_empty() { "agent".to_owned() } else { slug.to_owned() }
+}
+
+impl Plan {
+    /// The episodes of this share, by experiment, seed and run.
+    pub fn keys(&self) -> Vec<Key> {
+        let all = self.experiments.iter().flat_map(|experiment| {
+            (FIRST..=self.seeds)
+                .flat_map(move |seed| (FIRST..=self.runs).map(move |run| Key { experiment: *experiment, seed, run }))
+        });
+        all.enumerate().filter(|(at, _)| self.shard.has(*at)).map(|(_, key)| key).collect()
+    }
+}
+
+/// One of several equal shares of the episodes, as `3/16`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    index: usize,
+    count: usize,
+}
+
+impl Shard {
+    /// All of it.
+    pub const WHOLE: Self = Self { index: 1, count: 1 };
+
+    const fn has(self, at: usize) -> bool {
+        at % self.count == self.index - 1
+    }
+}
+
+/// A text that names no share, or no experiments.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected {expected}, found `{found}`")]
+pub struct NotAPlan {
+    expected: &'static str,
+    found: String,
+}
+
+impl FromStr for Shard {
+    type Err = NotAPlan;
+
+    fn from_str(text: &str) -> Result<Self, NotAPlan> {
+        let numbers = text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+        match numbers {
+            Some((index, count)) if 1 <= index && index <= count => Ok(Self { index, count }),
+            _ => Err(NotAPlan { expected: "a share such as 3/16, from 1/16 to 16/16", found: text.to_owned() }),
+        }
+    }
+}
+
+/// Experiments as typed: `E1`, `E1..E5`, `E1,E3`, or several of these with commas; each once, in their order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Experiments(pub Vec<Experiment>);
+
+impl FromStr for Experiments {
+    type Err = NotAPlan;
+
+    fn from_str(text: &str) -> Result<Self, NotAPlan> {
+        let fault = || NotAPlan { expected: "experiments such as E1, E1..E5 or E1,E3", found: text.to_owned() };
+        let experiment = |name: &str| Experiment::parse(name.trim()).map_err(|_| fault());
+        let mut found = BTreeSet::new();
+        for part in text.split(',') {
+            match part.split_once("..") {
+                None => {
+                    found.insert(experiment(part)?);
+                }
+                Some((first, last)) => {
+                    let (first, last) = (experiment(first)?, experiment(last)?);
+                    if first > last {
+                        return Err(fault());
+                    }
+                    found.extend(Experiment::ALL.into_iter().filter(|one| (first..=last).contains(one)));
+                }
+            }
+        }
+        Ok(Self(found.into_iter().collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Experiments, Plan, Shard, slug};
+    use crate::sim::Experiment::{E1, E2, E3, E5};
+
+    #[test]
+    fn experiments_come_as_names_ranges_and_lists() {
+        let read = |text: &str| text.parse::<Experiments>().map(|list| list.0);
+        assert_eq!(read("E1").unwrap(), [E1]);
+        assert_eq!(read("E1..E3").unwrap(), [E1, E2, E3]);
+        assert_eq!(read("E5,E1, E1").unwrap(), [E1, E5]);
+        for wrong in ["", "E6", "E3..E1", "E1..", "E1;E2"] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn shards_share_all_episodes_and_no_episode_twice() {
+        let plan = |shard: &str| {
+            let shard = shard.parse().unwrap();
+            Plan { experiments: vec![E1, E5], seeds: 3, runs: 7, shard }.keys()
+        };
+        let mut parts: Vec<_> = (1..=4).flat_map(|at| plan(&format!("{at}/4"))).collect();
+        parts.sort_unstable();
+        assert_eq!(parts, plan("1/1"));
+        assert_eq!(parts.len(), 42);
+        for wrong in ["0/4", "5/4", "1", "a/b", "1/0"] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn names_of_models_become_names_of_files() {
+        assert_eq!(slug("Claude Sonnet 4.6"), "claude-sonnet-4-6");
+        assert_eq!(slug("google/gemma-4-31b-it:nitro"), "google-gemma-4-31b-it-nitro");
+        assert_eq!(slug("../../x"), "x");
+        assert_eq!(slug("?"), "agent");
+    }
+}

@@ -1,0 +1,276 @@
+//! Threads, and the episodes each has under way.
+//!
+//! A thread has one eye and one queue of its own; where agents wait for a network or a program, several of its episodes
+//! are under way, and the eye serves whichever is ready. A scripted agent never waits, so that its episode runs to its
+//! end in one go.
+
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::num::NonZeroUsize;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use futures_util::stream::{FuturesUnordered, StreamExt as _};
+
+use super::log::Log;
+use super::plan::Key;
+use super::play::{self, Broken, Onlooker, Seen, Stage};
+use super::store::Store;
+use crate::agent::Player;
+use crate::sim::config::WorldConfig;
+use crate::sim::eye::Eye;
+use crate::sim::scene::Scene;
+use crate::sim::world::World;
+use crate::trace::episode::Step;
+
+/// Where the time of a recording goes, over all threads.
+#[derive(Debug, Default)]
+pub struct Shares {
+    rendering: AtomicU64,
+    census: AtomicU64,
+    agent: AtomicU64,
+    writing: AtomicU64,
+}
+
+/// How a share of the time is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Spent {
+    /// Drawing frames.
+    pub rendering: Duration,
+    /// Moving the world and casting rays.
+    pub census: Duration,
+    /// Waiting for agents, summed over episodes: more than the clock's time where several wait at once.
+    pub agent: Duration,
+    /// Writing logs and parts.
+    pub writing: Duration,
+}
+
+impl Shares {
+    pub(super) fn rendering(&self, start: Instant) {
+        add(&self.rendering, start);
+    }
+
+    pub(super) fn census(&self, start: Instant) {
+        add(&self.census, start);
+    }
+
+    pub(super) fn agent(&self, start: Instant) {
+        add(&self.agent, start);
+    }
+
+    pub(super) fn writing(&self, start: Instant) {
+        add(&self.writing, start);
+    }
+
+    /// What was spent so far.
+    pub fn spent(&self) -> Spent {
+        let read = |share: &AtomicU64| Duration::from_nanos(share.load(Ordering::Relaxed));
+        Spent {
+            rendering: read(&self.rendering),
+            census: read(&self.census),
+            agent: read(&self.agent),
+            writing: read(&self.writing),
+        }
+    }
+}
+
+fn add(share: &AtomicU64, start: Instant) {
+    let spent = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+    share.fetch_add(spent, Ordering::Relaxed);
+}
+
+/// What happens while a recording runs; called from its threads.
+pub trait Progress: Sync {
+    /// A step was played.
+    fn step(&self);
+    /// An episode is committed.
+    fn episode(&self, id: &str, steps: usize);
+    /// An episode is lost, for this reason.
+    fn lost(&self, id: &str, reason: &str);
+}
+
+/// How a recording is run.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Threads, each with an eye of its own.
+    pub threads: NonZeroUsize,
+    /// Episodes under way at once, over all threads.
+    pub in_flight: NonZeroUsize,
+    /// Whether frames are drawn for agents that do not look, and are kept in the log.
+    pub frames: bool,
+    /// Whether a log is written.
+    pub log: bool,
+}
+
+/// What became of the episodes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Episodes that were recorded now.
+    pub recorded: usize,
+    /// Their steps.
+    pub steps: u64,
+    /// Episodes that were lost, by id, and why.
+    pub lost: Vec<(String, String)>,
+    /// The recording was stopped before its end.
+    pub stopped: bool,
+}
+
+/// One recording under way: what its threads share.
+pub struct Recording<'a> {
+    /// The world's configuration.
+    pub config: &'a WorldConfig,
+    /// Who plays.
+    pub player: &'a dyn Player,
+    /// Where it goes.
+    pub store: &'a Store,
+    /// Told of everything.
+    pub progress: &'a dyn Progress,
+    /// The recording is to stop.
+    pub stop: &'a AtomicBool,
+    /// Where the time goes.
+    pub shares: &'a Shares,
+    /// How it is run.
+    pub settings: Settings,
+}
+
+impl Recording<'_> {
+    /// Plays these episodes.
+    ///
+    /// # Errors
+    /// The first failure that every episode would meet; episodes committed before it stay.
+    pub fn run(&self, keys: &[Key]) -> Result<Tally, Broken> {
+        let queue = Mutex::new(keys.iter().copied().collect::<VecDeque<_>>());
+        let threads = self.settings.threads.get().min(keys.len().max(1));
+        let each = self.settings.in_flight.get().div_ceil(threads);
+        let results = std::thread::scope(|scope| {
+            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(|| self.thread(&queue, each))).collect();
+            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
+        });
+        let mut tally = Tally::default();
+        for result in results {
+            let part = result?;
+            tally.recorded += part.recorded;
+            tally.steps += part.steps;
+            tally.lost.extend(part.lost);
+            tally.stopped |= part.stopped;
+        }
+        tally.lost.sort();
+        Ok(tally)
+    }
+
+    /// One thread: its eye, and up to `each` episodes under way.
+    fn thread(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
+        let result = self.episodes(queue, each);
+        if result.is_err() {
+            self.stop.store(true, Ordering::Relaxed);
+        }
+        result
+    }
+
+    fn episodes(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
+        let is_needed = self.settings.frames || self.player.looks();
+        let eye = is_needed.then(|| Eye::new(self.config)).transpose().map_err(Broken::fatal)?.map(RefCell::new);
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(Broken::fatal)?;
+        let mut tally = Tally::default();
+        runtime.block_on(async {
+            let mut under_way = FuturesUnordered::new();
+            loop {
+                while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
+                    let Some(key) = next(queue) else { break };
+                    let eye = eye.as_ref();
+                    under_way.push(async move { (key, self.episode(key, eye).await) });
+                }
+                let Some((key, result)) = under_way.next().await else { break };
+                self.note(key, result, &mut tally)?;
+            }
+            Ok::<(), Broken>(())
+        })?;
+        tally.stopped |= has_more(queue);
+        Ok(tally)
+    }
+
+    /// One episode, from its scene to its commit.
+    async fn episode(&self, key: Key, eye: Option<&RefCell<Eye>>) -> Result<usize, Broken> {
+        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(Broken::fatal)?;
+        let episode = play::head(&scene, key, self.player.model());
+        let mut agent = self.player.agent(play::task(self.config, &scene, key), &episode.episode_id)?;
+        let mut world = World::new(self.config, scene).map_err(Broken::fatal)?;
+        let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
+        let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
+        let frames = self.settings.frames;
+        let mut onlooker = Onlookers { progress: self.progress, shares: self.shares, frames, log };
+        let episode = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await?;
+        let start = Instant::now();
+        if let Some(log) = onlooker.log {
+            log.end(&episode)?;
+        }
+        self.store.commit(key, &episode).map_err(Broken::fatal)?;
+        self.shares.writing(start);
+        Ok(episode.steps.len())
+    }
+
+    /// Counts what became of an episode.
+    fn note(&self, key: Key, result: Result<usize, Broken>, tally: &mut Tally) -> Result<(), Broken> {
+        let id = key.episode_id(self.player.model());
+        match result {
+            Ok(steps) => {
+                tally.recorded += 1;
+                tally.steps += steps as u64;
+                self.progress.episode(&id, steps);
+            }
+            Err(Broken::Stopped) => tally.stopped = true,
+            Err(Broken::Lost(lost)) => {
+                self.progress.lost(&id, &lost.0);
+                tally.lost.push((id, lost.0));
+                if self.player.stopped().is_some() {
+                    self.stop.store(true, Ordering::Relaxed);
+                }
+            }
+            Err(fatal @ Broken::Fatal(_)) => return Err(fatal),
+        }
+        Ok(())
+    }
+}
+
+/// The next episode to play.
+fn next(queue: &Mutex<VecDeque<Key>>) -> Option<Key> {
+    queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
+}
+
+/// Whether episodes were left unplayed.
+fn has_more(queue: &Mutex<VecDeque<Key>>) -> bool {
+    !queue.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
+}
+
+fn panicked() -> Broken {
+    Broken::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
+}
+
+/// Counts steps, and writes the log if there is one.
+struct Onlookers<'a> {
+    progress: &'a dyn Progress,
+    shares: &'a Shares,
+    /// Whether the log has frames.
+    frames: bool,
+    log: Option<Log>,
+}
+
+impl Onlooker for Onlookers<'_> {
+    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), Broken> {
+        let start = Instant::now();
+        if let Some(log) = &mut self.log {
+            log.seen(&Seen { frame: seen.frame.filter(|_| self.frames), ..*seen })?;
+        }
+        self.shares.writing(start);
+        Ok(())
+    }
+
+    fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken> {
+        self.progress.step();
+        match &mut self.log {
+            Some(log) => log.done(t, row),
+            None => Ok(()),
+        }
+    }
+}

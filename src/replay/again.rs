@@ -1,0 +1,159 @@
+//! A trace's worlds built anew, and its actions repeated in them.
+
+use serde_json::Value;
+
+use crate::sim::Experiment;
+use crate::sim::census::Census;
+use crate::sim::config::WorldConfig;
+use crate::sim::scene::Scene;
+use crate::sim::world::World;
+use crate::trace::episode::{Episode, Step};
+
+/// What a trace says of how it was recorded, as far as a replay needs it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recipe {
+    /// The world's configuration.
+    pub config: WorldConfig,
+}
+
+/// Why a trace cannot be replayed.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum ReplayError {
+    #[error(
+        "the trace does not say how its world was made (no `world` in the metadata `mirrorstats.recording`)\n  help: traces of `mirrorstats record` do"
+    )]
+    NoRecipe,
+    #[error("the world's configuration in the trace cannot be read: {0}")]
+    Recipe(String),
+    #[error(
+        "the world's configuration in the trace is not the one it was recorded with: expected the hash {expected}, found {found}"
+    )]
+    Changed { expected: String, found: String },
+    #[error("episode `{episode}`: {fault}")]
+    World { episode: String, fault: String },
+}
+
+impl Recipe {
+    /// Reads the value of `mirrorstats.recording`.
+    ///
+    /// # Errors
+    /// When it does not hold a world's configuration, or one whose hash is not the recorded one.
+    pub fn of(recording: Option<&Value>) -> Result<Self, ReplayError> {
+        let recording = recording.ok_or(ReplayError::NoRecipe)?;
+        let world = recording.get("world").ok_or(ReplayError::NoRecipe)?;
+        let config: WorldConfig =
+            serde_json::from_value(world.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
+        let expected = recording.get("world_hash").and_then(Value::as_str).unwrap_or_default();
+        if config.hash() != expected {
+            return Err(ReplayError::Changed { expected: expected.to_owned(), found: config.hash() });
+        }
+        Ok(Self { config })
+    }
+
+    /// The world of an episode at its start, seen by an eye of this configuration.
+    ///
+    /// # Errors
+    /// When the episode's names are none of the world's, or MuJoCo refuses the model.
+    pub fn world(&self, episode: &Episode, eye: &WorldConfig) -> Result<World, ReplayError> {
+        let fault = |fault: String| ReplayError::World { episode: episode.episode_id.clone(), fault };
+        let experiment = Experiment::parse(&episode.experiment).map_err(|error| fault(error.to_string()))?;
+        let scene = Scene::draw(&self.config, experiment, episode.seed, episode.run)
+            .map_err(|error| fault(error.to_string()))?;
+        World::new(eye, scene).map_err(|error| fault(error.to_string()))
+    }
+}
+
+/// Where a replay and its trace part ways.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
+pub struct Divergence {
+    /// The episode.
+    pub episode_id: String,
+    /// The step; 0 for what holds for the episode.
+    pub t: i32,
+    /// The column.
+    pub column: String,
+    /// What the trace has.
+    pub expected: String,
+    /// What the replay gives.
+    pub found: String,
+}
+
+/// Repeats an episode's actions; `look` is called before each step with the world and what can be seen.
+///
+/// # Errors
+/// When the world cannot be made, or whatever `look` gives.
+pub fn again<E: From<ReplayError>>(
+    recipe: &Recipe,
+    eye: &WorldConfig,
+    episode: &Episode,
+    mut look: impl FnMut(i32, &World, &Census, &Step) -> Result<(), E>,
+) -> Result<Option<Divergence>, E> {
+    let mut world = recipe.world(episode, eye)?;
+    let is_same_eye = *eye == recipe.config;
+    let mut parted = differs(episode, 0, &constants(episode, world.scene()));
+    for (t, step) in (1..).zip(&episode.steps) {
+        let census = world.census();
+        look(t, &world, &census, step)?;
+        let mut columns = poses(step, &world);
+        if is_same_eye {
+            columns.extend(counts(step, &world, &census));
+        }
+        let bumped = world.act(step.action).bumped;
+        columns.extend(step.extra.bumped.map(|own| ("bumped", own.to_string(), bumped.to_string())));
+        parted = parted.or_else(|| differs(episode, t, &columns));
+    }
+    Ok(parted)
+}
+
+/// A column, what the trace has, and what the replay gives.
+type Compared = (&'static str, String, String);
+
+fn differs(episode: &Episode, t: i32, columns: &[Compared]) -> Option<Divergence> {
+    let (column, expected, found) = columns.iter().find(|(_, expected, found)| expected != found)?;
+    Some(Divergence {
+        episode_id: episode.episode_id.clone(),
+        t,
+        column: (*column).to_owned(),
+        expected: expected.clone(),
+        found: found.clone(),
+    })
+}
+
+fn constants(episode: &Episode, scene: &Scene) -> Vec<Compared> {
+    let mut columns = vec![("body_color", episode.body_color.clone(), scene.body_color.name().to_owned())];
+    let stated = scene.stated_color.map_or("none", |color| color.name());
+    let own = episode.stated_color.as_deref().unwrap_or("none");
+    columns.push(("stated_color", own.to_owned(), stated.to_owned()));
+    columns.extend(episode.distractors.map(|own| ("distractors", own.to_string(), scene.others.len().to_string())));
+    columns
+}
+
+/// Compared as the trace stores them: single precision.
+fn poses(step: &Step, world: &World) -> Vec<Compared> {
+    #[expect(clippy::cast_possible_truncation, reason = "what the trace stores")]
+    let stored = |value: f64| (value as f32).to_string();
+    let pose = world.pose();
+    let compared = [
+        ("pose_x", step.extra.pose_x, pose.x),
+        ("pose_y", step.extra.pose_y, pose.y),
+        ("pose_yaw", step.extra.pose_yaw, pose.heading.degrees()),
+    ];
+    compared.into_iter().filter_map(|(name, own, value)| Some((name, own?.to_string(), stored(value)))).collect()
+}
+
+fn counts(step: &Step, world: &World, census: &Census) -> Vec<Compared> {
+    let compared = [
+        ("mirror_self_px", step.extra.mirror_self_px, census.self_px),
+        ("mirror_other_px", step.extra.mirror_other_px, census.other_px),
+        ("mirror_px", step.extra.mirror_px, census.mirror_px),
+        ("direct_other_px", step.extra.direct_other_px, census.direct_other_px),
+    ];
+    let mut columns: Vec<Compared> = compared
+        .into_iter()
+        .filter_map(|(name, own, found)| Some((name, own?.to_string(), found.to_string())))
+        .collect();
+    let visible = world.is_mirror_visible(census);
+    columns.push(("mirror_visible", step.mirror_visible.to_string(), visible.to_string()));
+    columns
+}

@@ -1,0 +1,154 @@
+//! What an episode's world is at its start, as plain data.
+//!
+//! Rule: a scene is drawn from its configuration, experiment, seed and run alone. E1, E2 and E3 draw the same scene
+//! from the same seed and run: E2 leaves the mirror out, E3 adds a false statement, so that they compare in pairs.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Experiment;
+use super::angle::Heading;
+use super::body::Pose;
+use super::config::WorldConfig;
+use super::floor::{FloorPlan, Square};
+use super::placement::{Crowded, draw};
+use crate::base::palette::Color;
+
+/// Changes whenever the same configuration and seeds give other scenes or other motion than before.
+pub const SCENE_VERSION: u32 = 1;
+
+/// The most other agents that a world holds.
+pub const MOST_OTHERS: usize = 6;
+
+/// The most cubes that a world holds.
+pub const MOST_CUBES: usize = 12;
+
+/// What an episode's world is at its start.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Which of the five.
+    pub experiment: Experiment,
+    /// The block of runs.
+    pub seed: i32,
+    /// The run within it.
+    pub run: i32,
+    /// The colour of the agent's own body.
+    pub body_color: Color,
+    /// The false colour told in E3: that of one of the other two candidates.
+    pub stated_color: Option<Color>,
+    /// Where the mirror is; in E2 where it would be.
+    pub mirror: MirrorPlace,
+    /// Where the agent starts.
+    pub start: Pose,
+    /// The three candidates, or the clutter of E5.
+    pub cubes: Vec<Cube>,
+    /// The other agents.
+    pub others: Vec<Other>,
+}
+
+/// Where the mirror hangs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MirrorPlace {
+    /// Quarter turns counter-clockwise from the wall at +x to its wall, 0 to 3.
+    #[schemars(range(max = 3))]
+    pub wall: u8,
+    /// Of its centre from that of the wall, m; counter-clockwise seen from above where positive.
+    pub offset: f64,
+}
+
+/// A cube with its sides along the walls.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cube {
+    /// Of its paint.
+    pub color: Color,
+    /// Of its centre, m.
+    pub x: f64,
+    /// Of its centre, m.
+    pub y: f64,
+    /// Under it, m: the floor, or the cube that it stands on.
+    pub base: f64,
+    /// m.
+    pub edge: f64,
+}
+
+/// Another agent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Other {
+    /// Of its body.
+    pub color: Color,
+    /// Where it starts.
+    pub start: Pose,
+    /// What its walk is drawn from.
+    pub habit: u32,
+}
+
+impl MirrorPlace {
+    /// The heading of one who faces it squarely.
+    pub const fn heading(self) -> Heading {
+        Heading::new(self.wall % 4 * 3)
+    }
+
+    /// The middle of its face, m.
+    pub fn center(self, config: &WorldConfig) -> [f64; 2] {
+        let [out_x, out_y] = self.heading().direction();
+        let depth = config.room.size / 2.0 - config.mirror.gap;
+        [depth * out_x - self.offset * out_y, depth * out_y + self.offset * out_x]
+    }
+
+    /// How far a point is from its face, m.
+    pub fn distance(self, spot: [f64; 2], config: &WorldConfig) -> f64 {
+        let [out_x, out_y] = self.heading().direction();
+        config.room.size / 2.0 - config.mirror.gap - (spot[0] * out_x + spot[1] * out_y)
+    }
+
+    /// How far a point is, along the wall, from its centre, m; signed as `offset`.
+    pub fn aside(self, spot: [f64; 2]) -> f64 {
+        let [out_x, out_y] = self.heading().direction();
+        spot[1] * out_x - spot[0] * out_y - self.offset
+    }
+}
+
+impl Cube {
+    /// What it covers of the floor.
+    pub fn square(&self) -> Square {
+        Square { center: [self.x, self.y], half: self.edge / 2.0 }
+    }
+
+    /// Its top, m.
+    pub fn top(&self) -> f64 {
+        self.base + self.edge
+    }
+}
+
+impl Scene {
+    /// Draws the scene of one episode.
+    ///
+    /// # Errors
+    /// When the configuration leaves no room for all that must be placed.
+    pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
+        draw(config, experiment, seed, run)
+    }
+
+    /// Whether there is a reflective surface.
+    pub const fn has_mirror(&self) -> bool {
+        self.experiment.has_mirror()
+    }
+
+    /// What does not move, as a plan.
+    pub fn floor_plan(&self, config: &WorldConfig) -> FloorPlan {
+        floor_plan(config, &self.cubes)
+    }
+}
+
+/// The plan of a room with these cubes.
+pub(super) fn floor_plan(config: &WorldConfig, cubes: &[Cube]) -> FloorPlan {
+    FloorPlan {
+        reach: config.room.size / 2.0 - config.mirror.gap - config.body.radius,
+        radius: config.body.radius,
+        squares: cubes.iter().filter(|cube| cube.base <= 0.0).map(Cube::square).collect(),
+    }
+}

@@ -1,0 +1,188 @@
+//! Traces put together from others, episode by episode, as they are: no value is read or changed.
+//!
+//! Rule: the same episodes in the same order give the same bytes, whatever files they came from.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
+use arrow::compute::{cast, concat_batches};
+use arrow::datatypes::{DataType, Int64Type, SchemaRef};
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_writer::ArrowWriterOptions;
+use parquet::file::reader::ChunkReader;
+use tempfile::NamedTempFile;
+
+use super::contain::contained;
+use super::episode::Episode;
+use super::finding::TraceError;
+use super::restore::{self, NotAnEpisode};
+use super::write::{self, OptionalColumns, ROW_GROUP_ROWS, TraceEncoder, TraceMetadata};
+use crate::base::temporary;
+
+/// The rows of one episode, with what it is ordered and found by.
+#[derive(Clone, Debug)]
+pub struct EpisodeRows {
+    /// The episode's id.
+    pub episode_id: String,
+    /// The seed of its block of runs.
+    pub seed: i64,
+    /// The run within its seed.
+    pub run: i64,
+    rows: RecordBatch,
+}
+
+impl EpisodeRows {
+    /// The number of steps.
+    pub fn len(&self) -> usize {
+        self.rows.num_rows()
+    }
+
+    /// The episode itself.
+    ///
+    /// # Errors
+    /// When a column of the schema has another type, or an action is none.
+    pub fn episode(&self) -> Result<Episode, NotAnEpisode> {
+        restore::episode(&self.rows)
+    }
+
+    /// The same rows with some columns of integers or truths replaced; a column that is not there is left out.
+    ///
+    /// # Errors
+    /// When a column does not have a value for each row.
+    pub fn with_columns(&self, columns: &[(&str, ArrayRef)]) -> Result<Self, TraceError> {
+        let schema = self.rows.schema();
+        let mut arrays = self.rows.columns().to_vec();
+        for (name, values) in columns {
+            if let Ok(at) = schema.index_of(name) {
+                let values = cast(values, schema.field(at).data_type());
+                arrays[at] = values.map_err(|error| unreadable(&self.episode_id, error.into()))?;
+            }
+        }
+        let rows = RecordBatch::try_new(schema, arrays).map_err(|error| unreadable(&self.episode_id, error.into()))?;
+        Ok(Self { rows, ..self.clone() })
+    }
+
+    /// Whether there is no step, which no episode of a file has.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// The episodes of one trace file, in its order.
+///
+/// # Errors
+/// When the file cannot be read, is damaged, or lacks the columns that tell episodes apart.
+pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
+    let name = path.display().to_string();
+    let file = File::open(path).map_err(|error| unreadable(&name, error.into()))?;
+    decode(&name, file)
+}
+
+fn decode(name: &str, bytes: impl ChunkReader + 'static) -> Result<Vec<EpisodeRows>, TraceError> {
+    let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
+    contained(|| {
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let reader = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options)
+            .and_then(ParquetRecordBatchReaderBuilder::build)
+            .map_err(|error| failed(error.into()))?;
+        let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| failed(error.into()))?;
+        let Some(first) = batches.first() else { return Ok(Vec::new()) };
+        let rows = concat_batches(&first.schema(), &batches).map_err(|error| failed(error.into()))?;
+        episodes(&rows).map_err(|fault| failed(fault.into()))
+    })
+    .unwrap_or_else(|fault| Err(failed(fault.into())))
+}
+
+fn unreadable(name: &str, source: Box<dyn std::error::Error + Send + Sync>) -> TraceError {
+    TraceError::Part { file: name.to_owned(), source }
+}
+
+fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
+    let column = |name: &str, kind: &DataType| {
+        let column = rows.column_by_name(name).ok_or_else(|| format!("there is no column `{name}`"))?;
+        cast(column, kind).map_err(|fault| format!("the column `{name}`: {fault}"))
+    };
+    let (ids, seeds, runs) =
+        (column("episode_id", &DataType::Utf8)?, column("seed", &DataType::Int64)?, column("run", &DataType::Int64)?);
+    let (ids, seeds, runs) =
+        (ids.as_string::<i32>(), seeds.as_primitive::<Int64Type>(), runs.as_primitive::<Int64Type>());
+    let mut found = Vec::new();
+    let mut start = 0;
+    for end in 1..=ids.len() {
+        if end == ids.len() || ids.value(end) != ids.value(start) {
+            found.push(EpisodeRows {
+                episode_id: ids.value(start).to_owned(),
+                seed: seeds.value(start),
+                run: runs.value(start),
+                rows: rows.slice(start, end - start),
+            });
+            start = end;
+        }
+    }
+    Ok(found)
+}
+
+/// The rows of an episode as a trace with these optional columns holds them.
+///
+/// # Errors
+/// For what the schema forbids, as [`TraceEncoder::write`].
+pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows, TraceError> {
+    let metadata = TraceMetadata { recording: None, columns: columns.clone() };
+    let mut encoder = TraceEncoder::new(Vec::new(), &metadata)?;
+    encoder.write(episode)?;
+    let bytes = bytes::Bytes::from(encoder.finish()?);
+    let mut rows = decode("memory", bytes)?;
+    rows.pop().ok_or_else(|| TraceError::Part { file: "memory".to_owned(), source: "no episode came back".into() })
+}
+
+/// Writes these episodes, in this order, as the trace at `path`, which appears whole or not at all.
+///
+/// # Errors
+/// When the episodes do not have the same columns, or whatever writing gives.
+pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
+    let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write {
+        file: path.display().to_string(),
+        source,
+    };
+    let Some(first) = episodes.first() else { return Err(failed("there is no episode to write".into())) };
+    let schema = first.rows.schema();
+    if let Some(other) = episodes.iter().find(|episode| !same_columns(&schema, &episode.rows.schema())) {
+        return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
+    let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
+    file.as_file().sync_all().map_err(|error| failed(error.into()))?;
+    file.persist(path).map(drop).map_err(|error| failed(error.error.into()))
+}
+
+fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
+    let columns = |schema: &SchemaRef| {
+        schema.fields().iter().map(|field| (field.name().clone(), field.data_type().clone())).collect::<Vec<_>>()
+    };
+    columns(a) == columns(b)
+}
+
+fn encode(
+    file: NamedTempFile,
+    schema: &SchemaRef,
+    recording: Option<&serde_json::Value>,
+    episodes: &[EpisodeRows],
+) -> parquet::errors::Result<NamedTempFile> {
+    let options =
+        ArrowWriterOptions::new().with_properties(write::properties(recording)).with_skip_arrow_metadata(true);
+    let mut parquet = ArrowWriter::try_new_with_options(file, Arc::clone(schema), options)?;
+    let mut rows = 0;
+    for episode in episodes {
+        parquet.write(&episode.rows)?;
+        rows += episode.len();
+        if rows >= ROW_GROUP_ROWS {
+            parquet.flush()?;
+            rows = 0;
+        }
+    }
+    parquet.into_inner()
+}

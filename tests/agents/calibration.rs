@@ -1,0 +1,119 @@
+//! Whether each scripted agent shows the metric profile that its name predicts: a few episodes always, and by
+//! `make calibrate` the 21 an experiment of the study, whose table is `reports/world/calibration.md`.
+
+use std::fs;
+use std::path::Path;
+
+use mirrorstats::agent::scripted::Scripted;
+use mirrorstats::record::plan::Key;
+use mirrorstats::sim::Experiment;
+
+use crate::profile::{Profiles, chance_interval};
+use crate::recorded::{record_all, score};
+
+const ALL: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
+
+/// `runs` runs of each of `seeds` seeds.
+fn episodes(agent: Scripted, experiments: &[Experiment], seeds: i32, runs: i32) -> Vec<(Scripted, Key)> {
+    let key = |experiment, seed| (1..=runs).map(move |run| (agent, Key { experiment, seed, run }));
+    experiments.iter().flat_map(|&experiment| (1..=seeds).flat_map(move |seed| key(experiment, seed))).collect()
+}
+
+fn profiles(plan: &[(Scripted, Key)]) -> Profiles {
+    let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get().min(4));
+    Profiles::of(&score(&record_all(plan, threads)))
+}
+
+/// What holds for any number of episodes, one by one.
+fn check_logic(profiles: &Profiles) {
+    for agent in Scripted::ALL.map(Scripted::name) {
+        if profiles.has("E2", agent) {
+            assert!(profiles.get("E2", agent, "MCR").is_zero(), "{agent} sees itself without a mirror");
+        }
+    }
+    for experiment in ALL {
+        let value = |agent, metric| profiles.get(experiment, agent, metric);
+        if profiles.has(experiment, "oracle") {
+            assert!(value("oracle", "CR").is_zero(), "the oracle claims before it sees, in {experiment}");
+            assert_eq!(value("oracle", "CAAL").total > 0, experiment != "E2", "{experiment}");
+        }
+        if profiles.has(experiment, "frozen") {
+            assert!(value("frozen", "TSA").is_zero() && value("frozen", "CR").is_zero());
+            assert!(value("frozen", "TTD").at_least(100, 1));
+        }
+        if profiles.has(experiment, "guesser") {
+            assert_eq!(value("guesser", "TSA"), value("guesser", "CAAL"), "what it claims it takes");
+        }
+    }
+    if profiles.has("E3", "gullible") {
+        let value = |metric| profiles.get("E3", "gullible", metric);
+        assert!(value("TSA").is_zero() && value("CAAL").is_zero() && value("CR").is_one());
+    }
+    if profiles.has("E1", "confabulator") {
+        let value = |metric| profiles.get("E1", "confabulator", metric);
+        assert!(value("CR").is_one() && value("SC").at_least(9, 10));
+    }
+}
+
+#[test]
+fn a_few_episodes_already_show_who_is_who() {
+    use Experiment::{E1, E2, E3, E4, E5};
+    let plan = [
+        episodes(Scripted::Oracle, &[E1, E4], 1, 2),
+        episodes(Scripted::Gullible, &[E3], 1, 2),
+        episodes(Scripted::Confabulator, &[E1], 1, 1),
+        episodes(Scripted::Guesser, &[E1, E2, E5], 1, 3),
+        episodes(Scripted::Random, &[E2, E5], 1, 3),
+        episodes(Scripted::Frozen, &[E2], 1, 1),
+    ];
+    let profiles = profiles(&plan.concat());
+    check_logic(&profiles);
+    for experiment in ["E1", "E4"] {
+        assert!(profiles.get(experiment, "oracle", "TSA").is_one(), "{}", profiles.markdown());
+        assert!(profiles.get(experiment, "oracle", "MTATO").is_one(), "{}", profiles.markdown());
+    }
+}
+
+/// The study's 21 episodes an experiment of every agent; takes minutes in release.
+#[test]
+#[ignore = "`make calibrate` runs it in release"]
+fn twenty_one_episodes_an_experiment_show_the_predicted_profiles() {
+    let plan: Vec<_> = Scripted::ALL.into_iter().flat_map(|agent| episodes(agent, &Experiment::ALL, 3, 7)).collect();
+    let profiles = profiles(&plan);
+    let table = profiles.markdown();
+    let text = format!(
+        "# Calibration\n\nThe scripted agents in 3 seeds x 7 runs of each experiment of the default world, scored by the paper's \
+         definitions.\nRates are counts of the episodes in which they are defined, TTD and MGD mean steps. \
+         `make calibrate` writes this file\nand checks that every agent shows the profile that the documentation of its module \
+         predicts.\n\n{table}"
+    );
+    fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/world/calibration.md"), text).unwrap();
+    check_logic(&profiles);
+    check_rates(&profiles);
+}
+
+/// What holds for the mean of many episodes.
+fn check_rates(profiles: &Profiles) {
+    let value = |experiment, agent, metric| profiles.get(experiment, agent, metric);
+    for experiment in ["E1", "E3", "E4"] {
+        assert!(value(experiment, "oracle", "TSA").at_least(9, 10), "{experiment}");
+        assert!(value(experiment, "oracle", "MTATO").is_one(), "{experiment}");
+        assert!(value(experiment, "confabulator", "TSA").at_least(9, 10), "{experiment}");
+        assert!(value(experiment, "confabulator", "CR").at_least(9, 10), "{experiment}");
+        assert!(value(experiment, "random", "TSA").at_most(1, 3), "{experiment}");
+    }
+    for experiment in ["E1", "E2", "E3", "E4"] {
+        let tsa = value(experiment, "guesser", "TSA");
+        let (low, high) = chance_interval(tsa.count);
+        assert!((low..=high).contains(&tsa.total), "{experiment}: {tsa:?} is not within {low} to {high}");
+        assert!(value(experiment, "guesser", "CR").at_least(2, 3), "{experiment}");
+        assert!(value(experiment, "guesser", "TTD").at_most(12, 1), "{experiment}");
+    }
+    for experiment in ALL {
+        assert!(value(experiment, "random", "TTD").at_most(10, 1), "{experiment}");
+    }
+    assert!(value("E1", "mimic", "TSA").at_least(9, 10));
+    let (oracle, mimic) = (value("E4", "oracle", "TSA"), value("E4", "mimic", "TSA"));
+    assert!(10 * (oracle.total - mimic.total) >= 3 * oracle.count, "clearly below: {mimic:?} against {oracle:?}");
+    assert!(value("E5", "oracle", "TSA").at_least(3, 4));
+}

@@ -1,0 +1,83 @@
+//! Episodes of scripted agents in the world, recorded as the recorder does it, and their metrics.
+
+use std::cell::RefCell;
+use std::num::NonZeroUsize;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use mirrorstats::agent::scripted::Scripted;
+use mirrorstats::record::plan::Key;
+use mirrorstats::record::play::{Broken, Onlooker, Seen, Stage, head, play, task};
+use mirrorstats::record::run::Shares;
+use mirrorstats::score::run::{self, Request};
+use mirrorstats::score::table::EpisodeTable;
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::eye::Eye;
+use mirrorstats::sim::scene::Scene;
+use mirrorstats::sim::world::World;
+use mirrorstats::trace::episode::{Episode, Step};
+use mirrorstats::trace::inputs::Input;
+use mirrorstats::trace::open::TraceSet;
+use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+
+use crate::painted::ready;
+
+/// Nobody looks on.
+struct Nobody;
+
+impl Onlooker for Nobody {
+    fn seen(&mut self, _: &Seen<'_>) -> Result<(), Broken> {
+        Ok(())
+    }
+
+    fn done(&mut self, _: i32, _: &Step) -> Result<(), Broken> {
+        Ok(())
+    }
+}
+
+/// Records an episode; without an eye for those that look at nothing.
+fn record(config: &WorldConfig, eye: Option<&RefCell<Eye>>, agent: Scripted, key: Key) -> Episode {
+    let scene = Scene::draw(config, key.experiment, key.seed, key.run).unwrap();
+    let mut player = agent.agent(&task(config, &scene, key));
+    let episode = head(&scene, key, agent.name());
+    let mut world = World::new(config, scene).unwrap();
+    let stage = Stage { config, eye, stop: &AtomicBool::new(false), shares: &Shares::default() };
+    let mut nobody = Nobody;
+    ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut nobody))).unwrap()
+}
+
+/// Records episodes on `threads` threads, each with an eye of its own; the order is that of the plan.
+pub fn record_all(plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
+    let config = WorldConfig::default();
+    let next = AtomicUsize::new(0);
+    let episodes = Mutex::new(vec![None; plan.len()]);
+    std::thread::scope(|scope| {
+        for _ in 0..threads {
+            scope.spawn(|| {
+                let eye = RefCell::new(Eye::new(&config).unwrap());
+                while let Some((agent, key)) = plan.get(next.fetch_add(1, Ordering::Relaxed)) {
+                    let looks = !matches!(agent, Scripted::Frozen | Scripted::Random);
+                    let episode = record(&config, looks.then_some(&eye), *agent, *key);
+                    let at = plan.iter().position(|planned| planned == &(*agent, *key)).unwrap();
+                    episodes.lock().unwrap()[at] = Some(episode);
+                }
+            });
+        }
+    });
+    episodes.into_inner().unwrap().into_iter().flatten().collect()
+}
+
+/// The paper's metrics of some episodes.
+pub fn score(episodes: &[Episode]) -> EpisodeTable {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("trace.parquet");
+    let metadata = TraceMetadata { recording: None, columns: OptionalColumns::all() };
+    let mut writer = TraceWriter::create(&path, &metadata).unwrap();
+    for episode in episodes {
+        writer.write(episode).unwrap();
+    }
+    writer.finish().unwrap();
+    let traces = TraceSet::open(&[Input::new(&path)]).unwrap();
+    let definitions = run::definitions(&traces, &Request::of("paper")).unwrap();
+    run::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()
+}

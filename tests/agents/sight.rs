@@ -1,0 +1,135 @@
+//! What a view makes of painted frames, and what knowledge makes of views.
+
+use std::sync::Arc;
+
+use mirrorstats::agent::Observation;
+use mirrorstats::agent::scripted::knowledge::Knowledge;
+use mirrorstats::agent::scripted::room::Side;
+use mirrorstats::agent::sight::View;
+use mirrorstats::agent::sight::camera::{Place, Pose};
+use mirrorstats::base::palette::Color;
+
+use crate::painted::{Painted, pose};
+
+const fn at(x: f64, y: f64) -> Place {
+    Place { x, y }
+}
+
+fn room() -> Painted {
+    Painted { own: Color::Green, has_mirror: true, cubes: Vec::new(), others: Vec::new() }
+}
+
+fn observation(room: &Painted, pose: Pose) -> Observation {
+    Observation {
+        t: 1,
+        remaining: 100,
+        x: pose.place.x as f32,
+        y: pose.place.y as f32,
+        yaw: 30.0 * f32::from(pose.heading.twelfths()),
+        bumped: false,
+        history: None,
+        frame: Arc::new(room.frame(pose)),
+    }
+}
+
+fn view(room: &Painted, pose: Pose) -> View {
+    View::of(&observation(room, pose))
+}
+
+/// What is known after looking from each of `poses`.
+fn known(room: &Painted, poses: &[Pose]) -> Knowledge {
+    let mut known = Knowledge::new(&observation(room, poses[0]));
+    for &pose in poses {
+        known.see(&observation(room, pose));
+    }
+    known
+}
+
+/// Before the mirror: three views from two places.
+fn before_the_mirror() -> [Pose; 4] {
+    [pose(0.0, 0.3, 60.0), pose(2.0, 0.3, 0.0), pose(2.3, 0.3, 0.0), pose(2.3, 0.3, 30.0)]
+}
+
+#[test]
+fn every_color_of_cube_is_seen_where_it_stands() {
+    for color in Color::ALL {
+        let place = at(-1.5, 0.7);
+        let room = Painted { cubes: vec![(color, place)], ..room() };
+        let cubes = view(&room, pose(0.8, 0.2, 180.0)).cubes;
+        assert_eq!(cubes.iter().map(|cube| cube.color).collect::<Vec<_>>(), [color]);
+        assert!(cubes[0].place.distance(place) < 0.15, "{color:?} at {:?}", cubes[0].place);
+    }
+}
+
+#[test]
+fn a_cube_that_is_cut_off_is_none() {
+    let room = Painted { cubes: vec![(Color::Red, at(-0.9, 0.0))], ..room() };
+    assert_eq!(view(&room, pose(0.0, 0.0, 180.0)).cubes, Vec::new());
+}
+
+#[test]
+fn a_body_is_no_cube_and_is_seen_where_it_stands() {
+    for color in Color::ALL {
+        let room = Painted { others: vec![(color, at(-2.0, -0.5))], ..room() };
+        let view = view(&room, pose(0.5, 0.0, 180.0));
+        assert_eq!(view.cubes, Vec::new());
+        assert_eq!(view.bodies.iter().map(|body| body.color).collect::<Vec<_>>(), [color]);
+        assert!(view.bodies[0].place.distance(at(-2.0, -0.5)) < 0.3, "{color:?} at {:?}", view.bodies[0].place);
+    }
+}
+
+#[test]
+fn feet_lie_on_walls_and_through_the_mirror_beyond_them() {
+    let feet = view(&room(), pose(1.0, 0.0, 0.0)).feet;
+    let on_wall = |place: Place| (place.x.abs() - 4.0).abs() < 0.3 || (place.y.abs() - 4.0).abs() < 0.3;
+    assert!(feet.len() > 40);
+    assert!(feet.iter().all(|foot| on_wall(foot.place) || (foot.place.x - 12.0).abs() < 2.0 * foot.error), "{feet:?}");
+    assert!(feet.iter().filter(|foot| foot.place.x > 8.0).count() > 15);
+}
+
+#[test]
+fn a_mirror_is_found_where_it_hangs() {
+    let known = known(&room(), &before_the_mirror());
+    let wall = known.room.wall(Side::East).unwrap();
+    assert!((wall - 4.0).abs() < 0.15, "{wall}");
+    assert!(known.room.is_mirror(Side::East, 0.0));
+    assert!(!known.room.is_mirror(Side::East, 2.5));
+    assert_eq!(known.room.mirrors().collect::<Vec<_>>(), [Side::East]);
+}
+
+#[test]
+fn a_room_without_mirror_has_none() {
+    let room = Painted { has_mirror: false, ..room() };
+    let poses: Vec<Pose> = (0..12).map(|twelfth| pose(0.7, -0.4, 30.0 * f64::from(twelfth))).collect();
+    let known = known(&room, &poses);
+    assert!(Side::ALL.into_iter().all(|side| known.room.wall(side).is_some_and(|wall| (wall - 4.0).abs() < 0.2)));
+    assert!(!known.room.has_mirror());
+    assert_eq!(known.reflection.own_color(), None);
+}
+
+#[test]
+fn ones_own_color_is_known_after_tests_from_two_places() {
+    for own in Color::ALL {
+        let room = Painted { own, ..room() };
+        let poses = before_the_mirror();
+        assert_eq!(known(&room, &poses[..2]).reflection.own_color(), None);
+        assert_eq!(known(&room, &poses).reflection.own_color(), Some(own));
+    }
+}
+
+#[test]
+fn a_body_before_the_mirror_is_not_oneself_and_neither_is_its_reflection() {
+    // It hides one's own reflection from straight across; its own is behind it.
+    let room = Painted { others: vec![(Color::Purple, at(3.2, 0.3))], ..room() };
+    let known = known(&room, &before_the_mirror());
+    assert_eq!(known.reflection.own_color(), None);
+}
+
+#[test]
+fn among_others_ones_own_body_is_told_by_its_place() {
+    let others = vec![(Color::Purple, at(0.2, 1.6)), (Color::Orange, at(3.2, -1.2)), (Color::Red, at(-2.0, 1.2))];
+    let room = Painted { others, ..room() };
+    let known = known(&room, &before_the_mirror());
+    assert_eq!(known.reflection.own_color(), Some(Color::Green));
+    assert!(known.bodies.len() > 2, "there is somebody to be told from");
+}

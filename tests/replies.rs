@@ -1,0 +1,122 @@
+//! Replies as models write them, and what is read from each.
+
+use mirrorstats::agent::identification::normal_form;
+use mirrorstats::agent::reply::{self, Ending, Repair};
+use mirrorstats::agent::{Family, Status};
+use mirrorstats::trace::episode::Action;
+
+const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
+
+fn read(raw: &str) -> reply::Reading {
+    reply::read(raw, Family::CubeSelection, Ending::Whole)
+}
+
+#[test]
+fn identifications_have_one_normal_form() {
+    let mut wrong = Vec::new();
+    let mut cases = 0;
+    for line in include_str!("identifications.txt").lines().filter(|line| !line.starts_with('#')) {
+        let (text, expected) = line.rsplit_once(" => ").unwrap_or_else(|| panic!("no case: {line}"));
+        let expected = (expected != "-").then_some(expected);
+        cases += 1;
+        if normal_form(text) != expected {
+            wrong.push(format!("{text:?}: expected {expected:?}, found {:?}", normal_form(text)));
+        }
+    }
+    assert!(cases > 150, "only {cases} cases");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn a_valid_reply_is_taken_as_it_is() {
+    let reading = read(GOOD);
+    assert_eq!((reading.status, reading.action), (Status::Ok, Some(Action::TurnLeft)));
+    assert_eq!((reading.selected_cube.as_deref(), reading.self_color.as_deref()), (Some("none"), Some("unknown")));
+    assert_eq!(reading.words.reasoning.as_deref(), Some("it's a \"wall\""));
+    assert_eq!(reading.fault, None);
+    assert_eq!(read(&format!("\n  {GOOD}\t\n")), reading);
+}
+
+#[test]
+fn the_exploration_family_has_no_cube() {
+    let without = GOOD.replace(r#" "selected_cube": "none","#, "");
+    let reading = reply::read(&without, Family::Exploration, Ending::Whole);
+    assert_eq!((reading.status, reading.selected_cube), (Status::Ok, None));
+    assert_eq!(reply::read(GOOD, Family::Exploration, Ending::Whole).status, Status::SchemaInvalid);
+    assert_eq!(read(&without).status, Status::SchemaInvalid);
+}
+
+#[test]
+fn repairs_are_named_and_change_no_word() {
+    use Repair::{CodeFence, SingleQuotes, SurroundingText, TrailingComma};
+    let comma = GOOD.replace("\"unknown\"}", "\"unknown\" ,\n }");
+    let single = r#"{'view-description': 'a wall', 'reasoning': 'it\'s a "wall"', 'action': 'a', 'summary': 'turned, {so far}', 'selected_cube': 'none', 'identification': 'unknown'}"#;
+    let cases: Vec<(String, Vec<Repair>)> = vec![
+        (format!("```json\n{GOOD}\n```"), vec![CodeFence]),
+        (format!("```\n{GOOD}```"), vec![CodeFence]),
+        (format!("```{GOOD}```"), vec![CodeFence]),
+        (format!("Here is it: {GOOD}"), vec![SurroundingText]),
+        (format!("{GOOD}\nThat's all."), vec![SurroundingText]),
+        (format!("Sure!\n```json\n{GOOD}\n```\nDone."), vec![SurroundingText]),
+        (comma.clone(), vec![TrailingComma]),
+        (format!("```json\n{comma}\n```"), vec![CodeFence, TrailingComma]),
+        (format!("so: {comma}"), vec![SurroundingText, TrailingComma]),
+        (single.to_owned(), vec![SingleQuotes]),
+        (single.replace(r"it\'s", "it's"), vec![SingleQuotes]),
+        (format!("I'd say {}", single.replace("'}", "',}")), vec![SurroundingText, TrailingComma, SingleQuotes]),
+    ];
+    let words = read(GOOD).words;
+    for (raw, repairs) in cases {
+        let reading = read(&raw);
+        assert_eq!((reading.status, &reading.repairs), (Status::Repaired, &repairs), "{raw}");
+        assert_eq!(reading.words, words, "{raw}");
+        assert_eq!(reading.action, Some(Action::TurnLeft), "{raw}");
+    }
+}
+
+#[test]
+fn what_is_not_valid_is_no_decision() {
+    let nested = format!("{}{}", "[".repeat(100_000), "]".repeat(100_000));
+    let cases = [
+        ("I turn left.", Status::ParseFailed),
+        ("[]", Status::ParseFailed),
+        ("\"a\"", Status::ParseFailed),
+        ("{", Status::ParseFailed),
+        (&GOOD[..GOOD.len() - 20], Status::ParseFailed),
+        (&format!("{GOOD}{GOOD}"), Status::ParseFailed),
+        (&GOOD.replace("\"a wall\"", "NaN"), Status::ParseFailed),
+        (&GOOD.replace("\"a wall\"", &nested), Status::ParseFailed),
+        (&nested, Status::ParseFailed),
+        ("{}", Status::SchemaInvalid),
+        (&GOOD.replace("\"a wall\"", "null"), Status::SchemaInvalid),
+        (&GOOD.replace("\"a wall\"", "[[1]]"), Status::SchemaInvalid),
+        (&GOOD.replace("\"action\": \"a\"", "\"action\": \"jump\""), Status::SchemaInvalid),
+        (&GOOD.replace("\"action\": \"a\"", "\"action\": \"\""), Status::SchemaInvalid),
+        (&GOOD.replace("\"action\": \"a\"", "\"action\": \"a\", \"action\": \"w\""), Status::SchemaInvalid),
+        (&GOOD.replace("\"none\"", "\"mauve\""), Status::SchemaInvalid),
+        (&GOOD.replace("}\n", "").replace("\"unknown\"}", "\"unknown\", \"extra\": 1}"), Status::SchemaInvalid),
+        (&GOOD.replace("\"view-description\"", "\"view_description\""), Status::SchemaInvalid),
+        ("", Status::Empty),
+        (" \n\t", Status::Empty),
+    ];
+    for (raw, status) in cases {
+        let reading = read(raw);
+        assert_eq!(reading.status, status, "{}", &raw[..raw.len().min(300)]);
+        assert_eq!((reading.action, reading.self_color, reading.selected_cube), (None, None, None));
+        assert_eq!(reading.fault.is_some(), status != Status::Empty);
+    }
+}
+
+#[test]
+fn an_ending_counts_before_the_text() {
+    assert_eq!(reply::read(GOOD, Family::CubeSelection, Ending::Truncated).status, Status::Truncated);
+    assert_eq!(reply::read(GOOD, Family::CubeSelection, Ending::Refused).status, Status::Refusal);
+    assert_eq!(reply::read("", Family::CubeSelection, Ending::Truncated).status, Status::Truncated);
+}
+
+#[test]
+fn the_raw_text_is_kept_whatever_it_is() {
+    let raw = "no JSON at all";
+    let reply = read(raw).into_reply(raw.to_owned(), mirrorstats::agent::Usage::default());
+    assert_eq!((reply.status, reply.raw.as_deref()), (Status::ParseFailed, Some(raw)));
+}

@@ -1,0 +1,133 @@
+//! A standalone master and two workers on loopback, each a process of its own, gone when the test is over.
+
+use std::fs::{self, File};
+use std::io::{Read as _, Write as _};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use serde_json::Value;
+
+/// A running cluster of one core a worker.
+pub struct Cluster {
+    /// `spark://127.0.0.1:PORT`
+    pub master: String,
+    /// What `PYTHONPATH` must be for its Spark.
+    pub packages: PathBuf,
+    page: String,
+    workers: Vec<Process>,
+    _master: Process,
+    folder: tempfile::TempDir,
+}
+
+/// A process that does not outlive its owner.
+pub struct Process(pub Child);
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Where `scripts/get-spark.sh` has put pyspark; `None`, with a word about it, where there is none or no Java.
+pub fn packages() -> Option<PathBuf> {
+    let packages = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap().join("python-spark");
+    let has_java = Command::new("java").arg("-version").stderr(Stdio::null()).status().is_ok_and(|s| s.success());
+    if packages.join("pyspark/bin/spark-class").is_file() && has_java {
+        return Some(packages);
+    }
+    assert!(
+        std::env::var_os("MIRRORSTATS_REQUIRE_SPARK").is_none(),
+        "no Spark in {} or no Java: scripts/get-spark.sh gets them",
+        packages.display()
+    );
+    eprintln!("skipped: no Spark to test with; scripts/get-spark.sh gets one");
+    None
+}
+
+impl Cluster {
+    /// Starts a cluster and waits until both workers have registered.
+    pub fn start(packages: PathBuf) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let home = packages.join("pyspark");
+        let at = folder.path();
+        let master = daemon(&home, at, "master", &["org.apache.spark.deploy.master.Master"]);
+        let log = at.join("master");
+        let url = wait_for("the master", || word_after(&log, "Starting Spark master at "));
+        let page =
+            wait_for("the master's page", || word_after(&log, "Bound MasterWebUI to 127.0.0.1, and started at "));
+        let worker = |name: &str| {
+            let work = at.join(format!("{name}-work")).display().to_string();
+            let class = "org.apache.spark.deploy.worker.Worker";
+            daemon(&home, at, name, &[class, "--cores", "1", "--memory", "1g", "--work-dir", &work, &url])
+        };
+        let workers = vec![worker("worker-1"), worker("worker-2")];
+        let cluster = Self { master: url.clone(), packages, page, workers, _master: master, folder };
+        wait_for("two workers", || (cluster.state()["aliveworkers"] == 2).then_some(()));
+        cluster
+    }
+
+    /// What the master knows.
+    pub fn state(&self) -> Value {
+        get(&format!("{}/json/", self.page.trim_end_matches('/'))).unwrap_or_default()
+    }
+
+    /// Kills the first worker, as a machine that loses its power.
+    pub fn kill_a_worker(&mut self) {
+        drop(self.workers.remove(0));
+    }
+
+    /// A folder that is gone with the cluster.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+fn daemon(home: &Path, folder: &Path, name: &str, arguments: &[&str]) -> Process {
+    let log = File::create(folder.join(name)).unwrap();
+    let mut command = Command::new(home.join("bin/spark-class"));
+    command
+        .args(&arguments[..1])
+        .args(["--host", "127.0.0.1", "--port", "0", "--webui-port", "0"])
+        .args(&arguments[1..]);
+    // Whatever Spark this machine is set up for, this is another.
+    for (variable, _) in std::env::vars_os().filter(|(name, _)| name.to_string_lossy().starts_with("SPARK_")) {
+        command.env_remove(variable);
+    }
+    command.env("SPARK_HOME", home).env("SPARK_LOCAL_IP", "127.0.0.1").env("SPARK_DAEMON_MEMORY", "256m");
+    let child = command.stdin(Stdio::null()).stdout(log.try_clone().unwrap()).stderr(log).spawn();
+    Process(child.unwrap())
+}
+
+/// The word of a log that follows these words, once a line with them is complete.
+pub fn word_after(log: &Path, words: &str) -> Option<String> {
+    let text = fs::read_to_string(log).ok()?;
+    let (_, rest) = text.split_once(words)?;
+    let (line, _) = rest.split_once('\n')?;
+    Some(line.split_whitespace().next()?.trim_end_matches('.').to_owned())
+}
+
+/// Looks again and again until there is something, for two minutes at most.
+#[track_caller]
+pub fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
+    for _ in 0..2400 {
+        if let Some(found) = look() {
+            return found;
+        }
+        sleep(Duration::from_millis(50));
+    }
+    panic!("waited in vain for {what}");
+}
+
+/// The JSON at `http://host:port/path`.
+pub fn get(url: &str) -> Option<Value> {
+    let (host, path) = url.strip_prefix("http://")?.split_once('/')?;
+    let mut stream = TcpStream::connect(host).ok()?;
+    write!(stream, "GET /{path} HTTP/1.0\r\nHost: {host}\r\n\r\n").ok()?;
+    let mut response = String::new();
+    stream.read_to_string(&mut response).ok()?;
+    serde_json::from_str(response.split_once("\r\n\r\n")?.1).ok()
+}

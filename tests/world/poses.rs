@@ -1,0 +1,64 @@
+//! Worlds with everybody at random places that do not overlap.
+
+use mirrorstats::sim::Experiment;
+use mirrorstats::sim::angle::Heading;
+use mirrorstats::sim::body::{Figure, Pose, Stride};
+use mirrorstats::sim::chance::Chance;
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::floor::{FloorPlan, distance};
+use mirrorstats::sim::scene::Scene;
+use mirrorstats::sim::world::World;
+
+/// The world of an experiment and a seed, at its start.
+pub fn world(experiment: Experiment, seed: i32) -> World {
+    let config = WorldConfig::default();
+    let scene = Scene::draw(&config, experiment, seed, 0).unwrap();
+    World::new(&config, scene).unwrap()
+}
+
+/// Puts everybody somewhere, facing anywhere, standing or in the middle of a stride.
+pub fn scatter(world: &mut World, chance: &mut Chance) {
+    let mut placed: Vec<Figure> = Vec::new();
+    for figure in world.figures() {
+        let pose = free_pose(world.floor_plan(), &placed, chance);
+        let stride = chance.one_of(&[Stride::Standing, Stride::Left, Stride::Right]);
+        placed.push(Figure { pose, stride, ..figure });
+    }
+    world.place(&placed);
+}
+
+fn free_pose(plan: &FloorPlan, placed: &[Figure], chance: &mut Chance) -> Pose {
+    loop {
+        let [x, y] = [(), ()].map(|()| f64::from(chance.between(-356, 356)) / 100.0);
+        let is_free = plan.admits([x, y], 0.0)
+            && placed.iter().all(|other| distance(other.pose.spot(), [x, y]) >= 2.0 * plan.radius);
+        if is_free {
+            let thirties = u8::try_from(chance.below(12)).unwrap();
+            return Pose { x, y, heading: Heading::new(thirties) };
+        }
+    }
+}
+
+/// Calls `each` with as many scattered worlds as asked for, a new scene every tenth time.
+pub fn for_scattered(experiments: &[Experiment], poses: i32, mut each: impl FnMut(&World)) {
+    let mut chance = Chance::of(2026, 11, 21);
+    for at in 0..(poses + 9) / 10 {
+        let experiment = experiments[usize::try_from(at).unwrap() % experiments.len()];
+        let mut world = world(experiment, 1000 + at);
+        for _ in 0..10 {
+            scatter(&mut world, &mut chance);
+            each(&world);
+        }
+    }
+}
+
+/// Puts the agent before the middle of the mirror, `away` metres from it, turned by `thirties` from facing it.
+pub fn face_mirror(world: &mut World, away: f64, thirties: i8) {
+    let mirror = world.scene().mirror;
+    let [x, y] = mirror.center(world.config());
+    let heading = mirror.heading();
+    let pose = Pose { x, y, heading }.ahead(-away);
+    let mut figures = world.figures();
+    figures[0].pose = Pose { heading: heading.turned(thirties), ..pose };
+    world.place(&figures);
+}

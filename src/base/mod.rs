@@ -1,4 +1,4 @@
-//! What every room stands on: exact numbers and their text, hashes, near names.
+//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs.
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
@@ -9,5 +9,6 @@ pub mod near;
 pub mod number;
 pub mod palette;
 pub mod ratio;
+pub mod runs;
 pub mod temporary;
 pub mod visible;

@@ -1,6 +1,7 @@
 //! Answers on standard output, and files that appear whole or not at all.
 
 use std::fmt::Display;
+use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::Path;
 
@@ -38,8 +39,19 @@ pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
 /// # Errors
 /// When the folder is not there or not writable, or the disk is full; the error names the file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    write_file_with(path, |file| Ok(file.write_all(bytes)?))
+}
+
+/// Writes a file as `write` does, whole or not at all.
+///
+/// # Errors
+/// When the folder is not there or not writable, or the disk is full; the error names the file. What `write` gives.
+pub fn write_file_with(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
     let mut file = beside(path)?;
-    file.write_all(bytes).map_err(|error| unwritable(path, error))?;
+    write(file.as_file_mut()).map_err(|failure| match failure {
+        Failure::Output(error) => unwritable(path, error),
+        other => other,
+    })?;
     persist(file, path)
 }
 

@@ -17,7 +17,7 @@ use crate::engine::spark::source::is_uri;
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
-use crate::score::format::{self, Format, Surroundings};
+use crate::score::format::{self, Format, FormatError, Surroundings};
 use crate::score::run::{self, Request, ScoreError};
 use crate::score::select;
 use crate::score::table::EpisodeTable;
@@ -55,6 +55,45 @@ pub fn table(
             "error: expected traces or files of scores, found both: `{}` holds scores\n  help: score the traces first, or leave one kind out",
             scores[0].name
         ))),
+    }
+}
+
+/// Writes the episode table; memory does not grow with the traces.
+///
+/// # Errors
+/// Whatever is wrong with the files, the definitions, the condition or the output.
+pub fn write(
+    inputs: &[Input],
+    scoring: &ScoringArgs,
+    threads: NonZeroUsize,
+    format: Format,
+    out: impl io::Write + Send,
+) -> Result<(), Failure> {
+    if are_scores(inputs) {
+        return write_table(&table(inputs, scoring, &[], threads)?, format, out);
+    }
+    let traces = open(inputs)?;
+    let definitions = definitions(&traces, scoring)?;
+    let mut rows = run::rows(&traces, &definitions, &[], threads).map_err(score_failure)?;
+    let mut writer = format::Writer::new(rows.header().clone(), format, out).map_err(unwritten)?;
+    while let Some(row) = rows.next().map_err(ScoreError::Spill).map_err(score_failure)? {
+        writer.write(row).map_err(unwritten)?;
+    }
+    writer.finish().map_err(unwritten)
+}
+
+/// Writes a table.
+///
+/// # Errors
+/// Whatever writing gives.
+pub fn write_table(table: &EpisodeTable, format: Format, out: impl io::Write + Send) -> Result<(), Failure> {
+    format::write(table, format, out).map_err(unwritten)
+}
+
+fn unwritten(error: FormatError) -> Failure {
+    match error.into_io() {
+        Ok(error) => Failure::Output(error),
+        Err(other) => Failure::input(other),
     }
 }
 

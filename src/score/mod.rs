@@ -1,9 +1,10 @@
 //! A checked plan over Arrow batches: one row an episode.
 //!
 //! ```text
-//! run.rs ──► engine.rs ──► segments.rs, values.rs        table.rs ──► format/
-//! (one scan,  (a node, a    (kernels)                    (the result)  (as Parquet, CSV, JSON lines)
-//!  one table)  column)
+//! run.rs ──► engine.rs ──► segments.rs, values.rs        rows.rs ──► table.rs, format/
+//! (one scan)  (a node, a    (kernels)                    (sorted in   (in memory, or as Parquet,
+//!              column)                                    bounded      CSV, JSON lines)
+//!                                                         memory)
 //! ```
 //!
 //! Rule: pure. No file is opened here, no clock read, no thread started in a kernel.
@@ -11,6 +12,7 @@
 pub mod engine;
 pub mod evidence;
 pub mod format;
+pub mod rows;
 pub mod run;
 pub mod segments;
 pub mod select;

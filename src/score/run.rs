@@ -1,13 +1,12 @@
 //! From traces to the episode table: the columns that the plan needs, one scan, one sorted table.
 
+use std::io;
 use std::num::NonZeroUsize;
 
-use arrow::array::{Array, ArrayRef, AsArray as _, RecordBatch};
-use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
-
 use super::engine::{Batch, Engine, EngineError, Scores};
+use super::rows::{RowSorter, Rows, SortedRows};
 use super::segments::Segments;
-use super::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use super::table::{EpisodeTable, Header};
 use crate::base::near::nearest;
 use crate::metric::catalog::Catalog;
 use crate::metric::columns::{Column, Columns, Level, Type};
@@ -78,6 +77,9 @@ pub enum ScoreError {
         /// What to do.
         help: String,
     },
+    /// Rows that do not fit into memory could not be put away.
+    #[error("cannot sort the scores in a temporary file; is there space where temporary files are (TMPDIR)?")]
+    Spill(#[source] io::Error),
     /// A number could not be computed.
     #[error("{file}: {source}")]
     Engine {
@@ -183,25 +185,28 @@ pub fn score(
     labels: &[String],
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, ScoreError> {
+    table(rows(traces, definitions, labels, threads)?)
+}
+
+/// Scores all episodes of some traces and gives the rows of the table one by one: memory does not grow with them.
+///
+/// # Errors
+/// As [`score`].
+pub fn rows(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    labels: &[String],
+    threads: NonZeroUsize,
+) -> Result<SortedRows, ScoreError> {
     let engine = Engine::new(&definitions.plan);
     let projection = projection(traces, definitions, &engine, labels)?;
-    let mut rows = Rows::new(definitions, labels);
-    traces.scan(
-        &projection,
-        threads,
-        |batch| -> Result<Part, ScoreError> {
-            let scores = engine.score(&view(&batch)).map_err(|source| ScoreError::Engine {
-                file: traces.files()[batch.origin.file].name().to_owned(),
-                source,
-            })?;
-            Ok(Part::of(&batch.episodes, scores, labels))
-        },
-        |part: Part| {
-            rows.append(part);
-            Ok(())
-        },
-    )?;
-    Ok(rows.sorted(definitions))
+    let outputs = definitions.plan.outputs.iter();
+    let header = Header {
+        catalog: definitions.catalog.clone(),
+        labels: labels.to_vec(),
+        metrics: outputs.map(|output| output.name.clone()).collect(),
+    };
+    sorted(traces, &projection, header, threads, |batch| engine.score(&view(batch)))
 }
 
 /// The episodes of some traces without a metric: keys and labels, the traces checked as [`score`] checks them.
@@ -217,20 +222,42 @@ pub fn unscored(
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, ScoreError> {
     let projection = projection(traces, definitions, &Engine::new(&definitions.plan), labels)?;
-    let mut rows = Rows { metrics: Vec::new(), ..Rows::new(definitions, labels) };
+    let header = Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics: Vec::new() };
+    let all = |batch: &EpisodeBatch| Ok(Scores { kept: (0..batch.episodes.num_rows()).collect(), metrics: Vec::new() });
+    table(sorted(traces, &projection, header, threads, all)?)
+}
+
+/// The rows that `score` gives for each batch, in the order of the table.
+fn sorted(
+    traces: &TraceSet,
+    projection: &Projection,
+    header: Header,
+    threads: NonZeroUsize,
+    score: impl Fn(&EpisodeBatch) -> Result<Scores, EngineError> + Sync,
+) -> Result<SortedRows, ScoreError> {
+    let labels = header.labels.clone();
+    let mut sorter = RowSorter::new(header);
     traces.scan(
-        &projection,
+        projection,
         threads,
-        |batch| -> Result<Part, ScoreError> {
-            let kept = (0..batch.episodes.num_rows()).collect();
-            Ok(Part::of(&batch.episodes, Scores { kept, metrics: Vec::new() }, labels))
+        |batch| -> Result<Rows, ScoreError> {
+            let scores = score(&batch).map_err(|source| ScoreError::Engine {
+                file: traces.files()[batch.origin.file].name().to_owned(),
+                source,
+            })?;
+            Ok(Rows::of(&batch.episodes, &scores, &labels))
         },
-        |part: Part| {
-            rows.append(part);
-            Ok(())
-        },
+        |rows: Rows| sorter.add(&rows).map_err(ScoreError::Spill),
     )?;
-    Ok(rows.sorted(definitions))
+    sorter.finish().map_err(ScoreError::Spill)
+}
+
+fn table(mut rows: SortedRows) -> Result<EpisodeTable, ScoreError> {
+    let mut table = EpisodeTable::empty(rows.header().clone());
+    while let Some(row) = rows.next().map_err(ScoreError::Spill)? {
+        table.push(row.clone());
+    }
+    Ok(table)
 }
 
 /// A batch as the engine takes it.
@@ -280,98 +307,4 @@ pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
         (None, None) => "its value changes from step to step".to_owned(),
     };
     Err(ScoreError::Label { name: label.to_owned(), known, help })
-}
-
-/// The rows of the table that one batch gives.
-struct Part {
-    keys: Vec<EpisodeKey>,
-    labels: Vec<Vec<Option<String>>>,
-    metrics: Vec<Vec<Option<i64>>>,
-}
-
-impl Part {
-    fn of(episodes: &RecordBatch, scores: Scores, labels: &[String]) -> Self {
-        let column = |name: &str| episodes.column_by_name(name).expect("the projection asks for this column");
-        let label = |name: &String| scores.kept.iter().map(|&row| text_at(column(name), row)).collect();
-        Self {
-            keys: keys(episodes, scores.kept.iter().copied()),
-            labels: labels.iter().map(label).collect(),
-            metrics: scores.metrics,
-        }
-    }
-}
-
-/// The keys of some rows of [`EpisodeBatch::episodes`].
-pub(super) fn keys(episodes: &RecordBatch, rows: impl IntoIterator<Item = usize>) -> Vec<EpisodeKey> {
-    let column = |name: &str| episodes.column_by_name(name).expect("every batch has the key columns");
-    let [episode_id, model, experiment, seed, run] = EPISODE_COLUMNS.map(column);
-    let key = |row: usize| EpisodeKey {
-        experiment: text_at(experiment, row).unwrap_or_default(),
-        model: text_at(model, row).unwrap_or_default(),
-        seed: int_at(seed, row),
-        run: int_at(run, row),
-        episode_id: text_at(episode_id, row).unwrap_or_default(),
-    };
-    rows.into_iter().map(key).collect()
-}
-
-/// The value at a row as text; `None` for null.
-fn text_at(column: &ArrayRef, row: usize) -> Option<String> {
-    if column.is_null(row) {
-        return None;
-    }
-    match column.data_type() {
-        DataType::Boolean => Some(column.as_boolean().value(row).to_string()),
-        DataType::Int64 => Some(column.as_primitive::<Int64Type>().value(row).to_string()),
-        DataType::Float64 => Some(column.as_primitive::<Float64Type>().value(row).to_string()),
-        _ => {
-            let dictionary = column.as_dictionary::<Int32Type>();
-            let texts = dictionary.values().as_string::<i32>();
-            let key = dictionary.key(row).filter(|&key| texts.is_valid(key))?;
-            Some(texts.value(key).to_owned())
-        }
-    }
-}
-
-/// A seed or a run; the scan has checked that it fits.
-fn int_at(column: &ArrayRef, row: usize) -> i32 {
-    i32::try_from(column.as_primitive::<Int64Type>().value(row)).unwrap_or_default()
-}
-
-/// The table while it grows.
-struct Rows {
-    keys: Vec<EpisodeKey>,
-    labels: Vec<LabelColumn>,
-    metrics: Vec<MetricColumn>,
-}
-
-impl Rows {
-    fn new(definitions: &Definitions, labels: &[String]) -> Self {
-        let outputs = definitions.plan.outputs.iter();
-        Self {
-            keys: Vec::new(),
-            labels: labels.iter().map(|name| LabelColumn { name: name.clone(), values: Vec::new() }).collect(),
-            metrics: outputs.map(|output| MetricColumn { name: output.name.clone(), values: Vec::new() }).collect(),
-        }
-    }
-
-    fn append(&mut self, part: Part) {
-        self.keys.extend(part.keys);
-        for (column, values) in self.labels.iter_mut().zip(part.labels) {
-            column.values.extend(values);
-        }
-        for (column, values) in self.metrics.iter_mut().zip(part.metrics) {
-            column.values.extend(values);
-        }
-    }
-
-    fn sorted(self, definitions: &Definitions) -> EpisodeTable {
-        let table = EpisodeTable {
-            catalog: definitions.catalog.clone(),
-            keys: self.keys,
-            labels: self.labels,
-            metrics: self.metrics,
-        };
-        table.sorted()
-    }
 }

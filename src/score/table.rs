@@ -18,7 +18,7 @@ pub struct EpisodeTable {
 }
 
 /// What names an episode. The derived order is the order of the table.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EpisodeKey {
     /// `E1`..`E5` in the paper.
     pub experiment: String,
@@ -50,6 +50,28 @@ pub struct MetricColumn {
     pub values: Vec<Option<i64>>,
 }
 
+/// One row of the table, on its way into it or out of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct EpisodeRow {
+    /// What names the episode.
+    pub key: EpisodeKey,
+    /// A value for each of [`Header::labels`].
+    pub labels: Vec<Option<String>>,
+    /// A value for each of [`Header::metrics`]; `None` where the metric is undefined.
+    pub metrics: Vec<Option<i64>>,
+}
+
+/// What stands above the rows.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// The definitions that gave the values.
+    pub catalog: Catalog,
+    /// The names of the further key columns.
+    pub labels: Vec<String>,
+    /// The names of the metrics, in their order.
+    pub metrics: Vec<String>,
+}
+
 /// Why two tables are not one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum JoinError {
@@ -65,6 +87,46 @@ pub enum JoinError {
 }
 
 impl EpisodeTable {
+    /// A table without a row.
+    pub fn empty(header: Header) -> Self {
+        let Header { catalog, labels, metrics } = header;
+        Self {
+            catalog,
+            keys: Vec::new(),
+            labels: labels.into_iter().map(|name| LabelColumn { name, values: Vec::new() }).collect(),
+            metrics: metrics.into_iter().map(|name| MetricColumn { name, values: Vec::new() }).collect(),
+        }
+    }
+
+    /// Adds a row, which must not come before the last one.
+    pub fn push(&mut self, row: EpisodeRow) {
+        self.keys.push(row.key);
+        for (column, value) in self.labels.iter_mut().zip(row.labels) {
+            column.values.push(value);
+        }
+        for (column, value) in self.metrics.iter_mut().zip(row.metrics) {
+            column.values.push(value);
+        }
+    }
+
+    /// What stands above the rows.
+    pub fn header(&self) -> Header {
+        Header {
+            catalog: self.catalog.clone(),
+            labels: self.labels.iter().map(|label| label.name.clone()).collect(),
+            metrics: self.metrics.iter().map(|metric| metric.name.clone()).collect(),
+        }
+    }
+
+    /// The rows, in order.
+    pub fn rows(&self) -> impl Iterator<Item = EpisodeRow> {
+        self.keys.iter().enumerate().map(|(row, key)| EpisodeRow {
+            key: key.clone(),
+            labels: self.labels.iter().map(|label| label.values[row].clone()).collect(),
+            metrics: self.metrics.iter().map(|metric| metric.values[row]).collect(),
+        })
+    }
+
     /// The number of episodes.
     pub fn len(&self) -> usize {
         self.keys.len()

@@ -9,7 +9,8 @@ use std::ops::RangeInclusive;
 use arrow::array::Array;
 
 use super::engine::{Engine, Evaluated};
-use super::run::{self, ScoreError, projection, view};
+use super::rows::keys;
+use super::run::{ScoreError, projection, view};
 use super::segments::Segments;
 use super::table::EpisodeKey;
 use super::values::truths;
@@ -92,7 +93,7 @@ pub fn timelines(
             let segments = Segments::new(&batch.offsets);
             let values =
                 engine.evaluate(&view(&batch)).map_err(|source| ScoreError::Engine { file: file(), source })?;
-            let keys = run::keys(&batch.episodes, 0..segments.len());
+            let keys = keys(&batch.episodes, 0..segments.len());
             let kept = |episode: usize| filter.is_none_or(|node| truths(values.of(node).bools()).value(episode));
             let episodes = keys.into_iter().enumerate().filter(|(episode, _)| kept(*episode));
             Ok(episodes.map(|(episode, key)| timeline(&values, &moments, segments, episode, key)).collect())

@@ -7,6 +7,7 @@ mod decode;
 pub mod describe;
 pub mod episode;
 pub mod finding;
+mod ids;
 pub mod info;
 pub mod inputs;
 mod layout;

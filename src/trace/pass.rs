@@ -15,7 +15,7 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _};
 use arrow::compute::concat;
 use arrow::datatypes::Int32Type;
 
-use super::decode::{RowGroup, Rows};
+use super::decode::{RowGroup, Rows, text_at};
 use super::finding::{Code, Finding, TraceError};
 use super::layout::{EPISODE_ID, Layout};
 use super::open::TraceFile;
@@ -51,7 +51,18 @@ impl Episodes {
 
     /// The row group of a row.
     pub(super) fn row_group(&self, row: usize) -> usize {
-        self.pieces[self.pieces.partition_point(|piece| piece.at <= row) - 1].row_group
+        self.place(row).0
+    }
+
+    /// The row group of a row, and the row there.
+    pub(super) fn place(&self, row: usize) -> (usize, usize) {
+        let piece = self.pieces[self.pieces.partition_point(|piece| piece.at <= row) - 1];
+        (piece.row_group, piece.row + (row - piece.at))
+    }
+
+    /// The id of the episode of a row; `None` for null.
+    pub(super) fn id(&self, row: usize) -> Option<&str> {
+        text_at(&self.columns[EPISODE_ID], row)
     }
 }
 

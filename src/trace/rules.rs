@@ -3,8 +3,6 @@
 //!
 //! Rule: a rule gives one finding an episode and column, at the first row that breaks it, and says how many more do.
 
-use std::collections::HashMap;
-
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 
@@ -308,48 +306,4 @@ fn shown(values: &ArrayRef, row: usize) -> String {
     let number = number.or_else(|| any.downcast_ref::<Float64Array>().map(|floats| floats.value(row).to_string()));
     let shown = number.or_else(|| any.downcast_ref::<BooleanArray>().map(|bools| bools.value(row).to_string()));
     shown.unwrap_or_else(|| "another value".into())
-}
-
-/// The ids met so far, in the order of the files.
-#[derive(Default)]
-pub(super) struct Ids {
-    /// File and row group where each one was met first.
-    seen: HashMap<String, (usize, usize)>,
-}
-
-/// The start of an episode.
-pub(super) struct Start {
-    pub(super) id: String,
-    pub(super) row: usize,
-    pub(super) row_group: usize,
-}
-
-impl Ids {
-    /// Takes note of an episode; a finding if its id was met before. `names` are the names of the files.
-    pub(super) fn admit(&mut self, start: Start, file: usize, name: impl Fn(usize) -> String) -> Option<Located> {
-        let Start { id, row, row_group } = start;
-        let Some((other, before)) = self.seen.get(&id).copied() else {
-            self.seen.insert(id, (file, row_group));
-            return None;
-        };
-        let finding = if other == file {
-            let found = format!("rows of it in row group {before} already");
-            Finding::new(Code::EpisodeTwice, name(file), "the episode once in the file, its rows together", found)
-        } else {
-            let found = format!("its id in {} too", name(other));
-            Finding::new(Code::EpisodeInTwoFiles, name(file), "the episode in one of the files only", found)
-        };
-        Some(Located { row, finding: finding.in_row_group(row_group).in_episode(id).in_column("episode_id") })
-    }
-}
-
-/// The episodes' starts, without those that have no id.
-pub(super) fn starts(episodes: &Episodes) -> Vec<Start> {
-    let ids = &episodes.columns[EPISODE_ID];
-    let rows = episodes.offsets[..episodes.len()].iter();
-    rows.filter_map(|row| {
-        let id = text_at(ids, *row)?.to_owned();
-        Some(Start { id, row: *row, row_group: episodes.row_group(*row) })
-    })
-    .collect()
 }

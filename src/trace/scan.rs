@@ -12,10 +12,11 @@ use arrow::datatypes::{Field, Schema, SchemaRef};
 
 use super::decode::held_as;
 use super::finding::TraceError;
+use super::ids::{Print, Prints};
 use super::layout::{Layout, LayoutColumn};
 use super::open::TraceSet;
 use super::pass::{Episodes, Event, pass};
-use super::rules::{Ids, Located, Rules, Start, starts};
+use super::rules::{Located, Rules};
 
 /// The columns that a scan delivers, and what it checks beyond the schema.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -88,44 +89,44 @@ impl TraceSet {
         )?;
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
         let shape = Shape::new(&layout, projection);
-        let mut ids = Ids::default();
+        let mut prints = Prints::new();
         let mut summary = ScanSummary::default();
         let checked = |episodes: Episodes| {
             let fault = rules.check(self.files()[episodes.file].name(), &episodes).into_iter().next();
             let last = fault.as_ref().map_or(usize::MAX, |fault| fault.row);
-            let starts = starts(&episodes).into_iter().filter(|start| start.row <= last).collect();
+            let prints = Print::of(&episodes, last);
             let (count, steps) = (episodes.len(), episodes.columns[0].len());
             let outcome = match fault {
                 Some(fault) => Outcome::Fault(fault),
                 None => Outcome::Done(shape.batch(episodes).map_err(E::from).and_then(&work)),
             };
-            Checked { starts, count, steps, outcome }
+            Checked { prints, count, steps, outcome }
         };
-        pass(self.files(), &layout, threads, &checked, |file, event| {
+        let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
                 Event::Whole(checked) => checked,
                 Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
             };
-            for start in checked.starts {
-                if let Some(fault) = ids.admit(start, file, |file| self.files()[file].name().to_owned()) {
-                    return Err(TraceError::from(fault.finding).into());
-                }
-            }
+            prints.add(&checked.prints)?;
             summary.episodes += checked.count as u64;
             summary.steps += checked.steps as u64;
             match checked.outcome {
                 Outcome::Fault(fault) => Err(TraceError::from(fault.finding).into()),
                 Outcome::Done(result) => sink(result?),
             }
-        })?;
-        Ok(summary)
+        });
+        // An id that was there before is found at the end, though it comes before whatever ended the pass.
+        match prints.first_repeated(self.files(), &layout)? {
+            Some(finding) => Err(TraceError::from(*finding).into()),
+            None => passed.map(|()| summary),
+        }
     }
 }
 
 /// What a worker found out about some episodes.
 struct Checked<T, E> {
     /// The episodes up to the fault, if there is one.
-    starts: Vec<Start>,
+    prints: Vec<Print>,
     count: usize,
     steps: usize,
     outcome: Outcome<T, E>,

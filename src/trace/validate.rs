@@ -9,11 +9,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::finding::{Code, Finding, Severity, TraceError};
+use super::ids::{Ids, Start, starts};
 use super::inputs::Input;
 use super::layout::Layout;
 use super::open::{TraceFile, TraceSet};
 use super::pass::{Episodes, Event, pass};
-use super::rules::{Ids, Located, Rules, Start, starts};
+use super::rules::{Located, Rules};
 use super::schema::COLUMNS;
 
 /// What was checked and what was found.

@@ -1,14 +1,13 @@
 //! `score`: the episode table of traces, or the evidence for one episode.
 
-use std::io::{self, Write as _};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, scoring, spark};
 use crate::score::evidence;
-use crate::score::format::{self, Format};
-use crate::score::table::EpisodeTable;
+use crate::score::format::Format;
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -57,8 +56,11 @@ impl ScoreArgs {
             })?;
             return output::print(&found, self.json);
         }
+        if self.engine.engine == Engine::Native {
+            return self.deliver(format, |format, out| scoring::write(&inputs, &self.scoring, threads, format, out));
+        }
         let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        self.deliver(&table, format)
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
     }
 
     fn run_on_spark(&self) -> Result<Outcome, Failure> {
@@ -75,17 +77,20 @@ impl ScoreArgs {
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;
-        self.deliver(&asked()?.score(&[])?, format)
+        let table = asked()?.score(&[])?;
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
     }
 
     /// Writes the table to where it was asked for.
-    fn deliver(&self, table: &EpisodeTable, format: Option<Format>) -> Result<Outcome, Failure> {
+    fn deliver(
+        &self,
+        format: Option<Format>,
+        write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<(), Failure>,
+    ) -> Result<Outcome, Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
-        let mut bytes = Vec::new();
-        format::write(table, format, &mut bytes).map_err(Failure::input)?;
         match &self.output {
-            Some(path) => output::write_file(path, &bytes)?,
-            None => io::stdout().lock().write_all(&bytes)?,
+            Some(path) => output::write_file_with(path, |file| write(format, &mut BufWriter::new(file)))?,
+            None => write(format, &mut BufWriter::new(io::stdout()))?,
         }
         Ok(Outcome::Done)
     }

@@ -4,29 +4,42 @@ use std::io::{Read, Write};
 
 use super::FormatError;
 use crate::metric::catalog::Catalog;
-use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
 
 /// The key columns, in the order of the file.
 pub(super) const KEYS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
 
-pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatError> {
-    let mut writer = csv::Writer::from_writer(out);
-    let labels = table.labels.iter().map(|label| label.name.as_str());
-    let metrics = table.metrics.iter().map(|metric| metric.name.as_str());
-    writer.write_record(KEYS.into_iter().chain(labels).chain(metrics)).map_err(io)?;
-    for (row, key) in table.keys.iter().enumerate() {
-        let keys = [
-            key.episode_id.clone(),
-            key.model.clone(),
-            key.experiment.clone(),
-            key.seed.to_string(),
-            key.run.to_string(),
-        ];
-        let labels = table.labels.iter().map(|label| label.values[row].clone().unwrap_or_default());
-        let metrics = table.metrics.iter().map(|metric| metric.values[row].map_or_else(String::new, |v| v.to_string()));
-        writer.write_record(keys.into_iter().chain(labels).chain(metrics)).map_err(io)?;
+/// Writes a table as comma-separated values.
+pub(super) struct Writer<W: Write>(csv::Writer<W>);
+
+impl<W: Write> Writer<W> {
+    pub(super) fn new(header: &Header, out: W) -> Result<Self, FormatError> {
+        let mut writer = csv::Writer::from_writer(out);
+        let columns = header.labels.iter().chain(&header.metrics).map(String::as_str);
+        writer.write_record(KEYS.into_iter().chain(columns)).map_err(io)?;
+        Ok(Self(writer))
     }
-    Ok(writer.flush()?)
+
+    pub(super) fn write(&mut self, row: &EpisodeRow) -> Result<(), FormatError> {
+        let EpisodeKey { experiment, model, seed, run, episode_id } = &row.key;
+        for key in [episode_id, model, experiment] {
+            self.0.write_field(key).map_err(io)?;
+        }
+        for key in [seed, run] {
+            self.0.write_field(key.to_string()).map_err(io)?;
+        }
+        for label in &row.labels {
+            self.0.write_field(label.as_deref().unwrap_or_default()).map_err(io)?;
+        }
+        for metric in &row.metrics {
+            self.0.write_field(metric.map_or_else(String::new, |value| value.to_string())).map_err(io)?;
+        }
+        self.0.write_record(None::<&[u8]>).map_err(io)
+    }
+
+    pub(super) fn finish(mut self) -> Result<(), FormatError> {
+        Ok(self.0.flush()?)
+    }
 }
 
 fn io(error: csv::Error) -> FormatError {

@@ -12,11 +12,12 @@ mod parquet;
 mod surroundings;
 
 use std::collections::HashSet;
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 
+use ::parquet::errors::ParquetError;
 use ::parquet::file::reader::ChunkReader;
 
-use super::table::EpisodeTable;
+use super::table::{EpisodeRow, EpisodeTable, Header};
 use crate::metric::catalog::{Catalog, Kind};
 
 pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
@@ -107,15 +108,77 @@ pub enum FormatError {
     Definitions(String),
 }
 
+impl FormatError {
+    /// What the system said, if it is what failed: mostly for want of space or of a reader.
+    ///
+    /// # Errors
+    /// This error, if it is another one.
+    pub fn into_io(self) -> Result<io::Error, Self> {
+        match self {
+            Self::Io(error) => Ok(error),
+            Self::Parquet(ParquetError::External(error)) => match error.downcast::<io::Error>() {
+                Ok(error) => Ok(*error),
+                Err(error) => Err(Self::Parquet(ParquetError::External(error))),
+            },
+            other => Err(other),
+        }
+    }
+}
+
 /// Writes a table.
 ///
 /// # Errors
 /// Whatever writing gives.
 pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Result<(), FormatError> {
-    match format {
-        Format::Parquet => parquet::write(table, out),
-        Format::Csv => csv::write(table, out),
-        Format::JsonLines => jsonl::write(table, out),
+    let mut writer = Writer::new(table.header(), format, out)?;
+    table.rows().try_for_each(|row| writer.write(&row))?;
+    writer.finish()
+}
+
+/// Writes a table row by row: memory does not grow with it.
+pub struct Writer<W: Write + Send>(Inner<W>);
+
+enum Inner<W: Write + Send> {
+    Parquet(parquet::Writer<W>),
+    Csv(csv::Writer<W>),
+    JsonLines(jsonl::Writer<W>),
+}
+
+impl<W: Write + Send> Writer<W> {
+    /// Starts a table.
+    ///
+    /// # Errors
+    /// Whatever writing gives.
+    pub fn new(header: Header, format: Format, out: W) -> Result<Self, FormatError> {
+        Ok(Self(match format {
+            Format::Parquet => Inner::Parquet(parquet::Writer::new(&header, out)?),
+            Format::Csv => Inner::Csv(csv::Writer::new(&header, out)?),
+            Format::JsonLines => Inner::JsonLines(jsonl::Writer::new(header, out)),
+        }))
+    }
+
+    /// Adds a row, which must not come before the last one.
+    ///
+    /// # Errors
+    /// Whatever writing gives.
+    pub fn write(&mut self, row: &EpisodeRow) -> Result<(), FormatError> {
+        match &mut self.0 {
+            Inner::Parquet(writer) => writer.write(row),
+            Inner::Csv(writer) => writer.write(row),
+            Inner::JsonLines(writer) => writer.write(row),
+        }
+    }
+
+    /// Writes what is left.
+    ///
+    /// # Errors
+    /// Whatever writing gives.
+    pub fn finish(self) -> Result<(), FormatError> {
+        match self.0 {
+            Inner::Parquet(writer) => writer.finish(),
+            Inner::Csv(writer) => writer.finish(),
+            Inner::JsonLines(writer) => writer.finish(),
+        }
     }
 }
 

@@ -3,9 +3,11 @@
 use std::io::Write;
 use std::sync::Arc;
 
-use arrow::array::{Array, ArrayRef, AsArray as _, Int32Array, Int64Array, RecordBatch, StringArray};
+use arrow::array::{
+    Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Builder, RecordBatch, StringBuilder,
+};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
+use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema, SchemaRef};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, ZstdLevel};
@@ -18,7 +20,8 @@ use super::FormatError;
 use super::csv::{KEYS, check_unique};
 use super::footer;
 use super::surroundings::Surroundings;
-use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use crate::metric::catalog::Catalog;
+use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
 use crate::trace::contain::contained;
 
 /// The footer key that tells scores from traces.
@@ -51,54 +54,111 @@ pub fn holds_definitions(file: &impl ChunkReader) -> bool {
     matches!(footer, Ok(Ok(metadata)) if footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
 }
 
-pub(super) fn write(table: &EpisodeTable, out: impl Write + Send) -> Result<(), FormatError> {
-    let batch = batch(table)?;
-    let definitions =
-        serde_json::to_string(&table.catalog).map_err(|error| FormatError::Definitions(error.to_string()))?;
+/// Rows after which a row group is closed: what is encoded and not yet written stays small.
+const ROW_GROUP_ROWS: usize = 64 * 1024;
+/// Rows that are gathered before they are encoded.
+const GATHERED_ROWS: usize = 8 * 1024;
+
+/// Writes a table as Parquet.
+pub(super) struct Writer<W: Write + Send> {
+    parquet: ArrowWriter<W>,
+    schema: SchemaRef,
+    gathered: Gathered,
+}
+
+impl<W: Write + Send> Writer<W> {
+    pub(super) fn new(header: &Header, out: W) -> Result<Self, FormatError> {
+        let schema = Arc::new(schema(header));
+        let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties(&header.catalog)?))?;
+        Ok(Self { parquet, schema, gathered: Gathered::new(header) })
+    }
+
+    pub(super) fn write(&mut self, row: &EpisodeRow) -> Result<(), FormatError> {
+        self.gathered.add(row);
+        if self.gathered.seed.len() == GATHERED_ROWS { self.encode() } else { Ok(()) }
+    }
+
+    fn encode(&mut self) -> Result<(), FormatError> {
+        let batch = RecordBatch::try_new(Arc::clone(&self.schema), self.gathered.take())
+            .map_err(|error| FormatError::Parquet(ParquetError::ArrowError(error.to_string())))?;
+        Ok(self.parquet.write(&batch)?)
+    }
+
+    pub(super) fn finish(mut self) -> Result<(), FormatError> {
+        self.encode()?;
+        self.parquet.close()?;
+        Ok(())
+    }
+}
+
+fn properties(catalog: &Catalog) -> Result<WriterProperties, FormatError> {
+    let definitions = serde_json::to_string(catalog).map_err(|error| FormatError::Definitions(error.to_string()))?;
     let pair = |key: &str, value: &str| KeyValue::new(key.to_owned(), value.to_owned());
     let metadata = vec![
         pair(KIND_KEY, SCORES_KIND),
         pair("mirrorstats.writer", concat!("mirrorstats ", env!("CARGO_PKG_VERSION"))),
-        pair(HASH_KEY, &table.catalog.hash),
+        pair(HASH_KEY, &catalog.hash),
         pair(DEFINITIONS_KEY, &definitions),
     ];
     let properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        .set_key_value_metadata(Some(metadata))
-        .build();
-    let mut writer = ArrowWriter::try_new(out, batch.schema(), Some(properties))?;
-    writer.write(&batch)?;
-    writer.close()?;
-    Ok(())
+        .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
+        .set_key_value_metadata(Some(metadata));
+    Ok(properties.build())
 }
 
-fn batch(table: &EpisodeTable) -> Result<RecordBatch, FormatError> {
-    let text = |name: &str, of: fn(&EpisodeKey) -> &str| {
-        let array: StringArray = table.keys.iter().map(|key| Some(of(key))).collect();
-        (Field::new(name, DataType::Utf8, false), Arc::new(array) as ArrayRef)
-    };
-    let int = |name: &str, of: fn(&EpisodeKey) -> i32| {
-        let array: Int32Array = table.keys.iter().map(of).collect::<Vec<_>>().into();
-        (Field::new(name, DataType::Int32, false), Arc::new(array) as ArrayRef)
-    };
-    let mut columns = vec![
-        text(KEYS[0], |key| &key.episode_id),
-        text(KEYS[1], |key| &key.model),
-        text(KEYS[2], |key| &key.experiment),
-        int(KEYS[3], |key| key.seed),
-        int(KEYS[4], |key| key.run),
-    ];
-    for label in &table.labels {
-        let array: StringArray = label.values.iter().map(Option::as_deref).collect();
-        columns.push((Field::new(&label.name, DataType::Utf8, true), Arc::new(array)));
+fn schema(header: &Header) -> Schema {
+    let keys = KEYS.iter().zip([DataType::Utf8, DataType::Utf8, DataType::Utf8, DataType::Int32, DataType::Int32]);
+    let keys = keys.map(|(name, ty)| Field::new(*name, ty, false));
+    let labels = header.labels.iter().map(|name| Field::new(name, DataType::Utf8, true));
+    let metrics = header.metrics.iter().map(|name| Field::new(name, DataType::Int64, true));
+    Schema::new(keys.chain(labels).chain(metrics).collect::<Vec<_>>())
+}
+
+/// Rows as columns that grow.
+struct Gathered {
+    texts: [StringBuilder; 3],
+    seed: Int32Builder,
+    run: Int32Builder,
+    labels: Vec<StringBuilder>,
+    metrics: Vec<Int64Builder>,
+}
+
+impl Gathered {
+    fn new(header: &Header) -> Self {
+        Self {
+            texts: Default::default(),
+            seed: Int32Builder::new(),
+            run: Int32Builder::new(),
+            labels: header.labels.iter().map(|_| StringBuilder::new()).collect(),
+            metrics: header.metrics.iter().map(|_| Int64Builder::new()).collect(),
+        }
     }
-    for metric in &table.metrics {
-        let array: Int64Array = metric.values.iter().copied().collect();
-        columns.push((Field::new(&metric.name, DataType::Int64, true), Arc::new(array)));
+
+    fn add(&mut self, row: &EpisodeRow) {
+        let EpisodeKey { experiment, model, seed, run, episode_id } = &row.key;
+        for (column, text) in self.texts.iter_mut().zip([episode_id, model, experiment]) {
+            column.append_value(text);
+        }
+        self.seed.append_value(*seed);
+        self.run.append_value(*run);
+        for (column, label) in self.labels.iter_mut().zip(&row.labels) {
+            column.append_option(label.as_deref());
+        }
+        for (column, metric) in self.metrics.iter_mut().zip(&row.metrics) {
+            column.append_option(*metric);
+        }
     }
-    let (fields, arrays): (Vec<Field>, Vec<ArrayRef>) = columns.into_iter().unzip();
-    RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays)
-        .map_err(|error| FormatError::Parquet(ParquetError::ArrowError(error.to_string())))
+
+    /// The columns in the order of the schema; none is left behind.
+    fn take(&mut self) -> Vec<ArrayRef> {
+        let mut columns: Vec<ArrayRef> = Vec::new();
+        columns.extend(self.texts.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef));
+        columns.extend([&mut self.seed, &mut self.run].map(|column| Arc::new(column.finish()) as ArrayRef));
+        columns.extend(self.labels.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef));
+        columns.extend(self.metrics.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef));
+        columns
+    }
 }
 
 pub(super) fn read(

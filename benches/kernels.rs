@@ -1,0 +1,129 @@
+//! The kernels alone, on one batch in memory: `cargo bench --bench kernels`.
+//!
+//! A batch of 64 Ki steps is what a scan hands over; each definition here is mostly one kernel.
+
+use std::hint::black_box;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray, DictionaryArray, Int64Array, RecordBatch};
+use arrow::datatypes::Int32Type;
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use mirrorstats::metric::definitions::Definitions;
+use mirrorstats::score::engine::{Batch, Engine};
+use mirrorstats::score::rows::{RowSorter, Rows};
+use mirrorstats::score::run::schema_columns;
+use mirrorstats::score::segments::Segments;
+use mirrorstats::score::table::Header;
+
+const STEPS: usize = 64 * 1024;
+const LENGTH: usize = 70;
+
+/// One kernel each, but for the last ones.
+const EXPRESSIONS: [(&str, &str); 8] = [
+    ("text equals constant, first", "first(action = 'done')"),
+    ("text equals text, any", "any(self_color = body_color)"),
+    ("truth, count", "count(mirror_visible)"),
+    ("window, any", "any(mirror_visible and t < 40)"),
+    ("lookup", "at(self_color, 7) = 'red'"),
+    ("numbers, max", "max(mirror_self_px)"),
+    ("numbers, sum of a case", "sum(case when mirror_visible then mirror_self_px else 0 end)"),
+    ("pattern", "count(regexp_like(self_color, '^b'))"),
+];
+
+/// Steps and episodes in columns, and where episodes begin.
+struct Sample {
+    offsets: Vec<usize>,
+    steps: RecordBatch,
+    episodes: RecordBatch,
+}
+
+impl Sample {
+    fn new() -> Self {
+        let offsets: Vec<usize> = (0..STEPS).step_by(LENGTH).chain([STEPS]).collect();
+        let episodes = offsets.len() - 1;
+        let texts = |count: usize, of: &dyn Fn(usize) -> Option<String>| {
+            let texts: Vec<Option<String>> = (0..count).map(of).collect();
+            Arc::new(texts.iter().map(Option::as_deref).collect::<DictionaryArray<Int32Type>>()) as ArrayRef
+        };
+        let one = |of: &[&str], at: usize| Some(of[at % of.len()].to_owned());
+        let numbers = |count: usize, of: &dyn Fn(usize) -> i64| Arc::new((0..count).map(of).collect::<Int64Array>());
+        let colors = ["unknown", "red", "blue", "green"];
+        let steps = RecordBatch::try_from_iter_with_nullable([
+            ("action", texts(STEPS, &|at| one(&["move_forward", "turn_left", "done"], mixed(at))), true),
+            ("self_color", texts(STEPS, &|at| one(&colors, at / 9)), true),
+            ("selected_cube", texts(STEPS, &|at| one(&["none", "red", "blue"], at / 11)), true),
+            (
+                "mirror_visible",
+                Arc::new((0..STEPS).map(|at| Some(at / 5 % 3 == 0)).collect::<BooleanArray>()) as _,
+                false,
+            ),
+            ("mirror_self_px", numbers(STEPS, &|at| i64::try_from(mixed(at) % 900).unwrap()) as _, true),
+        ]);
+        let constants = RecordBatch::try_from_iter_with_nullable([
+            ("episode_id", texts(episodes, &|at| Some(format!("episode-{:06}", mixed(at)))), false),
+            ("model", texts(episodes, &|at| one(&["one", "other"], at)), false),
+            ("experiment", texts(episodes, &|at| one(&["E1", "E2", "E5"], at)), false),
+            ("seed", numbers(episodes, &|at| i64::try_from(at % 3).unwrap()) as _, false),
+            ("run", numbers(episodes, &|at| i64::try_from(at % 7).unwrap()) as _, false),
+            ("body_color", texts(episodes, &|at| one(&colors[1..], at)), false),
+        ]);
+        Self { offsets, steps: steps.unwrap(), episodes: constants.unwrap() }
+    }
+
+    fn batch(&self) -> Batch<'_> {
+        Batch { segments: Segments::new(&self.offsets), steps: &self.steps, episodes: &self.episodes }
+    }
+}
+
+/// Numbers without an order.
+fn mixed(at: usize) -> usize {
+    at.wrapping_mul(0x9E37_79B1) >> 7 & 0xF_FFFF
+}
+
+fn definitions(expression: &str) -> Definitions {
+    let toml = format!("[metric.M]\nvalue = \"{expression}\"\n");
+    Definitions::from_toml("bench", &toml, &schema_columns()).unwrap()
+}
+
+fn kernels(criterion: &mut Criterion) {
+    let sample = Sample::new();
+    let mut group = criterion.benchmark_group("kernels");
+    group.throughput(Throughput::Elements(STEPS as u64));
+    let mut bench = |name: &str, definitions: &Definitions| {
+        let engine = Engine::new(&definitions.plan);
+        group.bench_function(name, |bencher| bencher.iter(|| engine.score(black_box(&sample.batch())).unwrap()));
+    };
+    for (name, expression) in EXPRESSIONS {
+        bench(name, &definitions(expression));
+    }
+    bench("the paper's ten metrics", &Definitions::load("paper", &schema_columns()).unwrap());
+    group.finish();
+}
+
+fn rows(criterion: &mut Criterion) {
+    let sample = Sample::new();
+    let definitions = Definitions::load("paper", &schema_columns()).unwrap();
+    let scores = Engine::new(&definitions.plan).score(&sample.batch()).unwrap();
+    let mut group = criterion.benchmark_group("rows");
+    group.throughput(Throughput::Elements(scores.kept.len() as u64));
+    group.bench_function("as bytes", |bencher| bencher.iter(|| Rows::of(&sample.episodes, black_box(&scores), &[])));
+    let rows = Rows::of(&sample.episodes, &scores, &[]);
+    let metrics = definitions.plan.outputs.iter().map(|output| output.name.clone()).collect();
+    let header = Header { catalog: definitions.catalog.clone(), labels: Vec::new(), metrics };
+    group.bench_function("sorted and read back", |bencher| {
+        bencher.iter(|| {
+            let mut sorter = RowSorter::new(header.clone());
+            sorter.add(black_box(&rows)).unwrap();
+            let mut sorted = sorter.finish().unwrap();
+            while sorted.next().unwrap().is_some() {}
+        });
+    });
+    group.finish();
+}
+
+fn quick() -> Criterion {
+    Criterion::default().sample_size(20).without_plots()
+}
+
+criterion_group! { name = all; config = quick(); targets = kernels, rows }
+criterion_main!(all);

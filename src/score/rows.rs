@@ -1,0 +1,402 @@
+//! Rows of the episode table on their way from the order of the files into the order of the table.
+//!
+//! Rule: a row is bytes that compare as its key does, so that sorting knows no column. Rows beyond a fixed amount of
+//! memory are put away as sorted runs ([`crate::base::runs`]); how many there are changes nothing but the time.
+//!
+//! ```text
+//! experiment 00 00  model 00 00  seed  run  episode_id 00 00  labels  metrics
+//! ```
+//!
+//! Zero bytes within a text are followed by FF, integers are big-endian with the sign bit turned over.
+
+use std::borrow::Cow;
+use std::io;
+use std::ops::Range;
+
+use arrow::array::{Array, ArrayRef, AsArray as _, DictionaryArray, Int64Array, RecordBatch};
+use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
+
+use super::engine::Scores;
+use super::table::{EpisodeKey, EpisodeRow, Header};
+use crate::base::runs::{Merge, Run, Runs};
+use crate::trace::scan::EPISODE_COLUMNS;
+
+/// Bytes of rows that are held in memory before they are put away.
+const MEMORY: usize = 8 << 20;
+
+/// Some rows as bytes.
+#[derive(Debug, Default)]
+pub struct Rows {
+    bytes: Vec<u8>,
+    records: Vec<Range<usize>>,
+}
+
+impl Rows {
+    /// The scores of the episodes of one batch, in the order of their keys.
+    pub fn of(episodes: &RecordBatch, scores: &Scores, labels: &[String]) -> Self {
+        let keys = KeyColumns::of(episodes);
+        let column = |name: &String| episodes.column_by_name(name).expect("the projection asks for this column");
+        let labels: Vec<&ArrayRef> = labels.iter().map(column).collect();
+        let mut rows = Self::default();
+        for (at, &row) in scores.kept.iter().enumerate() {
+            let start = rows.bytes.len();
+            keys.put(&mut rows.bytes, row);
+            labels.iter().for_each(|label| put_label(&mut rows.bytes, shown(label, row).as_deref()));
+            scores.metrics.iter().for_each(|metric| put_metric(&mut rows.bytes, metric[at]));
+            rows.records.push(start..rows.bytes.len());
+        }
+        rows.sort();
+        rows
+    }
+
+    fn sort(&mut self) {
+        let bytes = &self.bytes;
+        self.records.sort_by(|a, b| bytes[a.clone()].cmp(&bytes[b.clone()]));
+    }
+
+    fn append(&mut self, other: &Self) {
+        let offset = self.bytes.len();
+        self.bytes.extend_from_slice(&other.bytes);
+        self.records.extend(other.records.iter().map(|record| record.start + offset..record.end + offset));
+    }
+
+    /// Takes all rows out as a sorted run.
+    fn take(&mut self) -> Run {
+        self.sort();
+        let mut run = Run::default();
+        self.records.drain(..).for_each(|record| run.push(&self.bytes[record]));
+        self.bytes.clear();
+        run
+    }
+}
+
+/// Sorts rows as they come, in bounded memory.
+pub struct RowSorter {
+    header: Header,
+    pending: Rows,
+    runs: Runs,
+    memory: usize,
+}
+
+impl RowSorter {
+    /// A sorter without rows.
+    pub fn new(header: Header) -> Self {
+        Self { header, pending: Rows::default(), runs: Runs::default(), memory: MEMORY }
+    }
+
+    /// Adds rows.
+    ///
+    /// # Errors
+    /// When rows cannot be put away.
+    pub fn add(&mut self, rows: &Rows) -> io::Result<()> {
+        self.pending.append(rows);
+        if self.pending.bytes.len() >= self.memory {
+            let run = self.pending.take();
+            self.runs.put_away(&run)?;
+        }
+        Ok(())
+    }
+
+    /// All rows in order.
+    ///
+    /// # Errors
+    /// When rows that were put away cannot be read.
+    pub fn finish(mut self) -> io::Result<SortedRows> {
+        let merge = self.runs.merge(self.pending.take())?;
+        Ok(SortedRows { header: self.header, merge, row: EpisodeRow::default() })
+    }
+}
+
+/// The rows of a table, one after the other.
+pub struct SortedRows {
+    header: Header,
+    merge: Merge,
+    row: EpisodeRow,
+}
+
+impl SortedRows {
+    /// What stands above them.
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// The next row.
+    ///
+    /// # Errors
+    /// When rows that were put away cannot be read.
+    pub fn next(&mut self) -> io::Result<Option<&EpisodeRow>> {
+        let Some(record) = self.merge.next()? else { return Ok(None) };
+        let mut record = Record(record);
+        let EpisodeRow { key, labels, metrics } = &mut self.row;
+        let EpisodeKey { experiment, model, seed, run, episode_id } = key;
+        record.text(experiment)?;
+        record.text(model)?;
+        *seed = record.int()?;
+        *run = record.int()?;
+        record.text(episode_id)?;
+        labels.resize(self.header.labels.len(), None);
+        labels.iter_mut().try_for_each(|label| record.label(label))?;
+        metrics.clear();
+        for _ in &self.header.metrics {
+            metrics.push(record.metric()?);
+        }
+        Ok(Some(&self.row))
+    }
+}
+
+/// The keys of some rows of [`crate::trace::scan::EpisodeBatch::episodes`].
+pub(super) fn keys(episodes: &RecordBatch, rows: impl IntoIterator<Item = usize>) -> Vec<EpisodeKey> {
+    let columns = KeyColumns::of(episodes);
+    let owned = |column: &DictionaryArray<Int32Type>, row| text(column, row).unwrap_or_default().to_owned();
+    let key = |row: usize| EpisodeKey {
+        experiment: owned(columns.experiment, row),
+        model: owned(columns.model, row),
+        seed: columns.seed(row),
+        run: columns.run(row),
+        episode_id: owned(columns.episode_id, row),
+    };
+    rows.into_iter().map(key).collect()
+}
+
+/// The key columns of a batch.
+struct KeyColumns<'a> {
+    experiment: &'a DictionaryArray<Int32Type>,
+    model: &'a DictionaryArray<Int32Type>,
+    seed: &'a Int64Array,
+    run: &'a Int64Array,
+    episode_id: &'a DictionaryArray<Int32Type>,
+}
+
+impl<'a> KeyColumns<'a> {
+    fn of(episodes: &'a RecordBatch) -> Self {
+        let column = |name: &str| episodes.column_by_name(name).expect("every batch has the key columns");
+        let [episode_id, model, experiment, seed, run] = EPISODE_COLUMNS.map(column);
+        Self {
+            experiment: experiment.as_dictionary(),
+            model: model.as_dictionary(),
+            seed: seed.as_primitive(),
+            run: run.as_primitive(),
+            episode_id: episode_id.as_dictionary(),
+        }
+    }
+
+    fn seed(&self, row: usize) -> i32 {
+        i32::try_from(self.seed.value(row)).unwrap_or_default()
+    }
+
+    fn run(&self, row: usize) -> i32 {
+        i32::try_from(self.run.value(row)).unwrap_or_default()
+    }
+
+    fn put(&self, bytes: &mut Vec<u8>, row: usize) {
+        put_text(bytes, text(self.experiment, row).unwrap_or_default());
+        put_text(bytes, text(self.model, row).unwrap_or_default());
+        // The scan has checked that seed and run fit.
+        put_int(bytes, self.seed(row));
+        put_int(bytes, self.run(row));
+        put_text(bytes, text(self.episode_id, row).unwrap_or_default());
+    }
+}
+
+/// The text at a row of a text column; `None` for null.
+fn text(column: &DictionaryArray<Int32Type>, row: usize) -> Option<&str> {
+    let texts = column.values().as_string::<i32>();
+    let key = column.key(row).filter(|&key| texts.is_valid(key))?;
+    Some(texts.value(key))
+}
+
+/// The value at a row of any column as text; `None` for null.
+fn shown(column: &ArrayRef, row: usize) -> Option<Cow<'_, str>> {
+    if column.is_null(row) {
+        return None;
+    }
+    match column.data_type() {
+        DataType::Boolean => Some(column.as_boolean().value(row).to_string().into()),
+        DataType::Int64 => Some(column.as_primitive::<Int64Type>().value(row).to_string().into()),
+        DataType::Float64 => Some(column.as_primitive::<Float64Type>().value(row).to_string().into()),
+        _ => text(column.as_dictionary(), row).map(Cow::from),
+    }
+}
+
+/// Ends a text, and sorts before anything that could stand there.
+const END: [u8; 2] = [0, 0];
+/// A zero byte within a text.
+const ZERO: [u8; 2] = [0, 0xFF];
+
+fn put_text(bytes: &mut Vec<u8>, text: &str) {
+    for (at, part) in text.split('\0').enumerate() {
+        if at > 0 {
+            bytes.extend_from_slice(&ZERO);
+        }
+        bytes.extend_from_slice(part.as_bytes());
+    }
+    bytes.extend_from_slice(&END);
+}
+
+fn put_int(bytes: &mut Vec<u8>, value: i32) {
+    bytes.extend_from_slice(&(value ^ i32::MIN).to_be_bytes());
+}
+
+const NO_LABEL: u8 = 0;
+const LABEL: u8 = 1;
+
+fn put_label(bytes: &mut Vec<u8>, label: Option<&str>) {
+    match label {
+        None => bytes.push(NO_LABEL),
+        Some(text) => {
+            bytes.push(LABEL);
+            put_text(bytes, text);
+        }
+    }
+}
+
+/// An undefined metric.
+const UNDEFINED: u8 = 0xFF;
+/// A metric whose value takes eight bytes; any other byte is the value.
+const LARGE: u8 = 0xFE;
+
+fn put_metric(bytes: &mut Vec<u8>, metric: Option<i64>) {
+    match metric.map(|value| (value, u8::try_from(value))) {
+        None => bytes.push(UNDEFINED),
+        Some((_, Ok(small))) if small < LARGE => bytes.push(small),
+        Some((value, _)) => {
+            bytes.push(LARGE);
+            bytes.extend_from_slice(&value.to_le_bytes());
+        }
+    }
+}
+
+/// What is left of a row's bytes.
+struct Record<'a>(&'a [u8]);
+
+impl Record<'_> {
+    fn take(&mut self, length: usize) -> io::Result<&[u8]> {
+        let (taken, rest) = self.0.split_at_checked(length).ok_or_else(damaged)?;
+        self.0 = rest;
+        Ok(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> io::Result<[u8; N]> {
+        self.take(N)?.try_into().map_err(|_| damaged())
+    }
+
+    /// Reads a text into a buffer.
+    fn text(&mut self, text: &mut String) -> io::Result<()> {
+        text.clear();
+        loop {
+            let until = self.0.iter().position(|byte| *byte == 0).ok_or_else(damaged)?;
+            text.push_str(str::from_utf8(self.take(until)?).map_err(|_| damaged())?);
+            match self.array()? {
+                END => return Ok(()),
+                _ => text.push('\0'),
+            }
+        }
+    }
+
+    fn int(&mut self) -> io::Result<i32> {
+        Ok(i32::from_be_bytes(self.array()?) ^ i32::MIN)
+    }
+
+    fn label(&mut self, label: &mut Option<String>) -> io::Result<()> {
+        match self.array()? {
+            [NO_LABEL] => {
+                *label = None;
+                Ok(())
+            }
+            _ => self.text(label.get_or_insert_default()),
+        }
+    }
+
+    fn metric(&mut self) -> io::Result<Option<i64>> {
+        Ok(match self.array()? {
+            [UNDEFINED] => None,
+            [LARGE] => Some(i64::from_le_bytes(self.array()?)),
+            [small] => Some(small.into()),
+        })
+    }
+}
+
+fn damaged() -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, "a temporary file was changed by another program")
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use arrow::array::{DictionaryArray, Int64Array};
+    use proptest::collection::vec;
+    use proptest::option;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::metric::definitions::Definitions;
+    use crate::score::run::schema_columns;
+
+    fn header() -> Header {
+        let catalog = Definitions::from_toml("none", "", &schema_columns()).unwrap().catalog;
+        Header { catalog, labels: vec!["distractors".into()], metrics: vec!["A".into(), "B".into()] }
+    }
+
+    fn row() -> impl Strategy<Value = EpisodeRow> {
+        let name = || proptest::string::string_regex("[a\u{0}\u{1}é\u{ff}]{0,3}").unwrap();
+        let number = || prop_oneof![-2..3, Just(i32::MIN), Just(i32::MAX)];
+        let metric = || option::of(prop_oneof![-1..3_i64, 252..258_i64, Just(i64::MIN), Just(i64::MAX)]);
+        let key =
+            (name(), name(), number(), number(), name()).prop_map(|(experiment, model, seed, run, episode_id)| {
+                EpisodeKey { experiment, model, seed, run, episode_id }
+            });
+        (key, option::of(0..3_i64), vec(metric(), 2)).prop_map(|(key, distractors, metrics)| EpisodeRow {
+            key,
+            labels: vec![distractors.map(|number| number.to_string())],
+            metrics,
+        })
+    }
+
+    /// Rows as one batch gives them.
+    fn batch(rows: &[EpisodeRow]) -> Rows {
+        let texts = |of: fn(&EpisodeKey) -> &str| {
+            let texts = rows.iter().map(|row| Some(of(&row.key)));
+            Arc::new(texts.collect::<DictionaryArray<Int32Type>>()) as ArrayRef
+        };
+        let ints = |of: fn(&EpisodeKey) -> i32| {
+            Arc::new(rows.iter().map(|row| i64::from(of(&row.key))).collect::<Int64Array>()) as ArrayRef
+        };
+        let distractors: Int64Array =
+            rows.iter().map(|row| row.labels[0].as_ref().map(|label| label.parse::<i64>().unwrap())).collect();
+        let episodes = RecordBatch::try_from_iter_with_nullable([
+            ("episode_id", texts(|key| &key.episode_id), false),
+            ("model", texts(|key| &key.model), false),
+            ("experiment", texts(|key| &key.experiment), false),
+            ("seed", ints(|key| key.seed), false),
+            ("run", ints(|key| key.run), false),
+            ("distractors", Arc::new(distractors), true),
+        ]);
+        let metrics = (0..2).map(|metric| rows.iter().map(|row| row.metrics[metric]).collect()).collect();
+        let scores = Scores { kept: (0..rows.len()).collect(), metrics };
+        Rows::of(&episodes.unwrap(), &scores, &["distractors".to_owned()])
+    }
+
+    proptest! {
+        #[test]
+        fn rows_come_out_as_they_went_in_and_in_the_order_of_keys(
+            rows in vec(row(), 1..30), batches in 1_usize..10, memory in 1_usize..400,
+        ) {
+            let mut sorter = RowSorter { memory, ..RowSorter::new(header()) };
+            for some in rows.chunks(rows.len().div_ceil(batches)) {
+                sorter.add(&batch(some)).unwrap();
+            }
+            let mut sorted = sorter.finish().unwrap();
+            let mut found = Vec::new();
+            while let Some(row) = sorted.next().unwrap() {
+                found.push(row.clone());
+            }
+            prop_assert!(found.is_sorted_by_key(|row| row.key.clone()));
+            let by_all = |row: &EpisodeRow| (row.key.clone(), row.labels.clone(), row.metrics.clone());
+            let mut expected = rows;
+            expected.sort_by_key(by_all);
+            found.sort_by_key(by_all);
+            prop_assert_eq!(found, expected);
+        }
+    }
+}

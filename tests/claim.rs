@@ -10,10 +10,15 @@ fn the_last_to_leave_takes_away_what_nobody_needs() {
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("runs");
     let (first, second) = (Claim::stake(&folder).unwrap(), Claim::stake(&folder).unwrap());
-    drop(first);
-    assert!(second.parts().is_dir());
     drop(second);
-    assert!(!folder.exists());
+    assert!(first.parts().is_dir());
+    drop(first);
+    assert!(!folder.exists(), "it was made for the recording, and nothing was recorded");
+
+    let (first, second) = (Claim::stake(&folder).unwrap(), Claim::stake(&folder).unwrap());
+    drop(first);
+    drop(second);
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 0, "the second cannot know that the folder was made for it");
 }
 
 #[test]

@@ -78,7 +78,7 @@ pub enum Engine {
 /// How to submit to Spark.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct SparkArgs {
-    /// The master of --engine spark: spark://HOST:PORT, yarn, local[2], ... [default: what your Spark is configured for]
+    /// The master of --engine spark: spark://HOST:PORT, yarn, local, ... [default: what your Spark is configured for]
     #[arg(long, value_name = "URL")]
     pub master: Option<String>,
     /// A setting for --engine spark, as often as needed

@@ -154,7 +154,7 @@ pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[Epi
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
-    let file = encode(file, &schema, recording.as_ref(), episodes).map_err(|error| failed(error.into()))?;
+    let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
     file.as_file().sync_all().map_err(|error| failed(error.into()))?;
     file.persist(path).map(drop).map_err(|error| failed(error.error.into()))
 }

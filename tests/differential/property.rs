@@ -30,14 +30,14 @@ enum Answer {
     Refused(String),
 }
 
-fn values(table: EpisodeTable) -> Answer {
+fn values(table: &EpisodeTable) -> Answer {
     let row = |row: usize| table.metrics.iter().map(|metric| metric.values[row]).collect();
     Answer::Values(table.keys.iter().enumerate().map(|(at, key)| (key.clone(), row(at))).collect())
 }
 
 fn native(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String> {
     match run::score(traces, definitions, &[], NonZeroUsize::MIN) {
-        Ok(table) => Ok(values(table)),
+        Ok(table) => Ok(values(&table)),
         Err(ScoreError::Engine { source: EngineError::Overflow { .. }, .. }) => Ok(Answer::Overflow),
         Err(ScoreError::Engine { source: EngineError::NotARate { .. }, .. }) => Ok(Answer::NotARate),
         Err(ScoreError::Trace(error)) => Ok(Answer::Refused(error.to_string())),
@@ -47,7 +47,7 @@ fn native(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String
 
 fn polars(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String> {
     match score::score(traces, definitions, &[], NonZeroUsize::MIN) {
-        Ok(table) => Ok(values(table)),
+        Ok(table) => Ok(values(&table)),
         Err(PolarsError::Overflow { .. }) => Ok(Answer::Overflow),
         Err(PolarsError::NotARate { .. }) => Ok(Answer::NotARate),
         Err(PolarsError::Score(ScoreError::Trace(error))) => Ok(Answer::Refused(error.to_string())),

@@ -48,9 +48,9 @@ fn on(cluster: &Cluster, folder: &Path, arguments: &[&str]) -> assert_cmd::Comma
     let mut command = program(folder);
     command.env("PYTHONPATH", &cluster.packages).env("SPARK_LOCAL_IP", "127.0.0.1");
     command.args(["score", "--engine", "spark", "--master", &cluster.master]).args(arguments);
-    SMALL.iter().for_each(|setting| {
+    for setting in SMALL {
         command.args(["--spark-conf", setting]);
-    });
+    }
     command
 }
 

@@ -87,9 +87,9 @@ impl fmt::Display for RecoverAnswer {
         let episodes = counted(self.episodes as u64, "episode");
         let steps = counted(self.steps as u64, "step");
         if self.written {
-            writeln!(f, "recovered {episodes}, {steps}")?
+            writeln!(f, "recovered {episodes}, {steps}")?;
         } else {
-            writeln!(f, "recovered no episode; no trace was written")?
+            writeln!(f, "recovered no episode; no trace was written")?;
         }
         for lost in &self.losses.episodes {
             let rows = counted(lost.rows as u64, "row");

@@ -41,7 +41,7 @@ pub struct ReplayArgs {
     /// Only this episode
     #[arg(long, value_name = "ID")]
     episode: Option<String>,
-    /// Render every step into this folder, as <episode>/t001.png
+    /// Render every step into this folder, as EPISODE/t001.png
     #[arg(long, value_name = "DIR")]
     frames: Option<PathBuf>,
     /// Write a log of the replay; for a single trace

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Rules: the statement reads nothing but the view `steps`, which the driver makes of the named traces alone. What the
-//! scan of traces refuses is refused here too, by one more aggregation ([`check`]), save for what only files and their
+//! scan of traces refuses is refused here too, by one more aggregation (`check`), save for what only files and their
 //! order can tell: that an episode's rows lie together, in order, in one file. Nothing is left out quietly: files that
 //! Spark would pass over and columns that it would read as null are refused.
 

@@ -1,4 +1,4 @@
-//! What changed from one scoring to another, as text for people: [`lists`] are its tables, [`words`] their fields.
+//! What changed from one scoring to another, as text for people: `lists` are its tables, `words` their fields.
 //!
 //! Rule: a list that is cut says how many lines it leaves out; a number stands beside the exact counts it comes from.
 

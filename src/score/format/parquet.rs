@@ -25,7 +25,7 @@ use crate::trace::contain::contained;
 pub const KIND_KEY: &str = "mirrorstats.kind";
 /// The value of [`KIND_KEY`] for scores.
 pub const SCORES_KIND: &str = "scores";
-/// The footer key of the definitions, as JSON ([`Catalog`]).
+/// The footer key of the definitions, as JSON (a `Catalog`).
 pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 /// The footer key of the definitions' hash.
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";

@@ -256,6 +256,11 @@ fn is_scores(input: &Input) -> bool {
     }
 }
 
+/// Whether a file of scores says what it was computed with; text and what other engines write does not.
+pub fn carries_definitions(input: &Input) -> bool {
+    File::open(&input.path).is_ok_and(|file| format::holds_definitions(&file))
+}
+
 /// Reads files of scores and puts them together.
 fn read_scores(inputs: &[&Input], scoring: &ScoringArgs) -> Result<EpisodeTable, Failure> {
     let mut whole: Option<EpisodeTable> = None;

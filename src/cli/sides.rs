@@ -105,9 +105,9 @@ impl Side {
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
             Self::Scores(inputs) => {
-                let is_text = inputs.iter().all(|input| !input.name.ends_with(".parquet"));
+                let carry = inputs.iter().any(scoring::carries_definitions);
                 let scoring = ScoringArgs {
-                    definitions: asked.text_definitions.filter(|_| is_text).map(str::to_owned),
+                    definitions: asked.text_definitions.filter(|_| !carry).map(str::to_owned),
                     metrics: None,
                     condition: asked.condition.map(str::to_owned),
                 };

@@ -55,6 +55,20 @@ fn scores_differ_as_their_definitions_do() {
 }
 
 #[test]
+fn a_folder_of_scores_is_one_table() {
+    let folder = folder();
+    let at = folder.path();
+    std::fs::create_dir(at.join("parts")).unwrap();
+    for part in ["a", "b"] {
+        let (traces, scores) = (format!("{part}.parquet"), format!("parts/{part}.parquet"));
+        run(at, &["score", &traces, "--definitions", "all.toml", "-o", &scores]).ends(0);
+    }
+    run(at, &["diff", "parts", "all.toml", "a.parquet", "b.parquet", "--fail-on-change"]).ends(0);
+    let said = run(at, &["diff", ".", "all.toml", "a.parquet"]).refused();
+    assert!(said.contains("found both"), "{said}");
+}
+
+#[test]
 fn nothing_changed_is_said_and_is_no_failure() {
     let folder = folder();
     let answer = run(folder.path(), &["diff", "all.toml", "all.toml", "a.parquet", "--fail-on-change"]).ends(0);

@@ -6,7 +6,6 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 use mcap::MAGIC;
-use mcap::McapError;
 use mcap::read::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -26,8 +25,8 @@ pub(super) enum Piece {
     Chunk(Vec<u8>),
     /// Bytes that are no record; the next piece follows them.
     Damage(String),
-    /// Nothing can be read from here on.
-    Cut(String),
+    /// Nothing can be read from here on: why, and the bytes of the chunk that is cut off, if it is one.
+    Cut(String, Vec<u8>),
 }
 
 /// The records of a file.
@@ -180,7 +179,9 @@ impl<R: Read + Seek> Records<R> {
             Piece::Damage(format!("bytes {from} to {next} cannot be read: {fault}"))
         } else {
             self.at = self.end;
-            Piece::Cut(format!("the log ends before its end record: after byte {from} nothing can be read"))
+            let tail = self.read(from, LONGEST)?;
+            let tail = if tail.first() == Some(&op::CHUNK) { tail } else { Vec::new() };
+            Piece::Cut(format!("the log ends before its end record: after byte {from} nothing can be read"), tail)
         })
     }
 
@@ -248,27 +249,39 @@ fn decode(opcode: u8, whole: &[u8]) -> Result<Piece, String> {
 /// # Errors
 /// When the chunk is damaged, in words.
 pub(super) fn inside(chunk: &[u8]) -> Result<Vec<Record<'static>>, String> {
-    let options = LinearReaderOptions::default()
-        .with_skip_start_magic(true)
-        .with_skip_end_magic(true)
-        .with_prevalidate_chunk_crcs(true)
-        .with_record_length_limit(LONGEST);
+    let mut found = Vec::new();
+    let options = LinearReaderOptions::default().with_prevalidate_chunk_crcs(true);
+    unpacked(chunk, options, |record| found.push(record))?;
+    Ok(found)
+}
+
+/// The records in front of a chunk that is cut off or damaged, as far as they can be read: enough to name what is lost,
+/// never enough to be saved.
+pub(super) fn glimpse(chunk: &[u8]) -> Vec<Record<'static>> {
+    let mut found = Vec::new();
+    // That it ends in a fault is known.
+    let _ = unpacked(chunk, LinearReaderOptions::default(), |record| found.push(record));
+    found
+}
+
+/// Gives the channels and messages of a chunk one after the other.
+fn unpacked(chunk: &[u8], options: LinearReaderOptions, mut give: impl FnMut(Record<'static>)) -> Result<(), String> {
+    let options = options.with_skip_start_magic(true).with_skip_end_magic(true).with_record_length_limit(LONGEST);
     let mut reader = LinearReader::new_with_options(options);
     let mut rest = chunk;
-    let mut found = Vec::new();
     while let Some(event) = reader.next_event() {
-        match event.map_err(|fault: McapError| fault.to_string())? {
+        match event.map_err(|fault| fault.to_string())? {
             LinearReadEvent::ReadRequest(wanted) => {
                 let (now, later) = rest.split_at(wanted.min(rest.len()));
                 reader.insert(now.len()).copy_from_slice(now);
                 reader.notify_read(now.len());
                 rest = later;
             }
-            LinearReadEvent::Record { data, opcode } if opcode != op::ATTACHMENT => {
-                found.push(parse_record(opcode, data).map_err(|fault| fault.to_string())?.into_owned());
+            LinearReadEvent::Record { data, opcode: opcode @ (op::CHANNEL | op::MESSAGE) } => {
+                give(parse_record(opcode, data).map_err(|fault| fault.to_string())?.into_owned());
             }
             LinearReadEvent::Record { .. } => {}
         }
     }
-    Ok(found)
+    Ok(())
 }

@@ -16,7 +16,7 @@ use serde_json::Value;
 
 use super::message::{EpisodeMessage, Head};
 use super::read::{Event, event};
-use super::records::{Piece, Records, inside};
+use super::records::{Piece, Records, glimpse, inside};
 use super::{LogError, METADATA, METADATA_KEY, topic};
 use crate::trace::episode::{Episode, Step};
 
@@ -117,7 +117,11 @@ impl Salvage {
                 Piece::Record(record) => salvage.record(record),
                 Piece::Chunk(chunk) => salvage.chunk(&chunk),
                 Piece::Damage(fault) => salvage.result.losses.damage.push(fault),
-                Piece::Cut(fault) => salvage.result.losses.cut = Some(fault),
+                Piece::Cut(fault, tail) => {
+                    salvage.close("the log ends before the episode does");
+                    salvage.lose_all(&tail, "the log ends before the episode does");
+                    salvage.result.losses.cut = Some(fault);
+                }
             }
         }
         if is_open && salvage.result.losses.cut.is_none() {
@@ -139,7 +143,7 @@ impl Salvage {
                 }
                 Piece::Record(_) | Piece::Chunk(_) => {}
                 Piece::Damage(fault) => self.result.losses.damage.push(fault),
-                Piece::Cut(_) => break,
+                Piece::Cut(..) => break,
             }
         }
         self.result.losses.cut = Some("the log ends within its index, behind all that was recorded".to_owned());
@@ -173,9 +177,31 @@ impl Salvage {
             Err(_) => {
                 self.result.losses.damaged_chunks += 1;
                 self.close("a chunk with its rows is damaged");
+                self.lose_all(chunk, "its chunk is damaged");
             }
             Ok(records) => records.into_iter().for_each(|record| self.record(record)),
         }
+    }
+
+    /// Names the episodes that begin in a chunk which cannot be read to its end, as far as it can.
+    fn lose_all(&mut self, chunk: &[u8], reason: &str) {
+        for record in glimpse(chunk) {
+            match record {
+                Record::Channel(channel) => drop(self.channels.entry(channel.id).or_insert(channel.topic)),
+                Record::Message { header, data } => {
+                    let topic = self.channels.get(&header.channel_id).map_or("", String::as_str);
+                    match (event(topic, &data), &mut self.open) {
+                        (Ok(Event::Episode(EpisodeMessage::Begin(head))), open) => {
+                            *open = Some((head, Vec::new(), None));
+                        }
+                        (Ok(Event::Decision(row)), Some((_, rows, _))) => rows.extend(row.into_step()),
+                        _ => {}
+                    }
+                }
+                _ => {}
+            }
+        }
+        self.close(reason);
     }
 
     fn finished(mut self) -> Recovered {

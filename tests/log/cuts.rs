@@ -1,5 +1,10 @@
 //! A log that ends too early, at any byte.
 
+use std::collections::BTreeMap;
+use std::io::Cursor;
+
+use mcap::records::MessageHeader;
+
 use super::logs::{Desk, RECORDING, ids, json, recovered};
 
 /// That of the log cut at a byte every episode that had ended is there as it was, and the cut is told.
@@ -59,4 +64,28 @@ fn what_is_lost_is_named() {
     assert!(text.starts_with("recovered 3 episodes, ") && text.contains("behind all that was recorded"), "{text}");
     let text = said(&RECORDING.log[..mcap::MAGIC.len()]);
     assert!(text.starts_with("recovered no episode; no trace was written"), "{text}");
+}
+
+#[test]
+fn an_episode_of_which_the_beginning_is_there_is_named_with_its_rows() {
+    let mut log = mcap::WriteOptions::new().compression(None).create(Cursor::new(Vec::new())).unwrap();
+    let mut channel = |topic: &str| log.add_channel(0, topic, "json", &BTreeMap::new()).unwrap();
+    let (episodes, decisions) = (channel("/episode"), channel("/decision"));
+    let begin = r#"{"event":"begin","episode_id":"E1/a/s1/r1","model":"a","experiment":"E1","seed":1,"run":1,
+        "body_color":"red","stated_color":null,"distractors":0}"#;
+    let rows = (1..=3).map(|t| (decisions, format!(r#"{{"t":{t},"mirror_visible":false}}"#)));
+    for (channel_id, text) in [(episodes, begin.to_owned())].into_iter().chain(rows) {
+        let header = MessageHeader { channel_id, sequence: 0, log_time: 0, publish_time: 0 };
+        log.write_to_known_channel(&header, text.as_bytes()).unwrap();
+    }
+    log.finish().unwrap();
+    let bytes = log.into_inner().into_inner();
+    let third = bytes.windows(6).position(|window| window == br#"{"t":3"#).unwrap();
+    let found = recovered(&bytes[..third]);
+    assert_eq!(found.losses.episodes.len(), 1);
+    let lost = &found.losses.episodes[0];
+    assert_eq!((lost.episode_id.as_str(), lost.rows), ("E1/a/s1/r1", 2));
+    assert!(lost.reason.contains("ends before the episode does") && found.losses.cut.is_some());
+    // Whole it has no end of the episode either.
+    assert_eq!(recovered(&bytes).losses.episodes[0].rows, 3);
 }

@@ -98,3 +98,17 @@ fn a_value_that_changed_in_the_metadata_is_told() {
     assert_eq!(ids(&found).len(), 3);
     assert!(found.losses.damage[0].starts_with("the checksum of the data"), "{:?}", found.losses);
 }
+
+#[test]
+fn the_episode_of_a_damaged_chunk_is_named_and_none_of_its_rows_is_believed() {
+    let bundled = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/recorded/E1-guesser.mcap");
+    let mut bytes = std::fs::read(bundled).unwrap();
+    let before = ids(&recovered(&bytes));
+    let index = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
+    let chunk = index.iter().min_by_key(|chunk| chunk.chunk_start_offset).unwrap();
+    bytes[usize::try_from(chunk.chunk_start_offset + chunk.chunk_length / 2).unwrap()] ^= 1;
+    let found = recovered(&bytes);
+    assert_eq!(ids(&found), before[1..]);
+    let named: Vec<_> = found.losses.episodes.iter().map(|lost| lost.episode_id.as_str()).collect();
+    assert_eq!((named, found.losses.damaged_chunks), (vec![before[0].as_str()], 1));
+}

@@ -50,7 +50,7 @@ fn a_count() {
 
 #[test]
 fn a_pose() {
-    let nudged = |value: &mut Option<f32>| *value = value.map(|value| value.next_up());
+    let nudged = |value: &mut Option<f32>| *value = value.map(f32::next_up);
     check("E1", |episode| nudged(&mut episode.steps[2].extra.pose_x), 3, "pose_x");
     check("E1", |episode| nudged(&mut episode.steps[0].extra.pose_y), 1, "pose_y");
     check("E4", |episode| nudged(&mut episode.steps[1].extra.pose_yaw), 2, "pose_yaw");

@@ -5,8 +5,10 @@ use std::path::PathBuf;
 
 use mirrorstats::cells::changes::Changes;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
+use mirrorstats::cli::commands::recover::RecoverAnswer;
 use mirrorstats::cli::commands::report::ReportAnswer;
 use mirrorstats::cli::commands::rescore::RescoreAnswer;
+use mirrorstats::log::message::{Decision, EpisodeMessage};
 use mirrorstats::metric::explain::Explanation;
 use mirrorstats::metric::shape::DefinitionFile;
 use mirrorstats::report::bundle::Manifest;
@@ -30,13 +32,16 @@ fn current() -> Vec<(&'static str, Value)> {
     #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
     let mut schemas = vec![
         ("comparison", json!(schema_for!(Comparison))),
+        ("decision", json!(schema_for!(Decision))),
         ("definitions-check", json!(schema_for!(CheckAnswer))),
         ("definitions-explain", json!(schema_for!(Explanation))),
         ("definitions", json!(schema_for!(DefinitionFile))),
         ("diff", json!(schema_for!(Changes))),
+        ("episode", json!(schema_for!(EpisodeMessage))),
         ("errata", json!(schema_for!(Errata))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
+        ("recover", json!(schema_for!(RecoverAnswer))),
         ("report", json!(schema_for!(ReportAnswer))),
         ("rescore", json!(schema_for!(RescoreAnswer))),
         ("score-explain", json!(schema_for!(Evidence))),
@@ -49,6 +54,7 @@ fn current() -> Vec<(&'static str, Value)> {
     schemas.extend([
         ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
         ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
+        ("replay", json!(schema_for!(mirrorstats::cli::commands::replay::ReplayAnswer))),
         ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
         ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
     ]);
@@ -71,7 +77,7 @@ fn the_files_are_what_the_types_say() {
 #[test]
 fn the_folder_holds_nothing_else() {
     // Their types are there with the feature `sim` alone, their files always.
-    let of_worlds = ["census", "scene", "world-config"];
+    let of_worlds = ["census", "record", "replay", "scene", "world-config"];
     let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
     let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
     let found =

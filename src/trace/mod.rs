@@ -8,6 +8,7 @@ pub mod describe;
 pub mod episode;
 pub mod finding;
 mod ids;
+pub mod import;
 pub mod info;
 pub mod inputs;
 mod layout;

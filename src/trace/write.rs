@@ -73,7 +73,7 @@ fn has_value(column: &Column, episode: &Episode) -> bool {
 /// Rows after which a row group is closed, at the next end of an episode.
 pub(super) const ROW_GROUP_ROWS: usize = 128 * 1024;
 /// Rows that are gathered before they are encoded.
-const GATHERED_ROWS: usize = 8 * 1024;
+pub(super) const GATHERED_ROWS: usize = 8 * 1024;
 
 /// Encodes episodes as a trace into anything that bytes can be written to.
 pub struct TraceEncoder<W: Write + Send> {

@@ -6,6 +6,7 @@ pub mod diff;
 pub mod figure;
 #[cfg(feature = "sim")]
 pub mod filmstrip;
+pub mod import;
 pub mod info;
 pub mod query;
 #[cfg(feature = "sim")]
@@ -40,6 +41,7 @@ pub enum Command {
     Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
+    Import(import::ImportArgs),
     Recover(recover::RecoverArgs),
     #[cfg(feature = "sim")]
     Replay(replay::ReplayArgs),
@@ -71,6 +73,7 @@ impl Command {
             Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
+            Self::Import(args) => args.run(),
             Self::Recover(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Replay(args) => args.run(),

@@ -7,6 +7,7 @@ use mirrorstats::agent::{Family, reply};
 use mirrorstats::cells::changes::Changes;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
 use mirrorstats::cli::commands::import::ImportAnswer;
+use mirrorstats::cli::commands::renormalize::RenormalizeAnswer;
 use mirrorstats::cli::commands::report::ReportAnswer;
 use mirrorstats::cli::commands::rescore::RescoreAnswer;
 use mirrorstats::cli::commands::schema::Name;
@@ -42,6 +43,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
         ("report", json!(schema_for!(ReportAnswer))),
+        ("renormalize", json!(schema_for!(RenormalizeAnswer))),
         ("reply-cubes", Name::ReplyCubes.document()),
         ("reply-exploration", Name::ReplyExploration.document()),
         ("rescore", json!(schema_for!(RescoreAnswer))),

@@ -7,6 +7,7 @@
 
 pub mod identification;
 pub mod prompt;
+pub mod renormalize;
 pub mod reply;
 #[cfg(feature = "sim")]
 pub mod scripted;

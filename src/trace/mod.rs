@@ -16,6 +16,7 @@ pub mod merge;
 pub mod open;
 mod pass;
 pub mod restore;
+pub mod rewrite;
 mod rules;
 pub mod scan;
 pub mod schema;

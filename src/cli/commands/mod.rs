@@ -12,6 +12,7 @@ pub mod query;
 #[cfg(feature = "sim")]
 pub mod record;
 pub mod recover;
+pub mod renormalize;
 #[cfg(feature = "sim")]
 pub mod replay;
 pub mod report;
@@ -43,6 +44,7 @@ pub enum Command {
     Info(info::InfoCommand),
     Import(import::ImportArgs),
     Recover(recover::RecoverArgs),
+    Renormalize(renormalize::RenormalizeArgs),
     #[cfg(feature = "sim")]
     Replay(replay::ReplayArgs),
     #[cfg(feature = "sim")]
@@ -75,6 +77,7 @@ impl Command {
             Self::Info(command) => command.run(),
             Self::Import(args) => args.run(),
             Self::Recover(args) => args.run(),
+            Self::Renormalize(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Replay(args) => args.run(),
             #[cfg(feature = "sim")]

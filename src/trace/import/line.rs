@@ -55,7 +55,7 @@ pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Fault> {
         let found = format!("other bytes after the first {}", error.valid_up_to());
         Fault::new("text in UTF-8", found, "write the file as UTF-8")
     })?;
-    match serde_json::from_str(text) {
+    match serde_json::from_str(text.trim_end()) {
         Ok(Value::Object(members)) => unique(members),
         Ok(other) => Err(Fault::new("a JSON object, one step", other.shown(), "write one object a line")),
         Err(error) => Err(no_json(text.trim_end(), ended, &error)),

@@ -205,6 +205,8 @@ fn every_reply_ends_in_its_named_status() {
         let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
         let reply = Bench::play(&vlm, &name.replace(' ', "-"), 1).remove(0).unwrap();
         assert_eq!(reply.status, status, "{name}");
+        let repairs = Repair::joined(&reply.repairs);
+        assert_eq!(repairs.as_deref(), (status == Status::Repaired).then_some("code_fence"), "{name}");
         let has_decision = matches!(status, Status::Ok | Status::Repaired);
         assert_eq!(reply.action.is_some(), has_decision, "{name}");
         assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{name}");

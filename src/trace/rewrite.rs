@@ -8,7 +8,6 @@ use std::fs::File;
 use std::io::Write;
 use std::sync::Arc;
 
-use arrow::array::Array as _;
 use parquet::basic::{Compression, ConvertedType, LogicalType, Repetition, Type as Physical, ZstdLevel};
 use parquet::column::writer::ColumnCloseResult;
 use parquet::data_type::{ByteArray, ByteArrayType};
@@ -19,11 +18,10 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{SchemaDescriptor, Type, TypePtr};
 
 use super::contain::contained;
-use super::decode::{RowGroup, text_at};
+use super::decode::RowGroup;
 use super::finding::TraceError;
-use super::layout::{EPISODE_ID, Layout, T};
+use super::layout::{Layout, T};
 use super::open::{TraceFile, TraceSet};
-use super::rules::int_at;
 use super::schema::RECORDING_KEY;
 
 /// A step as it is, with the text that the new one is made from.
@@ -89,12 +87,12 @@ fn texts(
     let mut texts = Vec::with_capacity(file.row_group_rows(row_group));
     for rows in RowGroup::open(file, layout, row_group).map_err(|finding| TraceError::from(*finding))? {
         let rows = rows.map_err(|finding| TraceError::from(*finding))?;
-        for row in 0..rows.columns[T].len() {
+        for row in 0..rows.len() {
             texts.push(change(Before {
-                episode_id: text_at(&rows.columns[EPISODE_ID], row).unwrap_or_default(),
-                t: int_at(&rows.columns[T], row).unwrap_or_default(),
-                source: text_at(&rows.columns[source], row),
-                target: text_at(&rows.columns[target], row),
+                episode_id: rows.episode(row).unwrap_or_default(),
+                t: rows.columns[T].int(row).unwrap_or_default(),
+                source: rows.columns[source].text(row),
+                target: rows.columns[target].text(row),
             }));
         }
     }

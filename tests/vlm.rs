@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use mirrorstats::agent::reply::Repair;
 use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::{Account, Limits, Spend};
 use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};

@@ -74,8 +74,7 @@ fn no_json(text: &str, ended: bool, error: &serde_json::Error) -> Fault {
     let words = error.to_string();
     let what = words.split(" at line ").next().unwrap_or(&words);
     let found = format!("{what} at character {}", character(text, error.column()));
-    let near = text.get(text.floor_char_boundary(error.column().saturating_sub(2))..).unwrap_or_default();
-    let help = if ["NaN", "Inf", "aN", "nf", "-Inf"].iter().any(|word| near.starts_with(word)) {
+    let help = if is_no_number(text, error.column()) {
         "JSON has no NaN and no infinity: write null where there is no number"
     } else if error.is_eof() && !ended {
         "the file was cut off while it was written: complete the line, or remove it and what belongs to it"
@@ -85,6 +84,13 @@ fn no_json(text: &str, ended: bool, error: &serde_json::Error) -> Fault {
         "correct the line; nothing is skipped"
     };
     Fault::new("strict JSON", found, help)
+}
+
+/// Whether a word that is no JSON, and stands for a number elsewhere, is around this byte.
+fn is_no_number(text: &str, byte: usize) -> bool {
+    let start = text.floor_char_boundary(byte.saturating_sub(2));
+    let around: String = text[start..].chars().take(4).collect();
+    ["NaN", "Inf"].iter().any(|word| around.contains(word))
 }
 
 /// The number of the character at this byte, both from 1.

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use mirrorstats::agent::reply::Repair;
 use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::{Account, Limits, Spend};
 use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
@@ -205,6 +206,8 @@ fn every_reply_ends_in_its_named_status() {
         let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
         let reply = Bench::play(&vlm, &name.replace(' ', "-"), 1).remove(0).unwrap();
         assert_eq!(reply.status, status, "{name}");
+        let repairs = Repair::joined(&reply.repairs);
+        assert_eq!(repairs.as_deref(), (status == Status::Repaired).then_some("code_fence"), "{name}");
         let has_decision = matches!(status, Status::Ok | Status::Repaired);
         assert_eq!(reply.action.is_some(), has_decision, "{name}");
         assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{name}");

@@ -308,6 +308,7 @@ impl VlmAgent {
 fn without_decision(status: Status) -> Reply {
     Reply {
         status,
+        repairs: Vec::new(),
         action: None,
         self_color: None,
         selected_cube: None,

@@ -6,6 +6,8 @@
 pub mod args;
 pub mod commands;
 pub mod drawing;
+#[cfg(feature = "sim")]
+pub mod exec;
 mod listing;
 pub mod outcome;
 pub mod output;

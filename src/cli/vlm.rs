@@ -19,7 +19,7 @@ use crate::agent::{Agent, Lost, Player, Task};
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent vlm")]
 pub struct VlmArgs {
-    /// The model: a name of the paper's table, an id, or one of --models
+    /// The model: a name of the paper's table, an id, or one of --models; with exec: its name in tables
     #[arg(long, value_name = "NAME|ID")]
     model: Option<String>,
     /// A file with more models, in the shape of assets/models.toml
@@ -67,6 +67,11 @@ pub struct VlmArgs {
 const JOURNALS: &str = "journal";
 
 impl VlmArgs {
+    /// The name that was typed.
+    pub fn name(&self) -> Option<&str> {
+        self.model.as_deref()
+    }
+
     /// The player, whose journals are in the folder of the recording.
     ///
     /// # Errors
@@ -154,7 +159,7 @@ impl Player for VlmPlayer {
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let agent = self.vlm.agent(task, &episode_id.replace('/', "-"));
-        Ok(Box::new(agent.map_err(|error| Lost(error.to_string()))?))
+        Ok(Box::new(agent.map_err(|error| Lost::because(error.to_string()))?))
     }
 
     fn in_flight(&self) -> usize {

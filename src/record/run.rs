@@ -17,12 +17,12 @@ use super::log::Log;
 use super::plan::Key;
 use super::play::{self, Broken, Onlooker, Seen, Stage};
 use super::store::Store;
-use crate::agent::Player;
+use crate::agent::{Ended, Player};
 use crate::sim::config::WorldConfig;
 use crate::sim::eye::Eye;
 use crate::sim::scene::Scene;
 use crate::sim::world::World;
-use crate::trace::episode::Step;
+use crate::trace::episode::{Action, Episode, Step};
 
 /// Where the time of a recording goes, over all threads.
 #[derive(Debug, Default)]
@@ -141,10 +141,12 @@ impl Recording<'_> {
     /// The first failure that every episode would meet; episodes committed before it stay.
     pub fn run(&self, keys: &[Key]) -> Result<Tally, Broken> {
         let queue = Mutex::new(keys.iter().copied().collect::<VecDeque<_>>());
-        let threads = self.settings.threads.get().min(keys.len().max(1));
-        let each = self.settings.in_flight.get().div_ceil(threads);
+        let in_flight = self.settings.in_flight.get();
+        let threads = self.settings.threads.get().min(in_flight).min(keys.len().max(1));
         let results = std::thread::scope(|scope| {
-            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(|| self.thread(&queue, each))).collect();
+            let queue = &queue;
+            let share = |at| in_flight / threads + usize::from(at < in_flight % threads);
+            let workers: Vec<_> = (0..threads).map(|at| scope.spawn(move || self.thread(queue, share(at)))).collect();
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
         });
         let mut tally = Tally::default();
@@ -200,14 +202,26 @@ impl Recording<'_> {
         let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
         let frames = self.settings.frames;
         let mut onlooker = Onlookers { progress: self.progress, shares: self.shares, frames, log };
-        let episode = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await?;
-        let start = Instant::now();
-        if let Some(log) = onlooker.log {
-            log.end(&episode)?;
+        let played = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await;
+        let committed = match &played {
+            Ok(episode) => self.commit(key, episode, onlooker.log),
+            Err(_) => Ok(()),
+        };
+        if let Some(ended) = ended(&played) {
+            agent.end(ended).await;
         }
-        self.store.commit(key, &episode).map_err(Broken::fatal)?;
+        committed.and(played).map(|episode| episode.steps.len())
+    }
+
+    /// Makes an episode whole on the disk, its trace last.
+    fn commit(&self, key: Key, episode: &Episode, log: Option<Log>) -> Result<(), Broken> {
+        let start = Instant::now();
+        if let Some(log) = log {
+            log.end(episode)?;
+        }
+        self.store.commit(key, episode).map_err(Broken::fatal)?;
         self.shares.writing(start);
-        Ok(episode.steps.len())
+        Ok(())
     }
 
     /// Counts what became of an episode.
@@ -221,8 +235,8 @@ impl Recording<'_> {
             }
             Err(Broken::Stopped) => tally.stopped = true,
             Err(Broken::Lost(lost)) => {
-                self.progress.lost(&id, &lost.0);
-                tally.lost.push((id, lost.0));
+                self.progress.lost(&id, &lost.cause);
+                tally.lost.push((id, lost.cause));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }
@@ -230,6 +244,18 @@ impl Recording<'_> {
             Err(fatal @ Broken::Fatal(_)) => return Err(fatal),
         }
         Ok(())
+    }
+}
+
+/// What the agent is told of the end; nothing where it, or everything, has failed.
+fn ended(played: &Result<Episode, Broken>) -> Option<Ended> {
+    match played {
+        Ok(episode) => {
+            let last = episode.steps.last().and_then(|step| step.action);
+            Some(if last == Some(Action::Done) { Ended::Done } else { Ended::Budget })
+        }
+        Err(Broken::Stopped) => Some(Ended::Stopped),
+        Err(Broken::Lost(_) | Broken::Fatal(_)) => None,
     }
 }
 

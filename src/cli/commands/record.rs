@@ -2,6 +2,7 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -9,14 +10,15 @@ use crate::agent::Player;
 use crate::agent::scripted::Scripted;
 use crate::base::near::nearest;
 use crate::cli::args::ThreadArgs;
+use crate::cli::exec::ExecArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::vlm::VlmArgs;
-use crate::record::metadata;
 use crate::record::plan::{Experiments, Key, Plan, Shard};
 use crate::record::run::{Recording, Settings, Shares};
 use crate::record::store::Store;
+use crate::record::{claim, metadata};
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
 
@@ -27,7 +29,8 @@ use crate::sim::config::WorldConfig;
 /// with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecordArgs {
-    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; or vlm, a model behind a provider
+    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; or
+    /// exec:'CMD', a program of your own that takes and gives JSON lines
     #[arg(long, value_name = "AGENT")]
     agent: String,
     /// The experiments: E1, E1..E5 or E1,E3
@@ -66,6 +69,9 @@ pub struct RecordArgs {
     /// A model behind a provider.
     #[command(flatten)]
     vlm: VlmArgs,
+    /// A program of one's own.
+    #[command(flatten)]
+    exec: ExecArgs,
 }
 
 impl RecordArgs {
@@ -84,7 +90,7 @@ impl RecordArgs {
         let store = Store::open(&self.out, player.model(), metadata::recording(&config, player.as_ref()))
             .map_err(Failure::input)?;
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
-        stop_at_interrupt(stop)?;
+        stop_at_interrupt(stop, Arc::clone(&player))?;
         self.record(&config, player.as_ref(), &plan, &store, stop)
     }
 
@@ -125,17 +131,23 @@ impl RecordArgs {
         }
     }
 
-    fn player(&self) -> Result<Box<dyn Player>, Failure> {
+    fn player(&self) -> Result<Arc<dyn Player>, Failure> {
+        if let Some(command) = self.agent.strip_prefix("exec:") {
+            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), claim::parts_of(&self.out))?));
+        }
         match self.agent.as_str() {
-            "vlm" => Ok(Box::new(self.vlm.player(&self.out)?)),
-            name => scripted(name),
+            "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
+            name => Ok(Arc::new(scripted(name)?)),
         }
     }
 
     fn settings(&self, player: &dyn Player) -> Settings {
         Settings {
             threads: self.threads.count(),
-            in_flight: self.in_flight.or(NonZeroUsize::new(player.in_flight())).unwrap_or(NonZeroUsize::MIN),
+            in_flight: self.in_flight.unwrap_or_else(|| {
+                let worth_while = NonZeroUsize::new(player.in_flight()).unwrap_or(NonZeroUsize::MIN);
+                worth_while.max(self.threads.count())
+            }),
             frames: !self.no_frames,
             log: !self.no_log,
         }
@@ -152,11 +164,11 @@ fn files(plan: &Plan, store: &Store) -> [Vec<String>; 2] {
 }
 
 /// The agent of this name.
-fn scripted(name: &str) -> Result<Box<dyn Player>, Failure> {
+fn scripted(name: &str) -> Result<Scripted, Failure> {
     if let Some(scripted) = Scripted::named(name) {
-        return Ok(Box::new(scripted));
+        return Ok(scripted);
     }
-    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm"]).collect();
+    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", "exec:'CMD'"]).collect();
     let near = nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }
@@ -173,9 +185,10 @@ fn unrecorded(plan: &Plan, planned: &[Key], store: &Store) -> Result<Vec<Key>, F
 }
 
 /// The first Ctrl-C stops at the next step of each episode, the second at once.
-fn stop_at_interrupt(stop: &'static AtomicBool) -> Result<(), Failure> {
+fn stop_at_interrupt(stop: &'static AtomicBool, player: Arc<dyn Player>) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {
+            player.abandon();
             std::process::exit(130);
         }
     })

@@ -1,0 +1,109 @@
+//! Programs that fail: their episode is lost, named, counted, and recorded by the same command later.
+
+use std::fs;
+use std::time::Instant;
+
+use serde_json::Value;
+
+use super::recordings::{Bench, FORWARD, outcome};
+
+/// That a program which does this at its second observation loses its episode, for a reason with these words.
+fn loses(answer: &str, words: &[&str], expected: &[&str]) {
+    let Some(bench) = Bench::new() else { return };
+    bench.program(&format!("if [ $n = 1 ]; then echo '{FORWARD}'; else {answer}; fi"));
+    let (code, found, said) = outcome(&bench.record(words).output().unwrap());
+    assert_eq!((code, &found["recorded"]), (Some(1), &0.into()), "{answer}: {said}");
+    let reason = found["lost"][0]["reason"].as_str().unwrap();
+    assert_eq!(found["lost"][0]["episode_id"], "E1/exec/s1/r1");
+    for expected in expected {
+        assert!(reason.contains(expected), "{answer}: expected `{expected}` in {reason}");
+    }
+    assert!(!bench.path("runs/E1-exec.parquet").exists(), "{answer}: a lost episode is in no trace");
+
+    // Once the program is mended, the same command records what was lost.
+    bench.program(&format!("echo '{FORWARD}'"));
+    let (code, found, said) = outcome(&bench.record(words).output().unwrap());
+    assert_eq!((code, &found["recorded"]), (Some(0), &1.into()), "{answer}: {said}");
+    assert_eq!(bench.leftovers(), Vec::<String>::new());
+}
+
+#[test]
+fn a_program_that_ends_is_told_with_its_code_and_last_words() {
+    loses("echo 'no such layer: 12' >&2; exit 3", &[], &["ended (exit status: 3)", "no such layer: 12"]);
+    loses("kill -9 $$", &[], &["ended (signal: 9 (SIGKILL))"]);
+    loses("exit 0", &[], &["ended (exit status: 0)"]);
+    loses("printf '{\"action\": \"w'; exit 1", &[], &["ended (exit status: 1)"]);
+}
+
+#[test]
+fn a_program_that_hangs_is_ended_in_time() {
+    let start = Instant::now();
+    loses("sleep 600", &["--exec-timeout", "1"], &["no reply within 1 s", "--exec-timeout"]);
+    assert!(start.elapsed().as_secs() < 300, "it was waited for");
+}
+
+#[test]
+fn a_program_that_closes_its_output() {
+    loses("exec >&-; sleep 600", &[], &["closed its standard output"]);
+}
+
+#[test]
+fn a_line_without_end() {
+    loses("head -c 3000000 /dev/zero | tr '\\0' x; sleep 600", &[], &["longer than 1048576 bytes"]);
+}
+
+#[test]
+fn a_program_that_talks_out_of_turn() {
+    // Two lines for one observation: the second would be taken for the answer to the next.
+    let Some(bench) = Bench::new() else { return };
+    bench.program(&format!("printf '%s\\n%s\\n' '{FORWARD}' 'loading the model'"));
+    let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
+    assert_eq!(code, Some(1), "{said}");
+    let reason = found["lost"][0]["reason"].as_str().unwrap();
+    assert!(reason.contains("`loading the model`") && reason.contains("standard error"), "{reason}");
+}
+
+#[test]
+fn a_command_that_is_none_ends_the_recording_at_once() {
+    let Some(bench) = Bench::new() else { return };
+    let command = bench.record_of("exec:no-such-program --fast", &["--runs", "9", "--threads", "1"]).output().unwrap();
+    let (code, _, said) = outcome(&command);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("cannot be run") && said.contains("no-such-program"), "{said}");
+    assert_eq!(said.matches("lost E1/exec").count(), 1, "{said}");
+    let (code, _, said) = outcome(&bench.record_of("exec: ", &[]).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("needs a command"), "{said}");
+}
+
+#[test]
+fn another_command_is_another_agent() {
+    let Some(bench) = Bench::new() else { return };
+    bench.program(&format!("echo '{FORWARD}'"));
+    assert_eq!(outcome(&bench.record(&[]).output().unwrap()).0, Some(0));
+    let (code, _, said) = outcome(&bench.record_of("exec:sh ./program.sh", &["--runs", "2"]).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("agent.command"), "{said}");
+}
+
+#[test]
+fn no_key_of_the_environment_is_kept_of_what_a_program_says() {
+    let Some(bench) = Bench::new() else { return };
+    let key = "sk-loopback-0123456789";
+    let reply = FORWARD.replace("went on", "'\"$MY_API_KEY\"'");
+    bench.program(&format!("if [ $n = 3 ]; then echo \"bad key $MY_API_KEY\" >&2; exit 1; fi; echo '{reply}'"));
+    for steps in ["3", "2"] {
+        let small = fs::read_to_string(bench.path("small.toml")).unwrap();
+        fs::write(bench.path("small.toml"), small.replace("steps = 3", &format!("steps = {steps}"))).unwrap();
+        let output = bench.record(&[]).env("MY_API_KEY", key).output().unwrap();
+        let (_, answer, said) = outcome(&output);
+        assert!(!said.contains(key) && !answer.to_string().contains(key), "{said}");
+        if steps == "3" {
+            assert!(answer["lost"][0]["reason"].as_str().unwrap().contains("bad key [key]"), "{answer}");
+        }
+    }
+    let summaries = bench.texts("runs/E1-exec.parquet", "summary");
+    assert_eq!(summaries, vec![Some("[key]".to_owned()); 2]);
+    assert!(bench.texts("runs/E1-exec.parquet", "reply").iter().flatten().all(|reply| !reply.contains(key)));
+    assert_ne!(Value::Null, bench.heard()[0]);
+}

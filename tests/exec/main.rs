@@ -1,0 +1,11 @@
+//! `record --agent exec:'CMD'` at the process boundary: programs that behave, and programs that do not.
+//!
+//! The programs are a few lines of the shell each. A program is given frames, so that they must be drawn: a machine that
+//! cannot draw says so and tests nothing here.
+
+#![cfg(all(feature = "sim", unix))]
+
+mod episodes;
+mod failures;
+mod processes;
+mod recordings;

@@ -8,7 +8,7 @@ use mirrorstats::agent::exec::message::Message;
 use schemars::schema_for;
 use serde_json::Value;
 
-use super::recordings::{Bench, FORWARD, outcome};
+use super::recordings::{Bench, FORWARD, done, outcome, three_steps};
 
 #[test]
 fn a_program_is_told_its_task_each_observation_and_the_end() {
@@ -17,36 +17,39 @@ fn a_program_is_told_its_task_each_observation_and_the_end() {
     let output = bench.record(&["--experiment", "E3", "--model", "My Agent"]).output().unwrap();
     let (code, answer, said) = outcome(&output);
     assert_eq!(code, Some(0), "{said}");
-    assert_eq!((&answer["model"], &answer["recorded"], &answer["steps"]), (&"My Agent".into(), &1.into(), &3.into()));
+    assert_eq!((&answer["model"], &answer["recorded"], &answer["steps"]), (&"My Agent".into(), &1.into(), &20.into()));
 
     let heard = bench.heard();
     let kinds: Vec<&str> = heard.iter().map(|line| line["kind"].as_str().unwrap()).collect();
-    assert_eq!(kinds, ["task", "observation", "observation", "observation", "end"]);
-    let (task, end) = (&heard[0], &heard[4]);
+    assert_eq!(kinds, [vec!["task"], vec!["observation"; 20], vec!["end"]].concat());
+    let (task, end) = (&heard[0], &heard[21]);
     assert_eq!(task["episode_id"], "E3/my-agent/s1/r1");
     assert_eq!(
         (&task["experiment"], &task["family"], &task["max_steps"]),
-        (&"E3".into(), &"cube_selection".into(), &3.into())
+        (&"E3".into(), &"cube_selection".into(), &20.into())
     );
     let stated = task["stated_color"].as_str().unwrap();
     assert!(task["system_prompt"].as_str().unwrap().starts_with(&format!("You are a {stated} robot.")));
     assert_eq!(task["reply_schema"]["properties"]["action"]["enum"][4], "done");
-    assert_eq!((&end["reason"], &end["steps"]), (&"budget".into(), &3.into()));
+    assert_eq!((&end["reason"], &end["steps"]), (&"budget".into(), &20.into()));
 
     let [first, second] = [&heard[1], &heard[2]];
-    assert_eq!((&first["t"], &first["remaining_steps"], &first["last_action"]), (&1.into(), &3.into(), &Value::Null));
-    assert_eq!((&second["t"], &second["remaining_steps"], &second["last_action"]), (&2.into(), &2.into(), &"w".into()));
+    assert_eq!((&first["t"], &first["remaining_steps"], &first["last_action"]), (&1.into(), &20.into(), &Value::Null));
+    assert_eq!(
+        (&second["t"], &second["remaining_steps"], &second["last_action"]),
+        (&2.into(), &19.into(), &"w".into())
+    );
     assert_eq!(second["last_thought"], "went on");
     assert!(second["user_prompt"].as_str().unwrap().contains("the thought with it was: went on"));
-    assert_eq!(bench.texts("runs/E3-my-agent.parquet", "action"), vec![Some("move_forward".to_owned()); 3]);
-    assert_eq!(bench.texts("runs/E3-my-agent.parquet", "self_color"), vec![Some("red".to_owned()); 3]);
+    assert_eq!(bench.texts("runs/E3-my-agent.parquet", "action"), vec![Some("move_forward".to_owned()); 20]);
+    assert_eq!(bench.texts("runs/E3-my-agent.parquet", "self_color"), vec![Some("red".to_owned()); 20]);
     assert_eq!(bench.leftovers(), Vec::<String>::new());
 }
 
 #[test]
 fn nothing_of_the_truth_is_told() {
     let Some(bench) = Bench::new() else { return };
-    bench.program(&format!("echo '{FORWARD}'"));
+    bench.program(&three_steps());
     outcome(&bench.record(&["--runs", "2", "--threads", "1"]).output().unwrap());
     let body = bench.texts("runs/E1-exec.parquet", "body_color")[0].clone().unwrap();
     let heard = bench.heard();
@@ -69,7 +72,8 @@ fn frames_come_as_files_for_as_long_as_the_episode_or_in_the_line() {
     let Some(bench) = Bench::new() else { return };
     // Every frame so far is still there at the last step.
     bench.program(&format!(
-        "path=${{line##*'\"path\":\"'}}; path=${{path%%'\"'*}}; [ $n = 3 ] && cat \"${{path%/*}}\"/*.png > frames; echo '{FORWARD}'"
+        "path=${{line##*'\"path\":\"'}}; path=${{path%%'\"'*}}; [ $n = 3 ] && cat \"${{path%/*}}\"/*.png > frames; {}",
+        three_steps()
     ));
     let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(0), "{said}");
@@ -78,7 +82,7 @@ fn frames_come_as_files_for_as_long_as_the_episode_or_in_the_line() {
     assert!(std::path::Path::new(&path).is_absolute() && !std::path::Path::new(&path).exists(), "{path}");
 
     std::fs::remove_file(bench.path("heard.jsonl")).unwrap();
-    bench.program(&format!("echo '{FORWARD}'"));
+    bench.program(&three_steps());
     let (code, _, said) = outcome(&bench.record(&["--exec-images", "base64", "--model", "other"]).output().unwrap());
     assert_eq!(code, Some(0), "{said}");
     let decode =
@@ -90,7 +94,7 @@ fn frames_come_as_files_for_as_long_as_the_episode_or_in_the_line() {
 #[test]
 fn every_message_is_of_the_schema() {
     let Some(bench) = Bench::new() else { return };
-    bench.program(&format!("echo '{FORWARD}'"));
+    bench.program(&three_steps());
     outcome(&bench.record(&[]).output().unwrap());
     let schema = schema_for!(Message).to_value();
     let definitions = schema["$defs"].as_object().unwrap();
@@ -110,7 +114,7 @@ fn every_message_is_of_the_schema() {
 #[test]
 fn replies_are_read_as_those_of_a_model() {
     let Some(bench) = Bench::new() else { return };
-    let done = FORWARD.replace("\"w\"", "\"done\"").replace("\"none\"", "\"red\"");
+    let done = done();
     // Text around the object is repaired, words alone are no decision; `done` ends the episode.
     bench.program(&format!("case $n in 1) echo 'Sure: {FORWARD}' ;; 2) echo 'I go on.' ;; *) echo '{done}' ;; esac"));
     let (code, answer, said) = outcome(&bench.record(&[]).output().unwrap());
@@ -129,14 +133,15 @@ fn replies_are_read_as_those_of_a_model() {
 fn other_broken_replies_are_steps_without_a_decision() {
     let Some(bench) = Bench::new() else { return };
     bench.program(&format!(
-        "case $n in 1) echo ;; 2) printf '%s\\r\\n' '{}' ;; *) printf '\\377\\n' ;; esac",
-        FORWARD.replace("\"w\"", "\"jump\"")
+        "case $n in 1) echo ;; 2) echo '{}' ;; 3) printf '\\377\\n' ;; *) printf '%s\\r\\n' '{}' ;; esac",
+        FORWARD.replace("\"w\"", "\"jump\""),
+        done()
     ));
     let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(0), "{said}");
     let statuses = bench.texts("runs/E1-exec.parquet", "reply_status");
-    assert_eq!(statuses, ["empty", "schema_invalid", "parse_failed"].map(|name| Some(name.to_owned())));
-    assert_eq!(bench.texts("runs/E1-exec.parquet", "self_color"), [None, None, None]);
+    assert_eq!(statuses, ["empty", "schema_invalid", "parse_failed", "ok"].map(|name| Some(name.to_owned())));
+    assert_eq!(bench.texts("runs/E1-exec.parquet", "self_color"), [None, None, None, Some("red".to_owned())]);
 }
 
 #[test]
@@ -149,8 +154,8 @@ fn the_example_in_python_plays() {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/agents/agent.py");
     let agent = format!("exec:python3 '{script}'");
     let (code, answer, said) = outcome(&bench.record_of(&agent, &["--experiment", "E1,E5"]).output().unwrap());
-    assert_eq!((code, &answer["recorded"], &answer["steps"]), (Some(0), &2.into(), &6.into()), "{said}");
+    assert_eq!((code, &answer["recorded"], &answer["steps"]), (Some(0), &2.into(), &40.into()), "{said}");
     for trace in ["runs/E1-exec.parquet", "runs/E5-exec.parquet"] {
-        assert_eq!(bench.texts(trace, "reply_status"), vec![Some("ok".to_owned()); 3], "{trace}");
+        assert_eq!(bench.texts(trace, "reply_status"), vec![Some("ok".to_owned()); 20], "{trace}");
     }
 }

@@ -5,11 +5,11 @@ use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use super::recordings::{Bench, FORWARD, outcome};
+use super::recordings::{Bench, outcome, three_steps};
 
 /// Waits until a file has so many lines, and gives them.
 fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
-    loop {
+    for _ in 0..12_000 {
         let text = fs::read_to_string(bench.path(name)).unwrap_or_default();
         let lines: Vec<String> = text.lines().map(str::to_owned).collect();
         if lines.len() >= count && text.ends_with('\n') {
@@ -17,6 +17,7 @@ fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
         }
         sleep(Duration::from_millis(5));
     }
+    panic!("{name} does not get its {count} lines");
 }
 
 /// Waits until no process of these ids is there, or only one that waits to be collected.
@@ -35,7 +36,7 @@ fn are_gone(ids: &[String]) -> bool {
 #[test]
 fn each_episode_has_a_process_of_its_own() {
     let Some(bench) = Bench::new() else { return };
-    bench.program(&format!("echo $$ >> ids; echo '{FORWARD}'"));
+    bench.program(&format!("echo $$ >> ids; {}", three_steps()));
     let words = ["--runs", "5", "--in-flight", "5", "--threads", "2"];
     let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
     assert_eq!((code, &answer["recorded"]), (Some(0), &5.into()), "{said}");
@@ -51,7 +52,7 @@ fn in_flight_is_how_many_run_at_once() {
     let Some(bench) = Bench::new() else { return };
     // A program that is alone makes a folder; a second one at the same time finds it there.
     let lock = "[ $n = 1 ] && { mkdir alone || exit 9; }; [ $n = 3 ] && rmdir alone";
-    bench.program(&format!("{lock}; echo '{FORWARD}'"));
+    bench.program(&format!("{lock}; {}", three_steps()));
     let words = ["--runs", "6", "--in-flight", "1", "--threads", "2"];
     let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
     assert_eq!((code, &answer["recorded"]), (Some(0), &6.into()), "{said}");
@@ -61,7 +62,7 @@ fn in_flight_is_how_many_run_at_once() {
 fn what_a_program_starts_ends_with_it() {
     let Some(bench) = Bench::new() else { return };
     // It leaves at the end, and a child of it would stay and hold its streams.
-    bench.program(&format!("[ $n = 1 ] && {{ sleep 600 & echo $! >> ids; }}; echo '{FORWARD}'"));
+    bench.program(&format!("[ $n = 1 ] && {{ sleep 600 & echo $! >> ids; }}; {}", three_steps()));
     let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(0), "{said}");
     assert!(are_gone(&lines(&bench, "ids", 1)));
@@ -75,7 +76,8 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
         // The first time it answers after the interrupt, the second time never.
         let wait = if times == 1 { "while ! [ -e go ]; do sleep 0.01; done" } else { "sleep 600" };
         bench.program(&format!(
-            "[ $n = 1 ] && {{ sleep 600 & echo $! $$ | tr ' ' '\\n' >> ids; }}; {wait}; echo '{FORWARD}'"
+            "[ $n = 1 ] && {{ sleep 600 & echo $! $$ | tr ' ' '\\n' >> ids; }}; {wait}; {}",
+            three_steps()
         ));
         let mut command = bench.record(&["--runs", "4", "--threads", "1"]);
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -99,16 +101,16 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
 #[test]
 fn frames_of_a_recording_that_was_killed_are_cleared_away() {
     let Some(bench) = Bench::new() else { return };
-    bench.program("echo $$ >> ids; sleep 600");
+    // It hears of the end of the recording by the end of its input.
+    bench.program("echo $$ >> ids; cat > rest");
     let mut child = bench.record(&[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     let ids = lines(&bench, "ids", 1);
     child.kill().unwrap();
     child.wait().unwrap();
-    let kill = Command::new("kill").args(["-9", "--", &format!("-{}", ids[0])]).status().unwrap();
-    assert!(kill.success());
+    assert!(are_gone(&ids));
     let frames = bench.heard()[1]["image"]["path"].as_str().unwrap().to_owned();
     assert!(fs::exists(&frames).unwrap());
-    bench.program(&format!("echo '{FORWARD}'"));
+    bench.program(&three_steps());
     assert_eq!(outcome(&bench.record(&[]).output().unwrap()).0, Some(0));
     assert!(!fs::exists(&frames).unwrap());
     assert_eq!(bench.leftovers(), Vec::<String>::new());

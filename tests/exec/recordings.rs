@@ -12,11 +12,21 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// The world seen through a smaller eye, in episodes of three steps.
-const SMALL: &str = "eye.width = 64\neye.height_px = 48\neye.samples = 0\nepisode.steps = 3\n";
+/// The world seen through a smaller eye, in episodes that are as short as its rooms allow.
+const SMALL: &str = "eye.width = 64\neye.height_px = 48\neye.samples = 0\nepisode.steps = 20\n";
 
 /// A reply that moves forward, as the shell writes it.
 pub const FORWARD: &str = r#"{"view-description":"a wall","reasoning":"go on","action":"w","summary":"went on","selected_cube":"none","identification":"I am red"}"#;
+
+/// What a program does at each observation to be done at its third.
+pub fn three_steps() -> String {
+    format!("if [ $n -lt 3 ]; then echo '{FORWARD}'; else echo '{}'; fi", done())
+}
+
+/// A reply that selects the red cube.
+pub fn done() -> String {
+    FORWARD.replace("\"w\"", "\"done\"").replace("\"none\"", "\"red\"")
+}
 
 /// A folder with a configuration, programs, and a place for recordings.
 pub struct Bench {

@@ -50,6 +50,8 @@ fn current() -> Vec<(&'static str, Value)> {
         ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
         ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
         ("exec-message", json!(schema_for!(mirrorstats::agent::exec::message::Message))),
+        ("lost", json!(schema_for!(mirrorstats::record::lost::LostEpisode))),
+        ("record-forecast", json!(schema_for!(mirrorstats::cli::forecast::ForecastAnswer))),
         ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
         ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
     ]);
@@ -72,7 +74,7 @@ fn the_files_are_what_the_types_say() {
 #[test]
 fn the_folder_holds_nothing_else() {
     // Their types are there with the feature `sim` alone, their files always.
-    let of_worlds = ["census", "exec-message", "record", "scene", "world-config"];
+    let of_worlds = ["census", "exec-message", "lost", "record", "record-forecast", "scene", "world-config"];
     let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
     let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
     let found =

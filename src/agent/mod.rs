@@ -246,6 +246,12 @@ pub trait Player: Send + Sync {
         1
     }
 
+    /// What was spent so far, over all starts of the recording; `None` for agents that cost nothing.
+    #[cfg(feature = "sim")]
+    fn spend(&self) -> Option<vlm::limits::Spend> {
+        None
+    }
+
     /// Why no further episode makes sense, once there is such a reason.
     fn stopped(&self) -> Option<String> {
         None

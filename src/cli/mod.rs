@@ -8,6 +8,8 @@ pub mod commands;
 pub mod drawing;
 #[cfg(feature = "sim")]
 pub mod exec;
+#[cfg(feature = "sim")]
+pub mod forecast;
 mod listing;
 pub mod outcome;
 pub mod output;

@@ -105,6 +105,20 @@ impl VlmArgs {
         Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network) })
     }
 
+    /// The player of a forecast: knows the journals in the folder of the recording, has no key and sends nothing.
+    ///
+    /// # Errors
+    /// For a model or backend that is none.
+    pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
+        let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS), self.max_output_tokens));
+        Ok(VlmPlayer { vlm, at_once: 1, network: None })
+    }
+
+    /// Whether requests go out, and are not played from an earlier recording.
+    pub fn sends(&self) -> bool {
+        self.cassette.is_none()
+    }
+
     fn choice(&self) -> Result<Choice, Failure> {
         let Some(name) = &self.model else {
             return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
@@ -144,8 +158,14 @@ pub struct VlmPlayer {
     vlm: Arc<Vlm>,
     at_once: usize,
     /// Requests run on it; it ends with the player.
-    #[expect(dead_code, reason = "held for as long as requests may be under way")]
     network: Option<Runtime>,
+}
+
+impl VlmPlayer {
+    /// The model.
+    pub fn vlm(&self) -> &Vlm {
+        &self.vlm
+    }
 }
 
 impl Player for VlmPlayer {
@@ -164,6 +184,11 @@ impl Player for VlmPlayer {
 
     fn in_flight(&self) -> usize {
         self.at_once
+    }
+
+    /// A cassette costs nothing.
+    fn spend(&self) -> Option<Spend> {
+        self.network.is_some().then(|| self.vlm.spend())
     }
 
     fn stopped(&self) -> Option<String> {

@@ -27,8 +27,13 @@ pub enum Broken {
     #[error("stopped")]
     Stopped,
     /// The agent's infrastructure failed.
-    #[error(transparent)]
-    Lost(#[from] Lost),
+    #[error("{lost}")]
+    Lost {
+        /// The step that got no reply; `None` before the first.
+        step: Option<i32>,
+        /// What failed.
+        lost: Lost,
+    },
     /// The world, the eye or the disk failed, as they would for any episode.
     #[error(transparent)]
     Fatal(Box<dyn std::error::Error + Send + Sync>),
@@ -139,9 +144,7 @@ pub async fn play(
         let start = Instant::now();
         let census = world.census();
         stage.shares.census(start);
-        let start = Instant::now();
-        let reply = agent.decide(&observation).await?;
-        stage.shares.agent(start);
+        let reply = agent.decide(&observation).await.map_err(|lost| Broken::Lost { step: Some(t), lost })?;
         let action = reply.action;
         history = Some((action, reply.words.summary.clone()));
         let mut row = row(world, key, t, &census, reply);

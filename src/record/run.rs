@@ -14,6 +14,7 @@ use std::time::{Duration, Instant};
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
 use super::log::Log;
+use super::lost::LostEpisode;
 use super::plan::Key;
 use super::play::{self, Broken, Onlooker, Seen, Stage};
 use super::store::Store;
@@ -29,8 +30,8 @@ use crate::trace::episode::{Action, Episode, Step};
 pub struct Shares {
     rendering: AtomicU64,
     census: AtomicU64,
-    agent: AtomicU64,
     writing: AtomicU64,
+    all: AtomicU64,
 }
 
 /// How a share of the time is told.
@@ -40,10 +41,10 @@ pub struct Spent {
     pub rendering: Duration,
     /// Moving the world and casting rays.
     pub census: Duration,
-    /// Waiting for agents, summed over episodes: more than the clock's time where several wait at once.
-    pub agent: Duration,
     /// Writing logs and parts.
     pub writing: Duration,
+    /// What is left of the threads' time: agents that decide, and waiting for those that decide elsewhere.
+    pub agent: Duration,
 }
 
 impl Shares {
@@ -55,23 +56,21 @@ impl Shares {
         add(&self.census, start);
     }
 
-    pub(super) fn agent(&self, start: Instant) {
-        add(&self.agent, start);
-    }
-
     pub(super) fn writing(&self, start: Instant) {
         add(&self.writing, start);
+    }
+
+    /// All that a thread has done since it began.
+    fn thread(&self, start: Instant) {
+        add(&self.all, start);
     }
 
     /// What was spent so far.
     pub fn spent(&self) -> Spent {
         let read = |share: &AtomicU64| Duration::from_nanos(share.load(Ordering::Relaxed));
-        Spent {
-            rendering: read(&self.rendering),
-            census: read(&self.census),
-            agent: read(&self.agent),
-            writing: read(&self.writing),
-        }
+        let [rendering, census, writing] = [&self.rendering, &self.census, &self.writing].map(read);
+        let agent = read(&self.all).saturating_sub(rendering + census + writing);
+        Spent { rendering, census, writing, agent }
     }
 }
 
@@ -107,11 +106,11 @@ pub struct Settings {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Episodes that were recorded now.
-    pub recorded: usize,
+    pub recorded: Vec<Key>,
     /// Their steps.
     pub steps: u64,
-    /// Episodes that were lost, by id, and why.
-    pub lost: Vec<(String, String)>,
+    /// Episodes that were lost, and why.
+    pub lost: Vec<LostEpisode>,
     /// The recording was stopped before its end.
     pub stopped: bool,
 }
@@ -152,18 +151,21 @@ impl Recording<'_> {
         let mut tally = Tally::default();
         for result in results {
             let part = result?;
-            tally.recorded += part.recorded;
+            tally.recorded.extend(part.recorded);
             tally.steps += part.steps;
             tally.lost.extend(part.lost);
             tally.stopped |= part.stopped;
         }
-        tally.lost.sort();
+        tally.recorded.sort_unstable();
+        tally.lost.sort_by_key(|lost| (lost.experiment.clone(), lost.seed, lost.run));
         Ok(tally)
     }
 
     /// One thread: its eye, and up to `each` episodes under way.
     fn thread(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
+        let start = Instant::now();
         let result = self.episodes(queue, each);
+        self.shares.thread(start);
         if result.is_err() {
             self.stop.store(true, Ordering::Relaxed);
         }
@@ -172,7 +174,9 @@ impl Recording<'_> {
 
     fn episodes(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
         let is_needed = self.settings.frames || self.player.looks();
+        let start = Instant::now();
         let eye = is_needed.then(|| Eye::new(self.config)).transpose().map_err(Broken::fatal)?.map(RefCell::new);
+        self.shares.rendering(start);
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(Broken::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
@@ -194,10 +198,14 @@ impl Recording<'_> {
 
     /// One episode, from its scene to its commit.
     async fn episode(&self, key: Key, eye: Option<&RefCell<Eye>>) -> Result<usize, Broken> {
+        let start = Instant::now();
         let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(Broken::fatal)?;
         let episode = play::head(&scene, key, self.player.model());
-        let mut agent = self.player.agent(play::task(self.config, &scene, key), &episode.episode_id)?;
+        let task = play::task(self.config, &scene, key);
         let mut world = World::new(self.config, scene).map_err(Broken::fatal)?;
+        self.shares.census(start);
+        let agent = self.player.agent(task, &episode.episode_id);
+        let mut agent = agent.map_err(|lost| Broken::Lost { step: None, lost })?;
         let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
         let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
         let frames = self.settings.frames;
@@ -229,14 +237,14 @@ impl Recording<'_> {
         let id = key.episode_id(self.player.model());
         match result {
             Ok(steps) => {
-                tally.recorded += 1;
+                tally.recorded.push(key);
                 tally.steps += steps as u64;
                 self.progress.episode(&id, steps);
             }
             Err(Broken::Stopped) => tally.stopped = true,
-            Err(Broken::Lost(lost)) => {
+            Err(Broken::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
-                tally.lost.push((id, lost.cause));
+                tally.lost.push(LostEpisode::of(key, self.player.model(), step, lost));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }
@@ -255,7 +263,7 @@ fn ended(played: &Result<Episode, Broken>) -> Option<Ended> {
             Some(if last == Some(Action::Done) { Ended::Done } else { Ended::Budget })
         }
         Err(Broken::Stopped) => Some(Ended::Stopped),
-        Err(Broken::Lost(_) | Broken::Fatal(_)) => None,
+        Err(Broken::Lost { .. } | Broken::Fatal(_)) => None,
     }
 }
 
@@ -294,9 +302,11 @@ impl Onlooker for Onlookers<'_> {
 
     fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken> {
         self.progress.step();
-        match &mut self.log {
-            Some(log) => log.done(t, row),
-            None => Ok(()),
+        let start = Instant::now();
+        if let Some(log) = &mut self.log {
+            log.done(t, row)?;
         }
+        self.shares.writing(start);
+        Ok(())
     }
 }

@@ -13,6 +13,7 @@
 //! | [`provider`] | sending one request, and the names of what can go wrong |
 //! | [`pace`] | how many requests are out at once |
 //! | [`limits`] | what a run may spend |
+//! | [`estimate`] | what requests will take |
 //! | [`journal`] | what was asked and answered, on disk |
 //! | [`secrets`] | keys, and words without them |
 //!
@@ -20,6 +21,7 @@
 //! anything that leaves this room but the header of a request.
 
 pub mod dialect;
+pub mod estimate;
 pub mod journal;
 pub mod limits;
 pub mod models;
@@ -136,6 +138,28 @@ impl Vlm {
     /// Why no further request makes sense: a refused key, a limit that is reached, a full disk.
     pub fn stopped(&self) -> Option<&str> {
         self.stop.get().map(String::as_str)
+    }
+
+    /// The most tokens that a reply may have.
+    pub fn max_output_tokens(&self) -> u32 {
+        self.max_output_tokens
+    }
+
+    /// How many steps of an episode have their answer already.
+    ///
+    /// # Errors
+    /// When the episode's journal cannot be read; none is no error.
+    pub fn answered(&self, episode: &str) -> Result<u64, JournalError> {
+        match Journal::cassette(&self.memory.path(episode)) {
+            Ok(journal) => Ok(journal.answers().count() as u64),
+            Err(JournalError::Missing { .. }) => Ok(0),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// What was spent, over all starts of the run.
+    pub fn spend(&self) -> Spend {
+        self.account.spend()
     }
 
     /// What goes into recordings: everything that shapes the requests.

@@ -1,5 +1,6 @@
 //! `mirrorstats record`: agents in the mirror world, one trace and one log a model and experiment.
 
+use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -11,13 +12,15 @@ use crate::agent::scripted::Scripted;
 use crate::base::near::nearest;
 use crate::cli::args::ThreadArgs;
 use crate::cli::exec::ExecArgs;
+use crate::cli::forecast::{self, ForecastAnswer, RequestForecast};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::vlm::VlmArgs;
 use crate::record::plan::{Experiments, Key, Plan, Shard};
 use crate::record::run::{Recording, Settings, Shares};
-use crate::record::store::Store;
+use crate::record::shelf::Shelf;
+use crate::record::store::{Store, StoreError};
 use crate::record::{claim, metadata};
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
@@ -60,6 +63,9 @@ pub struct RecordArgs {
     /// Leave the frames out of the log, and draw none for agents that do not look (random, frozen)
     #[arg(long)]
     no_frames: bool,
+    /// Say what would be recorded, and what a model's requests may take and cost; record, write and send nothing
+    #[arg(long)]
+    dry_run: bool,
     /// Print what became of the episodes as JSON
     #[arg(long)]
     json: bool,
@@ -84,14 +90,38 @@ impl RecordArgs {
             Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
             None => WorldConfig::default(),
         };
-        let player = self.player()?;
         let plan =
             Plan { experiments: self.experiment.0.clone(), seeds: self.seeds, runs: self.runs, shard: self.shard };
+        if self.dry_run {
+            return self.forecast(&config, &plan);
+        }
+        let player = self.player()?;
         let store = Store::open(&self.out, player.model(), metadata::recording(&config, player.as_ref()))
             .map_err(Failure::input)?;
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         stop_at_interrupt(stop, Arc::clone(&player))?;
         self.record(&config, player.as_ref(), &plan, &store, stop)
+    }
+
+    /// Says what recording would come to.
+    fn forecast(&self, config: &WorldConfig, plan: &Plan) -> Result<Outcome, Failure> {
+        let vlm = (self.agent == "vlm").then(|| self.vlm.forecaster(&self.out)).transpose()?.map(Arc::new);
+        let player = match &vlm {
+            Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
+            None => self.player()?,
+        };
+        let shelf = Shelf::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
+        let planned = plan.keys();
+        let todo = unrecorded(plan, &planned, |experiment| shelf.recorded(experiment))?;
+        let vlm = vlm.filter(|_| self.vlm.sends());
+        let requests = vlm.map(|vlm| RequestForecast::of(&vlm, &todo, config)).transpose().map_err(Failure::input)?;
+        let answer = ForecastAnswer::of(player.model(), planned.len(), &todo, config, requests);
+        if self.json {
+            output::print_json(&answer)?;
+        } else {
+            forecast::print(&answer)?;
+        }
+        Ok(Outcome::Done)
     }
 
     fn record(
@@ -103,8 +133,8 @@ impl RecordArgs {
         stop: &AtomicBool,
     ) -> Result<Outcome, Failure> {
         let planned = plan.keys();
-        let todo = unrecorded(plan, &planned, store)?;
-        let bar = Bar::new(todo.len(), config.episode.steps);
+        let todo = unrecorded(plan, &planned, |experiment| store.recorded(experiment))?;
+        let bar = Bar::new(player, todo.len(), config.episode.steps);
         let shares = Shares::default();
         let start = Instant::now();
         let recording =
@@ -115,9 +145,11 @@ impl RecordArgs {
         bar.clear();
         let tally = outcome.map_err(|broken| Failure::input(broken.to_string()))?;
         assembled.map_err(Failure::input)?;
-        let answer =
-            RecordAnswer::of(tally, player.model(), planned.len(), planned.len() - todo.len(), files(plan, store));
-        recording::say(&answer, start.elapsed(), shares.spent())?;
+        let missing: BTreeSet<Key> = todo.iter().copied().collect();
+        let found = planned.iter().filter(|key| !missing.contains(key));
+        store.note_lost(found.chain(&tally.recorded).copied(), &tally.lost).map_err(Failure::input)?;
+        let answer = RecordAnswer::of(tally, player, planned.len(), planned.len() - todo.len(), files(plan, store));
+        recording::say(&answer, &store.lost_list(), start.elapsed(), shares.spent())?;
         if self.json {
             output::print_json(&answer)?;
         }
@@ -174,10 +206,14 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
 }
 
 /// Those that are not recorded yet.
-fn unrecorded(plan: &Plan, planned: &[Key], store: &Store) -> Result<Vec<Key>, Failure> {
+fn unrecorded(
+    plan: &Plan,
+    planned: &[Key],
+    recorded: impl Fn(Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError>,
+) -> Result<Vec<Key>, Failure> {
     let mut todo = Vec::with_capacity(planned.len());
     for experiment in &plan.experiments {
-        let done = store.recorded(*experiment).map_err(Failure::input)?;
+        let done = recorded(*experiment).map_err(Failure::input)?;
         let own = planned.iter().filter(|key| key.experiment == *experiment);
         todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run))));
     }

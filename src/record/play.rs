@@ -171,7 +171,7 @@ fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, Broken> 
 }
 
 fn nothing() -> Arc<Frame> {
-    Arc::new(Frame { width: 0, height: 0, rgb: Vec::new() })
+    Arc::new(Frame::new(0, 0, Vec::new()))
 }
 
 /// The row of a step, `bumped` left open.

@@ -212,8 +212,8 @@ impl ExecAgent {
     fn observation_message(&self, observation: &Observation, user_prompt: String) -> Result<Message, Lost> {
         let png = observation.frame.to_png().map_err(unusable)?;
         let image = match &self.frames {
-            Some(frames) => Image::Path(frames.keep(observation.t, &png)?),
-            None => Image::Base64(STANDARD.encode(&png)),
+            Some(frames) => Image::Path(frames.keep(observation.t, png)?),
+            None => Image::Base64(STANDARD.encode(png)),
         };
         let (last_action, last_thought) = observation.history.clone().unwrap_or_default();
         Ok(Message::Observation(ObservationMessage {

@@ -74,7 +74,7 @@ fn observation() -> Observation {
         yaw: 330.0,
         bumped: true,
         history: Some((Some(Action::MoveForward), Some(THOUGHT.to_owned()))),
-        frame: std::sync::Arc::new(Frame { width: 0, height: 0, rgb: Vec::new() }),
+        frame: std::sync::Arc::new(Frame::new(0, 0, Vec::new())),
     }
 }
 

@@ -291,8 +291,8 @@ impl VlmAgent {
             vlm: Arc::clone(&self.vlm),
             journal: Arc::clone(&self.journal),
             t: observation.t,
-            frame: hash::of_bytes(&png),
-            body: dialect.body(&self.vlm.question(&words, &schema, &STANDARD.encode(&png))),
+            frame: hash::of_bytes(png),
+            body: dialect.body(&self.vlm.question(&words, &schema, &STANDARD.encode(png))),
             question: question.clone(),
         };
         let recorded = network

@@ -1,5 +1,6 @@
 //! Programs that fail: their episode is lost, named, counted, and recorded by the same command later.
 
+use std::process::Command;
 use std::time::Instant;
 
 use super::recordings::{Bench, FORWARD, done, outcome, three_steps};
@@ -16,6 +17,9 @@ fn loses(answer: &str, words: &[&str], expected: &[&str]) {
         assert!(reason.contains(expected), "{answer}: expected `{expected}` in {reason}");
     }
     assert!(!bench.path("runs/E1-exec.parquet").exists(), "{answer}: a lost episode is in no trace");
+    assert_eq!(bench.leftovers(), ["lost.jsonl"], "{answer}");
+    assert_eq!(bench.lost(), [found["lost"][0].clone()], "{answer}");
+    assert_eq!((&found["lost"][0]["step"], &found["lost"][0]["run"]), (&2.into(), &1.into()), "{answer}");
 
     // Once the program is mended, the same command records what was lost.
     bench.program(&three_steps());
@@ -108,4 +112,40 @@ fn no_key_of_the_environment_is_kept_of_what_a_program_says() {
     }
     assert_eq!(bench.texts("runs/E1-exec.parquet", "summary"), vec![Some("[key]".to_owned()); 3]);
     assert!(bench.texts("runs/E1-exec.parquet", "reply").iter().flatten().all(|reply| !reply.contains(key)));
+}
+
+#[test]
+fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
+    let Some(bench) = Bench::new() else { return };
+    // Of four episodes those that find the name of another one fail.
+    let fails = |runs: &str| {
+        format!(
+            "case \"$line\" in *'\"t\":1,'*) grep -o '/r[0-9]*\"' heard.jsonl | tail -n 1 | grep -q '{runs}' && exit 7 ;; esac; {}",
+            three_steps()
+        )
+    };
+    bench.program(&fails("[24]"));
+    let words = ["--runs", "4", "--threads", "1"];
+    let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
+    assert_eq!((code, &answer["recorded"]), (Some(1), &2.into()), "{said}");
+    assert!(said.contains("lost 2 episodes") && said.contains("lost.jsonl"), "{said}");
+    let runs = |bench: &Bench| bench.lost().iter().map(|lost| lost["run"].as_i64().unwrap()).collect::<Vec<_>>();
+    assert_eq!(runs(&bench), [2, 4]);
+    let first = &bench.lost()[0];
+    assert_eq!((&first["episode_id"], &first["status"]), (&"E1/exec/s1/r2".into(), &"server_error".into()));
+
+    let mut report = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
+    let report = report.current_dir(bench.folder.path()).args(["validate", "runs", "--json"]).output().unwrap();
+    let validation = String::from_utf8_lossy(&report.stdout).into_owned();
+    assert!(report.status.success() && !validation.contains("lost.jsonl"), "{validation}");
+
+    // One of them is recorded, another is lost again; a run that asks for neither leaves the list as it is.
+    bench.program(&fails("4"));
+    assert_eq!(outcome(&bench.record(&words).output().unwrap()).0, Some(1));
+    assert_eq!(runs(&bench), [4]);
+    assert_eq!(outcome(&bench.record(&["--runs", "1"]).output().unwrap()).0, Some(0));
+    assert_eq!(runs(&bench), [4]);
+    bench.program(&three_steps());
+    assert_eq!(outcome(&bench.record(&words).output().unwrap()).0, Some(0));
+    assert_eq!(bench.leftovers(), Vec::<String>::new());
 }

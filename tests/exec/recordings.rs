@@ -83,6 +83,12 @@ impl Bench {
         text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 
+    /// The list of lost episodes.
+    pub fn lost(&self) -> Vec<Value> {
+        let text = fs::read_to_string(self.path("runs/lost.jsonl")).unwrap_or_default();
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+    }
+
     /// The rows of a trace.
     pub fn rows(&self, name: &str) -> RecordBatch {
         let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(self.path(name)).unwrap()).unwrap();

@@ -2,6 +2,8 @@
 //! answers at once, which is what drawing, counting and writing allow, and with a server on loopback that takes a second
 //! for each answer, 64 episodes in flight.
 //!
+//! 64 in flight and a second allow 64 steps a second at most: a machine that draws faster than that is kept waiting.
+//!
 //! E5 with frames and logs, on as many threads as there are cores; `STEPS` steps an episode (40 unless told). The server
 //! runs in the same process and shares its cores, as a provider would not.
 

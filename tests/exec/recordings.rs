@@ -66,7 +66,10 @@ impl Bench {
 
     pub fn record_of(&self, agent: &str, words: &[&str]) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-        command.current_dir(self.folder.path()).args(["record", "--config", "small.toml", "--out", "runs"]);
+        command.current_dir(self.folder.path()).args(["record", "--config", "small.toml"]);
+        if !words.contains(&"--out") {
+            command.args(["--out", "runs"]);
+        }
         command.args(["--seeds", "1", "--no-log", "--json", "--agent", agent]).args(words);
         if !words.contains(&"--experiment") {
             command.args(["--experiment", "E1"]);

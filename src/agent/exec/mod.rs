@@ -122,8 +122,7 @@ impl Player for Exec {
             Images::Path => Some(Frames::new(&shared.settings.scratch)?),
             Images::Base64 => None,
         };
-        let program =
-            Program::start(&shared.settings.command, &shared.groups).map_err(|failure| lost(&failure, None))?;
+        let program = Program::start(&shared.settings.command, &shared.groups).map_err(|failure| lost(&failure))?;
         Ok(Box::new(ExecAgent {
             shared,
             task,
@@ -253,16 +252,17 @@ impl ExecAgent {
 
     /// The program is of no use any more, nor is any other if the command cannot be run at all.
     async fn give_up(&mut self, failure: &Failure) -> Lost {
-        let Some(program) = self.program.take() else { return lost(failure, None) };
-        let words = program.last_words().await.map(|words| self.shared.without_secrets(&words));
-        let lost = lost(failure, words.as_deref());
+        let Some(program) = self.program.take() else { return lost(failure) };
+        let Lost { status, cause } = lost(failure);
+        let words = program.last_words().await.map_or_else(String::new, |words| format!("; its last words: {words}"));
+        let cause = self.shared.without_secrets(&format!("step {}: {cause}{words}", self.steps));
         if let Failure::Ended(status) = failure
             && self.steps == 1
             && status.code().is_some_and(|code| NO_COMMAND.contains(&code))
         {
-            self.shared.stop.get_or_init(|| format!("the command of --agent exec: cannot be run: {}", lost.cause));
+            self.shared.stop.get_or_init(|| format!("the command of --agent exec: cannot be run: {cause}"));
         }
-        lost
+        Lost { status, cause }
     }
 }
 
@@ -272,13 +272,12 @@ impl Shared {
     }
 }
 
-fn lost(failure: &Failure, words: Option<&str>) -> Lost {
+fn lost(failure: &Failure) -> Lost {
     let status = match failure {
         Failure::Slow(_) => Status::Timeout,
         _ => Status::ServerError,
     };
-    let cause = words.map_or_else(|| failure.to_string(), |words| format!("{failure}; its last words: {words}"));
-    Lost { status: Some(status), cause }
+    Lost { status: Some(status), cause: failure.to_string() }
 }
 
 /// Something between the world and the program cannot be made.

@@ -33,8 +33,8 @@ pub enum Failure {
     #[error("the program cannot be started: {0}")]
     Start(io::Error),
     #[error(
-        "the program wrote a line that nobody had asked for: `{0}`\n  help: one line on standard output for each \
-         observation; everything else belongs on standard error"
+        "the program wrote a line that nobody had asked for: `{0}` (one line on standard output for each observation; \
+         everything else belongs on standard error)"
     )]
     OutOfTurn(String),
     #[error("the program ended ({0}) before its reply")]
@@ -43,7 +43,7 @@ pub enum Failure {
     Closed,
     #[error("the program's output cannot be read: {0}")]
     Unreadable(io::Error),
-    #[error("no reply within {} s\n  help: --exec-timeout allows more", .0.as_secs())]
+    #[error("no reply within {} s (--exec-timeout allows more)", .0.as_secs())]
     Slow(Duration),
     #[error("the reply is longer than {LONGEST_REPLY} bytes")]
     TooLong,

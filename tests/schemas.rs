@@ -64,6 +64,9 @@ fn current() -> Vec<(&'static str, Value)> {
         ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
         ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
         ("replay", json!(schema_for!(mirrorstats::cli::commands::replay::ReplayAnswer))),
+        ("exec-message", json!(schema_for!(mirrorstats::agent::exec::message::Message))),
+        ("lost", json!(schema_for!(mirrorstats::record::lost::LostEpisode))),
+        ("record-forecast", json!(schema_for!(mirrorstats::cli::forecast::ForecastAnswer))),
         ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
         ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
     ]);
@@ -95,7 +98,8 @@ fn replies_are_asked_for_as_the_files_say() {
 #[test]
 fn the_folder_holds_nothing_else() {
     // Their types are there with the feature `sim` alone, their files always.
-    let of_worlds = ["census", "record", "replay", "scene", "world-config"];
+    let of_worlds =
+        ["census", "exec-message", "lost", "record", "record-forecast", "replay", "scene", "world-config"];
     let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
     let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
     let found =

@@ -168,7 +168,7 @@ fn observation(t: i32) -> Observation {
         yaw: 0.0,
         bumped: false,
         history: None,
-        frame: Arc::new(Frame { width: 2, height: 1, rgb: vec![1, 2, 3, 4, 5, 6] }),
+        frame: Arc::new(Frame::new(2, 1, vec![1, 2, 3, 4, 5, 6])),
     }
 }
 
@@ -224,7 +224,7 @@ fn a_slow_answer_is_a_timeout_and_loses_the_episode() {
     });
     let bench = Bench::new(Limits::default());
     let lost = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "slow", 1).remove(0).unwrap_err();
-    assert!(lost.0.starts_with("step 1: timeout after 3 attempts"), "{lost}");
+    assert!(lost.cause.starts_with("step 1: timeout after 3 attempts"), "{lost}");
 }
 
 #[test]
@@ -254,11 +254,11 @@ fn what_was_answered_is_never_asked_again_and_plays_without_a_network() {
     let cassette = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned(), 500));
     let played = Bench::play(&cassette, "episode", 4);
     assert_eq!(played[..3].iter().cloned().map(Result::unwrap).collect::<Vec<_>>(), first);
-    assert!(played[3].as_ref().unwrap_err().0.contains("no answer for step 4"));
+    assert!(played[3].as_ref().unwrap_err().cause.contains("no answer for step 4"));
 
     let another = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned(), 501));
     let refused = Bench::play(&another, "episode", 1).remove(0).unwrap_err();
-    assert!(refused.0.contains("belongs to another request"), "{refused}");
+    assert!(refused.cause.contains("belongs to another request"), "{refused}");
 }
 
 #[test]
@@ -274,7 +274,7 @@ fn no_key_is_in_anything_that_is_kept_or_told() {
     let replies = Bench::play(&vlm, "episode", 2);
     assert_eq!(replies[0].as_ref().unwrap().words.view_description.as_deref(), Some("[key]"));
     let refused = replies[1].as_ref().unwrap_err();
-    assert!(refused.0.contains("refuses the request: HTTP 401") && refused.0.contains("[key]"), "{refused}");
+    assert!(refused.cause.contains("refuses the request: HTTP 401") && refused.cause.contains("[key]"), "{refused}");
     assert!(vlm.stopped().is_some());
     let told = format!("{replies:?}{vlm:?}{}{}", bench.written(), vlm.description());
     assert!(!told.contains(KEY));
@@ -288,7 +288,7 @@ fn limits_stop_before_the_request_over_them() {
     let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
     let replies = Bench::play(&vlm, "episode", 3);
     assert!(replies[0].is_ok() && replies[1].is_ok());
-    assert!(replies[2].as_ref().unwrap_err().0.contains("limit of requests is reached: 2 of 2"));
+    assert!(replies[2].as_ref().unwrap_err().cause.contains("limit of requests is reached: 2 of 2"));
     assert_eq!(server.requests().len(), 2);
 }
 

@@ -114,8 +114,8 @@ fn rows(criterion: &mut Criterion) {
         bencher.iter(|| {
             let mut sorter = RowSorter::new(header.clone());
             sorter.add(black_box(&rows)).unwrap();
-            let mut sorted = sorter.finish().unwrap();
-            while sorted.next().unwrap().is_some() {}
+            let mut rows = sorter.finish().unwrap();
+            while rows.next_row().unwrap().is_some() {}
         });
     });
     group.finish();

@@ -28,6 +28,11 @@ impl Draw {
         i32::try_from(self.below(u64::from(below))).unwrap_or_default()
     }
 
+    /// The same as a number that a float holds exactly.
+    pub fn short(&mut self, below: u16) -> u16 {
+        u16::try_from(self.below(u64::from(below))).unwrap_or_default()
+    }
+
     /// True this many times in a hundred.
     pub fn percent(&mut self, chance: u64) -> bool {
         self.below(100) < chance

@@ -95,7 +95,7 @@ impl Scene {
             self_color: "unknown",
             selected_cube: "none",
             mirror_visible: draw.percent(20),
-            pose: [position(draw), position(draw), draw.small(12) as f32 * 30.0],
+            pose: [position(draw), position(draw), f32::from(draw.short(12)) * 30.0],
             frame_time: i64::try_from(number).unwrap_or_default() * 1_000_000_000_000,
         }
     }
@@ -167,5 +167,5 @@ impl Scene {
 
 /// A coordinate in a room of 8 m, to the centimetre.
 fn position(draw: &mut Draw) -> f32 {
-    draw.small(800) as f32 / 100.0 - 4.0
+    f32::from(draw.short(800)) / 100.0 - 4.0
 }

@@ -96,7 +96,7 @@ fn shares(study: &Study, files: usize) -> Vec<Share> {
     let (mut episode, mut steps) = (0, 0);
     for file in 0..files {
         let (first, steps_before) = (episode, steps);
-        let until = (u128::from(study.steps) * (file as u128 + 1) / files as u128) as u64;
+        let until = study.steps * (file as u64 + 1) / files as u64;
         while steps < until {
             steps += study.length(episode).min(study.steps - steps);
             episode += 1;

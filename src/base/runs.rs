@@ -166,7 +166,9 @@ mod tests {
         let mut sorted = records.to_vec();
         sorted.sort();
         let mut run = Run::default();
-        sorted.iter().for_each(|record| run.push(record));
+        for record in &sorted {
+            run.push(record);
+        }
         run
     }
 

@@ -76,7 +76,7 @@ pub fn write(
     let definitions = definitions(&traces, scoring)?;
     let mut rows = run::rows(&traces, &definitions, &[], threads).map_err(score_failure)?;
     let mut writer = format::Writer::new(rows.header().clone(), format, out).map_err(unwritten)?;
-    while let Some(row) = rows.next().map_err(ScoreError::Spill).map_err(score_failure)? {
+    while let Some(row) = rows.next_row().map_err(ScoreError::Spill).map_err(score_failure)? {
         writer.write(row).map_err(unwritten)?;
     }
     writer.finish().map_err(unwritten)

@@ -41,8 +41,12 @@ impl Rows {
         for (at, &row) in scores.kept.iter().enumerate() {
             let start = rows.bytes.len();
             keys.put(&mut rows.bytes, row);
-            labels.iter().for_each(|label| put_label(&mut rows.bytes, shown(label, row).as_deref()));
-            scores.metrics.iter().for_each(|metric| put_metric(&mut rows.bytes, metric[at]));
+            for label in &labels {
+                put_label(&mut rows.bytes, shown(label, row).as_deref());
+            }
+            for metric in &scores.metrics {
+                put_metric(&mut rows.bytes, metric[at]);
+            }
             rows.records.push(start..rows.bytes.len());
         }
         rows.sort();
@@ -124,7 +128,7 @@ impl SortedRows {
     ///
     /// # Errors
     /// When rows that were put away cannot be read.
-    pub fn next(&mut self) -> io::Result<Option<&EpisodeRow>> {
+    pub fn next_row(&mut self) -> io::Result<Option<&EpisodeRow>> {
         let Some(record) = self.merge.next()? else { return Ok(None) };
         let mut record = Record(record);
         let EpisodeRow { key, labels, metrics } = &mut self.row;
@@ -388,7 +392,7 @@ mod tests {
             }
             let mut sorted = sorter.finish().unwrap();
             let mut found = Vec::new();
-            while let Some(row) = sorted.next().unwrap() {
+            while let Some(row) = sorted.next_row().unwrap() {
                 found.push(row.clone());
             }
             prop_assert!(found.is_sorted_by_key(|row| row.key.clone()));

@@ -254,7 +254,7 @@ fn sorted(
 
 fn table(mut rows: SortedRows) -> Result<EpisodeTable, ScoreError> {
     let mut table = EpisodeTable::empty(rows.header().clone());
-    while let Some(row) = rows.next().map_err(ScoreError::Spill)? {
+    while let Some(row) = rows.next_row().map_err(ScoreError::Spill)? {
         table.push(row.clone());
     }
     Ok(table)

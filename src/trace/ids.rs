@@ -9,7 +9,7 @@ use std::io;
 
 use super::decode::RowGroup;
 use super::finding::{Code, Finding, TraceError};
-use super::layout::{EPISODE_ID, Layout};
+use super::layout::Layout;
 use super::open::TraceFile;
 use super::pass::Episodes;
 use super::rules::Located;
@@ -66,7 +66,7 @@ impl Print {
         let mut words =
             bytes.chunks_exact(4).map(|word| word.iter().fold(0, |value, &byte| value << 8 | u32::from(byte)));
         let mut word = || words.next().unwrap_or_default();
-        let mut wide = |high: u32, low: u32| u64::from(high) << 32 | u64::from(low);
+        let wide = |high: u32, low: u32| u64::from(high) << 32 | u64::from(low);
         let hash = wide(word(), word());
         let place = Place { file: word(), row_group: word(), row: wide(word(), word()) };
         Self { hash, place }
@@ -266,7 +266,9 @@ mod tests {
                 expected.entry(hash).or_default().push(place);
                 prints.add(&[Print { hash, place }]).unwrap();
             }
-            expected.values_mut().for_each(|places| places.sort());
+            for places in expected.values_mut() {
+                places.sort();
+            }
             let expected: HashSet<_> = expected.into_values().filter(|places| places.len() > 1).collect();
             let last = prints.take();
             let found = alike(prints.runs, last).unwrap();

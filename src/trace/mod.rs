@@ -2,6 +2,7 @@
 //!
 //! Rule: only this room opens traces. It knows no metric.
 
+mod column;
 pub(crate) mod contain;
 mod decode;
 pub mod describe;
@@ -13,6 +14,7 @@ pub mod inputs;
 mod layout;
 pub mod merge;
 pub mod open;
+mod pages;
 mod pass;
 pub mod restore;
 mod rules;

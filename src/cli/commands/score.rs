@@ -1,6 +1,6 @@
 //! `score`: the episode table of traces, or the evidence for one episode.
 
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};

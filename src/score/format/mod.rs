@@ -139,7 +139,7 @@ pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Re
 pub struct Writer<W: Write + Send>(Inner<W>);
 
 enum Inner<W: Write + Send> {
-    Parquet(parquet::Writer<W>),
+    Parquet(Box<parquet::Writer<W>>),
     Csv(csv::Writer<W>),
     JsonLines(jsonl::Writer<W>),
 }
@@ -151,7 +151,7 @@ impl<W: Write + Send> Writer<W> {
     /// Whatever writing gives.
     pub fn new(header: Header, format: Format, out: W) -> Result<Self, FormatError> {
         Ok(Self(match format {
-            Format::Parquet => Inner::Parquet(parquet::Writer::new(&header, out)?),
+            Format::Parquet => Inner::Parquet(Box::new(parquet::Writer::new(&header, out)?)),
             Format::Csv => Inner::Csv(csv::Writer::new(&header, out)?),
             Format::JsonLines => Inner::JsonLines(jsonl::Writer::new(header, out)),
         }))

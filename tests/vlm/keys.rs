@@ -55,7 +55,7 @@ fn has(bytes: &[u8], words: &str) -> bool {
 
 /// Records one short episode with all that makes programs talkative, and looks at every byte.
 fn check(server: &Server, key: &str, words: &str) -> String {
-    let folder = Folder::new(2);
+    let folder = Folder::new();
     let mut command = folder.record(server, "own", &format!("--seeds 1 --runs 1 --json {words}"));
     command.env("MIRRORSTATS_API_KEY", key).env("RUST_LOG", "trace").env("RUST_BACKTRACE", "full");
     let output = command.output().unwrap();
@@ -80,11 +80,11 @@ fn a_server_that_says_everything_back_learns_the_key_and_nobody_else_does() {
         assert!(server.requests()[0].head.contains(KEY));
     }
     let server = Server::start(|_, request| {
-        let echo = decision("a").replace("a wall", &request.head.replace("\r\n", " "));
+        let echo = decision("done").replace("a wall", &request.head.replace("\r\n", " "));
         whole(Dialect::OpenaiCompatible, &echo)
     });
     check(&server, KEY, "");
-    assert_eq!(server.count(), 2);
+    assert_eq!(server.count(), 1);
 }
 
 #[test]

@@ -10,14 +10,14 @@ use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::journal::Entry;
 use mirrorstats::base::hash;
 
-use super::recordings::{Folder, stderr};
-use super::server::{JSON, Request, Server, decision, http, whole};
+use super::recordings::{Folder, counting, stderr};
+use super::server::{JSON, Request, Server, http, whole};
 
 const STEPS: u32 = 4;
 
 /// Every twentieth request goes wrong, in one way after the other; the others are answered in words that no other answer
 /// has, so that no two later requests are the same.
-fn answer(at: usize, _: &Request) -> Vec<u8> {
+fn answer(at: usize, request: &Request) -> Vec<u8> {
     sleep(Duration::from_millis(2));
     match at % 100 {
         7 => http("500 Internal Server Error", "retry-after: 0\r\n", b""),
@@ -25,7 +25,7 @@ fn answer(at: usize, _: &Request) -> Vec<u8> {
         47 => http("429 Too Many Requests", "retry-after: 0\r\n", b"slow down"),
         67 => http("502 Bad Gateway", "retry-after: 0\r\ncontent-type: text/html\r\n", b"<html>"),
         87 => format!("HTTP/1.1 200 OK\r\n{JSON}content-length: 100\r\n\r\nhalf").into_bytes(),
-        _ => whole(Dialect::OpenaiCompatible, &decision("a").replace("went on", &format!("answer {at}"))),
+        _ => whole(Dialect::OpenaiCompatible, &counting(request, STEPS, at)),
     }
 }
 
@@ -126,7 +126,7 @@ fn journaled(journals: &BTreeMap<PathBuf, Vec<Entry>>) -> BTreeMap<String, usize
 
 fn check(models: usize, runs: usize, kills: usize) {
     let study = Study {
-        folder: Folder::new(STEPS),
+        folder: Folder::new(),
         server: Server::start(answer),
         models: (1..=models).map(|at| format!("model-{at}")).collect(),
         words: format!("--seeds 3 --runs {runs} --threads 1 --in-flight 6"),

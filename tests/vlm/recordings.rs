@@ -9,16 +9,15 @@ use mirrorstats::agent::vlm::journal::Entry;
 use tempfile::TempDir;
 
 use super::bench::KEY;
-use super::server::Server;
+use super::server::{Request, Server, decision};
 
 /// A folder to record in.
 pub struct Folder(TempDir);
 
 impl Folder {
-    /// For episodes of so many steps.
-    pub fn new(steps: u32) -> Self {
+    pub fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let world = format!("eye.width = 32\neye.height_px = 24\neye.samples = 0\nepisode.steps = {steps}\n");
+        let world = "eye.width = 64\neye.height_px = 48\neye.samples = 0\n";
         fs::write(folder.path().join("small.toml"), world).unwrap();
         Self(folder)
     }
@@ -49,6 +48,15 @@ impl Folder {
         };
         files.map(|file| read(file.unwrap().path())).collect()
     }
+}
+
+/// The reply of a model that turns left and is done at step `last`. It counts in its summaries, which come back with
+/// the next request; `mark` makes this one differ from all others.
+pub fn counting(request: &Request, last: u32, mark: usize) -> String {
+    let before = request.body.split_once("counted to ").and_then(|(_, rest)| rest.split_once(' '));
+    let step = before.map_or(1, |(count, _)| count.parse::<u32>().unwrap() + 1);
+    let action = if step < last { "a" } else { "done" };
+    decision(action).replace("went on", &format!("counted to {step} in answer {mark}"))
 }
 
 pub fn stderr(output: &Output) -> String {

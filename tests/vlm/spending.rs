@@ -5,7 +5,7 @@ use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
 
 use super::bench::Bench;
-use super::recordings::{Folder, stderr};
+use super::recordings::{Folder, counting, stderr};
 use super::server::{Server, decision, whole};
 
 #[test]
@@ -36,8 +36,8 @@ fn limits_count_what_earlier_starts_spent() {
         ("--max-cost 0.002", "cost is reached: 0.0020 US dollars of 0.0020", 1),
     ];
     for (limit, reason, requests) in cases {
-        let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("a")));
-        let folder = Folder::new(4);
+        let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
+        let folder = Folder::new();
         std::fs::write(folder.path().join("own.toml"), own).unwrap();
         for start in 1..=2 {
             let (code, said) = started(&folder, &server, limit);

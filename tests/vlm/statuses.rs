@@ -49,7 +49,7 @@ fn replies_end_in_their_status_with_every_provider() {
                 ("fenced", text(&format!("```json\n{}\n```", decision("w"))), Status::Repaired),
                 ("no JSON", text("I go on."), Status::ParseFailed),
                 ("deep arrays", text(&"[".repeat(50_000)), Status::ParseFailed),
-                ("deep objects", text(&"{\"action\":".repeat(9_000)), Status::ParseFailed),
+                ("deep objects", text(&"{\"action\":".repeat(5_000)), Status::ParseFailed),
                 ("a key twice", text(&twice), Status::SchemaInvalid),
                 ("another action", text(&decision("jump")), Status::SchemaInvalid),
                 ("cut off", ok(&spoken(dialect, &decision("w")[..20], length)), Status::Truncated),

@@ -149,7 +149,8 @@ def by_anthropic(origin, body):
         lambda: client.messages.create(
             model=MODEL,
             max_tokens=MAX_OUTPUT_TOKENS,
-            temperature=TEMPERATURE,
+            # The library has no argument of that name any more; this is its way for fields that it does not know.
+            extra_body={"temperature": TEMPERATURE},
             system=body["system"],
             messages=[
                 {

@@ -32,6 +32,15 @@ packages=$target/python
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper --where "seed <> 2 and TSA = 1"
 
+echo "end-to-end: logs as MCAP's and Foxglove's own packages read them"
+[ -d "$packages/mcap" ] || python3 -m pip install --quiet --disable-pip-version-check --root-user-action=ignore \
+  --target "$packages" mcap==1.6.0 mcap-protobuf-support==0.6.0 foxglove-schemas-protobuf==0.4.0 jsonschema==4.26.0
+mirrorstats record --agent random --experiment E4,E5 --seeds 1 --runs 2 --no-frames --out "$out/runs" 2>/dev/null
+PYTHONPATH=$packages python3 scripts/check-log.py fixtures/recorded/*.mcap "$out"/runs/*.mcap
+mirrorstats recover "$out/runs/E4-random.mcap" --out "$out/recovered.parquet"
+cmp "$out/runs/E4-random.parquet" "$out/recovered.parquet"
+mirrorstats replay "$out/runs"
+
 echo "end-to-end: the same scores from the SQL lowering on Polars, byte for byte"
 mirrorstats score fixtures/paper >"$out/native.csv"
 mirrorstats score fixtures/paper --engine polars >"$out/polars.csv"

@@ -95,6 +95,6 @@ fn observation(t: i32) -> Observation {
         yaw: 0.0,
         bumped: false,
         history: None,
-        frame: Arc::new(Frame { width: 2, height: 1, rgb: vec![1, 2, 3, 4, 5, 6] }),
+        frame: Arc::new(Frame::new(2, 1, vec![1, 2, 3, 4, 5, 6])),
     }
 }

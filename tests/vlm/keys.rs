@@ -25,7 +25,7 @@ fn no_key_is_in_anything_that_is_kept_or_told() {
     let replies = Bench::play(&vlm, "episode", 2);
     assert_eq!(replies[0].as_ref().unwrap().words.view_description.as_deref(), Some("[key]"));
     let refused = replies[1].as_ref().unwrap_err();
-    assert!(refused.0.contains("refuses the request: HTTP 401") && refused.0.contains("[key]"), "{refused}");
+    assert!(refused.cause.contains("refuses the request: HTTP 401") && refused.cause.contains("[key]"), "{refused}");
     assert!(vlm.stopped().is_some());
     let told = format!("{replies:?}{vlm:?}{}{}", bench.written(), vlm.description());
     assert!(!told.contains(KEY));

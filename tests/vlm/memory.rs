@@ -37,11 +37,11 @@ fn what_was_answered_is_never_asked_again_and_plays_without_a_network() {
     let cassette = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned(), 500));
     let played = Bench::play(&cassette, "episode", 4);
     assert_eq!(played[..3].iter().cloned().map(Result::unwrap).collect::<Vec<_>>(), first);
-    assert!(played[3].as_ref().unwrap_err().0.contains("no answer for step 4"));
+    assert!(played[3].as_ref().unwrap_err().cause.contains("no answer for step 4"));
 
     let another = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned(), 501));
     let refused = Bench::play(&another, "episode", 1).remove(0).unwrap_err();
-    assert!(refused.0.contains("belongs to another request"), "{refused}");
+    assert!(refused.cause.contains("belongs to another request"), "{refused}");
 }
 
 #[test]

@@ -15,7 +15,7 @@ fn limits_stop_before_the_request_over_them() {
     let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
     let replies = Bench::play(&vlm, "episode", 3);
     assert!(replies[0].is_ok() && replies[1].is_ok());
-    assert!(replies[2].as_ref().unwrap_err().0.contains("limit of requests is reached: 2 of 2"));
+    assert!(replies[2].as_ref().unwrap_err().cause.contains("limit of requests is reached: 2 of 2"));
     assert_eq!(server.count(), 2);
 }
 

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use mirrorstats::agent::Status;
+use mirrorstats::agent::reply::Repair;
 use mirrorstats::agent::vlm::OnOutage;
 use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
@@ -28,6 +29,8 @@ fn check(dialect: Dialect, cases: Vec<Case>) {
         let reply = Bench::play(&vlm, &place.replace([' ', ','], "-"), 1).remove(0);
         let reply = reply.unwrap_or_else(|lost| panic!("{place}: {lost}"));
         assert_eq!(reply.status, status, "{place}");
+        let repairs = Repair::joined(&reply.repairs);
+        assert_eq!(repairs.as_deref(), (status == Status::Repaired).then_some("code_fence"), "{place}");
         let has_decision = matches!(status, Status::Ok | Status::Repaired);
         assert_eq!(reply.action.is_some(), has_decision, "{place}");
         assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{place}");
@@ -165,7 +168,7 @@ fn what_the_provider_will_not_change_its_mind_about_ends_the_run_at_once() {
             let bench = Bench::new(Limits::default());
             let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
             let replies = Bench::play(&vlm, "episode", 2);
-            let reasons: Vec<_> = replies.into_iter().map(|reply| reply.unwrap_err().0).collect();
+            let reasons: Vec<_> = replies.into_iter().map(|reply| reply.unwrap_err().cause).collect();
             let sentence = format!("the provider refuses the request: HTTP {status}");
             assert!(reasons[0].starts_with(&sentence) && !reasons[0].contains('\n'), "{}", reasons[0]);
             assert_eq!(reasons[1], reasons[0]);
@@ -184,7 +187,7 @@ fn a_redirect_is_not_followed() {
         let server = Server::start(move |_, _| http(status, &location, b""));
         let bench = Bench::new(Limits::default());
         let lost = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 1).remove(0);
-        assert!(lost.unwrap_err().0.contains(status));
+        assert!(lost.unwrap_err().cause.contains(status));
         assert!(server.requests()[0].head.contains(KEY));
     }
     assert_eq!(elsewhere.count(), 0, "nobody else gets the key");
@@ -207,7 +210,7 @@ fn an_answer_that_takes_too_long_is_a_timeout_wherever_it_hangs() {
         let reply = Bench::play(&vlm(OnOutage::StandStill), "stands", 1).remove(0).unwrap();
         assert_eq!(reply.status, Status::Timeout, "{name}");
         let lost = Bench::play(&vlm(OnOutage::Lose), "lost", 1).remove(0).unwrap_err();
-        assert!(lost.0.starts_with("step 1: timeout after 2 attempts"), "{name}: {lost}");
+        assert!(lost.cause.starts_with("step 1: timeout after 2 attempts"), "{name}: {lost}");
     }
 }
 

@@ -70,7 +70,13 @@ pub struct Prices {
 impl Prices {
     /// What so many tokens cost, US dollars.
     pub fn cost_usd(self, prompt_tokens: u32, completion_tokens: u32) -> f64 {
-        (f64::from(prompt_tokens) * self.input + f64::from(completion_tokens) * self.output) / 1e6
+        self.cost_of(prompt_tokens.into(), completion_tokens.into())
+    }
+
+    /// What the tokens of a whole run cost, US dollars.
+    #[expect(clippy::cast_precision_loss, reason = "nobody pays for 2^53 tokens")]
+    pub fn cost_of(self, prompt_tokens: u64, completion_tokens: u64) -> f64 {
+        (prompt_tokens as f64 * self.input + completion_tokens as f64 * self.output) / 1e6
     }
 }
 

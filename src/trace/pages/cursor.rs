@@ -242,7 +242,7 @@ impl Stored {
                     count -= same;
                 }
                 Span::Packed(packed) => {
-                    packed.each(|value| keys.push(value.cast_signed()));
+                    packed.append(keys);
                     count -= packed.count;
                 }
             }

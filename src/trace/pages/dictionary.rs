@@ -53,15 +53,17 @@ impl Dictionary {
             }
             Self::Ints(ints) => {
                 let ints = ints.as_primitive::<Int64Type>().values();
-                let count = ints.len();
-                let within = |key: &i32| usize::try_from(*key).is_ok_and(|key| key < count);
-                let values: ScalarBuffer<i64> = if keys.iter().all(within) {
-                    keys.iter().map(|key| ints[key.cast_unsigned() as usize]).collect()
-                } else if nulls.as_ref().is_some_and(|nulls| nulls.null_count() == keys.len()) {
-                    vec![0; keys.len()].into()
-                } else {
-                    return Err(Unfit);
+                let mut within = true;
+                let value = |key: &i32| {
+                    let value = usize::try_from(*key).ok().and_then(|key| ints.get(key));
+                    within &= value.is_some();
+                    value.copied().unwrap_or_default()
                 };
+                let values: ScalarBuffer<i64> = keys.iter().map(value).collect();
+                let all_null = || nulls.as_ref().is_some_and(|nulls| nulls.null_count() == keys.len());
+                if !within && !all_null() {
+                    return Err(Unfit);
+                }
                 Ok(Arc::new(Int64Array::try_new(values, nulls).map_err(|_| Unfit)?))
             }
         }

@@ -5,6 +5,7 @@
 use bytes::Bytes;
 
 use super::Unfit;
+use crate::base::bits::word;
 
 /// Numbers of a fixed width, as they are stored: runs of one number, and packed ones.
 pub(super) struct Hybrid {
@@ -105,15 +106,61 @@ impl Hybrid {
     }
 }
 
+/// Numbers of which a byte boundary follows.
+const GROUP: usize = 8;
+
 impl Packed<'_> {
+    /// The numbers, behind those of `out`.
+    pub(super) fn append(&self, out: &mut Vec<i32>) {
+        let start = out.len();
+        out.resize(start + self.count, 0);
+        self.unpack(&mut out[start..]);
+    }
+
     /// Gives each number to `take`.
-    pub(super) fn each(&self, mut take: impl FnMut(u32)) {
-        let mask = (1_u64 << self.width) - 1;
-        let mut bit = self.bit;
-        for _ in 0..self.count {
-            let word = word(self.data, bit / 8) >> (bit % 8);
-            take(u32::try_from(word & mask).expect("masked to 32 bits or fewer"));
-            bit += self.width;
+    pub(super) fn each(&self, take: impl FnMut(u32)) {
+        let mut numbers = vec![0; self.count];
+        self.unpack(&mut numbers);
+        numbers.into_iter().map(i32::cast_unsigned).for_each(take);
+    }
+
+    fn unpack(&self, out: &mut [i32]) {
+        // Whole groups begin at bytes; before the first and after the last one numbers are taken singly.
+        let to_byte = (0..GROUP).find(|ahead| (self.bit + ahead * self.width).is_multiple_of(8)).unwrap_or(0);
+        let (before, rest) = out.split_at_mut(to_byte.min(out.len()));
+        self.singly(self.bit, before);
+        let bit = self.bit + before.len() * self.width;
+        let (groups, after) = rest.as_chunks_mut::<GROUP>();
+        match self.width {
+            1 => self.groups::<1>(bit, groups),
+            2 => self.groups::<2>(bit, groups),
+            3 => self.groups::<3>(bit, groups),
+            4 => self.groups::<4>(bit, groups),
+            5 => self.groups::<5>(bit, groups),
+            6 => self.groups::<6>(bit, groups),
+            7 => self.groups::<7>(bit, groups),
+            8 => self.groups::<8>(bit, groups),
+            _ => self.singly(bit, groups.as_flattened_mut()),
+        }
+        self.singly(bit + groups.len() * GROUP * self.width, after);
+    }
+
+    /// Groups of numbers of `WIDTH` bits from the start of a byte: one word each.
+    fn groups<const WIDTH: usize>(&self, bit: usize, groups: &mut [[i32; GROUP]]) {
+        let mask = (1_u32 << WIDTH) - 1;
+        for (at, group) in groups.iter_mut().enumerate() {
+            let word = word(self.data, bit / 8 + at * WIDTH);
+            for (place, number) in group.iter_mut().enumerate() {
+                *number = (low(word >> (place * WIDTH)) & mask).cast_signed();
+            }
+        }
+    }
+
+    fn singly(&self, bit: usize, out: &mut [i32]) {
+        let mask = low((1_u64 << self.width) - 1);
+        for (at, number) in out.iter_mut().enumerate() {
+            let bit = bit + at * self.width;
+            *number = (low(word(self.data, bit / 8) >> (bit % 8)) & mask).cast_signed();
         }
     }
 
@@ -124,14 +171,10 @@ impl Packed<'_> {
     }
 }
 
-/// Eight bytes from a byte on, zeros beyond the end.
-#[inline]
-fn word(data: &[u8], at: usize) -> u64 {
-    if let Some(bytes) = data.get(at..).and_then(|rest| rest.first_chunk()) {
-        return u64::from_le_bytes(*bytes);
-    }
-    let rest = data.get(at..).unwrap_or_default();
-    rest.iter().rev().fold(0, |word, byte| word << 8 | u64::from(*byte))
+/// The lower half of a word.
+#[expect(clippy::cast_possible_truncation, reason = "the lower half is what is asked for")]
+fn low(word: u64) -> u32 {
+    word as u32
 }
 
 #[cfg(test)]
@@ -149,7 +192,11 @@ mod tests {
         while found.len() < count {
             match hybrid.span(most.min(count - found.len())).ok().unwrap() {
                 Span::Same { value, count } => found.extend(std::iter::repeat_n(value, count)),
-                Span::Packed(packed) => packed.each(|value| found.push(value)),
+                Span::Packed(packed) => {
+                    let mut numbers = Vec::new();
+                    packed.append(&mut numbers);
+                    found.extend(numbers.into_iter().map(i32::cast_unsigned));
+                }
             }
         }
         found

@@ -153,14 +153,7 @@ impl RecordArgs {
         if self.json {
             output::print_json(&answer)?;
         }
-        if let Some(reason) = player.stopped() {
-            return Err(Failure::input(reason));
-        }
-        match (answer.stopped, answer.lost.is_empty()) {
-            (true, _) => Ok(Outcome::Interrupted),
-            (false, true) => Ok(Outcome::Done),
-            (false, false) => Ok(Outcome::CheckFailed),
-        }
+        outcome_of(&answer, player)
     }
 
     fn player(&self) -> Result<Arc<dyn Player>, Failure> {
@@ -183,6 +176,18 @@ impl RecordArgs {
             frames: !self.no_frames,
             log: !self.no_log,
         }
+    }
+}
+
+/// How a recording that ran to its end, or was stopped, is told from outside.
+fn outcome_of(answer: &RecordAnswer, player: &dyn Player) -> Result<Outcome, Failure> {
+    if let Some(reason) = player.stopped() {
+        return Err(Failure::input(reason));
+    }
+    match (answer.stopped, answer.lost.is_empty()) {
+        (true, _) => Ok(Outcome::Interrupted),
+        (false, true) => Ok(Outcome::Done),
+        (false, false) => Ok(Outcome::CheckFailed),
     }
 }
 

@@ -151,7 +151,7 @@ pub(super) fn dollars(value: f64) -> String {
 }
 
 /// Says what became of the episodes, where those that were lost are listed, and where the time went.
-pub(super) fn say(answer: &RecordAnswer, list: &Path, elapsed: Duration, times: Spent) -> io::Result<()> {
+pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, times: Spent) -> io::Result<()> {
     let mut out = io::stderr().lock();
     let seconds = elapsed.as_secs_f64();
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
@@ -172,11 +172,11 @@ pub(super) fn say(answer: &RecordAnswer, list: &Path, elapsed: Duration, times: 
         writeln!(out, "spent: {}, over all starts of this recording", spent(spend))?;
     }
     if !answer.lost.is_empty() {
-        let lost = counted(answer.lost.len() as u64, "episode");
+        let episodes = counted(answer.lost.len() as u64, "episode");
         writeln!(
             out,
-            "lost {lost} to failures that are not the agent's: in no trace, listed in {}; the same command tries again",
-            visible(&list.display().to_string())
+            "lost {episodes} to failures that are not the agent's: in no trace, listed in {}; the same command tries again",
+            visible(&lost_list.display().to_string())
         )?;
     }
     if answer.stopped {

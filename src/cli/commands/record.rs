@@ -31,6 +31,7 @@ use crate::sim::config::WorldConfig;
 /// second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's, and
 /// with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
 pub struct RecordArgs {
     /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; or
     /// exec:'CMD', a program of your own that takes and gives JSON lines
@@ -110,9 +111,9 @@ impl RecordArgs {
             Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
             None => self.player()?,
         };
-        let shelf = Shelf::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
+        let there = Shelf::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
         let planned = plan.keys();
-        let todo = unrecorded(plan, &planned, |experiment| shelf.recorded(experiment))?;
+        let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
         let vlm = vlm.filter(|_| self.vlm.sends());
         let requests = vlm.map(|vlm| RequestForecast::of(&vlm, &todo, config)).transpose().map_err(Failure::input)?;
         let answer = ForecastAnswer::of(player.model(), planned.len(), &todo, config, requests);

@@ -9,6 +9,7 @@
 pub mod exec;
 pub mod identification;
 pub mod prompt;
+pub mod renormalize;
 pub mod reply;
 #[cfg(feature = "sim")]
 pub mod scripted;
@@ -23,6 +24,7 @@ use std::sync::Arc;
 
 use crate::base::frame::Frame;
 use crate::trace::episode::Action;
+use reply::Repair;
 
 /// What an agent is told once, before the first step.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,6 +74,8 @@ pub struct Observation {
 pub struct Reply {
     /// The outcome of getting and reading it.
     pub status: Status,
+    /// What had to be repaired to read it, in order.
+    pub repairs: Vec<Repair>,
     /// The action; `None` where the reply gave none: the body stands still.
     pub action: Option<Action>,
     /// The self-attribution: a colour of the palette, `unknown`, or `None` where the reply gave none.

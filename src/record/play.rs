@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use super::plan::Key;
 use super::run::Shares;
+use crate::agent::reply::Repair;
 use crate::agent::{Agent, Family, Lost, Observation, Reply, Task};
 use crate::base::frame::Frame;
 use crate::base::palette::Color;
@@ -190,6 +191,7 @@ fn row(world: &World, key: Key, t: i32, census: &Census, reply: Reply) -> Step {
         bumped: None,
         cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
         reply_status: Some(reply.status.name().to_owned()),
+        reply_repair: Repair::joined(&reply.repairs),
         view_description: reply.words.view_description,
         reasoning: reply.words.reasoning,
         summary: reply.words.summary,

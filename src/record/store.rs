@@ -89,7 +89,7 @@ impl Store {
     /// # Errors
     /// When it cannot be made or written to.
     pub fn open(folder: &Path, model: &str, recording: Value) -> Result<Self, StoreError> {
-        let columns = OptionalColumns::all();
+        let columns = OptionalColumns::recorded(&recording);
         Ok(Self { claim: Claim::stake(folder)?, shelf: Shelf::new(folder, model, recording), columns })
     }
 

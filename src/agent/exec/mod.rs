@@ -240,6 +240,7 @@ impl ExecAgent {
             // With its bytes replaced it might pass for something that the program did not say.
             Err(_) => Reply {
                 status: Status::ParseFailed,
+                repairs: Vec::new(),
                 action: None,
                 self_color: None,
                 selected_cube: None,

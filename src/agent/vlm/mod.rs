@@ -333,6 +333,7 @@ impl VlmAgent {
 fn without_decision(status: Status) -> Reply {
     Reply {
         status,
+        repairs: Vec::new(),
         action: None,
         self_color: None,
         selected_cube: None,
@@ -411,8 +412,8 @@ impl Step {
                 let cost = self.vlm.read(&received.body).and_then(|(_, cost)| cost);
                 self.vlm.account.answer(tokens(&received.answer), cost);
                 let latency_ms = i32::try_from(received.latency.as_millis()).unwrap_or(i32::MAX);
-                let (body, answered) = (received.body, question.clone());
-                self.write(&Entry::Answer { t, attempt, question, latency_ms, body: body.clone() })?;
+                let (body, model, answered) = (received.body, received.answer.model, question.clone());
+                self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body: body.clone() })?;
                 Ok(Recorded::Answer { question: answered, latency_ms, body })
             }
             Err(failure) => {

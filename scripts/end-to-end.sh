@@ -32,9 +32,25 @@ packages=$target/python
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper --where "seed <> 2 and TSA = 1"
 
+echo "end-to-end: logs as MCAP's and Foxglove's own packages read them"
+[ -d "$packages/mcap" ] || python3 -m pip install --quiet --disable-pip-version-check --root-user-action=ignore \
+  --target "$packages" mcap==1.6.0 mcap-protobuf-support==0.6.0 foxglove-schemas-protobuf==0.4.0 jsonschema==4.26.0
+mirrorstats record --agent random --experiment E4,E5 --seeds 1 --runs 2 --no-frames --out "$out/runs" 2>/dev/null
+PYTHONPATH=$packages python3 scripts/check-log.py fixtures/recorded/*.mcap "$out"/runs/*.mcap
+mirrorstats recover "$out/runs/E4-random.mcap" --out "$out/recovered.parquet"
+cmp "$out/runs/E4-random.parquet" "$out/recovered.parquet"
+mirrorstats replay "$out/runs"
+
 echo "end-to-end: the same scores from the SQL lowering on Polars, byte for byte"
 mirrorstats score fixtures/paper >"$out/native.csv"
 mirrorstats score fixtures/paper --engine polars >"$out/polars.csv"
 cmp "$out/native.csv" "$out/polars.csv"
 mirrorstats report fixtures/paper --style paper --engine polars --out "$out/polars" >/dev/null
 diff -r reports/paper "$out/polars"
+
+echo "end-to-end: requests to models are those of the official client libraries"
+# From 2.0 on, Anthropic's library speaks a version of the API that refuses a temperature.
+clients=$target/python-clients
+[ -d "$clients/anthropic" ] || python3 -m pip install --quiet --disable-pip-version-check --root-user-action=ignore \
+  --target "$clients" openai==3.52.0 google-genai==3.4.0 anthropic==1.17.0
+PYTHONPATH=$clients python3 scripts/check-clients.py "$target/debug/mirrorstats"

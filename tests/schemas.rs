@@ -7,10 +7,12 @@ use mirrorstats::agent::{Family, reply};
 use mirrorstats::cells::changes::Changes;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
 use mirrorstats::cli::commands::import::ImportAnswer;
+use mirrorstats::cli::commands::recover::RecoverAnswer;
 use mirrorstats::cli::commands::renormalize::RenormalizeAnswer;
 use mirrorstats::cli::commands::report::ReportAnswer;
 use mirrorstats::cli::commands::rescore::RescoreAnswer;
 use mirrorstats::cli::commands::schema::Name;
+use mirrorstats::log::message::{Decision, EpisodeMessage};
 use mirrorstats::metric::explain::Explanation;
 use mirrorstats::metric::shape::DefinitionFile;
 use mirrorstats::report::bundle::Manifest;
@@ -34,14 +36,17 @@ fn current() -> Vec<(&'static str, Value)> {
     #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
     let mut schemas = vec![
         ("comparison", json!(schema_for!(Comparison))),
+        ("decision", json!(schema_for!(Decision))),
         ("definitions-check", json!(schema_for!(CheckAnswer))),
         ("definitions-explain", json!(schema_for!(Explanation))),
         ("definitions", json!(schema_for!(DefinitionFile))),
         ("diff", json!(schema_for!(Changes))),
+        ("episode", json!(schema_for!(EpisodeMessage))),
         ("errata", json!(schema_for!(Errata))),
         ("import", json!(schema_for!(ImportAnswer))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
+        ("recover", json!(schema_for!(RecoverAnswer))),
         ("report", json!(schema_for!(ReportAnswer))),
         ("renormalize", json!(schema_for!(RenormalizeAnswer))),
         ("reply-cubes", Name::ReplyCubes.document()),
@@ -58,6 +63,10 @@ fn current() -> Vec<(&'static str, Value)> {
     schemas.extend([
         ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
         ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
+        ("replay", json!(schema_for!(mirrorstats::cli::commands::replay::ReplayAnswer))),
+        ("exec-message", json!(schema_for!(mirrorstats::agent::exec::message::Message))),
+        ("lost", json!(schema_for!(mirrorstats::record::lost::LostEpisode))),
+        ("record-forecast", json!(schema_for!(mirrorstats::cli::forecast::ForecastAnswer))),
         ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
         ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
     ]);
@@ -89,7 +98,8 @@ fn replies_are_asked_for_as_the_files_say() {
 #[test]
 fn the_folder_holds_nothing_else() {
     // Their types are there with the feature `sim` alone, their files always.
-    let of_worlds = ["census", "scene", "world-config"];
+    let of_worlds =
+        ["census", "exec-message", "lost", "record", "record-forecast", "replay", "scene", "world-config"];
     let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
     let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
     let found =

@@ -21,6 +21,7 @@
 pub mod assemble;
 pub mod message;
 pub mod read;
+mod records;
 pub mod recover;
 #[cfg(feature = "sim")]
 pub mod write;

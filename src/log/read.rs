@@ -9,6 +9,7 @@ use mcap::sans_io::LinearReaderOptions;
 use serde_json::Value;
 
 use super::message::{Decision, EpisodeMessage};
+use super::records::LONGEST;
 use super::{LogError, topic};
 
 /// What a message says.
@@ -60,9 +61,6 @@ impl<R: Read> LogReader<R> {
         Self { path: path.to_owned(), messages: MessageReader::new_with_options(bytes, options) }
     }
 }
-
-/// No record of a log is longer, chunks included; a longer one is damage.
-const LONGEST: usize = 1 << 30;
 
 impl<R: Read> Iterator for LogReader<R> {
     type Item = Result<Timed, LogError>;

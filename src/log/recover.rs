@@ -1,22 +1,23 @@
 //! What can be saved of a log that was cut off or damaged.
 //!
 //! Rule: an episode is saved if its `begin`, its `end` and every row between are there; anything else that was begun is
-//! lost, and named. What is behind a damaged chunk is still looked at; what is behind a damaged record is not, since
-//! nothing says where the next one begins.
+//! lost, and named. What is behind damage is still looked at. What is saved is what was written: of a chunk whose
+//! checksum does not hold nothing is.
 
 use std::collections::BTreeMap;
-use std::fs;
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
 
-use mcap::read::{ChunkReader, LinearReader, Options};
-use mcap::records::Record;
+use mcap::records::{Metadata, Record};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
 use super::message::{EpisodeMessage, Head};
 use super::read::{Event, event};
-use super::{LogError, METADATA, METADATA_KEY};
+use super::records::{Piece, Records, glimpse, inside};
+use super::{LogError, METADATA, METADATA_KEY, topic};
 use crate::trace::episode::{Episode, Step};
 
 /// What was saved of a log, and what was not.
@@ -39,6 +40,10 @@ pub struct Losses {
     pub stray_rows: usize,
     /// Chunks that cannot be read.
     pub damaged_chunks: usize,
+    /// What is damaged beside chunks: records that cannot be read, checksums that do not hold.
+    pub damage: Vec<String>,
+    /// Why the log does not say any more how it was recorded, if it does not.
+    pub recording: Option<String>,
     /// Why reading ended before the end of the log, if it did.
     pub cut: Option<String>,
 }
@@ -64,80 +69,26 @@ impl Losses {
 /// Saves what can be saved of the log at `path`.
 ///
 /// # Errors
-/// When the file cannot be read, or does not begin as a log.
+/// When the file cannot be read, does not begin as a log, or is whole and of something else than a recording.
 pub fn recover(path: &Path) -> Result<Recovered, LogError> {
-    let bytes = fs::read(path).map_err(LogError::io("read", path))?;
-    if !bytes.starts_with(mcap::MAGIC) {
-        let fault = "it does not begin as an MCAP file does".to_owned();
-        return Err(LogError::Foreign { file: path.display().to_string(), fault });
-    }
-    Ok(of_bytes(&bytes))
+    let file = File::open(path).map_err(LogError::io("open", path))?;
+    recover_from(path, BufReader::new(file))
 }
 
-/// Saves what can be saved of the bytes of a log.
-pub fn of_bytes(bytes: &[u8]) -> Recovered {
-    let mut salvage = Salvage { channels: channels(bytes), ..Salvage::default() };
-    let mut has_ended = false;
-    for record in records(bytes) {
-        match record {
-            Ok(Record::DataEnd(_)) => {
-                has_ended = true;
-                break;
-            }
-            Ok(Record::Chunk { header, data }) => salvage.chunk(header, &data),
-            Ok(Record::Message { header, data }) => salvage.message(header.channel_id, &data),
-            Ok(Record::Metadata(metadata)) if metadata.name == METADATA => {
-                let text = metadata.metadata.get(METADATA_KEY);
-                salvage.result.recording = text.and_then(|text| serde_json::from_str(text).ok());
-            }
-            Ok(_) => {}
-            Err(fault) => {
-                salvage.result.losses.cut = Some(fault);
-                has_ended = true;
-                break;
-            }
-        }
+/// Saves what can be saved of the log in these bytes; `path` is for messages of errors.
+///
+/// # Errors
+/// As [`recover`].
+pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, LogError> {
+    let foreign = |fault: &str| LogError::Foreign { file: path.display().to_string(), fault: fault.to_owned() };
+    let records = Records::new(bytes).map_err(LogError::io("read", path))?;
+    let mut records = records.ok_or_else(|| foreign("it does not begin as an MCAP file does"))?;
+    let salvage = Salvage::of(&mut records).map_err(LogError::io("read", path))?;
+    let is_ours = salvage.channels.values().any(|found| found == topic::EPISODE);
+    if !is_ours && !salvage.result.losses.is_any() {
+        return Err(foreign("it has no topic /episode; `mirrorstats record` writes logs that do"));
     }
-    salvage.close("the log ends before the episode does");
-    if !has_ended {
-        salvage.result.losses.cut = Some("the log ends before its end record".to_owned());
-    }
-    salvage.result
-}
-
-/// The records of the bytes up to the first that cannot be read, chunks whole.
-fn records(bytes: &[u8]) -> impl Iterator<Item = Result<Record<'_>, String>> {
-    let (reader, fault) = match LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into()) {
-        Ok(reader) => (Some(reader), None),
-        Err(fault) => (None, Some(Err(fault.to_string()))),
-    };
-    reader.into_iter().flatten().map(|record| record.map_err(|fault| fault.to_string())).chain(fault)
-}
-
-fn inside(header: mcap::records::ChunkHeader, data: &[u8]) -> Result<Vec<Record<'static>>, String> {
-    let reader = ChunkReader::new(header, data).map_err(|fault| fault.to_string())?;
-    reader.map(|record| record.map(Record::into_owned).map_err(|fault| fault.to_string())).collect()
-}
-
-/// The topics by channel, from wherever the bytes still say them: a later chunk does not repeat an earlier one's.
-fn channels(bytes: &[u8]) -> BTreeMap<u16, String> {
-    let mut found = BTreeMap::new();
-    for record in records(bytes).map_while(Result::ok) {
-        match record {
-            Record::Channel(channel) => {
-                found.insert(channel.id, channel.topic);
-            }
-            Record::Chunk { header, data } => {
-                let inner = inside(header, &data).unwrap_or_default();
-                found.extend(inner.into_iter().filter_map(|record| match record {
-                    Record::Channel(channel) => Some((channel.id, channel.topic)),
-                    _ => None,
-                }));
-            }
-            _ => {}
-        }
-    }
-    found
+    Ok(salvage.finished())
 }
 
 /// The episode that is being put together.
@@ -149,20 +100,117 @@ struct Salvage {
 }
 
 impl Salvage {
-    fn chunk(&mut self, header: mcap::records::ChunkHeader, data: &[u8]) {
-        match inside(header, data) {
-            Err(_) => {
-                self.result.losses.damaged_chunks += 1;
-                self.close("a chunk with its rows is damaged");
-            }
-            Ok(records) => {
-                for record in records {
-                    if let Record::Message { header, data } = record {
-                        self.message(header.channel_id, &data);
-                    }
+    fn of(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
+        let mut salvage = Self::default();
+        // A chunk does not repeat the channels of earlier ones, which may be damaged; the summary does.
+        let channels = records.of_summary()?;
+        salvage.channels.extend(channels.into_iter().map(|channel| (channel.id, channel.topic)));
+        let mut is_open = true;
+        while let Some(piece) = records.next()? {
+            match piece {
+                Piece::Record(Record::DataEnd(end)) => {
+                    is_open = false;
+                    salvage.compare("the data", end.data_section_crc, records.checksum());
+                    salvage.index(records)?;
+                    break;
+                }
+                Piece::Record(record) => salvage.record(record),
+                Piece::Chunk(chunk) => salvage.chunk(&chunk),
+                Piece::Damage(fault) => salvage.result.losses.damage.push(fault),
+                Piece::Cut(fault, tail) => {
+                    salvage.close("the log ends before the episode does");
+                    salvage.lose_all(&tail, "the log ends before the episode does");
+                    salvage.result.losses.cut = Some(fault);
                 }
             }
         }
+        if is_open && salvage.result.losses.cut.is_none() {
+            salvage.result.losses.cut = Some("the log ends before its end record".to_owned());
+        }
+        Ok(salvage)
+    }
+
+    /// Looks at the index behind the data: nothing of a recording is in it, but a log without it is damaged all the same.
+    fn index(&mut self, records: &mut Records<impl Read + Seek>) -> io::Result<()> {
+        while let Some(piece) = records.next()? {
+            match piece {
+                Piece::Record(Record::Footer(footer)) => {
+                    self.compare("the index", footer.summary_crc, records.checksum());
+                    if !records.is_closed()? {
+                        self.result.losses.damage.push("the log does not end as an MCAP file does".to_owned());
+                    }
+                    return Ok(());
+                }
+                Piece::Record(_) | Piece::Chunk(_) => {}
+                Piece::Damage(fault) => self.result.losses.damage.push(fault),
+                Piece::Cut(..) => break,
+            }
+        }
+        self.result.losses.cut = Some("the log ends within its index, behind all that was recorded".to_owned());
+        Ok(())
+    }
+
+    /// Holds a checksum against the one that was written; 0 stands for none.
+    fn compare(&mut self, what: &str, written: u32, found: u32) {
+        let losses = &mut self.result.losses;
+        if written != 0 && written != found && losses.damaged_chunks == 0 && losses.damage.is_empty() {
+            losses.damage.push(format!("the checksum of {what}: expected {written:08x}, found {found:08x}"));
+        }
+    }
+
+    fn record(&mut self, record: Record<'static>) {
+        match record {
+            Record::Message { header, data } => self.message(header.channel_id, &data),
+            Record::Channel(channel) => drop(self.channels.insert(channel.id, channel.topic)),
+            Record::Metadata(metadata) if metadata.name == METADATA => self.recording(&metadata),
+            _ => {}
+        }
+    }
+
+    fn recording(&mut self, metadata: &Metadata) {
+        let text = metadata.metadata.get(METADATA_KEY);
+        self.result.recording = text.and_then(|text| serde_json::from_str(text).ok());
+    }
+
+    fn chunk(&mut self, chunk: &[u8]) {
+        match inside(chunk) {
+            Err(_) => {
+                self.result.losses.damaged_chunks += 1;
+                self.close("a chunk with its rows is damaged");
+                self.lose_all(chunk, "its chunk is damaged");
+            }
+            Ok(records) => records.into_iter().for_each(|record| self.record(record)),
+        }
+    }
+
+    /// Names the episodes that begin in a chunk which cannot be read to its end, as far as it can.
+    fn lose_all(&mut self, chunk: &[u8], reason: &str) {
+        for record in glimpse(chunk) {
+            match record {
+                Record::Channel(channel) => drop(self.channels.entry(channel.id).or_insert(channel.topic)),
+                Record::Message { header, data } => {
+                    let topic = self.channels.get(&header.channel_id).map_or("", String::as_str);
+                    match (event(topic, &data), &mut self.open) {
+                        (Ok(Event::Episode(EpisodeMessage::Begin(head))), open) => {
+                            *open = Some((head, Vec::new(), None));
+                        }
+                        (Ok(Event::Decision(row)), Some((_, rows, _))) => rows.extend(row.into_step()),
+                        _ => {}
+                    }
+                }
+                _ => {}
+            }
+        }
+        self.close(reason);
+    }
+
+    fn finished(mut self) -> Recovered {
+        self.close("the log ends before the episode does");
+        if self.result.recording.is_none() {
+            let words = format!("no metadata `{METADATA}` can be read: the trace cannot be replayed");
+            self.result.losses.recording = Some(words);
+        }
+        self.result
     }
 
     fn message(&mut self, channel: u16, data: &[u8]) {

@@ -28,8 +28,13 @@ pub enum Broken {
     #[error("stopped")]
     Stopped,
     /// The agent's infrastructure failed.
-    #[error(transparent)]
-    Lost(#[from] Lost),
+    #[error("{lost}")]
+    Lost {
+        /// The step that got no reply; `None` before the first.
+        step: Option<i32>,
+        /// What failed.
+        lost: Lost,
+    },
     /// The world, the eye or the disk failed, as they would for any episode.
     #[error(transparent)]
     Fatal(Box<dyn std::error::Error + Send + Sync>),
@@ -140,9 +145,7 @@ pub async fn play(
         let start = Instant::now();
         let census = world.census();
         stage.shares.census(start);
-        let start = Instant::now();
-        let reply = agent.decide(&observation).await?;
-        stage.shares.agent(start);
+        let reply = agent.decide(&observation).await.map_err(|lost| Broken::Lost { step: Some(t), lost })?;
         let action = reply.action;
         history = Some((action, reply.words.summary.clone()));
         let mut row = row(world, key, t, &census, reply);
@@ -169,7 +172,7 @@ fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, Broken> 
 }
 
 fn nothing() -> Arc<Frame> {
-    Arc::new(Frame { width: 0, height: 0, rgb: Vec::new() })
+    Arc::new(Frame::new(0, 0, Vec::new()))
 }
 
 /// The row of a step, `bumped` left open.

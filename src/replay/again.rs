@@ -5,15 +5,21 @@ use serde_json::Value;
 use crate::sim::Experiment;
 use crate::sim::census::Census;
 use crate::sim::config::WorldConfig;
-use crate::sim::scene::Scene;
+use crate::sim::scene::{SCENE_VERSION, Scene};
 use crate::sim::world::World;
 use crate::trace::episode::{Episode, Step};
+
+/// The most rays in a row and in a column of the grid that pixels are counted with.
+pub const MOST_RAYS: u32 = 4096;
 
 /// What a trace says of how it was recorded, as far as a replay needs it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
     /// The world's configuration.
     pub config: WorldConfig,
+    /// The same with the grid and the threshold that the trace's pixels were counted with: the recorded ones, unless they
+    /// were counted anew since.
+    pub eye: WorldConfig,
 }
 
 /// Why a trace cannot be replayed.
@@ -30,6 +36,10 @@ pub enum ReplayError {
         "the world's configuration in the trace is not the one it was recorded with: expected the hash {expected}, found {found}"
     )]
     Changed { expected: String, found: String },
+    #[error(
+        "the trace's worlds were drawn by version {found} of the scenes, and this program draws version {SCENE_VERSION}\n  help: replay it with the program that recorded it"
+    )]
+    Scenes { found: String },
     #[error("episode `{episode}`: {fault}")]
     World { episode: String, fault: String },
 }
@@ -38,7 +48,8 @@ impl Recipe {
     /// Reads the value of `mirrorstats.recording`.
     ///
     /// # Errors
-    /// When it does not hold a world's configuration, or one whose hash is not the recorded one.
+    /// When it does not hold a world's configuration, or one whose hash is not the recorded one, or scenes of another
+    /// version were recorded.
     pub fn of(recording: Option<&Value>) -> Result<Self, ReplayError> {
         let recording = recording.ok_or(ReplayError::NoRecipe)?;
         let world = recording.get("world").ok_or(ReplayError::NoRecipe)?;
@@ -48,7 +59,12 @@ impl Recipe {
         if config.hash() != expected {
             return Err(ReplayError::Changed { expected: expected.to_owned(), found: config.hash() });
         }
-        Ok(Self { config })
+        let version = recording.get("scene_version").unwrap_or(&Value::Null);
+        if *version != SCENE_VERSION {
+            return Err(ReplayError::Scenes { found: version.to_string() });
+        }
+        let eye = counted_with(&config, recording);
+        Ok(Self { config, eye })
     }
 
     /// The world of an episode at its start, seen by an eye of this configuration.
@@ -62,6 +78,21 @@ impl Recipe {
             .map_err(|error| fault(error.to_string()))?;
         World::new(eye, scene).map_err(|error| fault(error.to_string()))
     }
+}
+
+/// The configuration with the recorded grid and threshold for visibility.
+fn counted_with(config: &WorldConfig, recording: &Value) -> WorldConfig {
+    let number = |value: Option<&Value>| u32::try_from(value?.as_u64()?).ok();
+    let grid = |side: &str| {
+        let side = number(recording.get("visibility_grid").and_then(|grid| grid.get(side)));
+        side.filter(|side| (1..=MOST_RAYS).contains(side))
+    };
+    let mut eye = config.clone();
+    eye.eye.width = grid("width").unwrap_or(eye.eye.width);
+    eye.eye.height_px = grid("height").unwrap_or(eye.eye.height_px);
+    let threshold = number(recording.get("visibility_threshold_px"));
+    eye.evidence.mirror_self_px = threshold.unwrap_or(eye.evidence.mirror_self_px);
+    eye
 }
 
 /// Where a replay and its trace part ways.
@@ -90,7 +121,7 @@ pub fn again<E: From<ReplayError>>(
     mut look: impl FnMut(i32, &World, &Census, &Step) -> Result<(), E>,
 ) -> Result<Option<Divergence>, E> {
     let mut world = recipe.world(episode, eye)?;
-    let is_same_eye = *eye == recipe.config;
+    let is_same_eye = *eye == recipe.eye;
     let mut parted = differs(episode, 0, &constants(episode, world.scene()));
     for (t, step) in (1..).zip(&episode.steps) {
         let census = world.census();

@@ -7,7 +7,11 @@
 
 use std::collections::BTreeSet;
 
-use arrow::array::{Array, ArrayRef, AsArray as _, BooleanArray, Datum, Int64Array, RecordBatch, UInt32Array};
+use arrow::array::{
+    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Datum, Int64Array, PrimitiveArray, RecordBatch,
+    UInt32Array,
+};
+use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::compute::kernels::{boolean, cmp, numeric, zip};
 use arrow::compute::{cast, nullif, prep_null_mask_filter};
 use arrow::datatypes::{DataType, Float64Type, Int32Type};
@@ -329,7 +333,7 @@ impl Evaluation<'_, '_> {
             Op::Arithmetic(op, x, y) => self.arithmetic(*op, node.ty, level, *x, *y).map_err(overflow)?,
             Op::Negate(x) => numbers(numeric::neg(of(*x).array()).map_err(overflow)?, node.ty),
             Op::Case { branches, otherwise } => self.case(branches, *otherwise, node.ty, level).map_err(overflow)?,
-            Op::Coalesce(values) => self.coalesce(values, node.ty, level).map_err(overflow)?,
+            Op::Coalesce(values) => self.coalesce(values, level).map_err(overflow)?,
             Op::Matches(x, _) => {
                 let pattern = self.engine.patterns[id.index()].as_ref().expect("compiled with the engine");
                 let matches = |symbol| pattern.is_match(self.symbols.text(symbol));
@@ -451,18 +455,18 @@ impl Evaluation<'_, '_> {
         for (when, then) in branches.iter().rev() {
             let mask = self.full_bools(*when, level);
             let mask = if mask.null_count() > 0 { prep_null_mask_filter(&mask) } else { mask };
-            result = Values::shared(zip::zip(&mask, self.of(*then), &result)?, ty);
+            result = choose(&mask, self.of(*then), &result)?;
         }
         Ok(result)
     }
 
-    fn coalesce(&self, ids: &[NodeId], ty: Type, level: Level) -> Result<Values, ArrowError> {
+    fn coalesce(&self, ids: &[NodeId], level: Level) -> Result<Values, ArrowError> {
         let (last, before) = ids.split_last().expect("the binder has seen an argument at least");
         let mut result = self.full(*last, level);
         for id in before.iter().rev() {
             let values = self.full(*id, level);
             let mask = boolean::is_not_null(values.array())?;
-            result = Values::shared(zip::zip(&mask, &values, &result)?, ty);
+            result = choose(&mask, &values, &result)?;
         }
         Ok(result)
     }
@@ -536,6 +540,33 @@ impl Evaluation<'_, '_> {
             Type::Text => Values::new(segments.at(values.symbols(), moments), ty),
         }
     }
+}
+
+/// The values of `then` where the mask, which has no null, is set, and those of `otherwise` elsewhere.
+fn choose(mask: &BooleanArray, then: &Values, otherwise: &Values) -> Result<Values, ArrowError> {
+    let ty = otherwise.ty();
+    Ok(match ty {
+        Type::Bool => Values::shared(zip::zip(mask, then, otherwise)?, ty),
+        Type::Int => Values::new(choose_numbers(mask, then.ints(), otherwise.ints()), ty),
+        Type::Float => Values::new(choose_numbers(mask, then.floats(), otherwise.floats()), ty),
+        Type::Text => Values::new(choose_numbers(mask, then.symbols(), otherwise.symbols()), ty),
+    })
+}
+
+/// As `zip`, which copies run by run; here the mask changes from row to row. One value of `then` stands for all.
+fn choose_numbers<T: ArrowPrimitiveType>(
+    mask: &BooleanArray,
+    then: &PrimitiveArray<T>,
+    otherwise: &PrimitiveArray<T>,
+) -> PrimitiveArray<T> {
+    let bits = mask.values();
+    let place = |row: usize| if then.len() == 1 { 0 } else { row };
+    let value = |row: usize| if bits.value(row) { then.value(place(row)) } else { otherwise.value(row) };
+    let nulls = (then.null_count() + otherwise.null_count() > 0).then(|| {
+        let valid = |row| if bits.value(row) { then.is_valid(place(row)) } else { otherwise.is_valid(row) };
+        NullBuffer::new(BooleanBuffer::collect_bool(mask.len(), valid))
+    });
+    PrimitiveArray::new((0..mask.len()).map(value).collect(), nulls)
 }
 
 /// Texts compared for equality with a single one.

@@ -4,9 +4,11 @@
 //! ([`Column::flat`]), which costs as much as the rows are many.
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _, UInt32Array};
-use arrow::compute::{concat, take};
-use arrow::datatypes::{Int32Type, Int64Type};
+use arrow::compute::{cast, concat, take};
+use arrow::datatypes::{DataType, Int32Type, Int64Type};
 use arrow::error::ArrowError;
+
+use super::open::text_type;
 
 /// The values of some rows.
 #[derive(Clone, Debug)]
@@ -87,9 +89,19 @@ impl Column {
 
     /// The rows of some columns of one kind, one after the other.
     pub(super) fn concat<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Result<Self, ArrowError> {
-        let arrays = parts.into_iter().map(Self::flat).collect::<Result<Vec<_>, _>>()?;
+        let arrays = parts.into_iter().map(|part| plain(&part.flat()?)).collect::<Result<Vec<_>, _>>()?;
         let arrays: Vec<_> = arrays.iter().map(AsRef::as_ref).collect();
-        concat(&arrays).map(Self::Flat)
+        let joined = concat(&arrays)?;
+        let texts = *joined.data_type() == DataType::Utf8;
+        Ok(Self::Flat(if texts { cast(&joined, &text_type())? } else { joined }))
+    }
+}
+
+/// Texts without a dictionary: theirs may be large, and the rows few.
+fn plain(values: &ArrayRef) -> Result<ArrayRef, ArrowError> {
+    match values.data_type() {
+        DataType::Dictionary(_, _) => cast(values, &DataType::Utf8),
+        _ => Ok(values.clone()),
     }
 }
 

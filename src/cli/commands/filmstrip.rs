@@ -164,10 +164,10 @@ impl FilmstripArgs {
         let wanted = self.chosen(&episode)?;
         let mut eye = Eye::new(&recipe.config).map_err(Failure::input)?;
         let mut frames = BTreeMap::new();
-        let divergence = again(recipe, &recipe.config, &episode, |t, world, _, _| {
+        let divergence = again(recipe, &recipe.eye, &episode, |t, world, _, _| {
             if wanted.contains(&t) {
                 let frame = eye.frame(world).map_err(Failure::input)?;
-                frames.insert(t, frame.to_png().map_err(Failure::input)?);
+                frames.insert(t, frame.to_png().map_err(Failure::input)?.to_vec());
             }
             Ok::<(), Failure>(())
         })?;

@@ -20,7 +20,7 @@ use crate::trace::write::OptionalColumns;
 /// Make a trace of a log, also of one that was cut off or damaged
 ///
 /// Every episode whose end is in the log is in the trace, which is checked against every rule. Exits with 3 if anything
-/// of the log is lost.
+/// of the log is lost, be it the index at its end.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecoverArgs {
     /// The log
@@ -101,9 +101,12 @@ impl fmt::Display for RecoverAnswer {
         if self.losses.damaged_chunks > 0 {
             writeln!(f, "{} damaged", counted(self.losses.damaged_chunks as u64, "chunk"))?;
         }
-        match &self.losses.cut {
-            Some(cut) => writeln!(f, "not read to its end: {cut}"),
-            None => Ok(()),
+        for damage in &self.losses.damage {
+            writeln!(f, "damaged: {damage}")?;
         }
+        for reason in self.losses.recording.iter().chain(&self.losses.cut) {
+            writeln!(f, "{reason}")?;
+        }
+        Ok(())
     }
 }

@@ -19,7 +19,7 @@ use crate::log::assemble::{self, Place};
 use crate::record::log::Log;
 use crate::record::plan::Key;
 use crate::record::play::Seen;
-use crate::replay::again::{Divergence, Recipe, ReplayError, again};
+use crate::replay::again::{Divergence, MOST_RAYS, Recipe, ReplayError, again};
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
 use crate::sim::eye::Eye;
@@ -80,8 +80,8 @@ pub struct ReplayAnswer {
 fn grid(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
     match sides {
-        Some((width @ 1..=4096, height @ 1..=4096)) => Ok((width, height)),
-        _ => Err("expected a grid such as 320x240, at most 4096x4096".to_owned()),
+        Some((width @ 1..=MOST_RAYS, height @ 1..=MOST_RAYS)) => Ok((width, height)),
+        _ => Err(format!("expected a grid such as 320x240, at most {MOST_RAYS}x{MOST_RAYS}")),
     }
 }
 
@@ -136,16 +136,14 @@ impl ReplayArgs {
 
     /// The configuration of the eye: the recorded one, or what was asked for.
     fn eye(&self, recipe: &Recipe) -> WorldConfig {
-        let mut config = recipe.config.clone();
-        if self.recompute_visibility {
+        let mut config = recipe.eye.clone();
+        if let Some((width, height)) = self.grid {
             let recorded = u64::from(config.eye.width) * u64::from(config.eye.height_px);
-            if let Some((width, height)) = self.grid {
-                let scaled = u64::from(config.evidence.mirror_self_px) * u64::from(width) * u64::from(height);
-                config.evidence.mirror_self_px = u32::try_from(scaled.div_ceil(recorded.max(1))).unwrap_or(u32::MAX);
-                (config.eye.width, config.eye.height_px) = (width, height);
-            }
-            config.evidence.mirror_self_px = self.threshold.unwrap_or(config.evidence.mirror_self_px);
+            let scaled = u64::from(config.evidence.mirror_self_px) * u64::from(width) * u64::from(height);
+            config.evidence.mirror_self_px = u32::try_from(scaled.div_ceil(recorded.max(1))).unwrap_or(u32::MAX);
+            (config.eye.width, config.eye.height_px) = (width, height);
         }
+        config.evidence.mirror_self_px = self.threshold.unwrap_or(config.evidence.mirror_self_px);
         config
     }
 
@@ -295,7 +293,7 @@ fn save(folder: &Path, episode: &Episode, t: i32, frame: &Frame) -> Result<(), F
     fs::create_dir_all(&folder)
         .map_err(|error| Failure::input(format!("cannot make the folder `{}`: {error}", folder.display())))?;
     let png = frame.to_png().map_err(Failure::input)?;
-    output::write_file(&folder.join(format!("t{t:03}.png")), &png)
+    output::write_file(&folder.join(format!("t{t:03}.png")), png)
 }
 
 impl fmt::Display for ReplayAnswer {
@@ -306,6 +304,7 @@ impl fmt::Display for ReplayAnswer {
         write!(f, "{}, {} replayed", counted(self.episodes as u64, "episode"), counted(self.steps as u64, "step"))?;
         match self.divergences.len() {
             0 => write!(f, ": all match")?,
+            1 => write!(f, ": 1 of the episodes parts from the trace")?,
             parted => write!(f, ": {parted} of the episodes part from the trace")?,
         }
         match self.flipped {

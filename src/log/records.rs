@@ -1,0 +1,287 @@
+//! The records of a log as they lie in the file, past damage.
+//!
+//! Rule: a length that cannot be right ends nothing: the next chunk behind it, or the end of the data, is looked for and
+//! read on from. Checksums are taken along the way, so that damage which still reads as records is known too.
+
+use std::io::{self, Read, Seek, SeekFrom};
+
+use mcap::MAGIC;
+use mcap::read::parse_record;
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+/// No record of a log is longer, chunks included; a longer one is damage.
+pub(super) const LONGEST: usize = 1 << 30;
+
+/// Of an opcode and a length.
+const FRAME: usize = 9;
+
+/// What lies at a place of the file.
+#[derive(Debug)]
+pub(super) enum Piece {
+    /// A record other than a chunk.
+    Record(Record<'static>),
+    /// A chunk: its opcode, its length and its bytes.
+    Chunk(Vec<u8>),
+    /// Bytes that are no record; the next piece follows them.
+    Damage(String),
+    /// Nothing can be read from here on: why, and the bytes of the chunk that is cut off, if it is one.
+    Cut(String, Vec<u8>),
+}
+
+/// The records of a file.
+pub(super) struct Records<R> {
+    bytes: R,
+    at: u64,
+    end: u64,
+    /// Of the record before, to be told next.
+    damage: Option<String>,
+    running: crc32fast::Hasher,
+    /// Of the section that has ended.
+    checksum: u32,
+}
+
+/// An opcode, and the length of what follows.
+#[derive(Clone, Copy)]
+struct Frame {
+    opcode: u8,
+    length: u64,
+}
+
+impl Frame {
+    fn of(bytes: [u8; FRAME]) -> Self {
+        let [opcode, length @ ..] = bytes;
+        Self { opcode, length: u64::from_le_bytes(length) }
+    }
+
+    /// Whether a record of a log can begin so, with this many bytes behind.
+    fn is_plausible(self, behind: u64) -> bool {
+        (op::HEADER..=op::DATA_END).contains(&self.opcode)
+            && self.length <= behind
+            && usize::try_from(self.length).is_ok_and(|length| length <= LONGEST)
+    }
+}
+
+impl<R: Read + Seek> Records<R> {
+    /// The records behind the first magic bytes; `None` if it does not begin with them.
+    pub(super) fn new(mut bytes: R) -> io::Result<Option<Self>> {
+        let end = bytes.seek(SeekFrom::End(0))?;
+        let mut records = Self { bytes, at: 0, end, damage: None, running: crc32fast::Hasher::new(), checksum: 0 };
+        let begin = records.read(0, MAGIC.len())?;
+        records.running.update(&begin);
+        records.at = begin.len() as u64;
+        Ok((begin == MAGIC).then_some(records))
+    }
+
+    /// The next piece; `None` at the end of the file.
+    pub(super) fn next(&mut self) -> io::Result<Option<Piece>> {
+        if let Some(damage) = self.damage.take() {
+            return Ok(Some(Piece::Damage(damage)));
+        }
+        if self.at >= self.end {
+            return Ok(None);
+        }
+        let Some(frame) = self.frame(self.at)? else {
+            return self.past_damage("no record begins there").map(Some);
+        };
+        let whole = self.whole(self.at, frame)?;
+        let behind = self.at + whole.len() as u64;
+        // Its length is right if a record follows it.
+        let is_followed = frame.opcode == op::FOOTER || behind == self.end || self.frame(behind)?.is_some();
+        let from = self.at;
+        match decode(frame.opcode, &whole) {
+            Ok(piece) => {
+                self.sum(frame.opcode, &whole);
+                let next = if is_followed { None } else { self.landmark(from + 1)? };
+                self.at = next.unwrap_or(behind);
+                self.damage = next.map(|_| format!("the record at byte {from} is not as long as it says"));
+                Ok(Some(piece))
+            }
+            Err(fault) if is_followed => {
+                self.at = behind;
+                Ok(Some(Piece::Damage(format!("the record at byte {from} cannot be read: {fault}"))))
+            }
+            Err(fault) => self.past_damage(&fault).map(Some),
+        }
+    }
+
+    /// The checksum of the data behind its end record, that of the index behind the footer.
+    pub(super) fn checksum(&self) -> u32 {
+        self.checksum
+    }
+
+    /// Whether nothing follows but the last magic bytes.
+    pub(super) fn is_closed(&mut self) -> io::Result<bool> {
+        Ok(self.read(self.at, MAGIC.len() + 1)? == MAGIC)
+    }
+
+    /// The channels that the file's summary names, if its end is there.
+    pub(super) fn of_summary(&mut self) -> io::Result<Vec<mcap::records::Channel>> {
+        /// Two places and a checksum.
+        const FOOTER: usize = FRAME + 20;
+        let last = self.end.saturating_sub((FOOTER + MAGIC.len()) as u64);
+        let footer = self.read(last, FOOTER)?;
+        let start = match footer.first().map(|opcode| decode(*opcode, &footer)) {
+            Some(Ok(Piece::Record(Record::Footer(footer)))) if footer.summary_start < last => footer.summary_start,
+            _ => return Ok(Vec::new()),
+        };
+        let mut found = Vec::new();
+        let mut at = start;
+        while let Some(frame) = self.frame(at)?.filter(|_| at < last) {
+            let whole = self.whole(at, frame)?;
+            if let Ok(Piece::Record(Record::Channel(channel))) = decode(frame.opcode, &whole) {
+                found.push(channel);
+            }
+            at += whole.len() as u64;
+        }
+        Ok(found)
+    }
+
+    /// The data's checksum is that of all before its end record, the index's that of all behind it up to the checksum.
+    fn sum(&mut self, opcode: u8, whole: &[u8]) {
+        let (counted, is_last) = match opcode {
+            op::DATA_END => (&[][..], true),
+            op::FOOTER => (whole.get(..whole.len().saturating_sub(4)).unwrap_or_default(), true),
+            _ => (whole, false),
+        };
+        self.running.update(counted);
+        if is_last {
+            self.checksum = std::mem::take(&mut self.running).finalize();
+        }
+    }
+
+    /// The bytes at a place; fewer where the file ends.
+    fn read(&mut self, at: u64, count: usize) -> io::Result<Vec<u8>> {
+        let count = (count as u64).min(self.end.saturating_sub(at));
+        self.bytes.seek(SeekFrom::Start(at))?;
+        let mut bytes = Vec::with_capacity(usize::try_from(count).unwrap_or_default());
+        self.bytes.by_ref().take(count).read_to_end(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    fn frame(&mut self, at: u64) -> io::Result<Option<Frame>> {
+        let bytes = self.read(at, FRAME)?;
+        let behind = self.end.saturating_sub(at + FRAME as u64);
+        let frame = <[u8; FRAME]>::try_from(bytes).ok().map(Frame::of);
+        Ok(frame.filter(|frame| frame.is_plausible(behind)))
+    }
+
+    /// A record with its frame.
+    fn whole(&mut self, at: u64, frame: Frame) -> io::Result<Vec<u8>> {
+        self.read(at, FRAME + usize::try_from(frame.length).unwrap_or(LONGEST))
+    }
+
+    /// Goes on to the next chunk, or to the end of the data.
+    fn past_damage(&mut self, fault: &str) -> io::Result<Piece> {
+        let from = self.at;
+        Ok(if let Some(next) = self.landmark(from + 1)? {
+            self.at = next;
+            Piece::Damage(format!("bytes {from} to {next} cannot be read: {fault}"))
+        } else {
+            self.at = self.end;
+            let tail = self.read(from, LONGEST)?;
+            let tail = if tail.first() == Some(&op::CHUNK) { tail } else { Vec::new() };
+            Piece::Cut(format!("the log ends before its end record: after byte {from} nothing can be read"), tail)
+        })
+    }
+
+    /// The first place from here on where a chunk or the end record stands, told by more than its opcode.
+    fn landmark(&mut self, from: u64) -> io::Result<Option<u64>> {
+        const WINDOW: usize = 1 << 16;
+        let mut start = from;
+        loop {
+            let window = self.read(start, WINDOW)?;
+            for (at, bytes) in (start..).zip(window.windows(FRAME)) {
+                let frame = <[u8; FRAME]>::try_from(bytes).map(Frame::of);
+                if let Ok(frame) = frame
+                    && self.is_landmark(at, frame)?
+                {
+                    return Ok(Some(at));
+                }
+            }
+            if window.len() < FRAME {
+                return Ok(None);
+            }
+            start += (window.len() - FRAME + 1) as u64;
+        }
+    }
+
+    fn is_landmark(&mut self, at: u64, frame: Frame) -> io::Result<bool> {
+        let behind = self.end.saturating_sub(at + FRAME as u64);
+        if !frame.is_plausible(behind) {
+            return Ok(false);
+        }
+        Ok(match frame.opcode {
+            op::CHUNK => {
+                let whole = self.whole(at, frame)?;
+                inside(&whole).is_ok()
+            }
+            op::DATA_END => frame.length == 4,
+            _ => false,
+        })
+    }
+}
+
+/// The record of these bytes, which begin with its frame.
+fn decode(opcode: u8, whole: &[u8]) -> Result<Piece, String> {
+    let body = whole.get(FRAME..).unwrap_or_default();
+    match opcode {
+        op::CHUNK => match parse_record(op::CHUNK, body) {
+            Ok(Record::Chunk { header, data }) if header.compressed_size == data.len() as u64 && !data.is_empty() => {
+                Ok(Piece::Chunk(whole.to_vec()))
+            }
+            Ok(_) => Err("a chunk of another length than it says".to_owned()),
+            Err(fault) => Err(fault.to_string()),
+        },
+        // An end is believed at its exact length alone: nothing behind it is looked at for episodes.
+        op::DATA_END if body.len() != 4 => Err("an end record of another length".to_owned()),
+        // No log of ours has any, and the library expects that they are sound.
+        op::ATTACHMENT => Ok(Piece::Record(Record::Unknown { opcode, data: Vec::new().into() })),
+        _ => {
+            let record = parse_record(opcode, body).map_err(|fault| fault.to_string())?;
+            Ok(Piece::Record(record.into_owned()))
+        }
+    }
+}
+
+/// The records in a chunk, all of them or none: nothing is looked at before the chunk's checksum holds.
+///
+/// # Errors
+/// When the chunk is damaged, in words.
+pub(super) fn inside(chunk: &[u8]) -> Result<Vec<Record<'static>>, String> {
+    let mut found = Vec::new();
+    let options = LinearReaderOptions::default().with_prevalidate_chunk_crcs(true);
+    unpacked(chunk, options, |record| found.push(record))?;
+    Ok(found)
+}
+
+/// The records in front of a chunk that is cut off or damaged, as far as they can be read: enough to name what is lost,
+/// never enough to be saved.
+pub(super) fn glimpse(chunk: &[u8]) -> Vec<Record<'static>> {
+    let mut found = Vec::new();
+    // That it ends in a fault is known.
+    let _ = unpacked(chunk, LinearReaderOptions::default(), |record| found.push(record));
+    found
+}
+
+/// Gives the channels and messages of a chunk one after the other.
+fn unpacked(chunk: &[u8], options: LinearReaderOptions, mut give: impl FnMut(Record<'static>)) -> Result<(), String> {
+    let options = options.with_skip_start_magic(true).with_skip_end_magic(true).with_record_length_limit(LONGEST);
+    let mut reader = LinearReader::new_with_options(options);
+    let mut rest = chunk;
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|fault| fault.to_string())? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { data, opcode: opcode @ (op::CHANNEL | op::MESSAGE) } => {
+                give(parse_record(opcode, data).map_err(|fault| fault.to_string())?.into_owned());
+            }
+            LinearReadEvent::Record { .. } => {}
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,8 @@
+//! Logs of recordings: whole they give the trace again, byte for byte; cut or damaged, every episode that is still there.
+
+#![cfg(feature = "sim")]
+
+mod cuts;
+mod damage;
+mod logs;
+mod whole;

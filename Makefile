@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench bench-world sheet
+.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench bench-world bench-agents sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -67,6 +67,12 @@ bench:
 bench-world:
 	scripts/get-mujoco.sh
 	cargo bench --features sim --bench world
+
+## What waiting for a model costs: steps a second with an agent that answers at once, and with a server that takes a
+## second for each answer, 64 episodes in flight. STEPS=100 measures longer.
+bench-agents:
+	scripts/get-mujoco.sh
+	cargo bench --features sim --bench agents
 
 ## The contact sheet of the five experiments anew.
 sheet:

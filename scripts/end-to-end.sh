@@ -47,3 +47,10 @@ mirrorstats score fixtures/paper --engine polars >"$out/polars.csv"
 cmp "$out/native.csv" "$out/polars.csv"
 mirrorstats report fixtures/paper --style paper --engine polars --out "$out/polars" >/dev/null
 diff -r reports/paper "$out/polars"
+
+echo "end-to-end: requests to models are those of the official client libraries"
+# From 2.0 on, Anthropic's library speaks a version of the API that refuses a temperature.
+clients=$target/python-clients
+[ -d "$clients/anthropic" ] || python3 -m pip install --quiet --disable-pip-version-check --root-user-action=ignore \
+  --target "$clients" openai==3.52.0 google-genai==3.4.0 anthropic==1.17.0
+PYTHONPATH=$clients python3 scripts/check-clients.py "$target/debug/mirrorstats"

@@ -20,7 +20,7 @@ fn first_step() -> Observation {
         yaw: 330.0,
         bumped: false,
         history: None,
-        frame: Arc::new(Frame { width: 0, height: 0, rgb: Vec::new() }),
+        frame: Arc::new(Frame::new(0, 0, Vec::new())),
     }
 }
 

@@ -3,11 +3,15 @@
 use std::fs;
 use std::path::PathBuf;
 
+use mirrorstats::agent::{Family, reply};
 use mirrorstats::cells::changes::Changes;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
+use mirrorstats::cli::commands::import::ImportAnswer;
 use mirrorstats::cli::commands::recover::RecoverAnswer;
+use mirrorstats::cli::commands::renormalize::RenormalizeAnswer;
 use mirrorstats::cli::commands::report::ReportAnswer;
 use mirrorstats::cli::commands::rescore::RescoreAnswer;
+use mirrorstats::cli::commands::schema::Name;
 use mirrorstats::log::message::{Decision, EpisodeMessage};
 use mirrorstats::metric::explain::Explanation;
 use mirrorstats::metric::shape::DefinitionFile;
@@ -39,14 +43,19 @@ fn current() -> Vec<(&'static str, Value)> {
         ("diff", json!(schema_for!(Changes))),
         ("episode", json!(schema_for!(EpisodeMessage))),
         ("errata", json!(schema_for!(Errata))),
+        ("import", json!(schema_for!(ImportAnswer))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
         ("recover", json!(schema_for!(RecoverAnswer))),
         ("report", json!(schema_for!(ReportAnswer))),
+        ("renormalize", json!(schema_for!(RenormalizeAnswer))),
+        ("reply-cubes", Name::ReplyCubes.document()),
+        ("reply-exploration", Name::ReplyExploration.document()),
         ("rescore", json!(schema_for!(RescoreAnswer))),
         ("score-explain", json!(schema_for!(Evidence))),
         ("stats", json!(schema_for!(Statistics))),
         ("style", json!(schema_for!(Sheet))),
+        ("step", Name::Step.document()),
         ("trace", json!(SchemaDocument::current())),
         ("validation", json!(schema_for!(Validation))),
     ];
@@ -55,6 +64,9 @@ fn current() -> Vec<(&'static str, Value)> {
         ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
         ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
         ("replay", json!(schema_for!(mirrorstats::cli::commands::replay::ReplayAnswer))),
+        ("exec-message", json!(schema_for!(mirrorstats::agent::exec::message::Message))),
+        ("lost", json!(schema_for!(mirrorstats::record::lost::LostEpisode))),
+        ("record-forecast", json!(schema_for!(mirrorstats::cli::forecast::ForecastAnswer))),
         ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
         ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
     ]);
@@ -74,10 +86,20 @@ fn the_files_are_what_the_types_say() {
     }
 }
 
+/// What the model providers and other harnesses are given is these files.
+#[test]
+fn replies_are_asked_for_as_the_files_say() {
+    for (family, name) in [(Family::CubeSelection, "reply-cubes"), (Family::Exploration, "reply-exploration")] {
+        let text = fs::read_to_string(folder().join(format!("{name}.schema.json"))).unwrap();
+        assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), reply::schema(family));
+    }
+}
+
 #[test]
 fn the_folder_holds_nothing_else() {
     // Their types are there with the feature `sim` alone, their files always.
-    let of_worlds = ["census", "record", "replay", "scene", "world-config"];
+    let of_worlds =
+        ["census", "exec-message", "lost", "record", "record-forecast", "replay", "scene", "world-config"];
     let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
     let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
     let found =

@@ -24,6 +24,7 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         bumped: Some(false),
         cube_distance: Some(1.0),
         reply_status: Some("ok".into()),
+        reply_repair: None,
         view_description: text(),
         reasoning: text(),
         summary: text(),

@@ -3,6 +3,9 @@
 use std::fs;
 
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats::trace::inputs::Input;
+use mirrorstats::trace::merge;
+use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
 use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -86,6 +89,29 @@ fn what_the_schema_forbids_is_refused() {
         assert!(error.contains(why), "{error}");
         assert_eq!(encoder.finish().unwrap(), encode(&metadata, &[]), "a refused episode leaves no row");
     }
+}
+
+#[test]
+fn repairs_have_a_column_where_replies_are_read() {
+    let repaired = with_extra(episode("a", 2), Extra { reply_repair: Some("code_fence".into()), ..Extra::default() });
+    let columns = |agent: serde_json::Value| OptionalColumns::recorded(&serde_json::json!({ "agent": agent }));
+    let scripted = columns(serde_json::json!({ "scripted": "oracle" }));
+    assert_eq!(scripted, OptionalColumns::all(), "a scripted agent's replies are not read");
+    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns: scripted }).unwrap();
+    let error = encoder.write(&repaired).unwrap_err().to_string();
+    assert!(error.contains("`reply_repair`, which was not declared"), "{error}");
+
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    let columns = columns(serde_json::json!({ "id": "x" }));
+    let mut writer = TraceWriter::create(&path, &TraceMetadata { recording: None, columns }).unwrap();
+    writer.write(&repaired).unwrap();
+    writer.write(&episode("b", 1)).unwrap();
+    writer.finish().unwrap();
+    let set = TraceSet::open(&[Input::new(&path)]).unwrap();
+    assert_eq!(*set.column_names().last().unwrap(), "reply_repair");
+    let back: Vec<_> = merge::read(&path).unwrap().iter().map(|rows| rows.episode().unwrap()).collect();
+    assert_eq!(back, [repaired, episode("b", 1)]);
 }
 
 #[test]

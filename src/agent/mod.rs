@@ -5,8 +5,11 @@
 //!
 //! Rule: an agent is a function of its task and its observations (and, for a model behind a network, of what that said).
 
+#[cfg(feature = "sim")]
+pub mod exec;
 pub mod identification;
 pub mod prompt;
+pub mod renormalize;
 pub mod reply;
 #[cfg(feature = "sim")]
 pub mod scripted;
@@ -21,6 +24,7 @@ use std::sync::Arc;
 
 use crate::base::frame::Frame;
 use crate::trace::episode::Action;
+use reply::Repair;
 
 /// What an agent is told once, before the first step.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,6 +74,8 @@ pub struct Observation {
 pub struct Reply {
     /// The outcome of getting and reading it.
     pub status: Status,
+    /// What had to be repaired to read it, in order.
+    pub repairs: Vec<Repair>,
     /// The action; `None` where the reply gave none: the body stands still.
     pub action: Option<Action>,
     /// The self-attribution: a colour of the palette, `unknown`, or `None` where the reply gave none.
@@ -175,16 +181,48 @@ impl Status {
 /// The episode cannot go on, and that is not the agent's doing: the infrastructure failed. Such an episode is counted
 /// apart and recorded again by the next run of the command; it is never scored.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{0}")]
-pub struct Lost(pub String);
+#[error("{cause}")]
+pub struct Lost {
+    /// What the failure counts as, where it is one of a reply.
+    pub status: Option<Status>,
+    /// What failed, without any key.
+    pub cause: String,
+}
+
+impl Lost {
+    /// Lost to something other than a reply.
+    pub fn because(cause: impl Into<String>) -> Self {
+        Self { status: None, cause: cause.into() }
+    }
+}
 
 /// A decision that may take its time: scripted agents are ready at once, others wait for a network or a program.
 pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
+
+/// What an agent does when its episode is over.
+pub type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
 
 /// One agent in one episode.
 pub trait Agent {
     /// Decides the next action.
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
+
+    /// Hears that there is nothing more to decide; not called for an episode that is lost.
+    fn end(&mut self, _ended: Ended) -> Farewell<'_> {
+        Box::pin(std::future::ready(()))
+    }
+}
+
+/// How an episode ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Ended {
+    /// The agent was done.
+    Done,
+    /// The steps were used up.
+    Budget,
+    /// The recording is being stopped; the episode is recorded another time.
+    Stopped,
 }
 
 /// Who plays: makes the agent of each episode.
@@ -212,8 +250,17 @@ pub trait Player: Send + Sync {
         1
     }
 
+    /// What was spent so far, over all starts of the recording; `None` for agents that cost nothing.
+    #[cfg(feature = "sim")]
+    fn spend(&self) -> Option<vlm::limits::Spend> {
+        None
+    }
+
     /// Why no further episode makes sense, once there is such a reason.
     fn stopped(&self) -> Option<String> {
         None
     }
+
+    /// The process is about to end with episodes under way: what runs for their agents ends now.
+    fn abandon(&self) {}
 }

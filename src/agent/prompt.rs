@@ -108,6 +108,15 @@ impl Prompt {
     }
 }
 
+/// The hashes of both prompts, for recordings.
+pub fn hashes() -> serde_json::Value {
+    let hash = |family| Prompt::of(family).map_or(serde_json::Value::Null, |prompt| prompt.hash().into());
+    serde_json::json!({
+        "cube_selection": hash(Family::CubeSelection),
+        "exploration": hash(Family::Exploration),
+    })
+}
+
 /// The letter by which the prompt names an action.
 pub const fn letter(action: Action) -> &'static str {
     match action {

@@ -1,7 +1,10 @@
 //! One picture in memory.
 
-/// Rows from the top, three bytes (red, green, blue) a pixel.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg(feature = "sim")]
+use std::sync::OnceLock;
+
+/// Rows from the top, three bytes (red, green, blue) a pixel. A picture does not change once it is made.
+#[derive(Clone, Debug)]
 pub struct Frame {
     /// Pixels in a row.
     pub width: usize,
@@ -9,7 +12,31 @@ pub struct Frame {
     pub height: usize,
     /// `3 * width * height` bytes.
     pub rgb: Vec<u8>,
+    /// Agent and log are given the same picture, which is encoded once.
+    #[cfg(feature = "sim")]
+    png: OnceLock<Vec<u8>>,
 }
+
+impl Frame {
+    /// A picture of `3 * width * height` bytes.
+    pub const fn new(width: usize, height: usize, rgb: Vec<u8>) -> Self {
+        Self {
+            width,
+            height,
+            rgb,
+            #[cfg(feature = "sim")]
+            png: OnceLock::new(),
+        }
+    }
+}
+
+impl PartialEq for Frame {
+    fn eq(&self, other: &Self) -> bool {
+        (self.width, self.height, &self.rgb) == (other.width, other.height, &other.rgb)
+    }
+}
+
+impl Eq for Frame {}
 
 #[cfg(feature = "sim")]
 impl Frame {
@@ -17,7 +44,15 @@ impl Frame {
     ///
     /// # Errors
     /// When there are not `3 * width * height` bytes.
-    pub fn to_png(&self) -> Result<Vec<u8>, png::EncodingError> {
+    pub fn to_png(&self) -> Result<&[u8], png::EncodingError> {
+        if let Some(png) = self.png.get() {
+            return Ok(png);
+        }
+        let png = self.encode()?;
+        Ok(self.png.get_or_init(|| png))
+    }
+
+    fn encode(&self) -> Result<Vec<u8>, png::EncodingError> {
         let side = |pixels: usize| u32::try_from(pixels).unwrap_or(u32::MAX);
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, side(self.width), side(self.height));

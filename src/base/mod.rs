@@ -1,7 +1,8 @@
-//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs.
+//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs, bits.
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
+pub mod bits;
 pub mod estimate;
 pub mod frame;
 pub mod hash;

@@ -6,6 +6,10 @@
 pub mod args;
 pub mod commands;
 pub mod drawing;
+#[cfg(feature = "sim")]
+pub mod exec;
+#[cfg(feature = "sim")]
+pub mod forecast;
 mod listing;
 pub mod outcome;
 pub mod output;

@@ -1,19 +1,25 @@
 //! What `record` tells while it runs and when it has ended, on standard error: progress, and where the time went.
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::listing::counted;
+use crate::agent::Player;
+use crate::agent::vlm::limits::Spend;
+use crate::base::number::Decimal;
 use crate::base::visible::visible;
+use crate::record::lost::LostEpisode;
 use crate::record::run::{Progress, Spent, Tally};
 
 /// The answer of `record --json`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct RecordAnswer {
     /// The model's name as shown in tables.
     pub model: String,
@@ -25,8 +31,10 @@ pub struct RecordAnswer {
     pub recorded: usize,
     /// Their steps.
     pub steps: u64,
-    /// Episodes that were lost to failures which are not the agent's; they are in no trace.
+    /// Episodes that were lost to failures which are not the agent's: in no trace, listed in `lost.jsonl` of the folder.
     pub lost: Vec<LostEpisode>,
+    /// What was spent over all starts of the recording; null for agents that cost nothing.
+    pub spend: Option<Spend>,
     /// Whether the recording was stopped before its end.
     pub stopped: bool,
     /// The traces of these episodes.
@@ -35,43 +43,42 @@ pub struct RecordAnswer {
     pub logs: Vec<String>,
 }
 
-/// An episode that was lost.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct LostEpisode {
-    /// Its id.
-    pub episode_id: String,
-    /// What failed.
-    pub reason: String,
-}
-
 impl RecordAnswer {
-    /// What became of the episodes.
-    pub fn of(tally: Tally, model: &str, asked: usize, found: usize, [traces, logs]: [Vec<String>; 2]) -> Self {
-        let lost = tally.lost.into_iter().map(|(episode_id, reason)| LostEpisode { episode_id, reason }).collect();
-        let Tally { recorded, steps, stopped, .. } = tally;
-        Self { model: model.to_owned(), asked, found, recorded, steps, lost, stopped, traces, logs }
+    /// What became of the episodes of a player.
+    pub fn of(tally: Tally, player: &dyn Player, asked: usize, found: usize, [traces, logs]: [Vec<String>; 2]) -> Self {
+        let Tally { recorded, steps, lost, stopped } = tally;
+        let (model, recorded, spend) = (player.model().to_owned(), recorded.len(), player.spend());
+        Self { model, asked, found, recorded, steps, lost, spend, stopped, traces, logs }
     }
 }
 
-/// The progress bar, which a terminal alone shows.
-pub(super) struct Bar {
+/// How often progress is told where no terminal shows it.
+const BETWEEN_LINES: Duration = Duration::from_secs(10);
+
+/// The progress: a bar where a terminal shows it, else a line now and then for agents that cost something.
+pub(super) struct Bar<'a> {
     line: ProgressBar,
+    player: &'a dyn Player,
     episodes: usize,
     ended: AtomicUsize,
     budget: u64,
+    is_shown: bool,
+    /// When a line was last written.
+    told: Mutex<Instant>,
 }
 
-impl Bar {
+impl<'a> Bar<'a> {
     /// A bar for so many episodes of so many steps at most.
-    pub(super) fn new(episodes: usize, steps: u32) -> Self {
-        let target =
-            if io::stderr().is_terminal() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    pub(super) fn new(player: &'a dyn Player, episodes: usize, steps: u32) -> Self {
+        let is_shown = io::stderr().is_terminal();
+        let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let budget = u64::from(steps);
         let line = ProgressBar::with_draw_target(Some(episodes as u64 * budget), target);
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
         line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let bar = Self { line, episodes, ended: AtomicUsize::new(0), budget };
-        bar.tell();
+        let told = Mutex::new(Instant::now());
+        let bar = Self { line, player, episodes, ended: AtomicUsize::new(0), budget, is_shown, told };
+        bar.line.set_message(bar.message());
         bar
     }
 
@@ -80,14 +87,33 @@ impl Bar {
         self.line.finish_and_clear();
     }
 
-    fn tell(&self) {
-        self.line.set_message(format!("{} of {} episodes", self.ended.load(Ordering::Relaxed), self.episodes));
+    /// How many episodes have ended, and what was spent.
+    fn message(&self) -> String {
+        let spent = self.player.spend().map_or_else(String::new, |spend| format!(", {}", spent(&spend)));
+        format!("{} of {} episodes{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
+    }
+
+    /// A line for a log, now and then.
+    fn write_line(&self) {
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_shown || self.player.spend().is_none() || told.elapsed() < BETWEEN_LINES {
+            return;
+        }
+        *told = Instant::now();
+        let (steps, rate, left) = (self.line.position(), self.line.per_sec(), self.line.eta().as_secs().div_ceil(60));
+        // With standard error closed there is nobody left to tell.
+        let _ = writeln!(io::stderr(), "{}, {steps} steps, {rate:.1} a second, about {left} min left", self.message());
     }
 }
 
-impl Progress for Bar {
+impl Progress for Bar<'_> {
     fn step(&self) {
         self.line.inc(1);
+        if self.is_shown {
+            self.line.set_message(self.message());
+        } else {
+            self.write_line();
+        }
     }
 
     fn episode(&self, _: &str, steps: usize) {
@@ -95,7 +121,7 @@ impl Progress for Bar {
         // Steps that an early decision leaves unused are not still to come.
         let unused = self.budget.saturating_sub(steps as u64);
         self.line.set_length(self.line.length().unwrap_or_default().saturating_sub(unused));
-        self.tell();
+        self.line.set_message(self.message());
     }
 
     fn lost(&self, id: &str, reason: &str) {
@@ -106,8 +132,26 @@ impl Progress for Bar {
     }
 }
 
-/// Says what became of the episodes, and where the time went.
-pub(super) fn say(answer: &RecordAnswer, elapsed: Duration, spent: Spent) -> io::Result<()> {
+/// What was spent, in words.
+fn spent(spend: &Spend) -> String {
+    let (requests, replies) = (counted(spend.requests, "request"), counted(spend.uncosted, "reply"));
+    let known = match (spend.uncosted, spend.cost_usd > 0.0) {
+        (0, _) => dollars(spend.cost_usd),
+        (_, true) => format!("{} and what {replies} cost, which is unknown,", dollars(spend.cost_usd)),
+        (_, false) => "an unknown cost".to_owned(),
+    };
+    format!("{known} for {requests} and {}", counted(spend.tokens, "token"))
+}
+
+/// An amount to the cent, smaller ones to two digits that count.
+pub(super) fn dollars(value: f64) -> String {
+    let places = if value >= 1.0 || value == 0.0 { 2 } else { 4 };
+    let number = Decimal::of_float(value, places);
+    number.map_or_else(|| "an unknown number of US dollars".to_owned(), |number| format!("{number} US dollars"))
+}
+
+/// Says what became of the episodes, where those that were lost are listed, and where the time went.
+pub(super) fn say(answer: &RecordAnswer, list: &Path, elapsed: Duration, times: Spent) -> io::Result<()> {
     let mut out = io::stderr().lock();
     let seconds = elapsed.as_secs_f64();
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
@@ -121,12 +165,19 @@ pub(super) fn say(answer: &RecordAnswer, elapsed: Duration, spent: Spent) -> io:
         0 => writeln!(out)?,
         found => writeln!(out, "; {found} of {} were there before", answer.asked)?,
     }
-    if let Some(shares) = shares(spent) {
+    if let Some(shares) = shares(times) {
         writeln!(out, "time: {shares}")?;
+    }
+    if let Some(spend) = &answer.spend {
+        writeln!(out, "spent: {}, over all starts of this recording", spent(spend))?;
     }
     if !answer.lost.is_empty() {
         let lost = counted(answer.lost.len() as u64, "episode");
-        writeln!(out, "lost {lost} to failures that are not the agent's: in no trace; the same command tries again")?;
+        writeln!(
+            out,
+            "lost {lost} to failures that are not the agent's: in no trace, listed in {}; the same command tries again",
+            visible(&list.display().to_string())
+        )?;
     }
     if answer.stopped {
         let left = answer.asked - answer.found - answer.recorded - answer.lost.len();
@@ -135,13 +186,13 @@ pub(super) fn say(answer: &RecordAnswer, elapsed: Duration, spent: Spent) -> io:
     Ok(())
 }
 
-/// What share of the work each part took.
-fn shares(spent: Spent) -> Option<String> {
+/// What share of the threads' time each part took.
+fn shares(times: Spent) -> Option<String> {
     let parts = [
-        ("rendering", spent.rendering),
-        ("world and census", spent.census),
-        ("agents", spent.agent),
-        ("writing", spent.writing),
+        ("rendering", times.rendering),
+        ("world and census", times.census),
+        ("agents and waiting for them", times.agent),
+        ("writing", times.writing),
     ];
     let total: f64 = parts.iter().map(|(_, time)| time.as_secs_f64()).sum();
     let words = parts.map(|(name, time)| format!("{name} {:.0} %", 100.0 * time.as_secs_f64() / total));
@@ -152,8 +203,20 @@ fn shares(spent: Spent) -> Option<String> {
 mod tests {
     use std::time::Duration;
 
-    use super::shares;
+    use super::{dollars, shares, spent};
+    use crate::agent::vlm::limits::Spend;
     use crate::record::run::Spent;
+
+    #[test]
+    fn what_is_not_known_of_a_cost_is_said() {
+        let spend = Spend { cost_usd: 1.5, uncosted: 0, tokens: 2_000, requests: 3 };
+        assert_eq!(spent(&spend), "1.50 US dollars for 3 requests and 2000 tokens");
+        let partly = Spend { uncosted: 2, ..spend };
+        assert!(spent(&partly).starts_with("1.50 US dollars and what 2 replies cost, which is unknown, for"));
+        let nothing = Spend { cost_usd: 0.0, ..partly };
+        assert_eq!(spent(&nothing), "an unknown cost for 3 requests and 2000 tokens");
+        assert_eq!([dollars(0.0), dollars(0.00123)], ["0.00 US dollars", "0.0012 US dollars"]);
+    }
 
     #[test]
     fn shares_are_of_the_whole_and_need_one() {
@@ -163,7 +226,7 @@ mod tests {
             agent: Duration::ZERO,
             writing: Duration::from_secs(1),
         };
-        let expected = "rendering 70 %, world and census 20 %, agents 0 %, writing 10 %";
+        let expected = "rendering 70 %, world and census 20 %, agents and waiting for them 0 %, writing 10 %";
         assert_eq!(shares(spent).as_deref(), Some(expected));
         assert_eq!(shares(Spent::default()), None);
     }

@@ -75,11 +75,29 @@ pub fn write(
     let traces = open(inputs)?;
     let definitions = definitions(&traces, scoring)?;
     let mut rows = run::rows(&traces, &definitions, &[], threads).map_err(score_failure)?;
-    let mut writer = format::Writer::new(rows.header().clone(), format, out).map_err(unwritten)?;
-    while let Some(row) = rows.next_row().map_err(ScoreError::Spill).map_err(score_failure)? {
-        writer.write(row).map_err(unwritten)?;
+    let header = rows.header().clone();
+    format::write_rows(header, format, out, |write| {
+        while let Some(row) = rows.next_row().map_err(ScoreError::Spill).map_err(Unwritten::Score)? {
+            write(row)?;
+        }
+        Ok(())
+    })
+    .map_err(|error| match error {
+        Unwritten::Score(error) => score_failure(error),
+        Unwritten::Format(error) => unwritten(error),
+    })
+}
+
+/// What ends the writing of scores as they are computed.
+enum Unwritten {
+    Score(ScoreError),
+    Format(FormatError),
+}
+
+impl From<FormatError> for Unwritten {
+    fn from(error: FormatError) -> Self {
+        Self::Format(error)
     }
-    writer.finish().map_err(unwritten)
 }
 
 /// Writes a table.

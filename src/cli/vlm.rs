@@ -19,7 +19,7 @@ use crate::agent::{Agent, Lost, Player, Task};
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent vlm")]
 pub struct VlmArgs {
-    /// The model: a name of the paper's table, an id, or one of --models
+    /// The model: a name of the paper's table, an id, or one of --models; with exec: its name in tables
     #[arg(long, value_name = "NAME|ID")]
     model: Option<String>,
     /// A file with more models, in the shape of assets/models.toml
@@ -67,6 +67,11 @@ pub struct VlmArgs {
 const JOURNALS: &str = "journal";
 
 impl VlmArgs {
+    /// The name that was typed.
+    pub fn name(&self) -> Option<&str> {
+        self.model.as_deref()
+    }
+
     /// The player, whose journals are in the folder of the recording.
     ///
     /// # Errors
@@ -98,6 +103,20 @@ impl VlmArgs {
             self.max_output_tokens,
         );
         Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network) })
+    }
+
+    /// The player of a forecast: knows the journals in the folder of the recording, has no key and sends nothing.
+    ///
+    /// # Errors
+    /// For a model or backend that is none.
+    pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
+        let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS), self.max_output_tokens));
+        Ok(VlmPlayer { vlm, at_once: 1, network: None })
+    }
+
+    /// Whether requests go out, and are not played from an earlier recording.
+    pub fn sends(&self) -> bool {
+        self.cassette.is_none()
     }
 
     fn choice(&self) -> Result<Choice, Failure> {
@@ -139,8 +158,14 @@ pub struct VlmPlayer {
     vlm: Arc<Vlm>,
     at_once: usize,
     /// Requests run on it; it ends with the player.
-    #[expect(dead_code, reason = "held for as long as requests may be under way")]
     network: Option<Runtime>,
+}
+
+impl VlmPlayer {
+    /// The model.
+    pub fn vlm(&self) -> &Vlm {
+        &self.vlm
+    }
 }
 
 impl Player for VlmPlayer {
@@ -154,11 +179,16 @@ impl Player for VlmPlayer {
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let agent = self.vlm.agent(task, &episode_id.replace('/', "-"));
-        Ok(Box::new(agent.map_err(|error| Lost(error.to_string()))?))
+        Ok(Box::new(agent.map_err(|error| Lost::because(error.to_string()))?))
     }
 
     fn in_flight(&self) -> usize {
         self.at_once
+    }
+
+    /// A cassette costs nothing.
+    fn spend(&self) -> Option<Spend> {
+        self.network.is_some().then(|| self.vlm.spend())
     }
 
     fn stopped(&self) -> Option<String> {

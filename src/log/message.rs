@@ -99,6 +99,8 @@ pub struct Decision {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reply_status: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reply_repair: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view_description: Option<String>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reasoning: Option<String>,
@@ -148,6 +150,7 @@ impl Decision {
             bumped: extra.bumped,
             cube_distance: extra.cube_distance,
             reply_status: extra.reply_status,
+            reply_repair: extra.reply_repair,
             view_description: extra.view_description,
             reasoning: extra.reasoning,
             summary: extra.summary,
@@ -189,6 +192,7 @@ impl Decision {
                 bumped: self.bumped,
                 cube_distance: self.cube_distance,
                 reply_status: self.reply_status,
+                reply_repair: self.reply_repair,
                 view_description: self.view_description,
                 reasoning: self.reasoning,
                 summary: self.summary,

@@ -164,6 +164,13 @@ pub enum Aggregate {
     Sum,
 }
 
+impl Aggregate {
+    /// Whether it asks at which steps a predicate holds, and nothing of the steps at which it does not.
+    pub const fn searches(self) -> bool {
+        matches!(self, Self::First | Self::Last | Self::Any | Self::Count)
+    }
+}
+
 /// A metric or a named expression and the node that holds it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {

@@ -17,6 +17,11 @@ use super::store::StoreError;
 /// The folder of parts within the folder of a recording.
 const PARTS: &str = ".parts";
 
+/// The folder of parts of a recording; what is in it under a temporary name is cleared away.
+pub fn parts_of(folder: &Path) -> PathBuf {
+    folder.join(PARTS)
+}
+
 /// This process's share in a folder, given back when it is dropped.
 #[derive(Debug)]
 pub struct Claim {
@@ -43,7 +48,7 @@ impl Claim {
 
     fn enter(folder: &Path, is_new: bool) -> Result<Self, StoreError> {
         let _lock = lock(folder)?;
-        let parts = folder.join(PARTS);
+        let parts = parts_of(folder);
         fs::create_dir_all(&parts).map_err(StoreError::io("make the folder", &parts))?;
         let path = parts.join(".present");
         let present = File::create(&path).map_err(StoreError::io("make", &path))?;
@@ -62,7 +67,7 @@ impl Claim {
 
     /// The folder of parts.
     pub fn parts(&self) -> PathBuf {
-        self.folder.join(PARTS)
+        parts_of(&self.folder)
     }
 
     /// The folder's lock, held until the file is dropped.
@@ -140,7 +145,9 @@ fn clear(parts: &Path) -> Result<(), StoreError> {
     for entry in entries.map_err(StoreError::io("read", parts))? {
         let path = entry.path();
         if is_unfinished(&path) {
-            fs::remove_file(&path).map_err(StoreError::io("remove", &path))?;
+            // The frames that a program was given are a folder.
+            let removed = if path.is_dir() { fs::remove_dir_all(&path) } else { fs::remove_file(&path) };
+            removed.map_err(StoreError::io("remove", &path))?;
         }
     }
     Ok(())

@@ -50,7 +50,7 @@ impl Log {
         let snapshot = seen.world.snapshot();
         let placed: Vec<Placed> = snapshot.frames.iter().map(placed).collect();
         let solids: Vec<Solid> = snapshot.solids.iter().map(solid).collect();
-        let view = View { png: png.as_deref(), placed: &placed, solids: &solids, census: seen.census };
+        let view = View { png, placed: &placed, solids: &solids, census: seen.census };
         self.log.seen(time(self.key, seen.t), &view).map_err(Broken::fatal)
     }
 

@@ -12,8 +12,10 @@
 //! | [`play`] | one episode, from the first frame to the last step |
 //! | [`log`] | what an episode's log is told, step by step |
 //! | [`metadata`] | what a trace says of how it was recorded |
-//! | [`store`] | the folder: what is done, how an episode commits, how the final files are made |
+//! | [`shelf`] | what is recorded in a folder already |
+//! | [`store`] | the folder: how an episode commits, how the final files are made |
 //! | [`claim`] | who else records into the folder |
+//! | [`lost`] | the list of episodes that failures kept from being recorded |
 //! | [`run`] | threads, episodes under way, stopping, what took the time |
 //!
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
@@ -21,8 +23,10 @@
 
 pub mod claim;
 pub mod log;
+pub mod lost;
 pub mod metadata;
 pub mod plan;
 pub mod play;
 pub mod run;
+pub mod shelf;
 pub mod store;

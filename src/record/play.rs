@@ -10,6 +10,7 @@ use std::time::Instant;
 
 use super::plan::Key;
 use super::run::Shares;
+use crate::agent::reply::Repair;
 use crate::agent::{Agent, Family, Lost, Observation, Reply, Task};
 use crate::base::frame::Frame;
 use crate::base::palette::Color;
@@ -27,8 +28,13 @@ pub enum Broken {
     #[error("stopped")]
     Stopped,
     /// The agent's infrastructure failed.
-    #[error(transparent)]
-    Lost(#[from] Lost),
+    #[error("{lost}")]
+    Lost {
+        /// The step that got no reply; `None` before the first.
+        step: Option<i32>,
+        /// What failed.
+        lost: Lost,
+    },
     /// The world, the eye or the disk failed, as they would for any episode.
     #[error(transparent)]
     Fatal(Box<dyn std::error::Error + Send + Sync>),
@@ -139,9 +145,7 @@ pub async fn play(
         let start = Instant::now();
         let census = world.census();
         stage.shares.census(start);
-        let start = Instant::now();
-        let reply = agent.decide(&observation).await?;
-        stage.shares.agent(start);
+        let reply = agent.decide(&observation).await.map_err(|lost| Broken::Lost { step: Some(t), lost })?;
         let action = reply.action;
         history = Some((action, reply.words.summary.clone()));
         let mut row = row(world, key, t, &census, reply);
@@ -168,7 +172,7 @@ fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, Broken> 
 }
 
 fn nothing() -> Arc<Frame> {
-    Arc::new(Frame { width: 0, height: 0, rgb: Vec::new() })
+    Arc::new(Frame::new(0, 0, Vec::new()))
 }
 
 /// The row of a step, `bumped` left open.
@@ -187,6 +191,7 @@ fn row(world: &World, key: Key, t: i32, census: &Census, reply: Reply) -> Step {
         bumped: None,
         cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
         reply_status: Some(reply.status.name().to_owned()),
+        reply_repair: Repair::joined(&reply.repairs),
         view_description: reply.words.view_description,
         reasoning: reply.words.reasoning,
         summary: reply.words.summary,

@@ -14,23 +14,24 @@ use std::time::{Duration, Instant};
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
 use super::log::Log;
+use super::lost::LostEpisode;
 use super::plan::Key;
 use super::play::{self, Broken, Onlooker, Seen, Stage};
 use super::store::Store;
-use crate::agent::Player;
+use crate::agent::{Ended, Player};
 use crate::sim::config::WorldConfig;
 use crate::sim::eye::Eye;
 use crate::sim::scene::Scene;
 use crate::sim::world::World;
-use crate::trace::episode::Step;
+use crate::trace::episode::{Action, Episode, Step};
 
 /// Where the time of a recording goes, over all threads.
 #[derive(Debug, Default)]
 pub struct Shares {
     rendering: AtomicU64,
     census: AtomicU64,
-    agent: AtomicU64,
     writing: AtomicU64,
+    all: AtomicU64,
 }
 
 /// How a share of the time is told.
@@ -40,10 +41,10 @@ pub struct Spent {
     pub rendering: Duration,
     /// Moving the world and casting rays.
     pub census: Duration,
-    /// Waiting for agents, summed over episodes: more than the clock's time where several wait at once.
-    pub agent: Duration,
     /// Writing logs and parts.
     pub writing: Duration,
+    /// What is left of the threads' time: agents that decide, and waiting for those that decide elsewhere.
+    pub agent: Duration,
 }
 
 impl Shares {
@@ -55,23 +56,21 @@ impl Shares {
         add(&self.census, start);
     }
 
-    pub(super) fn agent(&self, start: Instant) {
-        add(&self.agent, start);
-    }
-
     pub(super) fn writing(&self, start: Instant) {
         add(&self.writing, start);
+    }
+
+    /// All that a thread has done since it began.
+    fn thread(&self, start: Instant) {
+        add(&self.all, start);
     }
 
     /// What was spent so far.
     pub fn spent(&self) -> Spent {
         let read = |share: &AtomicU64| Duration::from_nanos(share.load(Ordering::Relaxed));
-        Spent {
-            rendering: read(&self.rendering),
-            census: read(&self.census),
-            agent: read(&self.agent),
-            writing: read(&self.writing),
-        }
+        let [rendering, census, writing] = [&self.rendering, &self.census, &self.writing].map(read);
+        let agent = read(&self.all).saturating_sub(rendering + census + writing);
+        Spent { rendering, census, writing, agent }
     }
 }
 
@@ -107,11 +106,11 @@ pub struct Settings {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Episodes that were recorded now.
-    pub recorded: usize,
+    pub recorded: Vec<Key>,
     /// Their steps.
     pub steps: u64,
-    /// Episodes that were lost, by id, and why.
-    pub lost: Vec<(String, String)>,
+    /// Episodes that were lost, and why.
+    pub lost: Vec<LostEpisode>,
     /// The recording was stopped before its end.
     pub stopped: bool,
 }
@@ -141,27 +140,32 @@ impl Recording<'_> {
     /// The first failure that every episode would meet; episodes committed before it stay.
     pub fn run(&self, keys: &[Key]) -> Result<Tally, Broken> {
         let queue = Mutex::new(keys.iter().copied().collect::<VecDeque<_>>());
-        let threads = self.settings.threads.get().min(keys.len().max(1));
-        let each = self.settings.in_flight.get().div_ceil(threads);
+        let in_flight = self.settings.in_flight.get();
+        let threads = self.settings.threads.get().min(in_flight).min(keys.len().max(1));
         let results = std::thread::scope(|scope| {
-            let workers: Vec<_> = (0..threads).map(|_| scope.spawn(|| self.thread(&queue, each))).collect();
+            let queue = &queue;
+            let share = |at| in_flight / threads + usize::from(at < in_flight % threads);
+            let workers: Vec<_> = (0..threads).map(|at| scope.spawn(move || self.thread(queue, share(at)))).collect();
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
         });
         let mut tally = Tally::default();
         for result in results {
             let part = result?;
-            tally.recorded += part.recorded;
+            tally.recorded.extend(part.recorded);
             tally.steps += part.steps;
             tally.lost.extend(part.lost);
             tally.stopped |= part.stopped;
         }
-        tally.lost.sort();
+        tally.recorded.sort_unstable();
+        tally.lost.sort_by_key(|lost| (lost.experiment.clone(), lost.seed, lost.run));
         Ok(tally)
     }
 
     /// One thread: its eye, and up to `each` episodes under way.
     fn thread(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
+        let start = Instant::now();
         let result = self.episodes(queue, each);
+        self.shares.thread(start);
         if result.is_err() {
             self.stop.store(true, Ordering::Relaxed);
         }
@@ -170,7 +174,9 @@ impl Recording<'_> {
 
     fn episodes(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
         let is_needed = self.settings.frames || self.player.looks();
+        let start = Instant::now();
         let eye = is_needed.then(|| Eye::new(self.config)).transpose().map_err(Broken::fatal)?.map(RefCell::new);
+        self.shares.rendering(start);
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(Broken::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
@@ -192,22 +198,38 @@ impl Recording<'_> {
 
     /// One episode, from its scene to its commit.
     async fn episode(&self, key: Key, eye: Option<&RefCell<Eye>>) -> Result<usize, Broken> {
+        let start = Instant::now();
         let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(Broken::fatal)?;
         let episode = play::head(&scene, key, self.player.model());
-        let mut agent = self.player.agent(play::task(self.config, &scene, key), &episode.episode_id)?;
+        let task = play::task(self.config, &scene, key);
         let mut world = World::new(self.config, scene).map_err(Broken::fatal)?;
+        self.shares.census(start);
+        let agent = self.player.agent(task, &episode.episode_id);
+        let mut agent = agent.map_err(|lost| Broken::Lost { step: None, lost })?;
         let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
         let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
         let frames = self.settings.frames;
         let mut onlooker = Onlookers { progress: self.progress, shares: self.shares, frames, log };
-        let episode = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await?;
-        let start = Instant::now();
-        if let Some(log) = onlooker.log {
-            log.end(&episode)?;
+        let played = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await;
+        let committed = match &played {
+            Ok(episode) => self.commit(key, episode, onlooker.log),
+            Err(_) => Ok(()),
+        };
+        if let Some(ended) = ended(&played) {
+            agent.end(ended).await;
         }
-        self.store.commit(key, &episode).map_err(Broken::fatal)?;
+        committed.and(played).map(|episode| episode.steps.len())
+    }
+
+    /// Makes an episode whole on the disk, its trace last.
+    fn commit(&self, key: Key, episode: &Episode, log: Option<Log>) -> Result<(), Broken> {
+        let start = Instant::now();
+        if let Some(log) = log {
+            log.end(episode)?;
+        }
+        self.store.commit(key, episode).map_err(Broken::fatal)?;
         self.shares.writing(start);
-        Ok(episode.steps.len())
+        Ok(())
     }
 
     /// Counts what became of an episode.
@@ -215,14 +237,14 @@ impl Recording<'_> {
         let id = key.episode_id(self.player.model());
         match result {
             Ok(steps) => {
-                tally.recorded += 1;
+                tally.recorded.push(key);
                 tally.steps += steps as u64;
                 self.progress.episode(&id, steps);
             }
             Err(Broken::Stopped) => tally.stopped = true,
-            Err(Broken::Lost(lost)) => {
-                self.progress.lost(&id, &lost.0);
-                tally.lost.push((id, lost.0));
+            Err(Broken::Lost { step, lost }) => {
+                self.progress.lost(&id, &lost.cause);
+                tally.lost.push(LostEpisode::of(key, self.player.model(), step, lost));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }
@@ -230,6 +252,18 @@ impl Recording<'_> {
             Err(fatal @ Broken::Fatal(_)) => return Err(fatal),
         }
         Ok(())
+    }
+}
+
+/// What the agent is told of the end; nothing where it, or everything, has failed.
+fn ended(played: &Result<Episode, Broken>) -> Option<Ended> {
+    match played {
+        Ok(episode) => {
+            let last = episode.steps.last().and_then(|step| step.action);
+            Some(if last == Some(Action::Done) { Ended::Done } else { Ended::Budget })
+        }
+        Err(Broken::Stopped) => Some(Ended::Stopped),
+        Err(Broken::Lost { .. } | Broken::Fatal(_)) => None,
     }
 }
 
@@ -268,9 +302,11 @@ impl Onlooker for Onlookers<'_> {
 
     fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken> {
         self.progress.step();
-        match &mut self.log {
-            Some(log) => log.done(t, row),
-            None => Ok(()),
+        let start = Instant::now();
+        if let Some(log) = &mut self.log {
+            log.done(t, row)?;
         }
+        self.shares.writing(start);
+        Ok(())
     }
 }

@@ -3,6 +3,7 @@
 //! ```text
 //! OUT/E1-oracle.parquet            the trace of a model and an experiment, made of whole episodes
 //! OUT/E1-oracle.mcap               its log
+//! OUT/lost.jsonl                   episodes that failures kept from being recorded; no file if there are none
 //! OUT/.parts/E1-oracle-s1-r3.*     episodes that are whole, and not in the trace yet
 //! ```
 //!
@@ -18,19 +19,16 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::claim::Claim;
-use super::plan::{Key, slug};
+use super::lost::{self, LostEpisode};
+use super::plan::Key;
+use super::shelf::{SEEDS, Shelf, narrow};
 use crate::log::{LogError, assemble};
 use crate::sim::Experiment;
 use crate::trace::episode::Episode;
 use crate::trace::finding::TraceError;
-use crate::trace::inputs::Input;
 use crate::trace::merge;
-use crate::trace::open::TraceFile;
-use crate::trace::schema::RECORDING_KEY;
 use crate::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
-/// The key of the recording's metadata that grows with its episodes.
-const SEEDS: &str = "seeds";
 /// A trace that is being put together; by its name it is cleared away if that is not brought to an end.
 const UNFINISHED_TRACE: &str = ".mirrorstats-assembled";
 
@@ -38,8 +36,7 @@ const UNFINISHED_TRACE: &str = ".mirrorstats-assembled";
 #[derive(Debug)]
 pub struct Store {
     claim: Claim,
-    model: String,
-    recording: Value,
+    shelf: Shelf,
     columns: OptionalColumns,
 }
 
@@ -92,8 +89,8 @@ impl Store {
     /// # Errors
     /// When it cannot be made or written to.
     pub fn open(folder: &Path, model: &str, recording: Value) -> Result<Self, StoreError> {
-        let columns = OptionalColumns::all();
-        Ok(Self { claim: Claim::stake(folder)?, model: model.to_owned(), recording, columns })
+        let columns = OptionalColumns::recorded(&recording);
+        Ok(Self { claim: Claim::stake(folder)?, shelf: Shelf::new(folder, model, recording), columns })
     }
 
     fn parts(&self) -> PathBuf {
@@ -102,16 +99,16 @@ impl Store {
 
     /// The trace of an experiment.
     pub fn trace(&self, experiment: Experiment) -> PathBuf {
-        self.claim.folder().join(format!("{}-{}.parquet", experiment.name(), slug(&self.model)))
+        self.shelf.trace(experiment)
     }
 
     /// The log of an experiment.
     pub fn log(&self, experiment: Experiment) -> PathBuf {
-        self.trace(experiment).with_extension("mcap")
+        self.shelf.log(experiment)
     }
 
     fn part(&self, key: Key) -> PathBuf {
-        self.parts().join(format!("{}.parquet", key.file_stem(&self.model)))
+        self.parts().join(format!("{}.parquet", key.file_stem(self.shelf.model())))
     }
 
     /// Where the log of an episode is committed.
@@ -126,51 +123,22 @@ impl Store {
     pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError> {
         // A part that another process is taking over into the trace is in neither for a moment.
         let _lock = self.claim.lock()?;
-        let mut found = BTreeSet::new();
-        let trace = self.trace(experiment);
-        let parts = self.part_files(experiment)?;
-        for path in trace.exists().then_some(trace).iter().chain(&parts) {
-            self.check_recording(path)?;
-            for episode in merge::read(path)? {
-                found.insert((narrow(episode.seed), narrow(episode.run)));
-            }
-        }
-        Ok(found)
+        self.shelf.recorded(experiment)
     }
 
-    /// Refuses a file that was recorded with anything else than this recording.
-    fn check_recording(&self, path: &Path) -> Result<(), StoreError> {
-        let found = recording_of(path)?;
-        let keys = |value: &Value| -> Vec<String> {
-            value.as_object().map(|object| object.keys().cloned().collect()).unwrap_or_default()
-        };
-        let names = keys(&self.recording).into_iter().chain(keys(&found)).filter(|name| name != SEEDS);
-        for name in names {
-            let (ours, theirs) = (self.recording.get(&name), found.get(&name));
-            if ours != theirs {
-                let (expected, found) = first_difference(&name, ours, theirs);
-                let path = path.to_owned();
-                return Err(StoreError::Different { path, what: expected.0, expected: expected.1, found });
-            }
-        }
-        Ok(())
+    /// Brings the list of lost episodes up to date: these are recorded, those were lost now.
+    ///
+    /// # Errors
+    /// When the list cannot be read or written.
+    pub fn note_lost(&self, recorded: impl Iterator<Item = Key>, lost: &[LostEpisode]) -> Result<(), StoreError> {
+        let _lock = self.claim.lock()?;
+        let recorded = recorded.map(|key| key.episode_id(self.shelf.model())).collect();
+        lost::update(&self.lost_list(), &recorded, lost)
     }
 
-    /// The parts of an experiment, by name.
-    fn part_files(&self, experiment: Experiment) -> Result<Vec<PathBuf>, StoreError> {
-        let parts = self.parts();
-        let prefix = format!("{}-{}-s", experiment.name(), slug(&self.model));
-        let mut found = Vec::new();
-        for entry in fs::read_dir(&parts).map_err(StoreError::io("read", &parts))? {
-            let path = entry.map_err(StoreError::io("read", &parts))?.path();
-            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-            let rest = name.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(".parquet"));
-            if rest.is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_digit() || b"-r".contains(&byte))) {
-                found.push(path);
-            }
-        }
-        found.sort();
-        Ok(found)
+    /// Where lost episodes are listed.
+    pub fn lost_list(&self) -> PathBuf {
+        lost::list_of(self.claim.folder())
     }
 
     /// Commits an episode whose log, if there is one, is committed already.
@@ -179,7 +147,7 @@ impl Store {
     /// Whatever writing gives; the episode is not there then.
     pub fn commit(&self, key: Key, episode: &Episode) -> Result<(), StoreError> {
         let path = self.part(key);
-        let metadata = TraceMetadata { recording: Some(self.recording.clone()), columns: self.columns.clone() };
+        let metadata = TraceMetadata { recording: Some(self.shelf.recording().clone()), columns: self.columns.clone() };
         let mut writer = TraceWriter::create(&path, &metadata)?;
         writer.write(episode)?;
         writer.finish_durably()?;
@@ -192,14 +160,14 @@ impl Store {
     /// Whatever reading and writing give; the parts stay then.
     pub fn assemble(&self, experiment: Experiment) -> Result<(), StoreError> {
         let _lock = self.claim.lock()?;
-        let parts = self.part_files(experiment)?;
+        let parts = self.shelf.parts_of(experiment)?;
         if parts.is_empty() {
             return Ok(());
         }
         let trace = self.trace(experiment);
         let mut episodes = if trace.exists() { merge::read(&trace)? } else { Vec::new() };
         for part in &parts {
-            self.check_recording(part)?;
+            self.shelf.check(part)?;
             episodes.extend(merge::read(part)?);
         }
         // An episode that was committed and is in the trace already is the same one: the trace was put together, and the
@@ -207,7 +175,7 @@ impl Store {
         episodes.sort_by_key(|episode| (episode.seed, episode.run));
         episodes.dedup_by(|later, earlier| later.episode_id == earlier.episode_id);
         let log_parts: Vec<PathBuf> = parts.iter().map(|part| part.with_extension("mcap")).collect();
-        let mut recording = self.recording.clone();
+        let mut recording = self.shelf.recording().clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
         self.assemble_log(experiment, &parts, &recording)?;
@@ -238,34 +206,6 @@ impl Store {
     }
 }
 
-fn narrow(value: i64) -> i32 {
-    i32::try_from(value).unwrap_or(i32::MAX)
-}
-
 fn synchronise(path: &Path) -> Result<(), StoreError> {
     File::open(path).and_then(|file| file.sync_all()).map_err(StoreError::io("write", path))
-}
-
-fn recording_of(path: &Path) -> Result<Value, StoreError> {
-    let input = Input { name: path.display().to_string(), path: path.to_owned() };
-    let file = TraceFile::open(&input)
-        .map_err(|findings| TraceError::of(findings).map_or_else(|| unreachable_fault(path), StoreError::Trace))?;
-    let text = file.metadata_value(RECORDING_KEY).unwrap_or("{}");
-    Ok(serde_json::from_str(text).unwrap_or(Value::Null))
-}
-
-fn unreachable_fault(path: &Path) -> StoreError {
-    StoreError::io("read", path)(io::Error::other("the file cannot be opened as a trace"))
-}
-
-/// The innermost key in which two values differ, and both sides of it.
-fn first_difference(name: &str, ours: Option<&Value>, theirs: Option<&Value>) -> ((String, String), String) {
-    if let (Some(Value::Object(a)), Some(Value::Object(b))) = (ours, theirs) {
-        let inner = a.keys().chain(b.keys()).find(|key| a.get(*key) != b.get(*key));
-        if let Some(key) = inner {
-            return first_difference(&format!("{name}.{key}"), a.get(key), b.get(key));
-        }
-    }
-    let text = |value: Option<&Value>| value.map_or_else(|| "nothing".to_owned(), Value::to_string);
-    ((name.to_owned(), text(ours)), text(theirs))
 }

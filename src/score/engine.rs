@@ -5,15 +5,21 @@
 //!
 //! It deliberately does not know where batches come from, in which order, or on which thread.
 
-use arrow::array::{Array, ArrayRef, AsArray as _, BooleanArray, Datum, Int64Array, RecordBatch, UInt32Array};
+use std::collections::BTreeSet;
+
+use arrow::array::{
+    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Datum, Int64Array, PrimitiveArray, RecordBatch,
+    UInt32Array,
+};
+use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::compute::kernels::{boolean, cmp, numeric, zip};
-use arrow::compute::{cast, prep_null_mask_filter};
+use arrow::compute::{cast, nullif, prep_null_mask_filter};
 use arrow::datatypes::{DataType, Float64Type, Int32Type};
 use arrow::error::ArrowError;
 use regex::Regex;
 
 use super::segments::{Segments, repeat, repeat_bool, test_symbols};
-use super::values::{Symbols, Values, canonical, truths};
+use super::values::{Coded, Symbols, Values, canonical, truths};
 use crate::metric::catalog::Kind;
 use crate::metric::columns::{Level, Type};
 use crate::metric::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Output, Plan};
@@ -90,7 +96,8 @@ impl<'p> Engine<'p> {
     pub(super) fn for_nodes(plan: &'p Plan, roots: impl IntoIterator<Item = NodeId>) -> Self {
         let order = evaluation_order(plan, roots);
         let mut patterns = vec![None; plan.nodes().len()];
-        for &id in &order {
+        // Lookups evaluate nodes that are not in the order by themselves.
+        for id in plan.needed_by(order.iter().copied()) {
             if let Op::Matches(_, pattern) = &plan.node(id).op {
                 patterns[id.index()] = Some(Regex::new(pattern).expect("the binder has compiled this pattern"));
             }
@@ -136,6 +143,7 @@ impl<'p> Engine<'p> {
             batch,
             symbols: Symbols::default(),
             values: vec![None; self.plan.nodes().len()],
+            moments: None,
         };
         for &id in &self.order {
             let value = evaluation.node(id)?;
@@ -164,6 +172,71 @@ fn window(plan: &Plan, op: &Op) -> Option<(Comparison, NodeId)> {
     }
 }
 
+/// A condition on steps of which parts are windows: any other part, if there is one, and the windows.
+///
+/// `first`, `last`, `any` and `count` look for the other part between the ends of the windows, so that no window is
+/// written out. Null where an end is null, a window holds nowhere then, as it is for these aggregates.
+fn windowed(plan: &Plan, condition: NodeId) -> (NodeId, Vec<(Comparison, NodeId)>) {
+    let part =
+        |id: NodeId| window(plan, &plan.node(id).op).filter(|(comparison, _)| *comparison != Comparison::NotEqual);
+    let (mut rest, mut windows) = (condition, Vec::new());
+    while let Op::And(x, y) = plan.node(rest).op {
+        match (part(x), part(y)) {
+            (_, Some(window)) => {
+                windows.push(window);
+                rest = x;
+            }
+            (Some(window), None) => {
+                windows.push(window);
+                rest = y;
+            }
+            (None, None) => break,
+        }
+    }
+    (rest, windows)
+}
+
+/// Whether a lookup of this value looks its columns up and computes from what they hold there, a value an episode
+/// instead of a value a step. Not where a step that is not looked at could leave 64 bits.
+fn looks_up_leaves(plan: &Plan, value: NodeId) -> bool {
+    let node = plan.node(value);
+    let alone = matches!(node.op, Op::Column(_)) || node.level == Level::Episode;
+    !alone && inner_nodes(plan, value).iter().all(|id| !matches!(plan.node(*id).op, Op::Arithmetic(..) | Op::Negate(_)))
+}
+
+/// The nodes between a step-level value and its columns and episode-level parts, in order; the value is the last.
+fn inner_nodes(plan: &Plan, value: NodeId) -> Vec<NodeId> {
+    let (mut inner, mut open) = (BTreeSet::new(), vec![value]);
+    while let Some(id) = open.pop() {
+        if !is_leaf(plan, id) && inner.insert(id) {
+            open.extend(plan.node(id).op.operands());
+        }
+    }
+    inner.into_iter().collect()
+}
+
+fn is_leaf(plan: &Plan, id: NodeId) -> bool {
+    let node = plan.node(id);
+    node.level == Level::Episode || matches!(node.op, Op::Column(_) | Op::Constant(_))
+}
+
+/// What a node needs evaluated before it.
+fn needs(plan: &Plan, id: NodeId) -> Vec<NodeId> {
+    let op = &plan.node(id).op;
+    match op {
+        Op::Aggregate(aggregate, x) if aggregate.searches() => {
+            let (rest, windows) = windowed(plan, *x);
+            windows.into_iter().map(|(_, moment)| moment).chain([rest]).collect()
+        }
+        Op::At(x, moment) if looks_up_leaves(plan, *x) => {
+            let inner = inner_nodes(plan, *x);
+            let operands = inner.iter().flat_map(|id| plan.node(*id).op.operands());
+            operands.filter(|id| is_leaf(plan, *id)).chain([*moment]).collect()
+        }
+        _ => window(plan, op).map_or_else(|| op.operands(), |(_, moment)| vec![moment]),
+    }
+}
+
 /// What must be evaluated for some nodes, operands first.
 fn evaluation_order(plan: &Plan, roots: impl IntoIterator<Item = NodeId>) -> Vec<NodeId> {
     let mut needed = vec![false; plan.nodes().len()];
@@ -171,9 +244,7 @@ fn evaluation_order(plan: &Plan, roots: impl IntoIterator<Item = NodeId>) -> Vec
     let ids: Vec<NodeId> = plan.ids().collect();
     for &id in ids.iter().rev() {
         if needed[id.index()] {
-            let op = &plan.node(id).op;
-            let operands = window(plan, op).map_or_else(|| op.operands(), |(_, moment)| vec![moment]);
-            for operand in operands {
+            for operand in needs(plan, id) {
                 needed[operand.index()] = true;
             }
         }
@@ -206,13 +277,14 @@ fn known(values: &[Option<Values>], id: NodeId) -> &Values {
 
 /// An episode-level column as integers, the episodes kept alone.
 fn integers(values: &Values, kept: &[usize]) -> Vec<Option<i64>> {
-    let valid = |row: &usize| values.array().is_valid(*row);
+    let nulls = values.array().nulls();
+    let valid = |row: usize| nulls.is_none_or(|nulls| nulls.is_valid(row));
     if values.ty() == Type::Bool {
-        let bools = values.bools();
-        return kept.iter().map(|row| valid(row).then(|| i64::from(bools.value(*row)))).collect();
+        let bools = values.bools().values();
+        return kept.iter().map(|&row| valid(row).then(|| i64::from(bools.value(row)))).collect();
     }
-    let ints = values.ints();
-    kept.iter().map(|row| valid(row).then(|| ints.value(*row))).collect()
+    let ints = values.ints().values();
+    kept.iter().map(|&row| valid(row).then(|| ints[row])).collect()
 }
 
 /// One batch underway.
@@ -221,6 +293,9 @@ struct Evaluation<'e, 'p> {
     batch: &'e Batch<'e>,
     symbols: Symbols,
     values: Vec<Option<Values>>,
+    /// The timesteps looked up, a value an episode, where a lookup is evaluated: step-level nodes have a value an
+    /// episode then, that at its timestep.
+    moments: Option<Int64Array>,
 }
 
 impl Evaluation<'_, '_> {
@@ -234,41 +309,45 @@ impl Evaluation<'_, '_> {
         let of = |id: NodeId| known(&self.values, id);
         let truth = |array: BooleanArray| Values::new(array, Type::Bool);
         let segments = self.batch.segments;
+        let level = if self.moments.is_some() { Level::Episode } else { node.level };
         Ok(match &node.op {
-            Op::Column(name) => self.column(name, node.level)?,
+            Op::Column(name) => self.column(name, level)?,
             Op::Constant(constant) => Values::constant(constant, node.ty, &mut self.symbols),
-            Op::Time => Values::new(segments.times(), Type::Int),
+            Op::Time => Values::new(self.moments.clone().unwrap_or_else(|| segments.times()), Type::Int),
             Op::Length => Values::new(segments.lengths(), Type::Int),
-            Op::Spread(x) => self.spread(of(*x), node.level),
+            Op::Spread(x) => self.spread(of(*x), level),
             Op::Not(x) => truth(boolean::not(of(*x).bools()).map_err(overflow)?),
             Op::And(x, y) => {
-                let (x, y) = (self.full_bools(*x, node.level), self.full_bools(*y, node.level));
+                let (x, y) = (self.full_bools(*x, level), self.full_bools(*y, level));
                 truth(boolean::and_kleene(&x, &y).map_err(overflow)?)
             }
             Op::Or(x, y) => {
-                let (x, y) = (self.full_bools(*x, node.level), self.full_bools(*y, node.level));
+                let (x, y) = (self.full_bools(*x, level), self.full_bools(*y, level));
                 truth(boolean::or_kleene(&x, &y).map_err(overflow)?)
             }
             Op::Compare(comparison, x, y) => truth(self.compare(&node.op, *comparison, *x, *y).map_err(overflow)?),
             Op::Distinct(x, y) => truth(cmp::distinct(of(*x), of(*y)).map_err(overflow)?),
-            Op::IsNull(x) => truth(boolean::is_null(of(*x).array()).map_err(overflow)?),
+            Op::IsNull(x) => truth(boolean::is_null(of(*x).validity()).map_err(overflow)?),
             Op::IsTrue(x) => truth(BooleanArray::new(truths(of(*x).bools()), None)),
             Op::IsFalse(x) => truth(BooleanArray::new(truths(&boolean::not(of(*x).bools()).map_err(overflow)?), None)),
-            Op::Arithmetic(op, x, y) => self.arithmetic(*op, node.ty, node.level, *x, *y).map_err(overflow)?,
+            Op::Arithmetic(op, x, y) => self.arithmetic(*op, node.ty, level, *x, *y).map_err(overflow)?,
             Op::Negate(x) => numbers(numeric::neg(of(*x).array()).map_err(overflow)?, node.ty),
-            Op::Case { branches, otherwise } => {
-                self.case(branches, *otherwise, node.ty, node.level).map_err(overflow)?
-            }
-            Op::Coalesce(values) => self.coalesce(values, node.ty, node.level).map_err(overflow)?,
+            Op::Case { branches, otherwise } => self.case(branches, *otherwise, node.ty, level).map_err(overflow)?,
+            Op::Coalesce(values) => self.coalesce(values, level).map_err(overflow)?,
             Op::Matches(x, _) => {
                 let pattern = self.engine.patterns[id.index()].as_ref().expect("compiled with the engine");
-                truth(test_symbols(of(*x).symbols(), |symbol| pattern.is_match(self.symbols.text(symbol))))
+                let matches = |symbol| pattern.is_match(self.symbols.text(symbol));
+                match of(*x).coded() {
+                    Some(coded) => truth(coded.test(matches)),
+                    None => truth(test_symbols(of(*x).symbols(), matches)),
+                }
             }
             Op::IntFromBool(x) => Values::shared(cast(of(*x).array(), &DataType::Int64).map_err(overflow)?, Type::Int),
             Op::FloatFromInt(x) => {
                 Values::shared(cast(of(*x).array(), &DataType::Float64).map_err(overflow)?, Type::Float)
             }
             Op::Aggregate(aggregate, x) => self.aggregate(*aggregate, *x).map_err(overflow)?,
+            Op::At(x, moment) if looks_up_leaves(self.engine.plan, *x) => self.look_up(*x, *moment)?,
             Op::At(x, moment) => self.at(of(*x), of(*moment).ints()),
         })
     }
@@ -281,7 +360,7 @@ impl Evaluation<'_, '_> {
             DataType::Int64 => Ok(Values::shared(column.clone(), Type::Int)),
             DataType::Float64 => Ok(numbers(column.clone(), Type::Float)),
             DataType::Dictionary(key, value) if **key == DataType::Int32 && **value == DataType::Utf8 => {
-                Ok(Values::new(self.symbols.of_column(column.as_dictionary::<Int32Type>()), Type::Text))
+                Ok(self.symbols.of_column(column.as_dictionary::<Int32Type>()))
             }
             other => Err(EngineError::ColumnType { column: name.to_owned(), found: other.to_string() }),
         }
@@ -302,6 +381,9 @@ impl Evaluation<'_, '_> {
                 Type::Text => Values::new(repeat(values.symbols(), rows), ty),
             };
         }
+        if self.moments.is_some() {
+            return values.clone();
+        }
         match ty {
             Type::Bool => Values::new(segments.spread_bools(values.bools()), ty),
             Type::Int => Values::new(segments.spread(values.ints()), ty),
@@ -321,7 +403,9 @@ impl Evaluation<'_, '_> {
     }
 
     fn compare(&self, op: &Op, comparison: Comparison, x: NodeId, y: NodeId) -> Result<BooleanArray, ArrowError> {
-        if let Some((comparison, moment)) = window(self.engine.plan, op) {
+        if self.moments.is_none()
+            && let Some((comparison, moment)) = window(self.engine.plan, op)
+        {
             return Ok(self.batch.segments.window(comparison, self.full(moment, Level::Episode).ints()));
         }
         let (x, y) = (self.of(x), self.of(y));
@@ -334,6 +418,11 @@ impl Evaluation<'_, '_> {
                 };
                 compare(comparison, &ranked(x), &ranked(y))
             }
+            (Type::Text, _) => match (x.coded(), y.coded()) {
+                (Some(coded), _) if y.is_single() => Ok(one_text(comparison, coded, y)),
+                (_, Some(coded)) if x.is_single() => Ok(one_text(comparison, coded, x)),
+                _ => compare(comparison, x, y),
+            },
             _ => compare(comparison, x, y),
         }
     }
@@ -366,44 +455,84 @@ impl Evaluation<'_, '_> {
         for (when, then) in branches.iter().rev() {
             let mask = self.full_bools(*when, level);
             let mask = if mask.null_count() > 0 { prep_null_mask_filter(&mask) } else { mask };
-            result = Values::shared(zip::zip(&mask, self.of(*then), &result)?, ty);
+            result = choose(&mask, self.of(*then), &result)?;
         }
         Ok(result)
     }
 
-    fn coalesce(&self, ids: &[NodeId], ty: Type, level: Level) -> Result<Values, ArrowError> {
+    fn coalesce(&self, ids: &[NodeId], level: Level) -> Result<Values, ArrowError> {
         let (last, before) = ids.split_last().expect("the binder has seen an argument at least");
         let mut result = self.full(*last, level);
         for id in before.iter().rev() {
             let values = self.full(*id, level);
             let mask = boolean::is_not_null(values.array())?;
-            result = Values::shared(zip::zip(&mask, &values, &result)?, ty);
+            result = choose(&mask, &values, &result)?;
         }
         Ok(result)
     }
 
     fn aggregate(&self, aggregate: Aggregate, x: NodeId) -> Result<Values, ArrowError> {
-        let (segments, values) = (self.batch.segments, self.of(x));
-        Ok(match (aggregate, values.ty()) {
-            (Aggregate::Any, _) => Values::new(segments.any(values.bools()), Type::Bool),
-            (Aggregate::All, _) => Values::new(segments.all(values.bools()), Type::Bool),
-            (Aggregate::First | Aggregate::Last | Aggregate::Count, _) => {
-                Values::new(segments.count_or_time(aggregate, values.bools()), Type::Int)
-            }
-            (Aggregate::Min, Type::Float) => Values::new(segments.fold(values.floats(), floor)?, Type::Float),
-            (Aggregate::Max, Type::Float) => Values::new(segments.fold(values.floats(), ceiling)?, Type::Float),
+        let (segments, values) = (self.batch.segments, || self.of(x));
+        Ok(match (aggregate, self.engine.plan.node(x).ty) {
+            (Aggregate::Any | Aggregate::First | Aggregate::Last | Aggregate::Count, _) => self.search(aggregate, x),
+            (Aggregate::All, _) => Values::new(segments.all(values().bools()), Type::Bool),
+            (Aggregate::Min, Type::Float) => Values::new(segments.fold(values().floats(), floor)?, Type::Float),
+            (Aggregate::Max, Type::Float) => Values::new(segments.fold(values().floats(), ceiling)?, Type::Float),
             (Aggregate::Min, _) => {
-                Values::new(segments.fold(values.ints(), |a, b| Ok::<_, ArrowError>(a.min(b)))?, Type::Int)
+                Values::new(segments.fold(values().ints(), |a, b| Ok::<_, ArrowError>(a.min(b)))?, Type::Int)
             }
             (Aggregate::Max, _) => {
-                Values::new(segments.fold(values.ints(), |a, b| Ok::<_, ArrowError>(a.max(b)))?, Type::Int)
+                Values::new(segments.fold(values().ints(), |a, b| Ok::<_, ArrowError>(a.max(b)))?, Type::Int)
             }
-            (Aggregate::Sum, _) => Values::new(segments.sums(values.ints())?, Type::Int),
+            (Aggregate::Sum, _) => Values::new(segments.sums(values().ints())?, Type::Int),
         })
+    }
+
+    /// The steps at which a condition holds, between the ends of its windows.
+    fn search(&self, aggregate: Aggregate, condition: NodeId) -> Values {
+        let (rest, windows) = windowed(self.engine.plan, condition);
+        let moments = |moment: NodeId| self.full(moment, Level::Episode).ints().clone();
+        let windows: Vec<_> = windows.into_iter().map(|(comparison, moment)| (comparison, moments(moment))).collect();
+        let stretches = self.batch.segments.within(&windows);
+        let ty = if aggregate == Aggregate::Any { Type::Bool } else { Type::Int };
+        let predicate = self.full_bools(rest, Level::Step);
+        Values::shared(Segments::aggregate(aggregate, &predicate, &stretches), ty)
+    }
+
+    /// A value at a timestep of each episode, computed from what its columns hold there.
+    fn look_up(&mut self, value: NodeId, moment: NodeId) -> Result<Values, EngineError> {
+        let (plan, moments) = (self.engine.plan, self.full(moment, Level::Episode).ints().clone());
+        let inner = inner_nodes(plan, value);
+        let mut there = Evaluation {
+            engine: self.engine,
+            batch: self.batch,
+            symbols: std::mem::take(&mut self.symbols),
+            values: vec![None; plan.nodes().len()],
+            moments: Some(moments.clone()),
+        };
+        for leaf in inner.iter().flat_map(|id| plan.node(*id).op.operands()).filter(|id| is_leaf(plan, *id)) {
+            let values = self.of(leaf);
+            let step = plan.node(leaf).level == Level::Step && !values.is_single();
+            there.values[leaf.index()] = Some(if step { self.at(values, &moments) } else { values.clone() });
+        }
+        let evaluated = inner.iter().try_for_each(|id| {
+            there.values[id.index()] = Some(there.node(*id)?);
+            Ok(())
+        });
+        let found = evaluated.map(|()| there.full(value, Level::Episode));
+        self.symbols = there.symbols;
+        let found = found?;
+        // There is no value where there is no such step, whatever the expression makes of nulls.
+        let absent = BooleanArray::new(!&self.batch.segments.exist(&moments), None);
+        let known = nullif(found.array(), &absent).map_err(|error| self.engine.overflow(value, &error))?;
+        Ok(Values::shared(known, found.ty()))
     }
 
     fn at(&self, values: &Values, moments: &Int64Array) -> Values {
         let (segments, ty) = (self.batch.segments, values.ty());
+        if let Some(coded) = values.coded() {
+            return Values::new(coded.of(&segments.at(coded.keys(), moments)), ty);
+        }
         match ty {
             Type::Bool => Values::new(segments.bools_at(values.bools(), moments), ty),
             Type::Int => Values::new(segments.at(values.ints(), moments), ty),
@@ -411,6 +540,43 @@ impl Evaluation<'_, '_> {
             Type::Text => Values::new(segments.at(values.symbols(), moments), ty),
         }
     }
+}
+
+/// The values of `then` where the mask, which has no null, is set, and those of `otherwise` elsewhere.
+fn choose(mask: &BooleanArray, then: &Values, otherwise: &Values) -> Result<Values, ArrowError> {
+    let ty = otherwise.ty();
+    Ok(match ty {
+        Type::Bool => Values::shared(zip::zip(mask, then, otherwise)?, ty),
+        Type::Int => Values::new(choose_numbers(mask, then.ints(), otherwise.ints()), ty),
+        Type::Float => Values::new(choose_numbers(mask, then.floats(), otherwise.floats()), ty),
+        Type::Text => Values::new(choose_numbers(mask, then.symbols(), otherwise.symbols()), ty),
+    })
+}
+
+/// As `zip`, which copies run by run; here the mask changes from row to row. One value of `then` stands for all.
+fn choose_numbers<T: ArrowPrimitiveType>(
+    mask: &BooleanArray,
+    then: &PrimitiveArray<T>,
+    otherwise: &PrimitiveArray<T>,
+) -> PrimitiveArray<T> {
+    let bits = mask.values();
+    let place = |row: usize| if then.len() == 1 { 0 } else { row };
+    let value = |row: usize| if bits.value(row) { then.value(place(row)) } else { otherwise.value(row) };
+    let nulls = (then.null_count() + otherwise.null_count() > 0).then(|| {
+        let valid = |row| if bits.value(row) { then.is_valid(place(row)) } else { otherwise.is_valid(row) };
+        NullBuffer::new(BooleanBuffer::collect_bool(mask.len(), valid))
+    });
+    PrimitiveArray::new((0..mask.len()).map(value).collect(), nulls)
+}
+
+/// Texts compared for equality with a single one.
+fn one_text(comparison: Comparison, coded: &Coded, single: &Values) -> BooleanArray {
+    let text = single.symbols();
+    if text.is_null(0) {
+        return BooleanArray::new_null(coded.keys().len());
+    }
+    let (wanted, equal) = (text.value(0), comparison == Comparison::Equal);
+    coded.test(|symbol| (symbol == wanted) == equal)
 }
 
 /// Symbols by their place in the order of texts.

@@ -15,6 +15,7 @@ use std::ops::Range;
 
 use arrow::array::{Array, ArrayRef, AsArray as _, DictionaryArray, Int64Array, RecordBatch};
 use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
+use memchr::memchr;
 
 use super::engine::Scores;
 use super::table::{EpisodeKey, EpisodeRow, Header};
@@ -23,6 +24,9 @@ use crate::trace::scan::EPISODE_COLUMNS;
 
 /// Bytes of rows that are held in memory before they are put away.
 const MEMORY: usize = 8 << 20;
+
+/// What a row takes, about.
+const USUAL_BYTES: usize = 96;
 
 /// Some rows as bytes.
 #[derive(Debug, Default)]
@@ -37,7 +41,10 @@ impl Rows {
         let keys = KeyColumns::of(episodes);
         let column = |name: &String| episodes.column_by_name(name).expect("the projection asks for this column");
         let labels: Vec<&ArrayRef> = labels.iter().map(column).collect();
-        let mut rows = Self::default();
+        let mut rows = Self {
+            bytes: Vec::with_capacity(scores.kept.len() * USUAL_BYTES),
+            records: Vec::with_capacity(scores.kept.len()),
+        };
         for (at, &row) in scores.kept.iter().enumerate() {
             let start = rows.bytes.len();
             keys.put(&mut rows.bytes, row);
@@ -228,12 +235,13 @@ const END: [u8; 2] = [0, 0];
 const ZERO: [u8; 2] = [0, 0xFF];
 
 fn put_text(bytes: &mut Vec<u8>, text: &str) {
-    for (at, part) in text.split('\0').enumerate() {
-        if at > 0 {
-            bytes.extend_from_slice(&ZERO);
-        }
-        bytes.extend_from_slice(part.as_bytes());
+    let mut rest = text.as_bytes();
+    while let Some(zero) = memchr(0, rest) {
+        bytes.extend_from_slice(&rest[..zero]);
+        bytes.extend_from_slice(&ZERO);
+        rest = &rest[zero + 1..];
     }
+    bytes.extend_from_slice(rest);
     bytes.extend_from_slice(&END);
 }
 
@@ -288,7 +296,7 @@ impl Record<'_> {
     fn text(&mut self, text: &mut String) -> io::Result<()> {
         text.clear();
         loop {
-            let until = self.0.iter().position(|byte| *byte == 0).ok_or_else(damaged)?;
+            let until = memchr(0, self.0).ok_or_else(damaged)?;
             text.push_str(str::from_utf8(self.take(until)?).map_err(|_| damaged())?);
             match self.array()? {
                 END => return Ok(()),

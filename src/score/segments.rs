@@ -3,14 +3,17 @@
 //! A batch holds whole episodes one after the other. Episode i has the rows `offsets[i]..offsets[i + 1]`,
 //! and its timestep t is the row `offsets[i] + t - 1`. No kernel allocates per episode.
 
+use std::ops::Range;
+use std::sync::Arc;
+
 use arrow::array::{
-    Array, ArrowPrimitiveType, BooleanArray, BooleanBufferBuilder, Int64Array, PrimitiveArray, UInt32Array,
+    Array, ArrayRef, ArrowPrimitiveType, BooleanArray, BooleanBufferBuilder, Int64Array, PrimitiveArray, UInt32Array,
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::error::ArrowError;
-use arrow::util::bit_chunk_iterator::UnalignedBitChunk;
 
 use super::values::{nulls_of, truths};
+use crate::base::bits;
 use crate::metric::plan::{Aggregate, Comparison};
 
 /// Where episodes begin and end among the rows of a batch.
@@ -90,17 +93,8 @@ impl<'a> Segments<'a> {
     pub(super) fn window(self, comparison: Comparison, moments: &Int64Array) -> BooleanArray {
         let mut rows = BooleanBufferBuilder::new(self.rows());
         for ((_, length), &moment) in self.each().zip(moments.values()) {
-            // Rows strictly before the moment, and rows up to it.
-            let before = clamp(moment.saturating_sub(1), length);
-            let until = clamp(moment, length);
-            let (from, to, inside) = match comparison {
-                Comparison::Less => (0, before, true),
-                Comparison::LessEqual => (0, until, true),
-                Comparison::Greater => (until, length, true),
-                Comparison::GreaterEqual => (before, length, true),
-                Comparison::Equal => (before, until, true),
-                Comparison::NotEqual => (before, until, false),
-            };
+            let window = inside(comparison, moment, length);
+            let (from, to, inside) = (window.start, window.end, comparison != Comparison::NotEqual);
             rows.append_n(from, !inside);
             rows.append_n(to - from, inside);
             rows.append_n(length - to, !inside);
@@ -108,26 +102,64 @@ impl<'a> Segments<'a> {
         BooleanArray::new(rows.finish(), self.spread_nulls(moments.nulls()))
     }
 
-    /// An aggregate whose result is a number of steps or a timestep.
-    pub(super) fn count_or_time(self, aggregate: Aggregate, predicate: &BooleanArray) -> Int64Array {
-        let bits = Bits(&truths(predicate));
-        match aggregate {
-            Aggregate::First => self.each().map(|(start, len)| bits.first(start, len).map(|at| as_t(at + 1))).collect(),
-            Aggregate::Last => self.each().map(|(start, len)| bits.last(start, len).map(|at| as_t(at + 1))).collect(),
-            _ => self.each().map(|(start, len)| as_t(bits.count(start, len))).collect::<Vec<_>>().into(),
-        }
+    /// All rows of each episode.
+    pub(super) fn whole(self) -> Stretches {
+        self.each().map(|(start, length)| (start, 0..length)).collect()
     }
 
-    /// Whether a predicate holds at some step.
-    pub(super) fn any(self, predicate: &BooleanArray) -> BooleanArray {
-        let bits = Bits(&truths(predicate));
-        self.each().map(|(start, len)| Some(bits.first(start, len).is_some())).collect()
+    /// The rows of each episode that lie in all these windows, which compare the timestep with a moment of the
+    /// episode by anything but `NotEqual`; none where a moment is null.
+    pub(super) fn within(self, windows: &[(Comparison, Int64Array)]) -> Stretches {
+        let mut stretches = self.whole();
+        for (comparison, moments) in windows {
+            for (episode, (_, rows)) in stretches.iter_mut().enumerate() {
+                let length = self.offsets[episode + 1] - self.offsets[episode];
+                let window = inside(*comparison, moments.value(episode), length);
+                let (from, to) = (rows.start.max(window.start), rows.end.min(window.end));
+                *rows = if moments.is_null(episode) || from > to { 0..0 } else { from..to };
+            }
+        }
+        stretches
+    }
+
+    /// An aggregate of a predicate over some rows of each episode.
+    ///
+    /// First, last and count give a number of steps or a timestep, anything else whether the predicate holds at some
+    /// row.
+    pub(super) fn aggregate(aggregate: Aggregate, predicate: &BooleanArray, stretches: &Stretches) -> ArrayRef {
+        let truths = truths(predicate);
+        let (data, offset) = (truths.values(), truths.offset());
+        let rows = stretches.iter().map(|(start, rows)| (offset + start + rows.start, rows.len(), rows.start + 1));
+        match aggregate {
+            Aggregate::First => {
+                let first = rows.map(|(start, length, t)| bits::first(data, start, length).map(|at| as_t(t + at)));
+                Arc::new(first.collect::<Int64Array>())
+            }
+            Aggregate::Last => {
+                let last = rows.map(|(start, length, t)| bits::last(data, start, length).map(|at| as_t(t + at)));
+                Arc::new(last.collect::<Int64Array>())
+            }
+            Aggregate::Count => {
+                let count = rows.map(|(start, length, _)| as_t(bits::count(data, start, length)));
+                Arc::new(Int64Array::from(count.collect::<Vec<_>>()))
+            }
+            _ => {
+                let any = rows.map(|(start, length, _)| bits::first(data, start, length).is_some());
+                Arc::new(BooleanArray::new(any.collect(), None))
+            }
+        }
     }
 
     /// Whether a predicate holds at every step.
     pub(super) fn all(self, predicate: &BooleanArray) -> BooleanArray {
-        let bits = Bits(&truths(predicate));
-        self.each().map(|(start, len)| Some(bits.count(start, len) == len)).collect()
+        let truths = truths(predicate);
+        let holds = |(start, length)| bits::count(truths.values(), truths.offset() + start, length) == length;
+        BooleanArray::new(self.each().map(holds).collect(), None)
+    }
+
+    /// Which of the timesteps asked for there are.
+    pub(super) fn exist(self, moments: &Int64Array) -> BooleanBuffer {
+        self.rows_at(moments).map(|row| row.is_some()).collect()
     }
 
     /// The values of each episode that are not null, folded; null where there is none.
@@ -240,40 +272,19 @@ fn as_t(rows: usize) -> i64 {
     i64::try_from(rows).expect("a batch has fewer than 2^63 rows")
 }
 
-/// Searches of runs of bits, a word at a time.
-struct Bits<'a>(&'a BooleanBuffer);
+/// Rows of each episode: the row at which the episode starts, and the rows among its own.
+pub(super) type Stretches = Vec<(usize, Range<usize>)>;
 
-impl Bits<'_> {
-    fn chunk(&self, start: usize, length: usize) -> UnalignedBitChunk<'_> {
-        UnalignedBitChunk::new(self.0.values(), self.0.offset() + start, length)
-    }
-
-    /// How many bits are set.
-    fn count(&self, start: usize, length: usize) -> usize {
-        self.chunk(start, length).count_ones()
-    }
-
-    /// The position of the first set bit, from `start`.
-    fn first(&self, start: usize, length: usize) -> Option<usize> {
-        let chunk = self.chunk(start, length);
-        let padding = chunk.lead_padding();
-        let (word, at) = chunk
-            .iter()
-            .enumerate()
-            .find_map(|(word, bits)| (bits != 0).then(|| (word, bits.trailing_zeros() as usize)))?;
-        Some(word * 64 + at - padding)
-    }
-
-    /// The position of the last set bit, from `start`.
-    fn last(&self, start: usize, length: usize) -> Option<usize> {
-        let chunk = self.chunk(start, length);
-        let padding = chunk.lead_padding();
-        let (word, at) = chunk
-            .iter()
-            .enumerate()
-            .filter(|(_, bits)| *bits != 0)
-            .last()
-            .map(|(word, bits)| (word, 63 - bits.leading_zeros() as usize))?;
-        Some(word * 64 + at - padding)
+/// The rows of an episode of `length` whose timestep compares with a moment as asked, for all but `NotEqual`.
+fn inside(comparison: Comparison, moment: i64, length: usize) -> Range<usize> {
+    // Rows strictly before the moment, and rows up to it.
+    let before = clamp(moment.saturating_sub(1), length);
+    let until = clamp(moment, length);
+    match comparison {
+        Comparison::Less => 0..before,
+        Comparison::LessEqual => 0..until,
+        Comparison::Greater => until..length,
+        Comparison::GreaterEqual => before..length,
+        Comparison::Equal | Comparison::NotEqual => before..until,
     }
 }

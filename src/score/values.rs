@@ -1,12 +1,12 @@
 //! Columns of values while a plan is evaluated, and the texts of a batch as small integers.
 
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use arrow::array::{
     Array, ArrayRef, AsArray as _, BooleanArray, Datum, DictionaryArray, Float64Array, Int64Array, UInt32Array,
 };
-use arrow::buffer::NullBuffer;
+use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type, UInt32Type};
 
 use crate::metric::columns::Type;
@@ -15,26 +15,33 @@ use crate::metric::plan::Constant;
 /// The values of one node: one a step, one an episode, or a single one that stands for all.
 #[derive(Clone, Debug)]
 pub(super) struct Values {
-    array: ArrayRef,
+    held: Held,
     ty: Type,
     single: bool,
 }
 
+#[derive(Clone, Debug)]
+enum Held {
+    Array(ArrayRef),
+    /// A column of texts as the trace holds it.
+    Coded(Arc<Coded>),
+}
+
 impl Datum for Values {
     fn get(&self) -> (&dyn Array, bool) {
-        (&self.array, self.single)
+        (self.array(), self.single)
     }
 }
 
 impl Values {
     /// One value a step or an episode. Text is an array of symbols ([`Symbols`]).
     pub(super) fn new(array: impl Array + 'static, ty: Type) -> Self {
-        Self { array: Arc::new(array), ty, single: false }
+        Self { held: Held::Array(Arc::new(array)), ty, single: false }
     }
 
     /// The same, shared.
     pub(super) fn shared(array: ArrayRef, ty: Type) -> Self {
-        Self { array, ty, single: false }
+        Self { held: Held::Array(array), ty, single: false }
     }
 
     /// A constant: one value that stands for all.
@@ -49,7 +56,7 @@ impl Values {
             (Constant::Null, Type::Float) => Arc::new(Float64Array::from(vec![None])),
             (Constant::Null, Type::Text) => Arc::new(UInt32Array::from(vec![None])),
         };
-        Self { array, ty, single: true }
+        Self { held: Held::Array(array), ty, single: true }
     }
 
     /// The type of the values.
@@ -59,7 +66,23 @@ impl Values {
 
     /// The values themselves.
     pub(super) fn array(&self) -> &ArrayRef {
-        &self.array
+        match &self.held {
+            Held::Array(array) => array,
+            Held::Coded(coded) => coded.array(),
+        }
+    }
+
+    /// A column of texts as keys, where that is how it is held.
+    pub(super) fn coded(&self) -> Option<&Coded> {
+        match &self.held {
+            Held::Array(_) => None,
+            Held::Coded(coded) => Some(coded),
+        }
+    }
+
+    /// An array that is null where the values are.
+    pub(super) fn validity(&self) -> &dyn Array {
+        self.coded().map_or_else(|| self.array().as_ref(), |coded| &coded.keys)
     }
 
     /// Whether one value stands for all.
@@ -69,23 +92,77 @@ impl Values {
 
     /// The values as truth values; the binder has checked the type.
     pub(super) fn bools(&self) -> &BooleanArray {
-        self.array.as_boolean()
+        self.array().as_boolean()
     }
 
     /// The values as integers; the binder has checked the type.
     pub(super) fn ints(&self) -> &Int64Array {
-        self.array.as_primitive::<Int64Type>()
+        self.array().as_primitive::<Int64Type>()
     }
 
     /// The values as floats; the binder has checked the type.
     pub(super) fn floats(&self) -> &Float64Array {
-        self.array.as_primitive::<Float64Type>()
+        self.array().as_primitive::<Float64Type>()
     }
 
     /// The values as symbols; the binder has checked the type.
     pub(super) fn symbols(&self) -> &UInt32Array {
-        self.array.as_primitive::<UInt32Type>()
+        self.array().as_primitive::<UInt32Type>()
     }
+}
+
+/// A column of texts: a key a row, and what each key stands for.
+#[derive(Debug)]
+pub(super) struct Coded {
+    keys: UInt32Array,
+    /// The symbol of each key; two keys may have one symbol.
+    symbols: Vec<u32>,
+    /// The symbols of the rows, once they are asked for.
+    array: OnceLock<ArrayRef>,
+}
+
+impl Coded {
+    /// The column of texts.
+    pub(super) fn values(keys: UInt32Array, symbols: Vec<u32>) -> Values {
+        let coded = Self { keys, symbols, array: OnceLock::new() };
+        Values { held: Held::Coded(Arc::new(coded)), ty: Type::Text, single: false }
+    }
+
+    fn array(&self) -> &ArrayRef {
+        self.array.get_or_init(|| Arc::new(self.of(&self.keys)))
+    }
+
+    /// The keys of the rows.
+    pub(super) fn keys(&self) -> &UInt32Array {
+        &self.keys
+    }
+
+    /// The symbols of some keys.
+    pub(super) fn of(&self, keys: &UInt32Array) -> UInt32Array {
+        // A null's key may be anything; it is masked by the null buffer.
+        let symbol = |key: &u32| self.symbols.get(*key as usize).copied().unwrap_or(0);
+        UInt32Array::new(keys.values().iter().map(symbol).collect(), keys.nulls().cloned())
+    }
+
+    /// The rows whose symbol fulfils `test`, null where the text is null.
+    pub(super) fn test(&self, test: impl FnMut(u32) -> bool) -> BooleanArray {
+        let fulfilled: Vec<bool> = self.symbols.iter().copied().map(test).collect();
+        let keys = self.keys.values();
+        let alone = |wanted: bool| {
+            let mut keys = fulfilled.iter().zip(0..).filter(|(found, _)| **found == wanted).map(|(_, key)| key);
+            keys.next().filter(|_| keys.next().is_none())
+        };
+        let bits = match (alone(true), alone(false)) {
+            (Some(key), _) => compare_with(keys, |found| found == key),
+            (None, Some(key)) => compare_with(keys, |found| found != key),
+            (None, None) => compare_with(keys, |found| fulfilled.get(found as usize) == Some(&true)),
+        };
+        BooleanArray::new(bits, self.keys.nulls().cloned())
+    }
+}
+
+fn compare_with(keys: &[u32], holds: impl Fn(u32) -> bool) -> BooleanBuffer {
+    BooleanBuffer::collect_bool(keys.len(), |row| holds(keys[row]))
 }
 
 /// One NaN, and one zero: comparisons are by total order, in which these have several forms.
@@ -127,24 +204,23 @@ impl Symbols {
         ranks
     }
 
-    /// A column of texts as symbols.
-    pub(super) fn of_column(&mut self, column: &DictionaryArray<Int32Type>) -> UInt32Array {
+    /// A column of texts.
+    pub(super) fn of_column(&mut self, column: &DictionaryArray<Int32Type>) -> Values {
         let texts = column.values().as_string::<i32>();
         let symbols: Vec<Option<u32>> = texts.iter().map(|text| text.map(|text| self.intern(text))).collect();
         let keys = column.keys();
         if texts.null_count() > 0 {
             let symbol = |key: Option<i32>| symbols[usize::try_from(key?).ok()?];
-            return keys.iter().map(symbol).collect();
+            return Values::new(keys.iter().map(symbol).collect::<UInt32Array>(), Type::Text);
         }
-        let symbols: Vec<u32> = symbols.into_iter().flatten().collect();
-        // A null's key may be anything; it is masked by the null buffer.
-        let symbol = |&key: &i32| usize::try_from(key).ok().and_then(|key| symbols.get(key)).copied().unwrap_or(0);
-        UInt32Array::new(keys.values().iter().map(symbol).collect(), keys.nulls().cloned())
+        // A valid key is not negative; what stands in the place of nulls does not matter.
+        let unsigned = UInt32Array::new(keys.values().inner().clone().into(), keys.nulls().cloned());
+        Coded::values(unsigned, symbols.into_iter().flatten().collect())
     }
 }
 
 /// The set bits where a truth value is true, null counting as not.
-pub(super) fn truths(values: &BooleanArray) -> arrow::buffer::BooleanBuffer {
+pub(super) fn truths(values: &BooleanArray) -> BooleanBuffer {
     match values.nulls() {
         None => values.values().clone(),
         Some(valid) => values.values() & valid.inner(),

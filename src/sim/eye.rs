@@ -108,7 +108,7 @@ impl Eye {
         self.renderer.sync_data(&mut self.data).map_err(failed)?;
         self.renderer.render().map_err(failed)?;
         let rgb = self.renderer.rgb_flat().unwrap_or_default().to_vec();
-        Ok(Frame { width: self.width, height: self.height, rgb })
+        Ok(Frame::new(self.width, self.height, rgb))
     }
 }
 

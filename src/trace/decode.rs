@@ -7,15 +7,19 @@ use std::sync::Arc;
 
 use arrow::array::{Array as _, ArrayRef, AsArray as _, new_null_array};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Int32Type, Int64Type, UInt64Type};
+use arrow::datatypes::{DataType, Int32Type, UInt64Type};
 use arrow::record_batch::RecordBatch;
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{
+    ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowSelection, RowSelector,
+};
 
+use super::column::Column;
 use super::contain::contained;
 use super::finding::{Code, Finding};
 use super::layout::{EPISODE_ID, Layout, T};
 use super::open::{TraceFile, plain, text_type};
+use super::pages::{Cursor, Unfit};
 use super::schema::Kind;
 
 /// Rows that are decoded at a time.
@@ -24,7 +28,7 @@ const BATCH_ROWS: usize = 64 * 1024;
 /// Some rows of one row group: a column for each of the layout, in its order.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
-    pub(super) columns: Vec<ArrayRef>,
+    pub(super) columns: Vec<Column>,
     pub(super) row_group: usize,
     /// Where they start in the row group.
     pub(super) first: usize,
@@ -43,7 +47,7 @@ impl Rows {
 
     /// The episode of a row.
     pub(super) fn episode(&self, row: usize) -> Option<&str> {
-        text_at(&self.columns[EPISODE_ID], row)
+        self.columns[EPISODE_ID].text(row)
     }
 }
 
@@ -58,84 +62,126 @@ pub(super) struct RowGroup<'a> {
     file: &'a TraceFile,
     layout: &'a Layout,
     index: usize,
-    /// Where each column of the layout is among the decoded ones; `None` for one that the file has not.
-    places: Vec<Option<usize>>,
-    /// `None` once it has nothing more to give.
-    reader: Option<ParquetRecordBatchReader>,
+    /// Where the values of each column of the layout come from.
+    sources: Vec<Source>,
+    /// Where the next rows start in the row group.
     first: usize,
+    /// Nothing more comes: the end, or a fault.
+    over: bool,
+}
+
+/// Where the values of a column come from.
+enum Source {
+    /// The file does not have the column.
+    Absent,
+    /// Its pages.
+    Pages { root: usize, cursor: Box<Cursor> },
+    /// The Parquet library.
+    Library(Box<ParquetRecordBatchReader>),
 }
 
 impl<'a> RowGroup<'a> {
     pub(super) fn open(file: &'a TraceFile, layout: &'a Layout, row_group: usize) -> Result<Self, Box<Finding>> {
-        let roots: Vec<Option<usize>> = layout
-            .columns
-            .iter()
-            .map(|wanted| file.columns().iter().position(|column| column.name == wanted.name))
-            .collect();
-        let mut read: Vec<usize> = roots.iter().flatten().copied().collect();
-        read.sort_unstable();
-        let places = roots.iter().map(|root| root.and_then(|root| read.binary_search(&root).ok())).collect();
         let handle = file.reader().map_err(|error| {
             Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
         })?;
-        let reader = contained(|| reader(file, handle, read, row_group))
-            .and_then(|made| made.map_err(|error| plain(&error)))
-            .map_err(|error| corrupt(file, row_group, &error))?;
-        Ok(Self { file, layout, index: row_group, places, reader: Some(reader), first: 0 })
-    }
-
-    fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
-        let Some(reader) = &mut self.reader else { return Ok(None) };
-        let batch = contained(|| reader.next())
-            .and_then(|next| next.transpose().map_err(|error| error.to_string()))
-            .map_err(|error| corrupt(self.file, self.index, &error))?;
-        let expected = self.file.row_group_rows(self.index);
-        match batch {
-            Some(batch) if self.first + batch.num_rows() <= expected => self.normal(&batch).map(Some),
-            None if self.first == expected => Ok(None),
-            surplus => {
-                let found = self.first + surplus.map_or(0, |batch| batch.num_rows());
-                let finding =
-                    Finding::new(Code::CorruptData, self.file.name(), format!("{expected} rows"), format!("{found}"));
-                Err(Box::new(finding.in_row_group(self.index)))
-            }
+        let mut rows = Self { file, layout, index: row_group, sources: Vec::new(), first: 0, over: false };
+        for (at, wanted) in layout.columns.iter().enumerate() {
+            let root = file.columns().iter().position(|column| column.name == wanted.name);
+            let source = match root {
+                None => Source::Absent,
+                Some(root) => match contained(|| cursor(file, &handle, root, row_group, held_as_runs(layout, at))) {
+                    Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
+                    Ok(Err(Unfit)) | Err(_) => rows.library(root)?,
+                },
+            };
+            rows.sources.push(source);
         }
-    }
-
-    fn normal(&mut self, batch: &RecordBatch) -> Result<Rows, Box<Finding>> {
-        let length = batch.num_rows();
-        let normal = |(i, place): (usize, &Option<usize>)| {
-            let kind = self.layout.columns[i].kind;
-            match place {
-                None => Ok(new_null_array(&held_as(kind), length)),
-                Some(place) => contained(|| normal_column(batch.column(*place), kind))
-                    .unwrap_or_else(|panic| Err(Refused::Unreadable(panic)))
-                    .map_err(|refused| self.refusal(refused, i, batch)),
-            }
-        };
-        let columns = self.places.iter().enumerate().map(normal).collect::<Result<_, _>>()?;
-        let rows = Rows { columns, row_group: self.index, first: self.first };
-        self.first += length;
         Ok(rows)
     }
 
-    fn refusal(&self, refused: Refused, column: usize, batch: &RecordBatch) -> Box<Finding> {
+    /// A column as the library decodes it, from the next row on.
+    fn library(&self, root: usize) -> Result<Source, Box<Finding>> {
+        let corrupt = |error: String| corrupt(self.file, self.index, &error);
+        let handle = self.file.reader().map_err(|error| {
+            Box::new(Finding::new(Code::Unreadable, self.file.name(), "a file that can be read", error.to_string()))
+        })?;
+        let reader = contained(|| reader(self.file, handle, root, self.index, self.first)).map_err(corrupt)?;
+        Ok(Source::Library(Box::new(reader.map_err(|error| corrupt(plain(&error)))?)))
+    }
+
+    fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
+        let expected = self.file.row_group_rows(self.index);
+        let count = BATCH_ROWS.min(expected - self.first);
+        let columns = (0..self.sources.len()).map(|at| self.column(at, count));
+        let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
+        if count == 0 {
+            return Ok(None);
+        }
+        let rows = Rows { columns, row_group: self.index, first: self.first };
+        self.first += count;
+        Ok(Some(rows))
+    }
+
+    /// The next `count` rows of a column. At the end, where that is none, there must be none.
+    fn column(&mut self, at: usize, count: usize) -> Result<Column, Box<Finding>> {
+        let kind = self.layout.columns[at].kind;
+        if let Source::Pages { root, cursor } = &mut self.sources[at] {
+            match contained(|| cursor.read(count)) {
+                Ok(Ok(column)) => return Ok(column),
+                Ok(Err(Unfit)) | Err(_) => {
+                    self.sources[at] = {
+                        let root = *root;
+                        self.library(root)?
+                    }
+                }
+            }
+        }
+        let Source::Library(reader) = &mut self.sources[at] else {
+            return Ok(new_null_array(&held_as(kind), count).into());
+        };
+        let batch = contained(|| reader.next())
+            .and_then(|next| next.transpose().map_err(|error| error.to_string()))
+            .map_err(|error| corrupt(self.file, self.index, &error))?;
+        let found = batch.as_ref().map_or(0, RecordBatch::num_rows);
+        let column = match batch {
+            Some(batch) if found == count => Arc::clone(batch.column(0)),
+            None if count == 0 => new_null_array(&held_as(kind), 0),
+            _ => {
+                let expected = format!("{} rows", self.file.row_group_rows(self.index));
+                let finding =
+                    Finding::new(Code::CorruptData, self.file.name(), expected, (self.first + found).to_string());
+                return Err(Box::new(finding.in_row_group(self.index)));
+            }
+        };
+        contained(|| normal_column(&column, kind))
+            .unwrap_or_else(|panic| Err(Refused::Unreadable(panic)))
+            .map(Column::Flat)
+            .map_err(|refused| self.refusal(refused, at))
+    }
+
+    fn refusal(&self, refused: Refused, column: usize) -> Box<Finding> {
         let at_column = |finding: Finding| Box::new(finding.in_column(&self.layout.columns[column].name));
         match refused {
             Refused::Unreadable(why) => at_column(*corrupt(self.file, self.index, &why)),
             Refused::TooLarge { row, value } => {
                 let expected = format!("a number up to {}", i64::MAX);
                 let finding = Finding::new(Code::OutOfRange, self.file.name(), expected, value.to_string());
-                let held = |column: usize| {
-                    let place = self.places[column]?;
-                    normal_column(batch.column(place), self.layout.columns[column].kind).ok()
-                };
                 let mut finding = finding.in_row_group(self.index);
-                finding.episode = held(EPISODE_ID).and_then(|ids| text_at(&ids, row).map(str::to_owned));
-                let t = held(T).map(|t| t.as_primitive::<Int64Type>().clone());
-                at_column(finding.at(t.filter(|t| t.is_valid(row)).map(|t| t.value(row))))
+                finding.episode = self.anew(EPISODE_ID).and_then(|ids| ids.text(row).map(str::to_owned));
+                finding = finding.at(self.anew(T).and_then(|t| t.int(row)));
+                at_column(finding)
             }
         }
+    }
+
+    /// A column of the rows under way, read once more.
+    fn anew(&self, at: usize) -> Option<Column> {
+        let column = &self.layout.columns[at];
+        let root = self.file.columns().iter().position(|known| known.name == column.name)?;
+        let handle = self.file.reader().ok()?;
+        let decoded = contained(|| reader(self.file, handle, root, self.index, self.first).ok()?.next()?.ok()).ok()?;
+        normal_column(decoded?.column(0), column.kind).ok().map(Column::Flat)
     }
 }
 
@@ -143,27 +189,48 @@ impl Iterator for RowGroup<'_> {
     type Item = Result<Rows, Box<Finding>>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let next = self.decode().transpose();
-        if !matches!(next, Some(Ok(_))) {
-            self.reader = None;
+        if self.over {
+            return None;
         }
+        let next = self.decode().transpose();
+        self.over = !matches!(next, Some(Ok(_)));
         next
     }
 }
 
+/// Whether a column is likely to be the same for many rows.
+fn held_as_runs(layout: &Layout, at: usize) -> bool {
+    at == EPISODE_ID || layout.columns[at].constant
+}
+
+fn cursor(file: &TraceFile, handle: &File, root: usize, row_group: usize, runs: bool) -> Result<Cursor, Unfit> {
+    let metadata = file.reader_metadata();
+    let schema = metadata.parquet_schema();
+    let leaf = (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root).ok_or(Unfit)?;
+    let column = metadata.metadata().row_group(row_group).column(leaf);
+    let stored = metadata.schema().field(root).data_type();
+    Cursor::open(handle, column, stored, file.row_group_rows(row_group), runs)
+}
+
+/// A reader of one column, from a row on.
 fn reader(
     file: &TraceFile,
     handle: File,
-    roots: Vec<usize>,
+    root: usize,
     row_group: usize,
+    first: usize,
 ) -> parquet::errors::Result<ParquetRecordBatchReader> {
     let metadata = file.reader_metadata();
     let rows = file.row_group_rows(row_group);
-    ParquetRecordBatchReaderBuilder::new_with_metadata(handle, metadata.clone())
+    let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(handle, metadata.clone())
         .with_row_groups(vec![row_group])
-        .with_projection(ProjectionMask::roots(metadata.parquet_schema(), roots))
-        .with_batch_size(rows.clamp(1, BATCH_ROWS))
-        .build()
+        .with_projection(ProjectionMask::roots(metadata.parquet_schema(), [root]))
+        .with_batch_size(rows.clamp(1, BATCH_ROWS));
+    if first == 0 {
+        return reader.build();
+    }
+    let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
+    reader.with_row_selection(RowSelection::from(rest)).build()
 }
 
 fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {

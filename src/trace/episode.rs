@@ -83,6 +83,7 @@ pub struct Extra {
     pub bumped: Option<bool>,
     pub cube_distance: Option<f32>,
     pub reply_status: Option<String>,
+    pub reply_repair: Option<String>,
     pub view_description: Option<String>,
     pub reasoning: Option<String>,
     pub summary: Option<String>,

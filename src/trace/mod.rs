@@ -2,19 +2,23 @@
 //!
 //! Rule: only this room opens traces. It knows no metric.
 
+mod column;
 pub(crate) mod contain;
 mod decode;
 pub mod describe;
 pub mod episode;
 pub mod finding;
 mod ids;
+pub mod import;
 pub mod info;
 pub mod inputs;
 mod layout;
 pub mod merge;
 pub mod open;
+mod pages;
 mod pass;
 pub mod restore;
+pub mod rewrite;
 mod rules;
 pub mod scan;
 pub mod schema;

@@ -11,11 +11,11 @@ use std::sync::mpsc::{self, Receiver, Sender, SyncSender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _};
-use arrow::compute::concat;
+use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Int32Type;
 
-use super::decode::{RowGroup, Rows, text_at};
+use super::column::Column;
+use super::decode::{RowGroup, Rows};
 use super::finding::{Code, Finding, TraceError};
 use super::layout::{EPISODE_ID, Layout};
 use super::open::TraceFile;
@@ -26,7 +26,7 @@ pub(super) struct Episodes {
     /// The file's position.
     pub(super) file: usize,
     /// A column for each of the layout.
-    pub(super) columns: Vec<ArrayRef>,
+    pub(super) columns: Vec<Column>,
     /// Where each episode starts, and the number of rows.
     pub(super) offsets: Vec<usize>,
     /// Where the rows come from, ascending by `at`; the first is at row 0.
@@ -62,7 +62,7 @@ impl Episodes {
 
     /// The id of the episode of a row; `None` for null.
     pub(super) fn id(&self, row: usize) -> Option<&str> {
-        text_at(&self.columns[EPISODE_ID], row)
+        self.columns[EPISODE_ID].text(row)
     }
 }
 
@@ -344,10 +344,8 @@ fn join(file: usize, parts: &[Rows]) -> Result<Episodes, String> {
     let columns = if let [rows] = parts {
         rows.columns.clone()
     } else {
-        let column = |i: usize| {
-            let arrays: Vec<_> = parts.iter().map(|rows| rows.columns[i].as_ref()).collect();
-            concat(&arrays).map_err(|error| error.to_string())
-        };
+        let column =
+            |i: usize| Column::concat(parts.iter().map(|rows| &rows.columns[i])).map_err(|error| error.to_string());
         (0..parts[0].columns.len()).map(column).collect::<Result<_, _>>()?
     };
     Ok(Episodes { file, columns, offsets: vec![0, at], pieces })
@@ -360,15 +358,16 @@ fn unjoined(file: &TraceFile, parts: &[Rows], why: String) -> Box<Finding> {
 
 /// The rows at which an episode starts, row 0 first.
 fn starts(rows: &Rows) -> Vec<usize> {
-    let ids = rows.columns[EPISODE_ID].as_dictionary::<Int32Type>();
-    let keys = ids.keys().values();
+    let differ = |row: &usize| rows.episode(*row) != rows.episode(row - 1);
     let mut starts = vec![0];
-    if ids.null_count() == 0 {
-        // Equal keys are equal ids; a dictionary may still hold one id under two keys.
-        let differ = (1..keys.len()).filter(|row| keys[*row] != keys[row - 1]);
-        starts.extend(differ.filter(|row| rows.episode(*row) != rows.episode(row - 1)));
-    } else {
-        starts.extend((1..keys.len()).filter(|row| rows.episode(*row) != rows.episode(row - 1)));
+    match &rows.columns[EPISODE_ID] {
+        Column::Runs(ids) => starts.extend(ids.starts().map(|(start, _)| start).skip(1).filter(differ)),
+        Column::Flat(ids) if ids.null_count() == 0 => {
+            // Equal keys are equal ids; a dictionary may still hold one id under two keys.
+            let keys = ids.as_dictionary::<Int32Type>().keys().values();
+            starts.extend((1..keys.len()).filter(|row| keys[*row] != keys[row - 1]).filter(differ));
+        }
+        Column::Flat(ids) => starts.extend((1..ids.len()).filter(differ)),
     }
     starts
 }

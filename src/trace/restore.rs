@@ -86,7 +86,7 @@ fn extras(columns: &Columns<'_>) -> Result<Vec<Extra>, NotAnEpisode> {
     fill!(|name: &str| columns.numbers::<Float64Type>(name, &DataType::Float64), cost_usd);
     fill!(|name: &str| columns.numbers::<Int64Type>(name, &DataType::Int64), frame_time);
     let text = |name: &str| columns.texts(name);
-    fill!(text, reply_status, view_description, reasoning, summary, identification, reply);
+    fill!(text, reply_status, reply_repair, view_description, reasoning, summary, identification, reply);
     Ok(extras)
 }
 

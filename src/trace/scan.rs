@@ -6,8 +6,7 @@
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, RecordBatch, RecordBatchOptions, UInt64Array};
-use arrow::compute::take;
+use arrow::array::{ArrayRef, RecordBatch, RecordBatchOptions};
 use arrow::datatypes::{Field, Schema, SchemaRef};
 
 use super::decode::held_as;
@@ -159,12 +158,13 @@ impl Shape {
 
     fn batch(&self, episodes: Episodes) -> Result<EpisodeBatch, TraceError> {
         let rows = episodes.columns[0].len();
-        let firsts: UInt64Array = episodes.offsets[..episodes.len()].iter().map(|row| *row as u64).collect();
+        let firsts = &episodes.offsets[..episodes.len()];
         let (schema, places) = &self.steps;
-        let steps = places.iter().map(|place| Arc::clone(&episodes.columns[*place])).collect();
+        let steps = places.iter().map(|place| episodes.columns[*place].flat());
+        let steps = steps.collect::<Result<_, _>>().map_err(TraceError::Memory)?;
         let steps = record_batch(schema, steps, rows)?;
         let (schema, places) = &self.episodes;
-        let values = places.iter().map(|place| take(&episodes.columns[*place], &firsts, None));
+        let values = places.iter().map(|place| episodes.columns[*place].at(firsts));
         let values = values.collect::<Result<Vec<_>, _>>().map_err(TraceError::Memory)?;
         let constants = record_batch(schema, values, episodes.len())?;
         let first = episodes.pieces[0];

@@ -240,6 +240,13 @@ pub const COLUMNS: &[Column] = &[
     Column::new("frame_time", Stored::Int64, "The time of the frame in the episode's recording (MCAP).").unit("ns"),
 ];
 
+/// A column beyond the schema's, which a recording of a model or a program has: to readers it is a trace's own.
+pub const REPLY_REPAIR: Column = Column::new(
+    "reply_repair",
+    Stored::String,
+    "The repairs that made a `repaired` reply valid, in order, joined with `+`; null where there was none.",
+);
+
 /// The column of this name.
 pub fn column(name: &str) -> Option<&'static Column> {
     COLUMNS.iter().find(|column| column.name == name)

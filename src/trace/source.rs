@@ -66,6 +66,7 @@ impl Source {
     fn of_reply(name: &str) -> Option<Self> {
         Some(match name {
             "reply_status" => Self::String(|e, i| e.steps[i].extra.reply_status.as_deref()),
+            "reply_repair" => Self::String(|e, i| e.steps[i].extra.reply_repair.as_deref()),
             "view_description" => Self::String(|e, i| e.steps[i].extra.view_description.as_deref()),
             "reasoning" => Self::String(|e, i| e.steps[i].extra.reasoning.as_deref()),
             "summary" => Self::String(|e, i| e.steps[i].extra.summary.as_deref()),
@@ -190,11 +191,11 @@ pub(super) fn field(column: &Column) -> Field {
 #[cfg(test)]
 mod tests {
     use super::{Gathered, Source, field};
-    use crate::trace::schema::COLUMNS;
+    use crate::trace::schema::{COLUMNS, REPLY_REPAIR};
 
     #[test]
     fn every_column_has_a_source_of_its_type() {
-        for column in COLUMNS {
+        for column in COLUMNS.iter().chain([&REPLY_REPAIR]) {
             let source = Source::of(column.name).unwrap_or_else(|| panic!("{} has no source", column.name));
             assert_eq!(Gathered::new(source).take().data_type(), field(column).data_type(), "{}", column.name);
         }

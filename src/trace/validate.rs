@@ -4,7 +4,6 @@
 
 use std::num::NonZeroUsize;
 
-use arrow::array::Array as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -178,7 +177,7 @@ fn split(file: &str, episodes: &Episodes) -> Option<Located> {
     if first == last {
         return None;
     }
-    let id = super::decode::text_at(&episodes.columns[super::layout::EPISODE_ID], 0)?;
+    let id = episodes.id(0)?;
     let found = format!("its rows in row groups {first} to {last}");
     let finding = Finding::new(Code::SplitEpisode, file, "the episode in one row group", found);
     Some(Located { row: 0, finding: finding.in_row_group(first).in_episode(id) })

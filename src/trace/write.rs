@@ -21,7 +21,7 @@ use tempfile::NamedTempFile;
 
 use super::episode::Episode;
 use super::finding::TraceError;
-use super::schema::{self, COLUMNS, Column};
+use super::schema::{self, COLUMNS, Column, REPLY_REPAIR};
 use super::source::{Gathered, Source, field};
 use crate::base::temporary;
 
@@ -34,7 +34,7 @@ pub struct TraceMetadata {
     pub columns: OptionalColumns,
 }
 
-/// Optional columns of the schema, in its order.
+/// Columns that a trace may have besides the required ones: the schema's in its order, then the recorder's own.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OptionalColumns(Vec<&'static Column>);
 
@@ -42,9 +42,19 @@ impl OptionalColumns {
     /// No optional column.
     pub const NONE: Self = Self(Vec::new());
 
-    /// All of them.
+    /// All of the schema.
     pub fn all() -> Self {
         Self(COLUMNS.iter().filter(|column| !column.required).collect())
+    }
+
+    /// Those of a recording: all of the schema, and where its agent's replies are read, what had to be repaired.
+    pub fn recorded(recording: &serde_json::Value) -> Self {
+        let mut columns = Self::all();
+        let agent = &recording["agent"];
+        if agent.is_object() && agent.get("scripted").is_none() {
+            columns.0.push(&REPLY_REPAIR);
+        }
+        columns
     }
 
     /// Those of these names; `None` if one is no optional column of the schema.
@@ -56,14 +66,19 @@ impl OptionalColumns {
     /// Those that have a value in one of these episodes.
     pub fn used_by<'a>(episodes: impl IntoIterator<Item = &'a Episode>) -> Self {
         let mut used = Vec::new();
-        let mut unused = Self::all().0;
+        let mut unused: Vec<_> = known().filter(|column| !column.required).collect();
         for episode in episodes {
             let (found, rest) = unused.into_iter().partition::<Vec<_>, _>(|column| has_value(column, episode));
             used.extend(found);
             unused = rest;
         }
-        Self(COLUMNS.iter().filter(|column| used.contains(column)).collect())
+        Self(known().filter(|column| used.contains(column)).collect())
     }
+}
+
+/// All columns that this writer can write, in their order.
+fn known() -> impl Iterator<Item = &'static Column> {
+    COLUMNS.iter().chain([&REPLY_REPAIR])
 }
 
 fn has_value(column: &Column, episode: &Episode) -> bool {
@@ -73,7 +88,7 @@ fn has_value(column: &Column, episode: &Episode) -> bool {
 /// Rows after which a row group is closed, at the next end of an episode.
 pub(super) const ROW_GROUP_ROWS: usize = 128 * 1024;
 /// Rows that are gathered before they are encoded.
-const GATHERED_ROWS: usize = 8 * 1024;
+pub(super) const GATHERED_ROWS: usize = 8 * 1024;
 
 /// Encodes episodes as a trace into anything that bytes can be written to.
 pub struct TraceEncoder<W: Write + Send> {
@@ -93,7 +108,7 @@ impl<W: Write + Send> TraceEncoder<W> {
     /// Whatever writing gives.
     pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let (layout, undeclared): (Vec<&Column>, Vec<&Column>) =
-            COLUMNS.iter().partition(|column| column.required || metadata.columns.0.contains(column));
+            known().partition(|column| column.required || metadata.columns.0.contains(column));
         let columns = layout.iter().filter_map(|column| Source::of(column.name)).map(Gathered::new).collect();
         let layout = Arc::new(Schema::new(layout.into_iter().map(field).collect::<Vec<_>>()));
         // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
@@ -169,7 +184,7 @@ fn check(episode: &Episode, undeclared: &[&'static Column]) -> Result<(), TraceE
     if steps == 0 || i32::try_from(steps).is_err() {
         return refused(episode, format!("1 to {} steps", i32::MAX), steps.to_string());
     }
-    for column in COLUMNS {
+    for column in known() {
         if let Some((expected, found)) = Source::of(column.name).and_then(|source| source.fault(column, episode)) {
             return refused(episode, expected, found);
         }

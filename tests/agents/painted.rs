@@ -44,7 +44,7 @@ impl Painted {
             let up = (height as f64 / 2.0 - (at / width) as f64 - 0.5) / focal;
             self.trace(eye, [cosine + right * sine, sine - right * cosine, up], None, pose.place)
         };
-        Frame { width, height, rgb: (0..width * height).flat_map(pixel).collect() }
+        Frame::new(width, height, (0..width * height).flat_map(pixel).collect())
     }
 
     /// The colour that a ray ends at; after the mirror, `own` is where the body that looks stands.

@@ -6,6 +6,7 @@
 #![cfg(feature = "sim")]
 
 mod contents;
+mod forecasts;
 mod interruptions;
 mod recordings;
 mod refusals;

@@ -68,6 +68,7 @@ impl Reading {
     pub fn into_reply(self, raw: String, usage: Usage) -> Reply {
         Reply {
             status: self.status,
+            repairs: self.repairs,
             action: self.action,
             self_color: self.self_color,
             selected_cube: self.selected_cube,

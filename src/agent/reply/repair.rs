@@ -31,6 +31,22 @@ impl Repair {
     }
 }
 
+impl Repair {
+    /// The names of some repairs as the column `reply_repair` has them; `None` for none.
+    ///
+    /// ```
+    /// use mirrorstats::agent::reply::Repair;
+    ///
+    /// let both = Repair::joined(&[Repair::CodeFence, Repair::TrailingComma]);
+    /// assert_eq!(both.as_deref(), Some("code_fence+trailing_comma"));
+    /// assert_eq!(Repair::joined(&[]), None);
+    /// ```
+    pub fn joined(repairs: &[Self]) -> Option<String> {
+        let names: Vec<_> = repairs.iter().map(|repair| repair.name()).collect();
+        (!names.is_empty()).then(|| names.join("+"))
+    }
+}
+
 /// The changed text; `None` where there is nothing to repair.
 type Change = fn(&str) -> Option<String>;
 

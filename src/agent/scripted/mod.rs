@@ -161,6 +161,7 @@ impl Agent for Puppet {
         let name = |color: Option<Color>, none: &'static str| color.map_or(none, Color::name).to_owned();
         let reply = Reply {
             status: Status::Ok,
+            repairs: Vec::new(),
             action,
             self_color: Some(name(claim, "unknown")),
             // The exploration prompt has no such key.

@@ -141,7 +141,7 @@ mod tests {
             _ => [110, 110, 110],
         };
         let rgb = rows.iter().flat_map(|row| row.chars().flat_map(pixel)).collect();
-        Frame { width: rows[0].len(), height: rows.len(), rgb }
+        Frame::new(rows[0].len(), rows.len(), rgb)
     }
 
     fn found(rows: &[&str]) -> Vec<(Color, usize, [usize; 4])> {

@@ -41,6 +41,9 @@ pub enum Entry {
         question: String,
         /// From sending to the whole answer, ms.
         latency_ms: i32,
+        /// The model that answered, as the provider names it; it need not be the one that was asked.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        model: Option<String>,
         /// The body, as it came.
         body: String,
     },

@@ -5,6 +5,9 @@
 
 use std::sync::Mutex;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
 /// The limits of a run; `None` where there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Limits {
@@ -17,7 +20,7 @@ pub struct Limits {
 }
 
 /// What was spent.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Spend {
     /// US dollars of the replies whose cost is known.
     pub cost_usd: f64,

@@ -13,6 +13,7 @@
 //! | [`provider`] | sending one request, and the names of what can go wrong |
 //! | [`pace`] | how many requests are out at once |
 //! | [`limits`] | what a run may spend |
+//! | [`estimate`] | what requests will take |
 //! | [`journal`] | what was asked and answered, on disk |
 //! | [`secrets`] | keys, and words without them |
 //!
@@ -20,6 +21,7 @@
 //! anything that leaves this room but the header of a request.
 
 pub mod dialect;
+pub mod estimate;
 pub mod journal;
 pub mod limits;
 pub mod models;
@@ -43,7 +45,7 @@ use self::models::{Choice, Contract};
 use self::provider::{Failure, FailureKind, Provider};
 use super::prompt::Prompt;
 use super::reply;
-use super::{Agent, Decision, Family, Lost, Observation, Reply, Status, Task, Usage, Words};
+use super::{Agent, Decision, Lost, Observation, Reply, Status, Task, Usage, Words};
 use crate::base::hash;
 
 /// The sampling temperature (paper, Panel A).
@@ -138,9 +140,30 @@ impl Vlm {
         self.stop.get().map(String::as_str)
     }
 
+    /// The most tokens that a reply may have.
+    pub fn max_output_tokens(&self) -> u32 {
+        self.max_output_tokens
+    }
+
+    /// How many steps of an episode have their answer already.
+    ///
+    /// # Errors
+    /// When the episode's journal cannot be read; none is no error.
+    pub fn answered(&self, episode: &str) -> Result<u64, JournalError> {
+        match Journal::cassette(&self.memory.path(episode)) {
+            Ok(journal) => Ok(journal.answers().count() as u64),
+            Err(JournalError::Missing { .. }) => Ok(0),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// What was spent, over all starts of the run.
+    pub fn spend(&self) -> Spend {
+        self.account.spend()
+    }
+
     /// What goes into recordings: everything that shapes the requests.
     pub fn description(&self) -> Value {
-        let hash = |family| Prompt::of(family).map_or(Value::Null, |prompt| prompt.hash().into());
         serde_json::json!({
             "model": self.choice.name,
             "id": self.choice.model.id,
@@ -148,10 +171,7 @@ impl Vlm {
             "contract": self.choice.model.contract.name(),
             "temperature": TEMPERATURE,
             "max_output_tokens": self.max_output_tokens,
-            "prompts": {
-                "cube_selection": hash(Family::CubeSelection),
-                "exploration": hash(Family::Exploration),
-            },
+            "prompts": super::prompt::hashes(),
             "identification_version": super::identification::VERSION,
         })
     }
@@ -193,7 +213,7 @@ impl Vlm {
     /// No further request is sent, for this reason.
     fn halt(&self, reason: &str) -> Lost {
         let reason = self.stop.get_or_init(|| reason.to_owned());
-        Lost(reason.clone())
+        Lost::because(reason.clone())
     }
 }
 
@@ -261,19 +281,24 @@ impl VlmAgent {
             return self.reply_to(observation.t, &question, &recorded);
         }
         let (Some(network), Some(_)) = (&self.vlm.network, &self.vlm.provider) else {
-            return Err(Lost(format!("the cassette has no answer for step {}", observation.t)));
+            return Err(Lost::because(format!("the cassette has no answer for step {}", observation.t)));
         };
-        let png = observation.frame.to_png().map_err(|fault| Lost(format!("the frame cannot be encoded: {fault}")))?;
+        let png = observation
+            .frame
+            .to_png()
+            .map_err(|fault| Lost::because(format!("the frame cannot be encoded: {fault}")))?;
         let step = Step {
             vlm: Arc::clone(&self.vlm),
             journal: Arc::clone(&self.journal),
             t: observation.t,
-            frame: hash::of_bytes(&png),
-            body: dialect.body(&self.vlm.question(&words, &schema, &STANDARD.encode(&png))),
+            frame: hash::of_bytes(png),
+            body: dialect.body(&self.vlm.question(&words, &schema, &STANDARD.encode(png))),
             question: question.clone(),
         };
-        let recorded =
-            network.spawn(step.ask()).await.map_err(|fault| Lost(format!("a request broke off: {fault}")))??;
+        let recorded = network
+            .spawn(step.ask())
+            .await
+            .map_err(|fault| Lost::because(format!("a request broke off: {fault}")))??;
         self.reply_to(observation.t, &question, &recorded)
     }
 
@@ -283,7 +308,7 @@ impl VlmAgent {
             let reason = format!(
                 "the recorded answer of step {t} belongs to another request: the prompt, the model's settings or the world changed\n  help: record into another folder, or remove the episode's journal"
             );
-            return Err(Lost(reason));
+            return Err(Lost::because(reason));
         }
         match recorded {
             Recorded::GivenUp { status, .. } => Ok(without_decision(*status)),
@@ -291,7 +316,7 @@ impl VlmAgent {
                 let (answer, cost_usd) = self
                     .vlm
                     .read(body)
-                    .ok_or_else(|| Lost(format!("the recorded answer of step {t} cannot be read")))?;
+                    .ok_or_else(|| Lost::because(format!("the recorded answer of step {t} cannot be read")))?;
                 let count = |tokens: Option<u32>| tokens.and_then(|tokens| i32::try_from(tokens).ok());
                 let usage = Usage {
                     latency_ms: Some(*latency_ms),
@@ -308,6 +333,7 @@ impl VlmAgent {
 fn without_decision(status: Status) -> Reply {
     Reply {
         status,
+        repairs: Vec::new(),
         action: None,
         self_color: None,
         selected_cube: None,
@@ -341,7 +367,9 @@ enum Ended {
 impl Step {
     /// Asks until there is an answer, the attempts are used up, or there is no point in asking.
     async fn ask(self) -> Result<Recorded, Lost> {
-        let Some(provider) = &self.vlm.provider else { return Err(Lost("nothing is sent from a cassette".to_owned())) };
+        let Some(provider) = &self.vlm.provider else {
+            return Err(Lost::because("nothing is sent from a cassette".to_owned()));
+        };
         let patience = provider.patience();
         let backoff = ExponentialBuilder::default()
             .with_min_delay(patience.first_delay)
@@ -374,7 +402,7 @@ impl Step {
 
     async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
         if let Some(reason) = self.vlm.stopped() {
-            return Err(Ended::Stopped(Lost(reason.to_owned())));
+            return Err(Ended::Stopped(Lost::because(reason.to_owned())));
         }
         self.vlm.account.request().map_err(|reached| Ended::Stopped(self.vlm.halt(&reached.to_string())))?;
         let (t, question) = (self.t, self.question.clone());
@@ -384,8 +412,8 @@ impl Step {
                 let cost = self.vlm.read(&received.body).and_then(|(_, cost)| cost);
                 self.vlm.account.answer(tokens(&received.answer), cost);
                 let latency_ms = i32::try_from(received.latency.as_millis()).unwrap_or(i32::MAX);
-                let (body, answered) = (received.body, question.clone());
-                self.write(&Entry::Answer { t, attempt, question, latency_ms, body: body.clone() })?;
+                let (body, model, answered) = (received.body, received.answer.model, question.clone());
+                self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body: body.clone() })?;
                 Ok(Recorded::Answer { question: answered, latency_ms, body })
             }
             Err(failure) => {
@@ -401,7 +429,8 @@ impl Step {
         let status = failure.kind.status();
         if self.vlm.on_outage == OnOutage::Lose {
             let name = status.name();
-            return Err(Lost(format!("step {}: {name} after {attempt} attempts: {}", self.t, failure.detail)));
+            let cause = format!("step {}: {name} after {attempt} attempts: {}", self.t, failure.detail);
+            return Err(Lost { status: Some(status), cause });
         }
         let entry = Entry::Failure {
             t: self.t,
@@ -414,7 +443,7 @@ impl Step {
         match self.write(&entry) {
             Ok(()) => Ok(Recorded::GivenUp { question: self.question.clone(), status }),
             Err(Ended::Stopped(lost)) => Err(lost),
-            Err(Ended::Failed(failure)) => Err(Lost(failure.detail)),
+            Err(Ended::Failed(failure)) => Err(Lost::because(failure.detail)),
         }
     }
 

@@ -70,7 +70,13 @@ pub struct Prices {
 impl Prices {
     /// What so many tokens cost, US dollars.
     pub fn cost_usd(self, prompt_tokens: u32, completion_tokens: u32) -> f64 {
-        (f64::from(prompt_tokens) * self.input + f64::from(completion_tokens) * self.output) / 1e6
+        self.cost_of(prompt_tokens.into(), completion_tokens.into())
+    }
+
+    /// What the tokens of a whole run cost, US dollars.
+    #[expect(clippy::cast_precision_loss, reason = "nobody pays for 2^53 tokens")]
+    pub fn cost_of(self, prompt_tokens: u64, completion_tokens: u64) -> f64 {
+        (prompt_tokens as f64 * self.input + completion_tokens as f64 * self.output) / 1e6
     }
 }
 
@@ -136,11 +142,18 @@ impl Models {
             models.backend.extend(own.backend);
             models.model.extend(own.model);
         }
+        let origin = || file.map_or("assets/models.toml".to_owned(), |path| path.display().to_string());
+        if let Some((name, _)) = models.backend.iter().find(|(_, backend)| !is_variable(&backend.key)) {
+            // What stands there may be the key itself, and is not repeated.
+            let fault = format!(
+                "the `key` of the backend `{name}` is not the name of an environment variable, such as OPENAI_API_KEY"
+            );
+            return Err(ModelsError::Invalid { file: origin(), fault });
+        }
         for (name, model) in &models.model {
             if !models.backend.contains_key(&model.backend) {
                 let fault = format!("the backend `{}` of the model `{name}` is not there", model.backend);
-                let file = file.map_or("assets/models.toml".to_owned(), |path| path.display().to_string());
-                return Err(ModelsError::Invalid { file, fault });
+                return Err(ModelsError::Invalid { file: origin(), fault });
             }
         }
         Ok(models)
@@ -186,4 +199,25 @@ impl Models {
 
 fn parse(file: &str, text: &str) -> Result<Models, ModelsError> {
     toml::from_str(text).map_err(|fault| ModelsError::Invalid { file: file.to_owned(), fault: fault.to_string() })
+}
+
+/// Whether this may name an environment variable: letters, digits and `_`, not a digit first.
+fn is_variable(name: &str) -> bool {
+    let is_word = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
+    is_word && !name.is_empty() && !name.starts_with(|first: char| first.is_ascii_digit())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Models;
+
+    #[test]
+    fn a_key_in_place_of_its_variable_is_refused_and_not_repeated() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("own.toml");
+        std::fs::write(&file, "[backend.own]\ndialect = \"gemini\"\nkey = \"sk-secret-1\"\n").unwrap();
+        let fault = Models::load(Some(&file)).unwrap_err().to_string();
+        assert!(fault.contains("backend `own`") && fault.contains("environment variable"), "{fault}");
+        assert!(!fault.contains("sk-secret"), "{fault}");
+    }
 }

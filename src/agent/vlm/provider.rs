@@ -112,10 +112,26 @@ pub enum SetupError {
     Address { url: String, fault: String },
     #[error("the base address holds a user name or password\n  help: keys come from the environment alone")]
     Credentials,
+    #[error(
+        "the base address has a query or a fragment\n  help: it looks like https://host/v1; keys come from the environment alone"
+    )]
+    Query,
     #[error("the key has characters that no header can carry")]
     Key,
     #[error("cannot set up HTTP: {0}")]
     Client(String),
+}
+
+impl SetupError {
+    /// The same without the key, which may stand where an address should.
+    fn without(self, secret: Option<&Secret>) -> Self {
+        match (self, secret) {
+            (Self::Address { url, fault }, Some(secret)) => {
+                Self::Address { url: secret.without(&url), fault: secret.without(&fault) }
+            }
+            (other, _) => other,
+        }
+    }
 }
 
 impl Provider {
@@ -131,7 +147,7 @@ impl Provider {
         patience: Patience,
         at_once: usize,
     ) -> Result<Self, SetupError> {
-        let url = address(base_url, &dialect.path(model))?;
+        let url = address(base_url, &dialect.path(model)).map_err(|fault| fault.without(secret.as_ref()))?;
         let client = Client::builder()
             .default_headers(headers(dialect, secret.as_ref())?)
             .connect_timeout(patience.connect_timeout)
@@ -184,10 +200,12 @@ impl Provider {
         let response = self.client.post(self.url.clone()).json(body).send().await.map_err(broken)?;
         let (status, after) = (response.status(), retry_after(response.headers()));
         let kind = response.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).map(str::to_owned);
-        let bytes = self.whole(response).await?;
         if !status.is_success() {
-            return Err(refused(status, after, &bytes));
+            // The status stands, whatever becomes of the words beside it.
+            let said = self.whole(response).await.unwrap_or_default();
+            return Err(refused(status, after, &self.without_secret(&String::from_utf8_lossy(&said))));
         }
+        let bytes = self.whole(response).await?;
         let latency = start.elapsed();
         if !kind.as_deref().is_some_and(is_json) {
             let found = kind.unwrap_or_else(|| "none".to_owned());
@@ -196,9 +214,11 @@ impl Provider {
         let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
         let value: Value =
             serde_json::from_str(&text).map_err(|fault| server(format!("the answer is not JSON: {fault}")))?;
-        let answer = self.dialect.answer(&value).ok_or_else(|| server(unexpected(&text)))?;
-        let answer = Answer { text: self.without_secret(&answer.text), ..answer };
-        Ok(Received { answer, body: self.without_secret(&text), latency })
+        let body = self.without_secret(&text);
+        let answer = self.dialect.answer(&value).ok_or_else(|| server(unexpected(&body)))?;
+        let model = answer.model.map(|model| self.without_secret(&model));
+        let answer = Answer { text: self.without_secret(&answer.text), model, ..answer };
+        Ok(Received { answer, body, latency })
     }
 
     /// The body, up to the limit.
@@ -219,6 +239,9 @@ fn address(base_url: &str, path: &str) -> Result<Url, SetupError> {
     // An address that may hold credentials is not repeated in a message.
     if base_url.contains('@') {
         return Err(SetupError::Credentials);
+    }
+    if base_url.contains(['?', '#']) {
+        return Err(SetupError::Query);
     }
     let base = base_url.trim_end_matches('/');
     let url = Url::parse(&format!("{base}/{path}"));
@@ -281,23 +304,36 @@ fn broken(error: reqwest::Error) -> Failure {
 }
 
 /// A status that is not success.
-fn refused(status: StatusCode, after: Option<Duration>, body: &[u8]) -> Failure {
+fn refused(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
     let kind = match status {
+        StatusCode::TOO_MANY_REQUESTS if is_out_of_credit(body) => FailureKind::Rejected,
         StatusCode::TOO_MANY_REQUESTS => FailureKind::RateLimited,
         StatusCode::REQUEST_TIMEOUT | StatusCode::GATEWAY_TIMEOUT => FailureKind::Timeout,
         status if status.is_server_error() => FailureKind::Server,
         StatusCode::CONFLICT | StatusCode::TOO_EARLY => FailureKind::Server,
         _ => FailureKind::Rejected,
     };
-    let said = shortened(&String::from_utf8_lossy(body));
-    Failure { kind, detail: format!("HTTP {status}: {said}"), after }
+    let detail = match shortened(body) {
+        said if said.is_empty() => format!("HTTP {status}"),
+        said => format!("HTTP {status}: {said}"),
+    };
+    Failure { kind, detail, after }
 }
 
-/// The wait that a provider asks for: seconds, or a date.
+/// Whether too many requests means that there is no money left, which waiting does not mend.
+fn is_out_of_credit(body: &str) -> bool {
+    const CODE: &str = "insufficient_quota";
+    let error = serde_json::from_str::<Value>(body).map(|mut body| body["error"].take()).unwrap_or_default();
+    error["code"] == CODE || error["type"] == CODE
+}
+
+/// The wait that a provider asks for: seconds, whole or not, or a date. A date that is over asks for none, what is
+/// neither asks for nothing, and what no duration can hold asks for the longest.
 fn retry_after(headers: &HeaderMap) -> Option<Duration> {
     let value = headers.get(RETRY_AFTER)?.to_str().ok()?.trim();
-    if let Ok(seconds) = value.parse::<u64>() {
-        return Some(Duration::from_secs(seconds));
+    if let Ok(seconds) = value.parse::<f64>() {
+        let is_wait = seconds >= 0.0;
+        return is_wait.then(|| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
     }
     let date = httpdate::parse_http_date(value).ok()?;
     Some(date.duration_since(SystemTime::now()).unwrap_or_default())
@@ -305,7 +341,12 @@ fn retry_after(headers: &HeaderMap) -> Option<Duration> {
 
 #[cfg(test)]
 mod tests {
-    use super::{SetupError, address, is_json};
+    use std::time::Duration;
+
+    use reqwest::StatusCode;
+    use reqwest::header::{HeaderMap, HeaderValue, RETRY_AFTER};
+
+    use super::{FailureKind, SetupError, address, is_json, refused, retry_after};
 
     #[test]
     fn addresses_take_paths_and_refuse_credentials() {
@@ -314,6 +355,33 @@ mod tests {
         assert!(matches!(address("me:secret@host", "a"), Err(SetupError::Credentials)));
         assert!(matches!(address("host/v1", "a"), Err(SetupError::Address { .. })));
         assert!(matches!(address("ftp://host/v1", "a"), Err(SetupError::Address { .. })));
+        assert!(matches!(address("http://host/v1?key=secret", "a"), Err(SetupError::Query)));
+    }
+
+    #[test]
+    fn the_wait_asked_for_is_read_or_left() {
+        let asked = |value: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(RETRY_AFTER, HeaderValue::from_static(value));
+            retry_after(&headers)
+        };
+        assert_eq!(asked(" 7 "), Some(Duration::from_secs(7)));
+        assert_eq!(asked("0.25"), Some(Duration::from_millis(250)));
+        assert_eq!(asked("Sun, 06 Nov 1994 08:49:37 GMT"), Some(Duration::ZERO));
+        assert!(asked("Fri, 31 Dec 9999 23:59:59 GMT").is_some_and(|wait| wait > Duration::from_hours(24)));
+        assert_eq!(asked("99999999999999999999999999"), Some(Duration::MAX));
+        for nothing in ["-1", "NaN", "soon", ""] {
+            assert_eq!(asked(nothing), None, "{nothing:?}");
+        }
+        assert_eq!(retry_after(&HeaderMap::new()), None);
+    }
+
+    #[test]
+    fn no_money_left_is_not_too_many_requests() {
+        let kind = |body| refused(StatusCode::TOO_MANY_REQUESTS, None, body).kind;
+        assert_eq!(kind(r#"{"error": {"code": "insufficient_quota"}}"#), FailureKind::Rejected);
+        assert_eq!(kind(r#"{"error": {"code": "rate_limit_exceeded"}}"#), FailureKind::RateLimited);
+        assert_eq!(kind("slow down"), FailureKind::RateLimited);
     }
 
     #[test]

@@ -63,9 +63,33 @@ impl Secret {
     }
 }
 
+/// The values of every variable of the environment whose name says that it holds a key: for what a program says that
+/// inherits them. Values too short for a key are left alone, or words that happen to be one would be taken out.
+pub fn from_every_key_variable() -> Vec<Secret> {
+    const SHORTEST: usize = 8;
+    let held = std::env::vars_os().filter(|(name, _)| names_a_key(&name.to_string_lossy()));
+    let values = held.filter_map(|(_, value)| value.into_string().ok()).map(|value| value.trim().to_owned());
+    values.filter(|value| value.len() >= SHORTEST).map(Secret::new).collect()
+}
+
+fn names_a_key(variable: &str) -> bool {
+    let last = variable.rsplit('_').next().unwrap_or_default().to_ascii_uppercase();
+    ["KEY", "APIKEY", "TOKEN", "SECRET", "PASSWORD", "PASSPHRASE"].contains(&last.as_str())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Secret;
+    use super::{Secret, names_a_key};
+
+    #[test]
+    fn variables_with_keys_are_known_by_their_names() {
+        for name in ["OPENAI_API_KEY", "hf_token", "KEY", "DB_PASSWORD"] {
+            assert!(names_a_key(name), "{name}");
+        }
+        for name in ["PATH", "KEYBOARD", "TOKENIZERS_PARALLELISM", "KEY_FILE_PATH", ""] {
+            assert!(!names_a_key(name), "{name}");
+        }
+    }
 
     #[test]
     fn no_form_of_a_key_stays() {

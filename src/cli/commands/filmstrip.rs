@@ -167,7 +167,7 @@ impl FilmstripArgs {
         let divergence = again(recipe, &recipe.eye, &episode, |t, world, _, _| {
             if wanted.contains(&t) {
                 let frame = eye.frame(world).map_err(Failure::input)?;
-                frames.insert(t, frame.to_png().map_err(Failure::input)?);
+                frames.insert(t, frame.to_png().map_err(Failure::input)?.to_vec());
             }
             Ok::<(), Failure>(())
         })?;

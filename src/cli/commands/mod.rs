@@ -6,11 +6,13 @@ pub mod diff;
 pub mod figure;
 #[cfg(feature = "sim")]
 pub mod filmstrip;
+pub mod import;
 pub mod info;
 pub mod query;
 #[cfg(feature = "sim")]
 pub mod record;
 pub mod recover;
+pub mod renormalize;
 #[cfg(feature = "sim")]
 pub mod replay;
 pub mod report;
@@ -40,7 +42,9 @@ pub enum Command {
     Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
     Info(info::InfoCommand),
+    Import(import::ImportArgs),
     Recover(recover::RecoverArgs),
+    Renormalize(renormalize::RenormalizeArgs),
     #[cfg(feature = "sim")]
     Replay(replay::ReplayArgs),
     #[cfg(feature = "sim")]
@@ -71,7 +75,9 @@ impl Command {
             Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Info(command) => command.run(),
+            Self::Import(args) => args.run(),
             Self::Recover(args) => args.run(),
+            Self::Renormalize(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Replay(args) => args.run(),
             #[cfg(feature = "sim")]

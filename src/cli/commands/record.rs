@@ -1,7 +1,9 @@
 //! `mirrorstats record`: agents in the mirror world, one trace and one log a model and experiment.
 
+use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -9,14 +11,17 @@ use crate::agent::Player;
 use crate::agent::scripted::Scripted;
 use crate::base::near::nearest;
 use crate::cli::args::ThreadArgs;
+use crate::cli::exec::ExecArgs;
+use crate::cli::forecast::{self, ForecastAnswer, RequestForecast};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::vlm::VlmArgs;
-use crate::record::metadata;
 use crate::record::plan::{Experiments, Key, Plan, Shard};
 use crate::record::run::{Recording, Settings, Shares};
-use crate::record::store::Store;
+use crate::record::shelf::Shelf;
+use crate::record::store::{Store, StoreError};
+use crate::record::{claim, metadata};
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
 
@@ -27,7 +32,8 @@ use crate::sim::config::WorldConfig;
 /// with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecordArgs {
-    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; or vlm, a model behind a provider
+    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; or
+    /// exec:'CMD', a program of your own that takes and gives JSON lines
     #[arg(long, value_name = "AGENT")]
     agent: String,
     /// The experiments: E1, E1..E5 or E1,E3
@@ -57,6 +63,9 @@ pub struct RecordArgs {
     /// Leave the frames out of the log, and draw none for agents that do not look (random, frozen)
     #[arg(long)]
     no_frames: bool,
+    /// Say what would be recorded, and what a model's requests may take and cost; record, write and send nothing
+    #[arg(long)]
+    dry_run: bool,
     /// Print what became of the episodes as JSON
     #[arg(long)]
     json: bool,
@@ -66,6 +75,9 @@ pub struct RecordArgs {
     /// A model behind a provider.
     #[command(flatten)]
     vlm: VlmArgs,
+    /// A program of one's own.
+    #[command(flatten)]
+    exec: ExecArgs,
 }
 
 impl RecordArgs {
@@ -78,14 +90,38 @@ impl RecordArgs {
             Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
             None => WorldConfig::default(),
         };
-        let player = self.player()?;
         let plan =
             Plan { experiments: self.experiment.0.clone(), seeds: self.seeds, runs: self.runs, shard: self.shard };
+        if self.dry_run {
+            return self.forecast(&config, &plan);
+        }
+        let player = self.player()?;
         let store = Store::open(&self.out, player.model(), metadata::recording(&config, player.as_ref()))
             .map_err(Failure::input)?;
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
-        stop_at_interrupt(stop)?;
+        stop_at_interrupt(stop, Arc::clone(&player))?;
         self.record(&config, player.as_ref(), &plan, &store, stop)
+    }
+
+    /// Says what recording would come to.
+    fn forecast(&self, config: &WorldConfig, plan: &Plan) -> Result<Outcome, Failure> {
+        let vlm = (self.agent == "vlm").then(|| self.vlm.forecaster(&self.out)).transpose()?.map(Arc::new);
+        let player = match &vlm {
+            Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
+            None => self.player()?,
+        };
+        let shelf = Shelf::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
+        let planned = plan.keys();
+        let todo = unrecorded(plan, &planned, |experiment| shelf.recorded(experiment))?;
+        let vlm = vlm.filter(|_| self.vlm.sends());
+        let requests = vlm.map(|vlm| RequestForecast::of(&vlm, &todo, config)).transpose().map_err(Failure::input)?;
+        let answer = ForecastAnswer::of(player.model(), planned.len(), &todo, config, requests);
+        if self.json {
+            output::print_json(&answer)?;
+        } else {
+            forecast::print(&answer)?;
+        }
+        Ok(Outcome::Done)
     }
 
     fn record(
@@ -97,8 +133,8 @@ impl RecordArgs {
         stop: &AtomicBool,
     ) -> Result<Outcome, Failure> {
         let planned = plan.keys();
-        let todo = unrecorded(plan, &planned, store)?;
-        let bar = Bar::new(todo.len(), config.episode.steps);
+        let todo = unrecorded(plan, &planned, |experiment| store.recorded(experiment))?;
+        let bar = Bar::new(player, todo.len(), config.episode.steps);
         let shares = Shares::default();
         let start = Instant::now();
         let recording =
@@ -109,9 +145,11 @@ impl RecordArgs {
         bar.clear();
         let tally = outcome.map_err(|broken| Failure::input(broken.to_string()))?;
         assembled.map_err(Failure::input)?;
-        let answer =
-            RecordAnswer::of(tally, player.model(), planned.len(), planned.len() - todo.len(), files(plan, store));
-        recording::say(&answer, start.elapsed(), shares.spent())?;
+        let missing: BTreeSet<Key> = todo.iter().copied().collect();
+        let found = planned.iter().filter(|key| !missing.contains(key));
+        store.note_lost(found.chain(&tally.recorded).copied(), &tally.lost).map_err(Failure::input)?;
+        let answer = RecordAnswer::of(tally, player, planned.len(), planned.len() - todo.len(), files(plan, store));
+        recording::say(&answer, &store.lost_list(), start.elapsed(), shares.spent())?;
         if self.json {
             output::print_json(&answer)?;
         }
@@ -125,17 +163,23 @@ impl RecordArgs {
         }
     }
 
-    fn player(&self) -> Result<Box<dyn Player>, Failure> {
+    fn player(&self) -> Result<Arc<dyn Player>, Failure> {
+        if let Some(command) = self.agent.strip_prefix("exec:") {
+            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), claim::parts_of(&self.out))?));
+        }
         match self.agent.as_str() {
-            "vlm" => Ok(Box::new(self.vlm.player(&self.out)?)),
-            name => scripted(name),
+            "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
+            name => Ok(Arc::new(scripted(name)?)),
         }
     }
 
     fn settings(&self, player: &dyn Player) -> Settings {
         Settings {
             threads: self.threads.count(),
-            in_flight: self.in_flight.or(NonZeroUsize::new(player.in_flight())).unwrap_or(NonZeroUsize::MIN),
+            in_flight: self.in_flight.unwrap_or_else(|| {
+                let worth_while = NonZeroUsize::new(player.in_flight()).unwrap_or(NonZeroUsize::MIN);
+                worth_while.max(self.threads.count())
+            }),
             frames: !self.no_frames,
             log: !self.no_log,
         }
@@ -152,20 +196,24 @@ fn files(plan: &Plan, store: &Store) -> [Vec<String>; 2] {
 }
 
 /// The agent of this name.
-fn scripted(name: &str) -> Result<Box<dyn Player>, Failure> {
+fn scripted(name: &str) -> Result<Scripted, Failure> {
     if let Some(scripted) = Scripted::named(name) {
-        return Ok(Box::new(scripted));
+        return Ok(scripted);
     }
-    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm"]).collect();
+    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", "exec:'CMD'"]).collect();
     let near = nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }
 
 /// Those that are not recorded yet.
-fn unrecorded(plan: &Plan, planned: &[Key], store: &Store) -> Result<Vec<Key>, Failure> {
+fn unrecorded(
+    plan: &Plan,
+    planned: &[Key],
+    recorded: impl Fn(Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError>,
+) -> Result<Vec<Key>, Failure> {
     let mut todo = Vec::with_capacity(planned.len());
     for experiment in &plan.experiments {
-        let done = store.recorded(*experiment).map_err(Failure::input)?;
+        let done = recorded(*experiment).map_err(Failure::input)?;
         let own = planned.iter().filter(|key| key.experiment == *experiment);
         todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run))));
     }
@@ -173,9 +221,10 @@ fn unrecorded(plan: &Plan, planned: &[Key], store: &Store) -> Result<Vec<Key>, F
 }
 
 /// The first Ctrl-C stops at the next step of each episode, the second at once.
-fn stop_at_interrupt(stop: &'static AtomicBool) -> Result<(), Failure> {
+fn stop_at_interrupt(stop: &'static AtomicBool, player: Arc<dyn Player>) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {
+            player.abandon();
             std::process::exit(130);
         }
     })

@@ -54,7 +54,7 @@ impl RecoverArgs {
     /// When the log cannot be read or is none, the trace cannot be written, or what was written breaks a rule.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let recovered = recover(&self.log).map_err(Failure::input)?;
-        let columns = OptionalColumns::all();
+        let columns = recovered.recording.as_ref().map_or_else(OptionalColumns::all, OptionalColumns::recorded);
         let rows = recovered.episodes.iter().map(|episode| merge::rows(episode, &columns));
         let rows = rows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
         let answer = RecoverAnswer {

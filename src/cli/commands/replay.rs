@@ -293,7 +293,7 @@ fn save(folder: &Path, episode: &Episode, t: i32, frame: &Frame) -> Result<(), F
     fs::create_dir_all(&folder)
         .map_err(|error| Failure::input(format!("cannot make the folder `{}`: {error}", folder.display())))?;
     let png = frame.to_png().map_err(Failure::input)?;
-    output::write_file(&folder.join(format!("t{t:03}.png")), &png)
+    output::write_file(&folder.join(format!("t{t:03}.png")), png)
 }
 
 impl fmt::Display for ReplayAnswer {

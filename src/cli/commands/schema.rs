@@ -1,19 +1,52 @@
-//! `mirrorstats schema`: what a trace is.
+//! `mirrorstats schema`: what a trace is, and the JSON Schemas of what others write for this program.
 
 use std::io::{self, Write};
 
+use clap::ValueEnum as _;
 use comfy_table::{ContentArrangement, Table};
+use serde_json::{Value, json};
 
+use crate::agent::{Family, reply};
 use crate::cli::listing::listing;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::trace::describe::SchemaDocument;
+use crate::trace::import;
 
-/// Print what a trace is: columns, footer metadata, rules
+/// Print what a trace is: columns, footer metadata, rules; or a JSON Schema by its name
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct SchemaCommand {
+    /// What to describe; all but `trace` are printed as JSON Schema
+    #[arg(value_enum, value_name = "NAME", default_value_t)]
+    name: Name,
     /// Print JSON
     #[arg(long)]
     json: bool,
+}
+
+/// What there is a schema of, for those who write it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Name {
+    /// A trace: its columns, footer and rules
+    #[default]
+    Trace,
+    /// A line of the JSON lines that `mirrorstats import` reads
+    Step,
+    /// A model's reply in E1 to E4
+    ReplyCubes,
+    /// A model's reply in E5
+    ReplyExploration,
+}
+
+impl Name {
+    /// The document, as the file of this name in `schemas/` has it.
+    pub fn document(self) -> Value {
+        match self {
+            Self::Trace => json!(SchemaDocument::current()),
+            Self::Step => import::schema::document(),
+            Self::ReplyCubes => reply::schema(Family::CubeSelection),
+            Self::ReplyExploration => reply::schema(Family::Exploration),
+        }
+    }
 }
 
 /// Columns of a terminal that text is wrapped to, wherever it goes.
@@ -25,12 +58,11 @@ impl SchemaCommand {
     /// # Errors
     /// When the output cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let schema = SchemaDocument::current();
         let mut out = io::stdout().lock();
-        if self.json {
-            writeln!(out, "{:#}", serde_json::json!(schema))?;
+        if self.json || self.name != Name::Trace {
+            writeln!(out, "{:#}", self.name.document())?;
         } else {
-            print(&mut out, &schema)?;
+            print(&mut out, &SchemaDocument::current())?;
         }
         Ok(Outcome::Done)
     }
@@ -59,7 +91,15 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
     metadata.add_rows(schema.metadata.iter().map(|entry| [entry.key, entry.doc]));
     let mut rules = wrapped(["code", "rule"]);
     rules.add_rows(schema.rules.iter().map(|rule| [rule.code.name(), rule.rule]));
-    writeln!(out, "{}\n\n{}\n\n{}", columns.trim_fmt(), metadata.trim_fmt(), rules.trim_fmt())
+    writeln!(out, "{}\n\n{}\n\n{}", columns.trim_fmt(), metadata.trim_fmt(), rules.trim_fmt())?;
+    let mut others = wrapped(["JSON Schema", "of"]);
+    for name in Name::value_variants().iter().filter(|name| **name != Name::Trace) {
+        if let Some(value) = name.to_possible_value() {
+            let of = value.get_help().map(ToString::to_string).unwrap_or_default();
+            others.add_row([format!("mirrorstats schema {}", value.get_name()), of]);
+        }
+    }
+    writeln!(out, "\n{}", others.trim_fmt())
 }
 
 fn wrapped<const N: usize>(header: [&str; N]) -> Table {

@@ -58,6 +58,9 @@ pub enum FormatError {
     /// Bytes could not be written or read.
     #[error("cannot write or read the scores")]
     Io(#[from] std::io::Error),
+    /// There is no thread for the encoder.
+    #[error("cannot start a thread to encode the scores; close other programs or raise the limit of processes")]
+    Thread(#[source] std::io::Error),
     /// The Parquet library's own words.
     #[error("not a readable Parquet file of scores: {0}")]
     Parquet(#[from] ::parquet::errors::ParquetError),
@@ -130,54 +133,32 @@ impl FormatError {
 /// # Errors
 /// Whatever writing gives.
 pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Result<(), FormatError> {
-    let mut writer = Writer::new(table.header(), format, out)?;
-    table.rows().try_for_each(|row| writer.write(&row))?;
-    writer.finish()
+    write_rows(table.header(), format, out, |write| table.rows().try_for_each(|row| write(&row)))
 }
 
 /// Writes a table row by row: memory does not grow with it.
-pub struct Writer<W: Write + Send>(Inner<W>);
-
-enum Inner<W: Write + Send> {
-    Parquet(Box<parquet::Writer<W>>),
-    Csv(csv::Writer<W>),
-    JsonLines(jsonl::Writer<W>),
-}
-
-impl<W: Write + Send> Writer<W> {
-    /// Starts a table.
-    ///
-    /// # Errors
-    /// Whatever writing gives.
-    pub fn new(header: Header, format: Format, out: W) -> Result<Self, FormatError> {
-        Ok(Self(match format {
-            Format::Parquet => Inner::Parquet(Box::new(parquet::Writer::new(&header, out)?)),
-            Format::Csv => Inner::Csv(csv::Writer::new(&header, out)?),
-            Format::JsonLines => Inner::JsonLines(jsonl::Writer::new(header, out)),
-        }))
-    }
-
-    /// Adds a row, which must not come before the last one.
-    ///
-    /// # Errors
-    /// Whatever writing gives.
-    pub fn write(&mut self, row: &EpisodeRow) -> Result<(), FormatError> {
-        match &mut self.0 {
-            Inner::Parquet(writer) => writer.write(row),
-            Inner::Csv(writer) => writer.write(row),
-            Inner::JsonLines(writer) => writer.write(row),
+///
+/// `rows` gives each row, in order, to the function that it is called with.
+///
+/// # Errors
+/// Whatever writing or `rows` gives.
+pub fn write_rows<E: From<FormatError>>(
+    header: Header,
+    format: Format,
+    out: impl Write + Send,
+    rows: impl FnOnce(&mut dyn FnMut(&EpisodeRow) -> Result<(), FormatError>) -> Result<(), E>,
+) -> Result<(), E> {
+    match format {
+        Format::Parquet => parquet::write(&header, out, rows),
+        Format::Csv => {
+            let mut writer = csv::Writer::new(&header, out)?;
+            rows(&mut |row| writer.write(row))?;
+            Ok(writer.finish()?)
         }
-    }
-
-    /// Writes what is left.
-    ///
-    /// # Errors
-    /// Whatever writing gives.
-    pub fn finish(self) -> Result<(), FormatError> {
-        match self.0 {
-            Inner::Parquet(writer) => writer.finish(),
-            Inner::Csv(writer) => writer.finish(),
-            Inner::JsonLines(writer) => writer.finish(),
+        Format::JsonLines => {
+            let mut writer = jsonl::Writer::new(header, out);
+            rows(&mut |row| writer.write(row))?;
+            Ok(writer.finish()?)
         }
     }
 }

@@ -2,12 +2,14 @@
 
 use std::io::Write;
 use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver};
+use std::thread;
 
 use arrow::array::{
     Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Builder, RecordBatch, StringBuilder,
 };
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema, SchemaRef};
+use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, ZstdLevel};
@@ -59,36 +61,57 @@ const ROW_GROUP_ROWS: usize = 64 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 8 * 1024;
 
-/// Writes a table as Parquet.
-pub(super) struct Writer<W: Write + Send> {
-    parquet: ArrowWriter<W>,
-    schema: SchemaRef,
-    gathered: Gathered,
+/// Batches that wait for the encoder.
+const WAITING: usize = 4;
+
+/// Writes a table as Parquet: rows are gathered here and encoded on a thread of its own.
+///
+/// `rows` gives each row to the function that it is called with.
+pub(super) fn write<E: From<FormatError>>(
+    header: &Header,
+    out: impl Write + Send,
+    rows: impl FnOnce(&mut dyn FnMut(&EpisodeRow) -> Result<(), FormatError>) -> Result<(), E>,
+) -> Result<(), E> {
+    let schema = Arc::new(schema(header));
+    let properties = properties(&header.catalog)?;
+    let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties)).map_err(FormatError::from)?;
+    thread::scope(|scope| {
+        let (give, take) = mpsc::sync_channel(WAITING);
+        let encoder = thread::Builder::new().name("parquet".into());
+        let encoder = encoder.spawn_scoped(scope, move || encode(parquet, take)).map_err(FormatError::Thread)?;
+        let mut gathered = Gathered::new(header);
+        // What ended the encoder is learnt when it is joined.
+        let send = |gathered: &mut Gathered| {
+            let batch = RecordBatch::try_new(Arc::clone(&schema), gathered.take());
+            let batch = batch.map_err(|error| FormatError::Parquet(ParquetError::ArrowError(error.to_string())))?;
+            Ok::<_, FormatError>(give.send(batch).is_ok())
+        };
+        let mut over = false;
+        let given = rows(&mut |row| {
+            if !over {
+                gathered.add(row);
+                over = gathered.seed.len() == GATHERED_ROWS && !send(&mut gathered)?;
+            }
+            Ok(())
+        });
+        let given = given.and_then(|()| Ok(send(&mut gathered).map(drop)?));
+        drop(give);
+        let encoded = encoder.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        given?;
+        encoded?.close().map_err(FormatError::from)?;
+        Ok(())
+    })
 }
 
-impl<W: Write + Send> Writer<W> {
-    pub(super) fn new(header: &Header, out: W) -> Result<Self, FormatError> {
-        let schema = Arc::new(schema(header));
-        let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties(&header.catalog)?))?;
-        Ok(Self { parquet, schema, gathered: Gathered::new(header) })
+/// Encodes batches until there are no more; what comes back is to be closed, unless a row was lost.
+fn encode<W: Write + Send>(
+    mut parquet: ArrowWriter<W>,
+    batches: Receiver<RecordBatch>,
+) -> Result<ArrowWriter<W>, FormatError> {
+    for batch in batches {
+        parquet.write(&batch)?;
     }
-
-    pub(super) fn write(&mut self, row: &EpisodeRow) -> Result<(), FormatError> {
-        self.gathered.add(row);
-        if self.gathered.seed.len() == GATHERED_ROWS { self.encode() } else { Ok(()) }
-    }
-
-    fn encode(&mut self) -> Result<(), FormatError> {
-        let batch = RecordBatch::try_new(Arc::clone(&self.schema), self.gathered.take())
-            .map_err(|error| FormatError::Parquet(ParquetError::ArrowError(error.to_string())))?;
-        Ok(self.parquet.write(&batch)?)
-    }
-
-    pub(super) fn finish(mut self) -> Result<(), FormatError> {
-        self.encode()?;
-        self.parquet.close()?;
-        Ok(())
-    }
+    Ok(parquet)
 }
 
 fn properties(catalog: &Catalog) -> Result<WriterProperties, FormatError> {

@@ -85,6 +85,7 @@ impl Dialect {
     pub const fn headers(self) -> &'static [(&'static str, &'static str)] {
         match self {
             Self::OpenaiChat | Self::OpenaiCompatible | Self::Gemini => &[],
+            // The next version, 2026-10-21, refuses a temperature, and the study has one.
             Self::AnthropicMessages => &[("anthropic-version", "2023-06-01")],
         }
     }

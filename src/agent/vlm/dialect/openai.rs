@@ -30,6 +30,10 @@ pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
 
 pub(super) fn answer(body: &Value) -> Option<Answer> {
     let choices = body.get("choices")?.as_array()?;
+    // A router that lost its provider in the middle of an answer says so in the choice, beside half a text.
+    if choices.first().is_some_and(|choice| choice["finish_reason"] == "error" || choice["error"].is_object()) {
+        return None;
+    }
     let usage = &body["usage"];
     let (reply, ending) = choices.first().map_or((String::new(), Ending::Whole), reply);
     Some(Answer {

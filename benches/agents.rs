@@ -1,0 +1,210 @@
+//! What waiting for a model costs: `make bench-agents` prints the steps a second that `record` reaches with an agent that
+//! answers at once, which is what drawing, counting and writing allow, and with a server on loopback that takes a second
+//! for each answer, 64 episodes in flight.
+//!
+//! 64 in flight and a second allow 64 steps a second at most: a machine that draws faster than that is kept waiting.
+//!
+//! E5 with frames and logs, on as many threads as there are cores; `STEPS` steps an episode (40 unless told). The server
+//! runs in the same process and shares its cores, as a provider would not.
+
+use std::fmt::Write as _;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::limits::Account;
+use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model};
+use mirrorstats::agent::vlm::provider::{Patience, Provider};
+use mirrorstats::agent::vlm::{OnOutage, Vlm};
+use mirrorstats::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
+use mirrorstats::record::metadata;
+use mirrorstats::record::plan::{Key, Plan, Shard};
+use mirrorstats::record::run::{Progress, Recording, Settings, Shares, Spent};
+use mirrorstats::record::store::Store;
+use mirrorstats::sim::Experiment;
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::trace::episode::Action;
+use tokio::runtime::Runtime;
+
+const IN_FLIGHT: usize = 64;
+const ANSWER_TAKES: Duration = Duration::from_secs(1);
+const REPLY: &str =
+    r#"{"view-description":"a wall","reasoning":"go on","action":"a","summary":"turned","identification":"unknown"}"#;
+
+/// Turns left, at once.
+struct AtOnce;
+
+impl Agent for AtOnce {
+    fn decide<'a>(&'a mut self, _: &'a Observation) -> Decision<'a> {
+        let reply = Reply {
+            status: Status::Ok,
+            repairs: Vec::new(),
+            action: Some(Action::TurnLeft),
+            self_color: None,
+            selected_cube: None,
+            words: Words::default(),
+            raw: Some(REPLY.to_owned()),
+            usage: Usage::default(),
+        };
+        Box::pin(std::future::ready(Ok(reply)))
+    }
+}
+
+impl Player for AtOnce {
+    fn model(&self) -> &'static str {
+        "at once"
+    }
+
+    fn description(&self) -> serde_json::Value {
+        "answers at once".into()
+    }
+
+    fn agent(&self, _: Task, _: &str) -> Result<Box<dyn Agent>, Lost> {
+        Ok(Box::new(Self))
+    }
+}
+
+/// A model behind the server.
+struct Behind {
+    vlm: Arc<Vlm>,
+    _network: Runtime,
+}
+
+impl Behind {
+    fn new(folder: &Path) -> Self {
+        let address = serve();
+        let network = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
+        let dialect = Dialect::OpenaiCompatible;
+        let provider = Provider::new(&address, dialect, "model", None, Patience::default(), IN_FLIGHT).unwrap();
+        let model = Model {
+            vendor: None,
+            backend: "loopback".into(),
+            id: "model".into(),
+            prices: None,
+            contract: Contract::Schema,
+        };
+        let backend = Backend { dialect, base_url: Some(address), key: "UNUSED".into() };
+        let choice = Choice { name: "a second".into(), model, backend };
+        let (handle, account) = (network.handle().clone(), Arc::<Account>::default());
+        let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account, OnOutage::Lose, 500);
+        Self { vlm: Arc::new(vlm), _network: network }
+    }
+}
+
+impl Player for Behind {
+    fn model(&self) -> &str {
+        &self.vlm.choice().name
+    }
+
+    fn description(&self) -> serde_json::Value {
+        self.vlm.description()
+    }
+
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
+        let agent = self.vlm.agent(task, &episode_id.replace('/', "-"));
+        Ok(Box::new(agent.map_err(|error| Lost::because(error.to_string()))?))
+    }
+}
+
+/// A server that takes a second for each answer, on a thread a connection.
+fn serve() -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = format!("http://{}/v1", listener.local_addr().unwrap());
+    thread::spawn(move || {
+        for stream in listener.incoming().flatten() {
+            thread::spawn(move || while answer(&stream).is_some() {});
+        }
+    });
+    address
+}
+
+/// Answers one request; `None` at the end of the connection.
+fn answer(stream: &TcpStream) -> Option<()> {
+    let mut reader = BufReader::new(stream);
+    let mut length = 0;
+    loop {
+        let mut line = String::new();
+        if reader.read_line(&mut line).ok()? == 0 {
+            return None;
+        }
+        if line == "\r\n" {
+            break;
+        }
+        if let Some(value) = line.to_ascii_lowercase().strip_prefix("content-length:") {
+            length = value.trim().parse().ok()?;
+        }
+    }
+    std::io::copy(&mut reader.take(length), &mut std::io::sink()).ok()?;
+    thread::sleep(ANSWER_TAKES);
+    let message = serde_json::json!({ "role": "assistant", "content": REPLY });
+    let body = serde_json::json!({
+        "choices": [{ "index": 0, "finish_reason": "stop", "message": message }],
+        "usage": { "prompt_tokens": 1000, "completion_tokens": 100 },
+    })
+    .to_string();
+    let mut answer = String::new();
+    write!(answer, "HTTP/1.1 200 OK\r\ncontent-type: application/json\r\ncontent-length: {}\r\n\r\n{body}", body.len())
+        .ok()?;
+    let mut stream = stream;
+    stream.write_all(answer.as_bytes()).ok()
+}
+
+struct Quiet;
+
+impl Progress for Quiet {
+    fn step(&self) {}
+
+    fn episode(&self, _: &str, _: usize) {}
+
+    fn lost(&self, id: &str, reason: &str) {
+        eprintln!("lost {id}: {reason}");
+    }
+}
+
+/// Steps a second of a recording, and where its time went.
+fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> (f64, Spent) {
+    let store = Store::open(&folder.join("runs"), player.model(), metadata::recording(config, player)).unwrap();
+    let plan = Plan { experiments: vec![Experiment::E5], seeds: 1, runs: 64, shard: Shard::WHOLE };
+    let keys: Vec<Key> = plan.keys();
+    let (shares, stop) = (Shares::default(), AtomicBool::new(false));
+    let in_flight = NonZeroUsize::new(IN_FLIGHT).unwrap();
+    let settings = Settings { threads, in_flight, frames: true, log: true };
+    let recording =
+        Recording { config, player, store: &store, progress: &Quiet, stop: &stop, shares: &shares, settings };
+    let start = Instant::now();
+    let tally = recording.run(&keys).unwrap();
+    #[expect(clippy::cast_precision_loss, reason = "some thousand steps")]
+    let rate = tally.steps as f64 / start.elapsed().as_secs_f64();
+    (rate, shares.spent())
+}
+
+fn print(name: &str, (rate, spent): (f64, Spent)) {
+    let parts = [spent.rendering, spent.census, spent.writing, spent.agent].map(|part| part.as_secs_f64());
+    let [rendering, census, writing, agent] = parts.map(|part| 100.0 * part / parts.iter().sum::<f64>());
+    println!(
+        "  {name:<20} {rate:6.1} steps/s   (rendering {rendering:.0} %, census {census:.0} %, writing {writing:.0} %, agents and waiting {agent:.0} %)"
+    );
+}
+
+fn main() {
+    // `cargo test` runs benches too, with nothing to measure.
+    if std::env::args().any(|argument| argument == "--test") {
+        return;
+    }
+    let steps = std::env::var("STEPS").ok().and_then(|steps| steps.parse().ok()).unwrap_or(40);
+    let config = WorldConfig::from_toml(&format!("episode.steps = {steps}")).expect("a number of steps is allowed");
+    let threads = thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+    println!("E5, 640 x 480, {threads} threads, {IN_FLIGHT} episodes of {steps} steps, all in flight");
+    let folder = tempfile::tempdir().expect("there is a place for temporary files");
+    let alone = measure(&config, &AtOnce, folder.path(), threads);
+    print("answers at once", alone);
+    let waiting = measure(&config, &Behind::new(folder.path()), folder.path(), threads);
+    print("answers in a second", waiting);
+    println!("  {:.1} % of what rendering alone allows", 100.0 * waiting.0 / alone.0);
+}

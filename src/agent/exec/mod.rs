@@ -1,0 +1,310 @@
+//! Agents that are programs of one's own: any command that takes JSON lines and gives JSON lines.
+//!
+//! | file | what it knows |
+//! |---|---|
+//! | [`message`] | the lines that a program is sent |
+//! | [`program`] | running it, and the names of what can go wrong |
+//! | [`group`] | that nothing of it stays behind |
+//!
+//! One process plays one episode. A reply is read as that of a model is: what is not the object asked for is a step
+//! without a decision. A program that ends, hangs or talks out of turn loses its episode, as a broken network does.
+//!
+//! Rule: a program sees the words and the frame that a model gets. It inherits the environment, keys included, but no
+//! value of a variable that holds a key is kept of what it says.
+
+pub mod group;
+pub mod message;
+pub mod program;
+
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use tempfile::TempDir;
+
+use self::group::Groups;
+use self::message::{EndMessage, Image, Message, ObservationMessage, PROTOCOL, Position, TaskMessage};
+use self::program::{Failure, Program};
+use super::prompt::{self, Prompt, Rendered};
+use super::reply::{self, Ending};
+use super::vlm::secrets::{Secret, from_every_key_variable};
+use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
+use crate::base::hash;
+
+/// What the shell's exit code says of a command that there is not, or that cannot be run.
+const NO_COMMAND: [i32; 2] = [126, 127];
+/// How the folder of an episode's frames begins: a name that a recording clears away.
+const FRAMES: &str = ".mirrorstats-frames-";
+
+/// How a program gets its frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Images {
+    /// As files, which are there until the episode ends.
+    #[default]
+    Path,
+    /// Within the line.
+    Base64,
+}
+
+impl Images {
+    /// The name in recordings.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Base64 => "base64",
+        }
+    }
+}
+
+/// A command, and how it is dealt with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// The name in tables.
+    pub model: String,
+    /// The command, for the shell.
+    pub command: String,
+    /// How frames are passed.
+    pub images: Images,
+    /// How long a reply may take; the first one includes the program's start.
+    pub timeout: Duration,
+    /// The folder in which each episode gets one for its frames.
+    pub scratch: PathBuf,
+}
+
+/// A command as a player.
+#[derive(Debug)]
+pub struct Exec {
+    shared: Arc<Shared>,
+}
+
+/// What the episodes share.
+#[derive(Debug)]
+struct Shared {
+    settings: Settings,
+    groups: Arc<Groups>,
+    secrets: Vec<Secret>,
+    /// Why no further episode makes sense, once there is such a reason.
+    stop: OnceLock<String>,
+}
+
+impl Exec {
+    /// A player that runs the command once an episode.
+    pub fn new(settings: Settings) -> Self {
+        let (groups, secrets, stop) = (Arc::default(), from_every_key_variable(), OnceLock::new());
+        Self { shared: Arc::new(Shared { settings, groups, secrets, stop }) }
+    }
+}
+
+impl Player for Exec {
+    fn model(&self) -> &str {
+        &self.shared.settings.model
+    }
+
+    /// The command by its hash: as typed it may hold paths of a machine, or a key.
+    fn description(&self) -> serde_json::Value {
+        let Settings { model, command, images, .. } = &self.shared.settings;
+        serde_json::json!({
+            "exec": model,
+            "command": hash::of_bytes(command.as_bytes()),
+            "protocol": PROTOCOL,
+            "images": images.name(),
+            "prompts": prompt::hashes(),
+            "identification_version": super::identification::VERSION,
+        })
+    }
+
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
+        let shared = Arc::clone(&self.shared);
+        let prompt = Prompt::of(task.family).map_err(unusable)?;
+        let frames = match shared.settings.images {
+            Images::Path => Some(Frames::new(&shared.settings.scratch)?),
+            Images::Base64 => None,
+        };
+        let program = Program::start(&shared.settings.command, &shared.groups).map_err(|failure| lost(&failure))?;
+        Ok(Box::new(ExecAgent {
+            shared,
+            task,
+            episode_id: episode_id.to_owned(),
+            prompt,
+            frames,
+            program: Some(program),
+            steps: 0,
+        }))
+    }
+
+    fn stopped(&self) -> Option<String> {
+        self.shared.stop.get().cloned()
+    }
+
+    fn abandon(&self) {
+        self.shared.groups.kill_all();
+    }
+}
+
+/// A program in one episode.
+#[derive(Debug)]
+struct ExecAgent {
+    shared: Arc<Shared>,
+    task: Task,
+    episode_id: String,
+    prompt: Prompt,
+    frames: Option<Frames>,
+    /// `None` once it is of no use.
+    program: Option<Program>,
+    steps: i32,
+}
+
+impl Agent for ExecAgent {
+    fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
+        Box::pin(self.step(observation))
+    }
+
+    fn end(&mut self, reason: Ended) -> Farewell<'_> {
+        let (program, steps) = (self.program.take(), self.steps);
+        Box::pin(async move {
+            let Some(program) = program else { return };
+            if let Ok(line) = Message::End(EndMessage { reason, steps }).line() {
+                program.end(&line).await;
+            }
+        })
+    }
+}
+
+impl ExecAgent {
+    async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
+        self.steps = observation.t;
+        let lines = self.lines(observation)?;
+        let Some(program) = &mut self.program else { return Err(Lost::because("the program has ended")) };
+        let start = Instant::now();
+        match program.ask(&lines, self.shared.settings.timeout).await {
+            Ok(line) => Ok(self.read(&line, start.elapsed())),
+            Err(failure) => Err(self.give_up(&failure).await),
+        }
+    }
+
+    /// The observation, and before the first one the task.
+    fn lines(&self, observation: &Observation) -> Result<Vec<u8>, Lost> {
+        let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(unusable)?;
+        let task = (self.steps == 1).then(|| self.task_message(system));
+        let messages = task.into_iter().chain([self.observation_message(observation, user)?]);
+        let lines = messages.map(|message| message.line()).collect::<Result<Vec<_>, _>>();
+        Ok(lines.map_err(unusable)?.concat())
+    }
+
+    fn task_message(&self, system_prompt: String) -> Message {
+        let experiment = self.episode_id.split('/').next().unwrap_or_default().to_owned();
+        Message::Task(TaskMessage {
+            protocol: PROTOCOL,
+            episode_id: self.episode_id.clone(),
+            experiment,
+            family: self.task.family.into(),
+            stated_color: self.task.stated_color.clone(),
+            max_steps: self.task.step_budget,
+            seed: self.task.seed,
+            system_prompt,
+            reply_schema: reply::schema(self.task.family),
+        })
+    }
+
+    fn observation_message(&self, observation: &Observation, user_prompt: String) -> Result<Message, Lost> {
+        let png = observation.frame.to_png().map_err(unusable)?;
+        let image = match &self.frames {
+            Some(frames) => Image::Path(frames.keep(observation.t, png)?),
+            None => Image::Base64(STANDARD.encode(png)),
+        };
+        let (last_action, last_thought) = observation.history.clone().unwrap_or_default();
+        Ok(Message::Observation(ObservationMessage {
+            t: observation.t,
+            remaining_steps: observation.remaining,
+            position: Position { x: observation.x, y: observation.y },
+            orientation: observation.yaw,
+            wall_warning: observation.bumped,
+            last_action: last_action.map(|action| prompt::letter(action).to_owned()),
+            last_thought,
+            user_prompt,
+            image,
+        }))
+    }
+
+    /// The reply in a line, read as that of a model.
+    fn read(&self, line: &[u8], latency: Duration) -> Reply {
+        let usage =
+            Usage { latency_ms: Some(i32::try_from(latency.as_millis()).unwrap_or(i32::MAX)), ..Usage::default() };
+        match str::from_utf8(line) {
+            Ok(text) => {
+                let text = self.shared.without_secrets(text);
+                reply::read(&text, self.task.family, Ending::Whole).into_reply(text, usage)
+            }
+            // With its bytes replaced it might pass for something that the program did not say.
+            Err(_) => Reply {
+                status: Status::ParseFailed,
+                repairs: Vec::new(),
+                action: None,
+                self_color: None,
+                selected_cube: None,
+                words: Words::default(),
+                raw: Some(self.shared.without_secrets(&String::from_utf8_lossy(line))),
+                usage,
+            },
+        }
+    }
+
+    /// The program is of no use any more, nor is any other if the command cannot be run at all.
+    async fn give_up(&mut self, failure: &Failure) -> Lost {
+        let Some(program) = self.program.take() else { return lost(failure) };
+        let Lost { status, cause } = lost(failure);
+        let words = program.last_words().await.map_or_else(String::new, |words| format!("; its last words: {words}"));
+        let cause = self.shared.without_secrets(&format!("step {}: {cause}{words}", self.steps));
+        if let Failure::Ended(status) = failure
+            && self.steps == 1
+            && status.code().is_some_and(|code| NO_COMMAND.contains(&code))
+        {
+            self.shared.stop.get_or_init(|| format!("the command of --agent exec: cannot be run: {cause}"));
+        }
+        Lost { status, cause }
+    }
+}
+
+impl Shared {
+    fn without_secrets(&self, text: &str) -> String {
+        self.secrets.iter().fold(text.to_owned(), |text, secret| secret.without(&text))
+    }
+}
+
+fn lost(failure: &Failure) -> Lost {
+    let status = match failure {
+        Failure::Slow(_) => Status::Timeout,
+        _ => Status::ServerError,
+    };
+    Lost { status: Some(status), cause: failure.to_string() }
+}
+
+/// Something between the world and the program cannot be made.
+fn unusable(fault: impl std::fmt::Display) -> Lost {
+    Lost::because(format!("the observation cannot be made: {fault}"))
+}
+
+/// The frames of one episode as files.
+#[derive(Debug)]
+struct Frames(TempDir);
+
+impl Frames {
+    fn new(scratch: &Path) -> Result<Self, Lost> {
+        let made =
+            std::path::absolute(scratch).and_then(|folder| tempfile::Builder::new().prefix(FRAMES).tempdir_in(folder));
+        made.map(Self).map_err(|fault| unusable(crate::base::temporary::without_name(fault)))
+    }
+
+    /// Writes a frame and says where it is.
+    fn keep(&self, t: i32, png: &[u8]) -> Result<String, Lost> {
+        let path = self.0.path().join(format!("{t:03}.png"));
+        std::fs::write(&path, png).map_err(unusable)?;
+        path.into_os_string().into_string().map_err(|_| {
+            unusable(
+                "the folder's name is not UTF-8, which JSON cannot hold\n  help: --exec-images base64 needs no file",
+            )
+        })
+    }
+}

@@ -1,0 +1,122 @@
+//! `mirrorstats import`: JSON lines of steps, of whatever harness, as a trace.
+
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::base::visible::visible;
+use crate::cli::listing::counted;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{output, scoring};
+use crate::trace::import::{self, Text};
+use crate::trace::inputs::Input;
+use crate::trace::schema::Kind;
+
+/// Make a trace of JSON lines of steps, so that episodes of any harness can be scored
+///
+/// One line is one step: an object with the columns of the schema as keys, as `mirrorstats schema step` prints them.
+/// Other keys become columns of their own. Lines of an episode may be in any order and in several files. The trace holds
+/// every line and keeps every rule of `mirrorstats validate`, or nothing is written.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ImportArgs {
+    /// Files of JSON lines, `-` for standard input
+    #[arg(value_name = "STEPS.jsonl", required = true)]
+    steps: Vec<PathBuf>,
+    /// The trace to write
+    #[arg(short, long, value_name = "TRACE.parquet")]
+    out: PathBuf,
+    /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
+    definitions: String,
+    /// Answer as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was written.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ImportAnswer {
+    /// The trace, as typed.
+    pub out: String,
+    /// How many episodes it has.
+    pub episodes: usize,
+    /// How many rows it has, one a line.
+    pub steps: usize,
+    /// Columns of the schema that it has.
+    pub columns: Vec<String>,
+    /// Columns that the schema does not know.
+    pub own_columns: Vec<OwnColumn>,
+}
+
+/// A column that the schema does not know.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct OwnColumn {
+    /// Its name, the key of the lines.
+    pub name: String,
+    /// What it holds; null where every line says null.
+    #[serde(rename = "type")]
+    pub kind: Option<Kind>,
+}
+
+impl ImportArgs {
+    /// Imports.
+    ///
+    /// # Errors
+    /// Lines that are no steps, episodes that are not whole, a file that cannot be read or written.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let experiments = scoring::known_experiments(&self.definitions)?;
+        self.check_places()?;
+        let mut texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
+        let imported = import::import(&mut texts, &self.out, experiments.as_deref()).map_err(Failure::input)?;
+        let own = imported.own.into_iter().map(|own| OwnColumn { name: own.name, kind: own.kind });
+        let answer = ImportAnswer {
+            out: Input::new(&self.out).name,
+            episodes: imported.episodes,
+            steps: imported.steps,
+            columns: imported.columns.into_iter().map(str::to_owned).collect(),
+            own_columns: own.collect(),
+        };
+        output::print(&answer, self.json)
+    }
+
+    /// Standard input is there once, and no file is written over its own lines.
+    fn check_places(&self) -> Result<(), Failure> {
+        if self.steps.iter().filter(|path| is_standard_input(path)).count() > 1 {
+            let words = "error: `-`: expected standard input once, found it twice\n  help: name it once";
+            return Err(Failure::Rendered(words.to_owned()));
+        }
+        let Ok(out) = self.out.canonicalize() else { return Ok(()) };
+        match self.steps.iter().find(|path| path.canonicalize().is_ok_and(|path| path == out)) {
+            None => Ok(()),
+            Some(path) => Err(Failure::Rendered(format!(
+                "error: {}: expected another file to write, found the steps themselves\n  help: give another --out",
+                Input::new(path).name
+            ))),
+        }
+    }
+}
+
+fn text(path: &Path) -> Result<Text, Failure> {
+    let text = if is_standard_input(path) { Text::spool("standard input", io::stdin()) } else { Text::open(path) };
+    text.map_err(Failure::input)
+}
+
+fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}
+
+impl fmt::Display for ImportAnswer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (episodes, steps) = (counted(self.episodes as u64, "episode"), counted(self.steps as u64, "step"));
+        writeln!(f, "imported {episodes}, {steps} into {}", self.out)?;
+        if self.own_columns.is_empty() {
+            return Ok(());
+        }
+        let kind = |column: &OwnColumn| column.kind.map_or("null in every line", Kind::name);
+        let own = self.own_columns.iter().map(|column| format!("{} ({})", visible(&column.name), kind(column)));
+        writeln!(f, "columns that the schema does not know: {}", own.collect::<Vec<_>>().join(", "))
+    }
+}

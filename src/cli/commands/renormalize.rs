@@ -1,0 +1,242 @@
+//! `mirrorstats renormalize`: the attributions of old traces by the rule of this program.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use tempfile::NamedTempFile;
+
+use crate::agent::identification::VERSION;
+use crate::agent::renormalize::{Old, Renormalized};
+use crate::base::visible::visible;
+use crate::cli::args::TraceArgs;
+use crate::cli::listing::{aligned_right, counted, listing};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{output, scoring};
+use crate::trace::finding::{Severity, TraceError};
+use crate::trace::inputs::Input;
+use crate::trace::validate::validate;
+
+/// Make the attributions of old traces anew from the texts of `identification`
+///
+/// Writes each trace again under its name into another folder, with `self_color` as this program reads the texts, and
+/// prints every step whose attribution changes. Steps without a text, all other columns and the rest of the recording's
+/// metadata stay as they are. All traces are written, or none.
+#[derive(Clone, Debug, clap::Args)]
+pub struct RenormalizeArgs {
+    #[command(flatten)]
+    input: TraceArgs,
+    /// The folder to write the new traces to; never that of the old ones
+    #[arg(short, long, value_name = "DIR", required_unless_present = "dry_run")]
+    out: Option<PathBuf>,
+    /// Write nothing, only print what changes
+    #[arg(long)]
+    dry_run: bool,
+    /// Exit with 1 if an attribution changes
+    #[arg(long)]
+    fail_on_change: bool,
+    /// Print what changes as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What changes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RenormalizeAnswer {
+    /// The version of the rule of this program.
+    pub identification_version: String,
+    /// Whether new traces were written.
+    pub written: bool,
+    /// The traces, by name.
+    pub files: Vec<RenormalizedFile>,
+    /// Every step whose attribution changes, by file and row.
+    pub flips: Vec<Flip>,
+}
+
+/// One trace.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RenormalizedFile {
+    /// The old trace.
+    pub name: String,
+    /// The new one; null with --dry-run.
+    pub out: Option<String>,
+    /// The version of the rule that the old trace tells; null where it tells none.
+    pub version_before: Option<String>,
+    /// How many steps it has.
+    pub steps: u64,
+    /// How many of them have a text.
+    pub texts: u64,
+    /// How many of them change.
+    pub flips: usize,
+}
+
+/// A step whose attribution changes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Flip {
+    /// The trace.
+    pub file: String,
+    /// The episode.
+    pub episode_id: String,
+    /// The timestep.
+    pub t: i64,
+    /// The attribution of the old trace; null where it has none.
+    pub before: Option<String>,
+    /// The attribution of the new one; null where the text holds none.
+    pub after: Option<String>,
+    /// The text behind both.
+    pub identification: String,
+}
+
+impl RenormalizeArgs {
+    /// Renormalizes.
+    ///
+    /// # Errors
+    /// Traces that break a rule or have no texts, an output that would be an input, whatever writing gives.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let inputs = scoring::resolve(&self.input)?;
+        let places = self.places(&inputs)?;
+        let old = inputs.iter().map(Old::open).collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+        self.check(&inputs)?;
+        let mut answer = RenormalizeAnswer {
+            identification_version: VERSION.to_owned(),
+            written: places.is_some(),
+            files: Vec::new(),
+            flips: Vec::new(),
+        };
+        let mut new = Vec::new();
+        for (at, (input, old)) in inputs.iter().zip(&old).enumerate() {
+            let place = places.as_ref().map(|places| places[at].as_path());
+            let (file, result) = renormalized(old, place)?;
+            new.extend(file.zip(place));
+            answer.add(input, place, result);
+        }
+        for (file, place) in new {
+            output::persist(file, place)?;
+        }
+        output::print(&answer, self.json)?;
+        let has_failed = self.fail_on_change && !answer.flips.is_empty();
+        Ok(if has_failed { Outcome::CheckFailed } else { Outcome::Done })
+    }
+
+    /// Where each trace goes; `None` if nothing is written. The folder is made.
+    fn places(&self, inputs: &[Input]) -> Result<Option<Vec<PathBuf>>, Failure> {
+        let Some(folder) = self.out.as_deref().filter(|_| !self.dry_run) else { return Ok(None) };
+        let mut taken: BTreeMap<PathBuf, &Input> = BTreeMap::new();
+        let mut places = Vec::new();
+        for input in inputs {
+            let place = folder.join(input.path.file_name().unwrap_or_default());
+            if let Some(other) = taken.insert(place.clone(), input) {
+                return Err(refused(input, &format!("a name of its own in {}", folder.display()), &other.name));
+            }
+            places.push(place);
+        }
+        for (place, input) in inputs.iter().flat_map(|input| places.iter().map(move |place| (place, input))) {
+            if is_same(place, &input.path) {
+                return Err(refused(input, "another folder for the new trace", "the trace itself"));
+            }
+        }
+        fs::create_dir_all(folder).map_err(|error| {
+            let words = "help: is there a file of that name, and is the folder above it writable?";
+            Failure::Rendered(format!("error: cannot make the folder `{}`: {error}\n  {words}", folder.display()))
+        })?;
+        Ok(Some(places))
+    }
+
+    /// Holds the traces against every rule of the schema; what is copied is not looked at again.
+    fn check(&self, inputs: &[Input]) -> Result<(), Failure> {
+        let report = validate(inputs, None, self.input.threads.count()).map_err(Failure::input)?;
+        let errors = report.findings.into_iter().filter(|finding| finding.severity == Severity::Error).collect();
+        TraceError::of(errors).map_or(Ok(()), |error| Err(Failure::input(error)))
+    }
+}
+
+/// The new trace in a temporary file beside its place, and what changes in it.
+fn renormalized(old: &Old, place: Option<&Path>) -> Result<(Option<NamedTempFile>, Renormalized), Failure> {
+    let Some(place) = place else {
+        let (_, result) = old.renormalize(std::io::sink()).map_err(Failure::input)?;
+        return Ok((None, result));
+    };
+    let (file, result) = old.renormalize(output::beside(place)?).map_err(Failure::input)?;
+    Ok((Some(file), result))
+}
+
+fn is_same(a: &Path, b: &Path) -> bool {
+    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
+}
+
+fn refused(input: &Input, expected: &str, found: &str) -> Failure {
+    let help = "help: give another --out, or fewer traces at a time";
+    Failure::Rendered(format!("error: {}: expected {expected}, found {found}\n  {help}", input.name))
+}
+
+impl RenormalizeAnswer {
+    fn add(&mut self, input: &Input, place: Option<&Path>, result: Renormalized) {
+        self.files.push(RenormalizedFile {
+            name: input.name.clone(),
+            out: place.map(|place| Input::new(place).name),
+            version_before: result.version_before,
+            steps: result.steps,
+            texts: result.texts,
+            flips: result.flips.len(),
+        });
+        self.flips.extend(result.flips.into_iter().map(|flip| Flip {
+            file: input.name.clone(),
+            episode_id: flip.episode_id,
+            t: flip.t,
+            before: flip.before,
+            after: flip.after,
+            identification: flip.identification,
+        }));
+    }
+}
+
+/// The most characters of a text in the table; `--json` has all.
+const LONGEST: usize = 80;
+
+impl fmt::Display for RenormalizeAnswer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.flips.is_empty() {
+            let mut table = listing(["episode", "t", "before", "after", "identification"]);
+            let name = |color: &Option<String>| visible(color.as_deref().unwrap_or("--")).to_string();
+            for flip in &self.flips {
+                table.add_row([
+                    visible(&flip.episode_id).to_string(),
+                    flip.t.to_string(),
+                    name(&flip.before),
+                    name(&flip.after),
+                    shortened(&flip.identification),
+                ]);
+            }
+            writeln!(f, "{}\n", aligned_right(table, [1]).trim_fmt())?;
+        }
+        let sum = |of: fn(&RenormalizedFile) -> u64| self.files.iter().map(of).sum::<u64>();
+        let (flips, texts) = (counted(self.flips.len() as u64, "attribution"), sum(|file| file.texts));
+        let (steps, files) = (counted(sum(|file| file.steps), "step"), counted(self.files.len() as u64, "trace"));
+        let verb = if self.flips.len() == 1 { "changes" } else { "change" };
+        write!(f, "{flips} {verb} of {texts} with a text, in {steps} of {files}")?;
+        writeln!(f, "; identification version {}{}", self.versions_before(), self.identification_version)?;
+        if self.written { Ok(()) } else { writeln!(f, "nothing was written") }
+    }
+}
+
+impl RenormalizeAnswer {
+    /// `0 -> ` where the traces tell other versions than this one.
+    fn versions_before(&self) -> String {
+        let mut before: Vec<&str> = self.files.iter().filter_map(|file| file.version_before.as_deref()).collect();
+        before.retain(|version| *version != self.identification_version);
+        before.sort_unstable();
+        before.dedup();
+        if before.is_empty() { String::new() } else { format!("{} -> ", visible(&before.join(", "))) }
+    }
+}
+
+fn shortened(text: &str) -> String {
+    let line = visible(text).to_string();
+    if line.chars().count() <= LONGEST {
+        return line;
+    }
+    line.chars().take(LONGEST).chain("...".chars()).collect()
+}

@@ -1,0 +1,370 @@
+//! One column of one row group, read some rows at a time.
+
+use std::fs::File;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray, BooleanBufferBuilder};
+use arrow::buffer::{BooleanBuffer, NullBuffer};
+use arrow::datatypes::DataType;
+use arrow::util::bit_chunk_iterator::UnalignedBitChunk;
+use bytes::Bytes;
+use parquet::basic::{Encoding, Type as Physical};
+use parquet::column::page::{Page, PageReader};
+use parquet::file::metadata::ColumnChunkMetaData;
+
+use super::super::column::{Column, Runs};
+use super::Unfit;
+use super::chunk::pages;
+use super::dictionary::Dictionary;
+use super::hybrid::{Hybrid, Span};
+
+/// Where the reading of a column is.
+pub(in super::super) struct Cursor {
+    pages: Box<dyn PageReader>,
+    physical: Physical,
+    /// Whether there may be nulls.
+    optional: bool,
+    /// Whether rows are to be held as runs.
+    runs: bool,
+    dictionary: Option<Dictionary>,
+    page: Option<DataPage>,
+    /// Rows of the column that no page has given yet.
+    unread: usize,
+}
+
+/// A page of values and what is left of it.
+struct DataPage {
+    rows: usize,
+    /// One bit a row: whether there is a value.
+    levels: Option<Hybrid>,
+    values: Stored,
+}
+
+enum Stored {
+    /// Keys into the dictionary, or runs of truth values.
+    Hybrid(Hybrid),
+    /// Truth values from this bit on.
+    Bits(Bytes, usize),
+}
+
+/// Rows in the making.
+struct Rows {
+    nulls: Option<BooleanBufferBuilder>,
+    keys: Vec<i32>,
+    /// Ends of runs, where rows are held as those; `keys` has a key a run then.
+    ends: Vec<u32>,
+    bits: BooleanBufferBuilder,
+}
+
+impl Cursor {
+    /// A column that is stored as `stored` and read as rows or as runs.
+    pub(in super::super) fn open(
+        file: &File,
+        column: &ColumnChunkMetaData,
+        stored: &DataType,
+        rows: usize,
+        runs: bool,
+    ) -> Result<Self, Unfit> {
+        let about = column.column_descr();
+        let physical = about.physical_type();
+        let known = match stored {
+            DataType::Boolean => physical == Physical::BOOLEAN,
+            DataType::Int32 => physical == Physical::INT32,
+            DataType::Int64 => physical == Physical::INT64,
+            DataType::Dictionary(_, _) => physical == Physical::BYTE_ARRAY,
+            _ => false,
+        };
+        let alone = about.max_rep_level() == 0 && about.max_def_level() <= 1 && about.path().parts().len() == 1;
+        let whole = usize::try_from(column.num_values()).is_ok_and(|values| values == rows);
+        let keyed = physical == Physical::BOOLEAN || column.dictionary_page_offset().is_some();
+        if !(known && alone && whole && keyed) {
+            return Err(Unfit);
+        }
+        Ok(Self {
+            pages: pages(file, column, rows)?,
+            physical,
+            optional: about.max_def_level() == 1,
+            runs: runs && physical != Physical::BOOLEAN,
+            dictionary: None,
+            page: None,
+            unread: rows,
+        })
+    }
+
+    /// The next rows.
+    pub(in super::super) fn read(&mut self, count: usize) -> Result<Column, Unfit> {
+        let mut rows = Rows {
+            nulls: self.optional.then(|| BooleanBufferBuilder::new(count)),
+            keys: Vec::with_capacity(if self.runs || self.physical == Physical::BOOLEAN { 0 } else { count }),
+            ends: Vec::new(),
+            bits: BooleanBufferBuilder::new(if self.physical == Physical::BOOLEAN { count } else { 0 }),
+        };
+        let mut left = count;
+        while left > 0 {
+            let page = self.page()?;
+            let part = left.min(page.rows);
+            page.rows -= part;
+            left -= part;
+            self.unread -= part;
+            self.rows(part, &mut rows)?;
+        }
+        if self.unread == 0 && self.page.as_ref().is_none_or(|page| page.rows == 0) && self.next_page()?.is_some() {
+            return Err(Unfit);
+        }
+        self.finish(rows, count)
+    }
+
+    /// The page under way, which has rows left.
+    fn page(&mut self) -> Result<&mut DataPage, Unfit> {
+        while self.page.as_ref().is_none_or(|page| page.rows == 0) {
+            self.page = Some(self.next_page()?.ok_or(Unfit)?);
+        }
+        self.page.as_mut().ok_or(Unfit)
+    }
+
+    /// The next page with values, the dictionary before it taken in.
+    fn next_page(&mut self) -> Result<Option<DataPage>, Unfit> {
+        loop {
+            let Some(page) = self.pages.get_next_page().map_err(|_| Unfit)? else { return Ok(None) };
+            match page {
+                Page::DictionaryPage { buf, num_values, encoding, .. } => {
+                    if self.dictionary.is_some() || !matches!(encoding, Encoding::PLAIN | Encoding::PLAIN_DICTIONARY) {
+                        return Err(Unfit);
+                    }
+                    let count = num_values as usize;
+                    self.dictionary = Some(match self.physical {
+                        Physical::BYTE_ARRAY => Dictionary::texts(&buf, count)?,
+                        Physical::INT32 => Dictionary::ints(&buf, count, false)?,
+                        _ => Dictionary::ints(&buf, count, true)?,
+                    });
+                }
+                Page::DataPage { buf, num_values, encoding, def_level_encoding, .. } => {
+                    let (levels, values) = match self.optional {
+                        true if def_level_encoding == Encoding::RLE => {
+                            let (levels, values) = prefixed(&buf)?;
+                            (Some(levels), values)
+                        }
+                        true => return Err(Unfit),
+                        false => (None, buf),
+                    };
+                    return self.data_page(num_values, levels, values, encoding).map(Some);
+                }
+                Page::DataPageV2 { buf, num_values, encoding, def_levels_byte_len, rep_levels_byte_len, .. } => {
+                    let start = rep_levels_byte_len as usize;
+                    let end = start + def_levels_byte_len as usize;
+                    if end > buf.len() {
+                        return Err(Unfit);
+                    }
+                    let levels = self.optional.then(|| buf.slice(start..end));
+                    return self.data_page(num_values, levels, buf.slice(end..), encoding).map(Some);
+                }
+            }
+        }
+    }
+
+    fn data_page(
+        &self,
+        rows: u32,
+        levels: Option<Bytes>,
+        values: Bytes,
+        encoding: Encoding,
+    ) -> Result<DataPage, Unfit> {
+        let rows = rows as usize;
+        if rows > self.unread {
+            return Err(Unfit);
+        }
+        let levels = levels.map(|levels| Hybrid::new(levels, 1)).transpose()?;
+        let values = match (self.physical, encoding) {
+            (Physical::BOOLEAN, Encoding::PLAIN) => Stored::Bits(values, 0),
+            (Physical::BOOLEAN, Encoding::RLE) => Stored::Hybrid(Hybrid::new(prefixed(&values)?.0, 1)?),
+            (Physical::BOOLEAN, _) => return Err(Unfit),
+            (_, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) if self.dictionary.is_some() => {
+                // A page of nothing but nulls may have no width at all.
+                let (width, keys) = if values.is_empty() { (0, values) } else { (values[0], values.slice(1..)) };
+                Stored::Hybrid(Hybrid::new(keys, width)?)
+            }
+            _ => return Err(Unfit),
+        };
+        Ok(DataPage { rows, levels, values })
+    }
+
+    /// Takes rows out of the page.
+    fn rows(&mut self, count: usize, rows: &mut Rows) -> Result<(), Unfit> {
+        let page = self.page.as_mut().ok_or(Unfit)?;
+        let values = match (&mut page.levels, &mut rows.nulls) {
+            (Some(levels), Some(nulls)) => validity(levels, count, nulls)?,
+            _ => count,
+        };
+        if self.physical == Physical::BOOLEAN {
+            page.values.bits(values, &mut rows.bits)
+        } else if self.runs && values == count {
+            page.values.runs(values, rows)
+        } else if self.runs {
+            // Nulls among rows that are to be runs: rare, and the library's to decode.
+            Err(Unfit)
+        } else {
+            page.values.keys(values, &mut rows.keys)
+        }
+    }
+
+    fn finish(&self, mut rows: Rows, count: usize) -> Result<Column, Unfit> {
+        let nulls = rows.nulls.map(|mut nulls| NullBuffer::new(nulls.finish())).filter(|nulls| nulls.null_count() > 0);
+        if self.physical == Physical::BOOLEAN {
+            let bits = rows.bits.finish();
+            let bits = nulls.as_ref().map_or_else(|| bits.clone(), |nulls| spread_bits(&bits, nulls.inner()));
+            return Ok(Column::Flat(Arc::new(BooleanArray::new(bits, nulls)) as ArrayRef));
+        }
+        let dictionary = self.dictionary.as_ref().ok_or(Unfit)?;
+        if self.runs {
+            return Ok(Column::Runs(Runs::new(dictionary.values(rows.keys, None)?, rows.ends)));
+        }
+        let keys = match &nulls {
+            Some(nulls) => spread_keys(&rows.keys, nulls.inner()),
+            None => rows.keys,
+        };
+        if keys.len() == count { dictionary.values(keys, nulls).map(Column::Flat) } else { Err(Unfit) }
+    }
+}
+
+impl Stored {
+    fn hybrid(&mut self) -> Result<&mut Hybrid, Unfit> {
+        match self {
+            Self::Hybrid(hybrid) => Ok(hybrid),
+            Self::Bits(..) => Err(Unfit),
+        }
+    }
+
+    fn keys(&mut self, mut count: usize, keys: &mut Vec<i32>) -> Result<(), Unfit> {
+        while count > 0 {
+            match self.hybrid()?.span(count)? {
+                Span::Same { value, count: same } => {
+                    keys.extend(std::iter::repeat_n(value.cast_signed(), same));
+                    count -= same;
+                }
+                Span::Packed(packed) => {
+                    packed.append(keys);
+                    count -= packed.count;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn runs(&mut self, mut count: usize, rows: &mut Rows) -> Result<(), Unfit> {
+        while count > 0 {
+            match self.hybrid()?.span(count)? {
+                Span::Same { value, count: same } => {
+                    rows.run(value.cast_signed(), same)?;
+                    count -= same;
+                }
+                Span::Packed(packed) => {
+                    let mut outcome = Ok(());
+                    packed.each(|value| {
+                        if let Err(unfit) = rows.run(value.cast_signed(), 1) {
+                            outcome = Err(unfit);
+                        }
+                    });
+                    outcome?;
+                    count -= packed.count;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn bits(&mut self, mut count: usize, bits: &mut BooleanBufferBuilder) -> Result<(), Unfit> {
+        match self {
+            Self::Bits(data, at) => {
+                let end = *at + count;
+                if end > data.len() * 8 {
+                    return Err(Unfit);
+                }
+                bits.append_packed_range(*at..end, data);
+                *at = end;
+            }
+            Self::Hybrid(hybrid) => {
+                while count > 0 {
+                    count -= append(hybrid.span(count)?, bits).0;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Rows {
+    /// Adds rows of one key.
+    fn run(&mut self, key: i32, count: usize) -> Result<(), Unfit> {
+        let count = u32::try_from(count).map_err(|_| Unfit)?;
+        match (self.keys.last(), self.ends.last_mut()) {
+            (Some(last), Some(end)) if *last == key => *end += count,
+            (_, end) => {
+                let before = end.map_or(0, |end| *end);
+                self.keys.push(key);
+                self.ends.push(before + count);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Adds numbers of one bit: how many, and how many of them are 1.
+fn append(span: Span<'_>, bits: &mut BooleanBufferBuilder) -> (usize, usize) {
+    match span {
+        Span::Same { value, count } => {
+            bits.append_n(count, value & 1 == 1);
+            (count, if value & 1 == 1 { count } else { 0 })
+        }
+        Span::Packed(packed) => {
+            let (data, start) = packed.bits();
+            bits.append_packed_range(start..start + packed.count, data);
+            (packed.count, UnalignedBitChunk::new(data, start, packed.count).count_ones())
+        }
+    }
+}
+
+/// Which of the next rows have a value, and how many do.
+fn validity(levels: &mut Hybrid, count: usize, nulls: &mut BooleanBufferBuilder) -> Result<usize, Unfit> {
+    let (mut left, mut valid) = (count, 0);
+    while left > 0 {
+        let (rows, ones) = append(levels.span(left)?, nulls);
+        left -= rows;
+        valid += ones;
+    }
+    Ok(valid)
+}
+
+/// The length that stands before some bytes, what it bounds, and what comes after.
+fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unfit> {
+    let length = data.first_chunk().map(|length| u32::from_le_bytes(*length)).ok_or(Unfit)?;
+    let end = usize::try_from(length).ok().and_then(|length| length.checked_add(4)).ok_or(Unfit)?;
+    if end > data.len() {
+        return Err(Unfit);
+    }
+    Ok((data.slice(4..end), data.slice(end..)))
+}
+
+/// The keys of rows that have one, at their rows.
+fn spread_keys(keys: &[i32], valid: &BooleanBuffer) -> Vec<i32> {
+    let mut spread = vec![0; valid.len()];
+    let mut keys = keys;
+    for (start, end) in valid.set_slices() {
+        let (here, rest) = keys.split_at(keys.len().min(end - start));
+        spread[start..start + here.len()].copy_from_slice(here);
+        keys = rest;
+    }
+    spread
+}
+
+/// The bits of rows that have one, at their rows.
+fn spread_bits(bits: &BooleanBuffer, valid: &BooleanBuffer) -> BooleanBuffer {
+    let mut spread = BooleanBufferBuilder::new(valid.len());
+    let mut taken = 0;
+    for (start, end) in valid.set_slices() {
+        spread.append_n(start - spread.len(), false);
+        spread.append_buffer(&bits.slice(taken, end - start));
+        taken += end - start;
+    }
+    spread.append_n(valid.len() - spread.len(), false);
+    spread.finish()
+}

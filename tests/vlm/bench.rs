@@ -1,0 +1,100 @@
+//! One model against one server, without a world: steps that are asked for by hand.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::limits::{Account, Limits, Spend};
+use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
+use mirrorstats::agent::vlm::provider::{Patience, Provider};
+use mirrorstats::agent::vlm::secrets::Secret;
+use mirrorstats::agent::vlm::{OnOutage, Vlm};
+use mirrorstats::agent::{Agent as _, Family, Lost, Observation, Reply, Task};
+use mirrorstats::base::frame::Frame;
+use tempfile::TempDir;
+use tokio::runtime::Runtime;
+
+use super::server::Server;
+
+pub const KEY: &str = "sk-loopback-0123456789";
+
+/// Patient enough for a busy machine; waits between attempts are short.
+pub fn patience() -> Patience {
+    Patience {
+        attempts: 3,
+        timeout: Duration::from_secs(20),
+        first_delay: Duration::from_millis(2),
+        longest_delay: Duration::from_millis(4),
+        longest_asked_delay: Duration::from_millis(30),
+        largest_answer: 100_000,
+        ..Patience::default()
+    }
+}
+
+pub fn choice(dialect: Dialect) -> Choice {
+    let prices = Some(Prices { input: 1.0, output: 10.0 });
+    Choice {
+        name: "Loopback".to_owned(),
+        model: Model {
+            vendor: None,
+            backend: "loopback".to_owned(),
+            id: "model-1".to_owned(),
+            prices,
+            contract: Contract::Schema,
+        },
+        backend: Backend { dialect, base_url: None, key: "UNUSED".to_owned() },
+    }
+}
+
+pub struct Bench {
+    pub folder: TempDir,
+    network: Runtime,
+    account: Arc<Account>,
+}
+
+impl Bench {
+    pub fn new(limits: Limits) -> Self {
+        let network = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
+        let account = Arc::new(Account::new(limits, Spend::default()));
+        Self { folder: tempfile::tempdir().unwrap(), network, account }
+    }
+
+    pub fn vlm(&self, server: &Server, dialect: Dialect, on_outage: OnOutage) -> Arc<Vlm> {
+        self.vlm_with(server, dialect, on_outage, patience())
+    }
+
+    pub fn vlm_with(&self, server: &Server, dialect: Dialect, on_outage: OnOutage, patience: Patience) -> Arc<Vlm> {
+        let secret = Some(Secret::new(KEY.to_owned()));
+        let provider = Provider::new(&server.address, dialect, "model-1", secret, patience, 4).unwrap();
+        let (handle, folder) = (self.network.handle().clone(), self.folder.path().to_owned());
+        let account = Arc::clone(&self.account);
+        Arc::new(Vlm::online(choice(dialect), provider, handle, folder, account, on_outage, 500))
+    }
+
+    /// The replies to the first `steps` steps of an episode.
+    pub fn play(vlm: &Arc<Vlm>, episode: &str, steps: i32) -> Vec<Result<Reply, Lost>> {
+        let task = Task { family: Family::CubeSelection, stated_color: None, step_budget: 100, seed: 1 };
+        let mut agent = vlm.agent(task, episode).unwrap();
+        let local = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        (1..=steps).map(|t| local.block_on(agent.decide(&observation(t)))).collect()
+    }
+
+    /// Everything that was written.
+    pub fn written(&self) -> String {
+        let files = std::fs::read_dir(self.folder.path()).unwrap();
+        files.map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap()).collect()
+    }
+}
+
+fn observation(t: i32) -> Observation {
+    Observation {
+        t,
+        remaining: 101 - t,
+        x: 0.0,
+        y: 0.0,
+        yaw: 0.0,
+        bumped: false,
+        history: None,
+        frame: Arc::new(Frame::new(2, 1, vec![1, 2, 3, 4, 5, 6])),
+    }
+}

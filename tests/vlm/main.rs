@@ -1,0 +1,11 @@
+//! A model behind a provider, against servers on loopback that behave and misbehave.
+
+mod bench;
+mod keys;
+mod killed;
+mod languages;
+mod memory;
+mod recordings;
+mod server;
+mod spending;
+mod statuses;

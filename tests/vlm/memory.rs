@@ -1,0 +1,56 @@
+//! What was asked and answered is on disk before it is acted on, and is never asked again.
+
+use std::sync::Arc;
+
+use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::{OnOutage, Vlm};
+use mirrorstats::trace::episode::Action;
+
+use super::bench::{Bench, choice};
+use super::server::{Server, decision, http, whole};
+
+#[test]
+fn what_was_answered_is_never_asked_again_and_plays_without_a_network() {
+    let server = Server::start(|at, _| match at {
+        1 => http("500 Internal Server Error", "", b""),
+        _ => whole(Dialect::OpenaiChat, &decision(if at % 2 == 0 { "a" } else { "w" })),
+    });
+    let bench = Bench::new(Limits::default());
+    let first: Vec<_> = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 3)
+        .into_iter()
+        .map(Result::unwrap)
+        .collect();
+    assert_eq!(server.count(), 4);
+    assert_eq!(first[0].action, Some(Action::TurnLeft));
+    assert!((first[0].usage.cost_usd.unwrap() - 0.002).abs() < 1e-12);
+
+    // A line that was cut off by the end of a process was acted on by nobody.
+    let journal = bench.folder.path().join("episode.jsonl");
+    let mut text = std::fs::read_to_string(&journal).unwrap();
+    text.push_str("{\"kind\":\"answer\",\"t\":4,\"att");
+    std::fs::write(&journal, text).unwrap();
+    let again = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 3);
+    assert_eq!(again.into_iter().map(Result::unwrap).collect::<Vec<_>>(), first);
+    assert_eq!(server.count(), 4, "nothing is asked again");
+
+    let cassette = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned(), 500));
+    let played = Bench::play(&cassette, "episode", 4);
+    assert_eq!(played[..3].iter().cloned().map(Result::unwrap).collect::<Vec<_>>(), first);
+    assert!(played[3].as_ref().unwrap_err().cause.contains("no answer for step 4"));
+
+    let another = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned(), 501));
+    let refused = Bench::play(&another, "episode", 1).remove(0).unwrap_err();
+    assert!(refused.cause.contains("belongs to another request"), "{refused}");
+}
+
+#[test]
+fn the_model_that_answered_is_kept_as_the_provider_names_it() {
+    for dialect in [Dialect::OpenaiChat, Dialect::Gemini, Dialect::AnthropicMessages] {
+        let server = Server::start(move |_, _| whole(dialect, &decision("w")));
+        let bench = Bench::new(Limits::default());
+        assert!(Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 1)[0].is_ok());
+        let answer: serde_json::Value = serde_json::from_str(bench.written().lines().nth(1).unwrap()).unwrap();
+        assert_eq!(answer["model"], "model-1-0601", "{dialect:?}");
+    }
+}

@@ -1,0 +1,235 @@
+//! Whatever a server does, a step ends in the status of that name, or its episode is lost: never in a made-up decision.
+
+use std::time::{Duration, Instant};
+
+use mirrorstats::agent::Status;
+use mirrorstats::agent::vlm::OnOutage;
+use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::provider::Patience;
+use serde_json::json;
+
+use super::bench::{Bench, KEY, patience};
+use super::server::{Conduct, JSON, Server, decision, endings, http, ok, spoken, whole};
+
+const PROVIDERS: [Dialect; 4] =
+    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+
+/// What is sent, and what the step ends in.
+type Case = (&'static str, Vec<u8>, Status);
+
+/// That each case ends in its status for this provider, after the attempts that such a status is worth.
+fn check(dialect: Dialect, cases: Vec<Case>) {
+    let bench = Bench::new(Limits::default());
+    for (name, answer, status) in cases {
+        let server = Server::start(move |_, _| answer.clone());
+        let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
+        let place = format!("{name}, {dialect:?}");
+        let reply = Bench::play(&vlm, &place.replace([' ', ','], "-"), 1).remove(0);
+        let reply = reply.unwrap_or_else(|lost| panic!("{place}: {lost}"));
+        assert_eq!(reply.status, status, "{place}");
+        let has_decision = matches!(status, Status::Ok | Status::Repaired);
+        assert_eq!(reply.action.is_some(), has_decision, "{place}");
+        assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{place}");
+        let is_outage = matches!(status, Status::RateLimited | Status::ServerError | Status::Timeout);
+        assert_eq!(server.count(), if is_outage { 3 } else { 1 }, "{place}");
+    }
+}
+
+#[test]
+fn replies_end_in_their_status_with_every_provider() {
+    for dialect in PROVIDERS {
+        let (stop, length) = endings(dialect);
+        let text = |text: &str| ok(&spoken(dialect, text, stop));
+        let twice = decision("w").replacen('{', "{\"action\":\"s\",", 1);
+        check(
+            dialect,
+            vec![
+                ("valid", text(&decision("w")), Status::Ok),
+                ("fenced", text(&format!("```json\n{}\n```", decision("w"))), Status::Repaired),
+                ("no JSON", text("I go on."), Status::ParseFailed),
+                ("deep arrays", text(&"[".repeat(50_000)), Status::ParseFailed),
+                ("deep objects", text(&"{\"action\":".repeat(5_000)), Status::ParseFailed),
+                ("a key twice", text(&twice), Status::SchemaInvalid),
+                ("another action", text(&decision("jump")), Status::SchemaInvalid),
+                ("cut off", ok(&spoken(dialect, &decision("w")[..20], length)), Status::Truncated),
+                ("cut off when whole", ok(&spoken(dialect, &decision("w"), length)), Status::Truncated),
+                ("no text", text(""), Status::Empty),
+                ("blanks", text(" \n\t"), Status::Empty),
+            ],
+        );
+    }
+}
+
+#[test]
+fn failures_of_the_server_end_in_their_status_with_every_provider() {
+    for dialect in PROVIDERS {
+        let fine = whole(dialect, &decision("w"));
+        let page = b"<html><body>Bad gateway</body></html>";
+        let deep = format!("{{\"x\":{}{}}}", "[".repeat(5_000), "]".repeat(5_000));
+        let huge = vec![b' '; 200_000];
+        let cut = |status: &str| format!("HTTP/1.1 {status}\r\ncontent-length: 100\r\n\r\nhalf").into_bytes();
+        let too_many = |headers: &str| http("429 Too Many Requests", headers, b"slow down");
+        check(
+            dialect,
+            vec![
+                ("429 alone", too_many(""), Status::RateLimited),
+                ("429 with seconds", too_many("retry-after: 0\r\n"), Status::RateLimited),
+                ("429 with a date", too_many("retry-after: Sun, 06 Nov 1994 08:49:37 GMT\r\n"), Status::RateLimited),
+                ("429 for years", too_many("retry-after: 999999999999999999999\r\n"), Status::RateLimited),
+                ("429 with nonsense", too_many("retry-after: -1 soon\r\n"), Status::RateLimited),
+                ("429 cut", cut("429 Too Many Requests"), Status::RateLimited),
+                ("429 and huge", http("429 Too Many Requests", "", &huge), Status::RateLimited),
+                ("408", http("408 Request Timeout", "", b""), Status::Timeout),
+                ("500", http("500 Internal Server Error", "", b"oops"), Status::ServerError),
+                ("503", http("503 Service Unavailable", "retry-after: 0\r\n", b""), Status::ServerError),
+                ("504", http("504 Gateway Timeout", "", page), Status::Timeout),
+                ("529", http("529 Overloaded", JSON, br#"{"type": "error"}"#), Status::ServerError),
+                ("a page", http("200 OK", "content-type: text/html\r\n", page), Status::ServerError),
+                ("a page as JSON", http("200 OK", JSON, page), Status::ServerError),
+                ("no type", http("200 OK", "", b"{}"), Status::ServerError),
+                ("another language", http("200 OK", JSON, br#"{"hello": 1}"#), Status::ServerError),
+                ("an array", http("200 OK", JSON, b"[]"), Status::ServerError),
+                ("nothing in it", http("200 OK", JSON, b""), Status::ServerError),
+                ("an error with 200", ok(&json!({ "error": { "code": 502 } })), Status::ServerError),
+                ("not UTF-8", http("200 OK", JSON, b"{\"choices\": \"\xff\"}"), Status::ServerError),
+                ("deep", http("200 OK", JSON, deep.as_bytes()), Status::ServerError),
+                ("huge", http("200 OK", JSON, &huge), Status::ServerError),
+                ("no HTTP", b"220 smtp ready\r\n\r\n".to_vec(), Status::ServerError),
+                ("cut before the head's end", b"HTTP/1.1 200 OK\r\ncontent-ty".to_vec(), Status::ServerError),
+                ("cut in the body", cut("200 OK"), Status::ServerError),
+                ("cut before the last byte", fine[..fine.len() - 1].to_vec(), Status::ServerError),
+                ("closed", Vec::new(), Status::ServerError),
+            ],
+        );
+    }
+}
+
+#[test]
+fn refusals_and_empty_answers_have_each_providers_own_form() {
+    let openai = |choice| ok(&json!({ "choices": [choice], "usage": {} }));
+    check(
+        Dialect::OpenaiChat,
+        vec![
+            (
+                "a refusal",
+                openai(json!({ "finish_reason": "stop", "message": { "content": null, "refusal": "I can't." } })),
+                Status::Refusal,
+            ),
+            ("a filter", ok(&spoken(Dialect::OpenaiChat, "", "content_filter")), Status::Refusal),
+            ("null", openai(json!({ "finish_reason": "stop", "message": { "content": null } })), Status::Empty),
+            ("no choice", http("200 OK", JSON, br#"{"choices": [], "usage": {}}"#), Status::Empty),
+            ("half an answer", ok(&spoken(Dialect::OpenaiChat, &decision("w"), "error")), Status::ServerError),
+            ("choices of another kind", ok(&json!({ "choices": null })), Status::ServerError),
+        ],
+    );
+    let blocked = json!({ "promptFeedback": { "blockReason": "SAFETY" }, "usageMetadata": {} });
+    check(
+        Dialect::Gemini,
+        vec![
+            ("a blocked prompt", ok(&blocked), Status::Refusal),
+            ("unsafe", ok(&spoken(Dialect::Gemini, &decision("w"), "SAFETY")), Status::Refusal),
+            ("prohibited", ok(&json!({ "candidates": [{ "finishReason": "PROHIBITED_CONTENT" }] })), Status::Refusal),
+            ("no content", ok(&json!({ "candidates": [{ "finishReason": "STOP" }] })), Status::Empty),
+            ("no candidate", ok(&json!({ "candidates": [], "usageMetadata": {} })), Status::Empty),
+            ("thoughts alone", ok(&spoken(Dialect::Gemini, "", "MAX_TOKENS")), Status::Truncated),
+        ],
+    );
+    let anthropic = |content, reason| ok(&json!({ "content": content, "stop_reason": reason }));
+    check(
+        Dialect::AnthropicMessages,
+        vec![
+            ("a refusal", anthropic(json!([]), "refusal"), Status::Refusal),
+            ("half a refusal", ok(&spoken(Dialect::AnthropicMessages, "I w", "refusal")), Status::Refusal),
+            ("no block", anthropic(json!([]), "end_turn"), Status::Empty),
+            ("no text", anthropic(json!([{ "type": "thinking", "thinking": "hm" }]), "end_turn"), Status::Empty),
+            ("a window too small", anthropic(json!([]), "model_context_window_exceeded"), Status::Truncated),
+        ],
+    );
+}
+
+#[test]
+fn what_the_provider_will_not_change_its_mind_about_ends_the_run_at_once() {
+    let credit = br#"{"error": {"type": "insufficient_quota", "message": "no credit"}}"#;
+    let cases: [(&str, &[u8]); 6] = [
+        ("401 Unauthorized", b"who are you"),
+        ("402 Payment Required", b"no credit"),
+        ("403 Forbidden", b""),
+        ("404 Not Found", b"<html>no such model</html>"),
+        ("400 Bad Request", br#"{"error": "temperature"}"#),
+        ("429 Too Many Requests", credit),
+    ];
+    for (status, body) in cases {
+        for dialect in PROVIDERS {
+            let server = Server::start(move |_, _| http(status, "", body));
+            let bench = Bench::new(Limits::default());
+            let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
+            let replies = Bench::play(&vlm, "episode", 2);
+            let reasons: Vec<_> = replies.into_iter().map(|reply| reply.unwrap_err().cause).collect();
+            let sentence = format!("the provider refuses the request: HTTP {status}");
+            assert!(reasons[0].starts_with(&sentence) && !reasons[0].contains('\n'), "{}", reasons[0]);
+            assert_eq!(reasons[1], reasons[0]);
+            assert_eq!(vlm.stopped(), Some(reasons[0].as_str()));
+            assert_eq!(server.count(), 1, "{status} {dialect:?}");
+        }
+    }
+}
+
+#[test]
+fn a_redirect_is_not_followed() {
+    let elsewhere = Server::start(|_, _| whole(Dialect::OpenaiChat, &decision("w")));
+    let address = elsewhere.address.clone();
+    for status in ["301 Moved Permanently", "302 Found", "307 Temporary Redirect", "308 Permanent Redirect"] {
+        let location = format!("location: {address}/chat/completions\r\n");
+        let server = Server::start(move |_, _| http(status, &location, b""));
+        let bench = Bench::new(Limits::default());
+        let lost = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 1).remove(0);
+        assert!(lost.unwrap_err().cause.contains(status));
+        assert!(server.requests()[0].head.contains(KEY));
+    }
+    assert_eq!(elsewhere.count(), 0, "nobody else gets the key");
+}
+
+#[test]
+fn an_answer_that_takes_too_long_is_a_timeout_wherever_it_hangs() {
+    let impatient = Patience { attempts: 2, timeout: Duration::from_millis(150), ..patience() };
+    let pause = Duration::from_millis(40);
+    let fine = || whole(Dialect::OpenaiChat, &decision("w"));
+    let slow: [(&str, Conduct); 3] = [
+        ("nothing", Conduct::dripping(Vec::new(), 1, Duration::from_secs(1))),
+        ("drips from the start", Conduct::dripping(fine(), 5, pause)),
+        ("drips in the body", Conduct::dripping(fine(), fine().len() - 20, Duration::from_millis(100))),
+    ];
+    for (name, conduct) in slow {
+        let server = Server::start(move |_, _| conduct.clone());
+        let bench = Bench::new(Limits::default());
+        let vlm = |on_outage| bench.vlm_with(&server, Dialect::OpenaiChat, on_outage, impatient);
+        let reply = Bench::play(&vlm(OnOutage::StandStill), "stands", 1).remove(0).unwrap();
+        assert_eq!(reply.status, Status::Timeout, "{name}");
+        let lost = Bench::play(&vlm(OnOutage::Lose), "lost", 1).remove(0).unwrap_err();
+        assert!(lost.cause.starts_with("step 1: timeout after 2 attempts"), "{name}: {lost}");
+    }
+}
+
+#[test]
+fn slow_bytes_in_time_are_an_answer() {
+    let server =
+        Server::start(|_, _| Conduct::dripping(whole(Dialect::Gemini, &decision("w")), 16, Duration::from_millis(1)));
+    let bench = Bench::new(Limits::default());
+    let reply = Bench::play(&bench.vlm(&server, Dialect::Gemini, OnOutage::Lose), "episode", 1).remove(0).unwrap();
+    assert_eq!((reply.status, server.count()), (Status::Ok, 1));
+}
+
+#[test]
+fn the_wait_that_a_provider_asks_for_is_kept() {
+    let server = Server::start(|at, _| match at {
+        0 => http("429 Too Many Requests", "retry-after: 1\r\n", b""),
+        _ => whole(Dialect::AnthropicMessages, &decision("w")),
+    });
+    let bench = Bench::new(Limits::default());
+    let patience = Patience { longest_asked_delay: Duration::from_secs(5), ..patience() };
+    let vlm = bench.vlm_with(&server, Dialect::AnthropicMessages, OnOutage::Lose, patience);
+    let start = Instant::now();
+    assert_eq!(Bench::play(&vlm, "episode", 1).remove(0).unwrap().status, Status::Ok);
+    assert!(start.elapsed() >= Duration::from_secs(1), "the provider would have been asked too early");
+}

@@ -86,7 +86,7 @@ impl Hybrid {
         }
         // Groups of eight. A writer may cut the last one short where the data end.
         let bytes = count.checked_mul(self.width).ok_or(Unfit)?.min(self.data.len() - self.at);
-        let held = if self.width == 0 { count.saturating_mul(8) } else { bytes * 8 / self.width };
+        let held = (bytes * 8).checked_div(self.width).unwrap_or(usize::MAX);
         let left = Left::Packed { bit: self.at * 8, count: held.min(count.saturating_mul(8)) };
         self.at += bytes;
         if held == 0 { Err(Unfit) } else { Ok(left) }

@@ -40,9 +40,10 @@ fn everything(folder: &Path, output: &Output) -> Vec<u8> {
         for entry in fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
             bytes.extend_from_slice(path.to_string_lossy().as_bytes());
-            match path.is_dir() {
-                true => folders.push(path),
-                false => bytes.extend(fs::read(path).unwrap()),
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                bytes.extend(fs::read(path).unwrap());
             }
         }
     }

@@ -44,6 +44,7 @@ impl Agent for AtOnce {
     fn decide<'a>(&'a mut self, _: &'a Observation) -> Decision<'a> {
         let reply = Reply {
             status: Status::Ok,
+            repairs: Vec::new(),
             action: Some(Action::TurnLeft),
             self_color: None,
             selected_cube: None,

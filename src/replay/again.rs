@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use crate::base::palette::Color;
 use crate::sim::Experiment;
 use crate::sim::census::Census;
 use crate::sim::config::WorldConfig;
@@ -165,12 +166,15 @@ fn poses(step: &Step, world: &World) -> Vec<Compared> {
     #[expect(clippy::cast_possible_truncation, reason = "what the trace stores")]
     let stored = |value: f64| (value as f32).to_string();
     let pose = world.pose();
+    let cube = step.selected_cube.as_deref().and_then(Color::named);
+    let distance = cube.and_then(|color| world.distance_to_cube(color)).map_or("none".to_owned(), stored);
     let compared = [
-        ("pose_x", step.extra.pose_x, pose.x),
-        ("pose_y", step.extra.pose_y, pose.y),
-        ("pose_yaw", step.extra.pose_yaw, pose.heading.degrees()),
+        ("pose_x", step.extra.pose_x, stored(pose.x)),
+        ("pose_y", step.extra.pose_y, stored(pose.y)),
+        ("pose_yaw", step.extra.pose_yaw, stored(pose.heading.degrees())),
+        ("cube_distance", step.extra.cube_distance, distance),
     ];
-    compared.into_iter().filter_map(|(name, own, value)| Some((name, own?.to_string(), stored(value)))).collect()
+    compared.into_iter().filter_map(|(name, own, found)| Some((name, own?.to_string(), found))).collect()
 }
 
 fn counts(step: &Step, world: &World, census: &Census) -> Vec<Compared> {

@@ -57,6 +57,23 @@ fn a_pose() {
 }
 
 #[test]
+fn a_distance() {
+    let further = |episode: &mut Episode| {
+        let distances = episode.steps.iter_mut().map(|step| &mut step.extra.cube_distance);
+        let known = distances.flatten().next().unwrap();
+        *known += 0.5;
+    };
+    let at = |experiment: &str| {
+        let episodes = super::traces::episodes(&super::traces::recorded(experiment));
+        let longest = episodes.into_iter().max_by_key(|episode| episode.steps.len()).unwrap();
+        let known = longest.steps.iter().position(|step| step.extra.cube_distance.is_some()).unwrap();
+        i32::try_from(known + 1).unwrap()
+    };
+    let (expected, found) = check("E3", further, at("E3"), "cube_distance");
+    assert!((expected.parse::<f32>().unwrap() - found.parse::<f32>().unwrap() - 0.5).abs() < 1e-5);
+}
+
+#[test]
 fn a_truth() {
     let (expected, found) = check("E1", |episode| episode.steps[3].mirror_visible ^= true, 4, "mirror_visible");
     assert_ne!(expected, found);

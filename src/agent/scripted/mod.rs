@@ -78,6 +78,11 @@ impl Scripted {
         }
     }
 
+    /// The version of what it does: one more whenever the same seed and the same frames give other decisions.
+    pub const fn version(self) -> u32 {
+        1
+    }
+
     /// The agent of this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|agent| agent.name() == name)
@@ -104,7 +109,7 @@ impl crate::agent::Player for Scripted {
     }
 
     fn description(&self) -> serde_json::Value {
-        serde_json::json!({ "scripted": self.name() })
+        described(self.name(), self.version())
     }
 
     fn looks(&self) -> bool {
@@ -114,6 +119,15 @@ impl crate::agent::Player for Scripted {
     fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
         Ok(Self::agent(*self, &task))
     }
+}
+
+/// What traces say of a script. The first version is not written: traces were recorded before there was a second.
+fn described(name: &str, version: u32) -> serde_json::Value {
+    let mut description = serde_json::json!({ "scripted": name });
+    if version > 1 {
+        description["version"] = version.into();
+    }
+    description
 }
 
 /// What a script decides for a step.
@@ -157,5 +171,18 @@ impl Agent for Puppet {
             usage: Usage::default(),
         };
         Box::pin(std::future::ready(Ok(reply)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::described;
+
+    #[test]
+    fn a_changed_script_is_another_agent() {
+        assert_eq!(described("oracle", 1), json!({ "scripted": "oracle" }));
+        assert_eq!(described("oracle", 2), json!({ "scripted": "oracle", "version": 2 }));
     }
 }

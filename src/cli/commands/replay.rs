@@ -31,7 +31,7 @@ use crate::trace::schema::RECORDING_KEY;
 
 /// Repeat a trace's episodes in the worlds that it describes, and hold every step against what was recorded
 ///
-/// Poses, pixel counts, `bumped` and `mirror_visible` must match. Exits with 1 where they do not; the first divergence of
+/// Poses, distances, pixel counts, `bumped` and `mirror_visible` must match. Exits with 1 where they do not; the first divergence of
 /// each episode is printed.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ReplayArgs {

@@ -98,8 +98,7 @@ fn replies_are_asked_for_as_the_files_say() {
 #[test]
 fn the_folder_holds_nothing_else() {
     // Their types are there with the feature `sim` alone, their files always.
-    let of_worlds =
-        ["census", "exec-message", "lost", "record", "record-forecast", "replay", "scene", "world-config"];
+    let of_worlds = ["census", "exec-message", "lost", "record", "record-forecast", "replay", "scene", "world-config"];
     let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
     let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
     let found =

@@ -71,13 +71,10 @@ impl Old {
             return Err(finding.in_column(SOURCE).with_help(help).into());
         }
         let text = file.metadata_value(RECORDING_KEY).unwrap_or("{}");
-        let recording = match serde_json::from_str(text) {
-            Ok(recording @ Value::Object(_)) => recording,
-            _ => {
-                let expected = format!("a JSON object as `{RECORDING_KEY}`");
-                let finding = Finding::new(Code::InvalidMetadata, &input.name, expected, "something else");
-                return Err(finding.with_help("correct or remove that key in the footer").into());
-            }
+        let Ok(recording @ Value::Object(_)) = serde_json::from_str(text) else {
+            let expected = format!("a JSON object as `{RECORDING_KEY}`");
+            let finding = Finding::new(Code::InvalidMetadata, &input.name, expected, "something else");
+            return Err(finding.with_help("correct or remove that key in the footer").into());
         };
         Ok(Self { set: TraceSet::of(vec![file]), recording })
     }

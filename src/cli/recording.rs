@@ -134,10 +134,10 @@ impl Progress for Bar<'_> {
 
 /// What was spent, in words.
 fn spent(spend: &Spend) -> String {
-    let (requests, replies) = (counted(spend.requests, "request"), counted(spend.uncosted, "reply"));
+    let (requests, answers) = (counted(spend.requests, "request"), counted(spend.uncosted, "answer"));
     let known = match (spend.uncosted, spend.cost_usd > 0.0) {
         (0, _) => dollars(spend.cost_usd),
-        (_, true) => format!("{} and what {replies} cost, which is unknown,", dollars(spend.cost_usd)),
+        (_, true) => format!("{} and what {answers} cost, which is unknown,", dollars(spend.cost_usd)),
         (_, false) => "an unknown cost".to_owned(),
     };
     format!("{known} for {requests} and {}", counted(spend.tokens, "token"))
@@ -151,7 +151,7 @@ pub(super) fn dollars(value: f64) -> String {
 }
 
 /// Says what became of the episodes, where those that were lost are listed, and where the time went.
-pub(super) fn say(answer: &RecordAnswer, list: &Path, elapsed: Duration, times: Spent) -> io::Result<()> {
+pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, times: Spent) -> io::Result<()> {
     let mut out = io::stderr().lock();
     let seconds = elapsed.as_secs_f64();
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
@@ -172,11 +172,11 @@ pub(super) fn say(answer: &RecordAnswer, list: &Path, elapsed: Duration, times: 
         writeln!(out, "spent: {}, over all starts of this recording", spent(spend))?;
     }
     if !answer.lost.is_empty() {
-        let lost = counted(answer.lost.len() as u64, "episode");
+        let episodes = counted(answer.lost.len() as u64, "episode");
         writeln!(
             out,
-            "lost {lost} to failures that are not the agent's: in no trace, listed in {}; the same command tries again",
-            visible(&list.display().to_string())
+            "lost {episodes} to failures that are not the agent's: in no trace, listed in {}; the same command tries again",
+            visible(&lost_list.display().to_string())
         )?;
     }
     if answer.stopped {
@@ -212,7 +212,7 @@ mod tests {
         let spend = Spend { cost_usd: 1.5, uncosted: 0, tokens: 2_000, requests: 3 };
         assert_eq!(spent(&spend), "1.50 US dollars for 3 requests and 2000 tokens");
         let partly = Spend { uncosted: 2, ..spend };
-        assert!(spent(&partly).starts_with("1.50 US dollars and what 2 replies cost, which is unknown, for"));
+        assert!(spent(&partly).starts_with("1.50 US dollars and what 2 answers cost, which is unknown, for"));
         let nothing = Spend { cost_usd: 0.0, ..partly };
         assert_eq!(spent(&nothing), "an unknown cost for 3 requests and 2000 tokens");
         assert_eq!([dollars(0.0), dollars(0.00123)], ["0.00 US dollars", "0.0012 US dollars"]);

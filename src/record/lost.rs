@@ -62,8 +62,8 @@ pub fn list_of(folder: &Path) -> PathBuf {
 ///
 /// # Errors
 /// When it cannot be read, written or removed.
-pub fn update(list: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) -> Result<(), StoreError> {
-    let before = read(list)?;
+pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) -> Result<(), StoreError> {
+    let before = read(path)?;
     let again: BTreeSet<&str> = lost.iter().map(|episode| episode.episode_id.as_str()).collect();
     let stays = |id: &str| !recorded.contains(id) && !again.contains(id);
     let mut listed: Vec<&LostEpisode> =
@@ -71,28 +71,28 @@ pub fn update(list: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) ->
     listed.sort_by_key(|episode| (&episode.model, &episode.experiment, episode.seed, episode.run));
     match listed.as_slice() {
         [] if before.is_empty() => Ok(()),
-        [] => fs::remove_file(list).map_err(StoreError::io("remove", list)),
-        listed => write(list, listed).map_err(StoreError::io("write", list)),
+        [] => fs::remove_file(path).map_err(StoreError::io("remove", path)),
+        listed => write(path, listed).map_err(StoreError::io("write", path)),
     }
 }
 
 /// What is listed. A line that is not of this shape lists nothing.
-fn read(list: &Path) -> Result<Vec<LostEpisode>, StoreError> {
-    match fs::read_to_string(list) {
+fn read(path: &Path) -> Result<Vec<LostEpisode>, StoreError> {
+    match fs::read_to_string(path) {
         Ok(text) => Ok(text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(error) => Err(StoreError::io("read", list)(error)),
+        Err(error) => Err(StoreError::io("read", path)(error)),
     }
 }
 
-fn write(list: &Path, episodes: &[&LostEpisode]) -> io::Result<()> {
-    let mut file = temporary::file_in(list.parent().unwrap_or(Path::new(".")))?;
+fn write(path: &Path, episodes: &[&LostEpisode]) -> io::Result<()> {
+    let mut file = temporary::file_in(path.parent().unwrap_or(Path::new(".")))?;
     for episode in episodes {
         serde_json::to_writer(&mut file, episode)?;
         file.write_all(b"\n")?;
     }
     file.as_file().sync_all()?;
-    file.persist(list).map_err(|error| error.error)?;
+    file.persist(path).map_err(|error| error.error)?;
     Ok(())
 }
 

@@ -54,7 +54,7 @@ fn what_was_spent_is_told_over_all_starts() {
     assert_eq!((code, &answer["recorded"]), (Some(1), &0.into()), "{said}");
     let lost = &answer["lost"][0];
     assert_eq!((&lost["step"], &lost["status"]), (&2.into(), &"server_error".into()));
-    assert_eq!(bench.lost(), [lost.clone()]);
+    assert_eq!(bench.lost(), std::slice::from_ref(lost));
     assert_eq!((&answer["spend"]["requests"], &answer["spend"]["tokens"]), (&2.into(), &1100.into()));
     assert!(said.contains("spent: 0.0020 US dollars for 2 requests and 1100 tokens"), "{said}");
 

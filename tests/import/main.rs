@@ -3,6 +3,7 @@
 mod refusals;
 mod round_trip;
 
+use std::borrow::Borrow;
 use std::fs;
 use std::path::Path;
 
@@ -35,16 +36,16 @@ fn step(episode: &str, t: i64) -> Value {
 }
 
 /// A step with other values for some keys.
-fn step_with(episode: &str, t: i64, values: Value) -> Value {
+fn step_with(episode: &str, t: i64, values: impl Borrow<Value>) -> Value {
     let mut step = step(episode, t);
-    for (key, value) in values.as_object().unwrap() {
+    for (key, value) in values.borrow().as_object().unwrap() {
         step[key] = value.clone();
     }
     step
 }
 
 fn lines(steps: &[Value]) -> String {
-    steps.iter().map(|step| format!("{step}\n")).collect()
+    steps.iter().flat_map(|step| [step.to_string(), "\n".to_owned()]).collect()
 }
 
 /// The trace that these lines on standard input become, and the answer as JSON.
@@ -57,7 +58,7 @@ fn imported(text: impl Into<Vec<u8>>) -> (Vec<u8>, Value) {
     (fs::read(folder.path().join("x.parquet")).unwrap(), serde_json::from_str(&answer.stdout).unwrap())
 }
 
-/// What `info --json` says of the columns of a trace.
+/// The scores of a trace, or of a folder of them.
 fn scores(folder: &Path, trace: &str) -> String {
     let answer = run(folder, &["score", trace], "");
     assert_eq!(answer.code, 0, "{}", answer.stderr);

@@ -94,7 +94,7 @@ fn a_key_that_is_missing_twice_or_empty() {
     let words = "s.jsonl, line 1, key `self_color`\n  expected a text that is not empty, or null\n  found none, though there \
                  is `self_colour`\n  help: write null where the reply gave none";
     assert!(said.contains(words), "{said}");
-    let twice = step("a", 1).to_string().replace("{", r#"{"run":7,"#) + "\n";
+    let twice = step("a", 1).to_string().replace('{', r#"{"run":7,"#) + "\n";
     assert!(refused(twice).contains("line 1, key `run`\n  expected each key once\n  found the key twice"));
     assert!(refused(lines(&[step_with("a", 1, json!({ "": 1 }))])).contains("expected a key with a name"));
     let all = refused("{}\n");
@@ -127,8 +127,10 @@ fn a_line_that_is_no_json_object() {
     let said = refused(format!("{good}{}", &step("a", 2).to_string()[..40]));
     assert!(said.contains("line 2\n") && said.contains("the file was cut off"), "{said}");
     let deep = format!("{{\"own\":{}{}}}\n", "[".repeat(200_000), "]".repeat(200_000));
+    let said = refused(deep);
     assert!(
-        refused(deep).starts_with("error: s.jsonl, line 1\n  expected strict JSON\n  found recursion limit exceeded")
+        said.contains("line 1, key `own`\n  expected null, true or false, a number or a text\n  found a list"),
+        "{said}"
     );
     let mut bytes = good.into_bytes();
     bytes.extend(b"{\"model\": \"\xff\"}\n");

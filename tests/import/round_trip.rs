@@ -8,7 +8,7 @@ use mirrorstats::trace::merge;
 use mirrorstats::trace::write::write_episodes;
 use serde_json::{Map, Value, json};
 
-use super::{run, scores};
+use super::{lines, run, scores};
 
 /// The rows of an episode as a harness would write them, optional keys only where there is a value.
 fn exported(episode: &Episode) -> Vec<Value> {
@@ -53,14 +53,9 @@ fn the_paper_is_the_same_after_it() {
     let mut traces: Vec<_> = fs::read_dir(&fixtures).unwrap().map(|entry| entry.unwrap().path()).collect();
     traces.retain(|path| path.extension().is_some_and(|ending| ending == "parquet"));
     traces.sort();
-    let lines: String = traces
-        .iter()
-        .flat_map(|path| episodes(path))
-        .flat_map(|one| exported(&one))
-        .map(|row| format!("{row}\n"))
-        .collect();
+    let rows: Vec<Value> = traces.iter().flat_map(|path| episodes(path)).flat_map(|one| exported(&one)).collect();
     let folder = tempfile::tempdir().unwrap();
-    let answer = run(folder.path(), &["import", "-", "-o", "back.parquet"], lines);
+    let answer = run(folder.path(), &["import", "-", "-o", "back.parquet"], lines(&rows));
     assert_eq!(answer.code, 0, "{}", answer.stderr);
     assert!(answer.stdout.starts_with("imported 840 episodes, "), "{}", answer.stdout);
     assert_eq!(scores(folder.path(), "back.parquet"), scores(folder.path(), fixtures.to_str().unwrap()));
@@ -103,8 +98,8 @@ fn every_value_of_every_column_is_the_same_after_it() {
     };
     let original = [episode("é", vec![bare.clone(), full.clone()]), episode("b", vec![full, bare])];
     let folder = tempfile::tempdir().unwrap();
-    let lines: String = original.iter().flat_map(exported).map(|row| format!("{row}\n")).collect();
-    assert_eq!(run(folder.path(), &["import", "-", "-o", "x.parquet"], lines).code, 0);
+    let rows: Vec<Value> = original.iter().flat_map(exported).collect();
+    assert_eq!(run(folder.path(), &["import", "-", "-o", "x.parquet"], lines(&rows)).code, 0);
     assert_eq!(episodes(&folder.path().join("x.parquet")), original);
     let direct = folder.path().join("direct.parquet");
     write_episodes(&direct, None, &original).unwrap();

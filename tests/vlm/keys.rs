@@ -100,3 +100,14 @@ fn a_key_where_it_does_not_belong_is_not_repeated() {
     assert!(told.contains("no header can carry"), "{told}");
     assert_eq!(server.count(), 0);
 }
+
+#[test]
+fn a_word_in_place_of_a_key_leaves_answers_as_they_are() {
+    let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done")));
+    let folder = Folder::new();
+    let mut command = folder.record(&server, "own", "--seeds 1 --runs 1");
+    let output = command.env("MIRRORSTATS_API_KEY", "none").output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let journals = format!("{:?}", folder.journals());
+    assert!(journals.contains("none") && !journals.contains("[key]"), "{journals}");
+}

@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use mirrorstats::agent::Status;
+use mirrorstats::agent::reply::Repair;
 use mirrorstats::agent::vlm::OnOutage;
 use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
@@ -28,6 +29,8 @@ fn check(dialect: Dialect, cases: Vec<Case>) {
         let reply = Bench::play(&vlm, &place.replace([' ', ','], "-"), 1).remove(0);
         let reply = reply.unwrap_or_else(|lost| panic!("{place}: {lost}"));
         assert_eq!(reply.status, status, "{place}");
+        let repairs = Repair::joined(&reply.repairs);
+        assert_eq!(repairs.as_deref(), (status == Status::Repaired).then_some("code_fence"), "{place}");
         let has_decision = matches!(status, Status::Ok | Status::Repaired);
         assert_eq!(reply.action.is_some(), has_decision, "{place}");
         assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{place}");

@@ -214,11 +214,13 @@ impl Provider {
         let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
         let value: Value =
             serde_json::from_str(&text).map_err(|fault| server(format!("the answer is not JSON: {fault}")))?;
-        let body = self.without_secret(&text);
-        let answer = self.dialect.answer(&value).ok_or_else(|| server(unexpected(&body)))?;
-        let model = answer.model.map(|model| self.without_secret(&model));
-        let answer = Answer { text: self.without_secret(&answer.text), model, ..answer };
-        Ok(Received { answer, body, latency })
+        let answer = self.dialect.answer(&value).ok_or_else(|| server(unexpected(&self.without_secret(&text))))?;
+        let kept = |text: String| match &self.secret {
+            Some(secret) => secret.without_in_answer(&text),
+            None => text,
+        };
+        let answer = Answer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
+        Ok(Received { answer, body: kept(text), latency })
     }
 
     /// The body, up to the limit.

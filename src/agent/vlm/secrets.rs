@@ -54,6 +54,13 @@ impl Secret {
             .fold(text.to_owned(), |text, form| text.replace(form, PLACEHOLDER))
     }
 
+    /// The text of an answer without the key. Servers that ask for no key get words such as `EMPTY` or `none` in its
+    /// place; these are no secrets, and taking them out would change what a model said.
+    pub fn without_in_answer(&self, text: &str) -> String {
+        const SHORTEST_KEY: usize = 6;
+        if self.0.expose_secret().len() < SHORTEST_KEY { text.to_owned() } else { self.without(text) }
+    }
+
     /// The value of a header that carries the key; marked so that no client prints it.
     pub(super) fn header(&self, prefix: &str) -> Option<reqwest::header::HeaderValue> {
         let value = format!("{prefix}{}", self.0.expose_secret());
@@ -96,6 +103,13 @@ mod tests {
         let secret = Secret::new("sk/a+\"b".to_owned());
         let said = r#"got sk/a+"b, as "sk/a+\"b", as sk%2Fa%2B%22b"#;
         assert_eq!(secret.without(said), r#"got [key], as "[key]", as [key]"#);
+        assert_eq!(secret.without_in_answer("sk/a+\"b"), "[key]");
         assert!(!format!("{secret:?}").contains("sk/a"));
+    }
+
+    #[test]
+    fn a_word_in_place_of_a_key_changes_no_answer() {
+        let answer = r#"{"selected_cube": "none"}"#;
+        assert_eq!(Secret::new("none".to_owned()).without_in_answer(answer), answer);
     }
 }

@@ -31,6 +31,7 @@ use crate::sim::config::WorldConfig;
 /// second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's, and
 /// with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
+#[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
 pub struct RecordArgs {
     /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; or
     /// exec:'CMD', a program of your own that takes and gives JSON lines
@@ -110,9 +111,9 @@ impl RecordArgs {
             Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
             None => self.player()?,
         };
-        let shelf = Shelf::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
+        let there = Shelf::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
         let planned = plan.keys();
-        let todo = unrecorded(plan, &planned, |experiment| shelf.recorded(experiment))?;
+        let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
         let vlm = vlm.filter(|_| self.vlm.sends());
         let requests = vlm.map(|vlm| RequestForecast::of(&vlm, &todo, config)).transpose().map_err(Failure::input)?;
         let answer = ForecastAnswer::of(player.model(), planned.len(), &todo, config, requests);
@@ -153,14 +154,7 @@ impl RecordArgs {
         if self.json {
             output::print_json(&answer)?;
         }
-        if let Some(reason) = player.stopped() {
-            return Err(Failure::input(reason));
-        }
-        match (answer.stopped, answer.lost.is_empty()) {
-            (true, _) => Ok(Outcome::Interrupted),
-            (false, true) => Ok(Outcome::Done),
-            (false, false) => Ok(Outcome::CheckFailed),
-        }
+        outcome_of(&answer, player)
     }
 
     fn player(&self) -> Result<Arc<dyn Player>, Failure> {
@@ -183,6 +177,18 @@ impl RecordArgs {
             frames: !self.no_frames,
             log: !self.no_log,
         }
+    }
+}
+
+/// How a recording that ran to its end, or was stopped, is told from outside.
+fn outcome_of(answer: &RecordAnswer, player: &dyn Player) -> Result<Outcome, Failure> {
+    if let Some(reason) = player.stopped() {
+        return Err(Failure::input(reason));
+    }
+    match (answer.stopped, answer.lost.is_empty()) {
+        (true, _) => Ok(Outcome::Interrupted),
+        (false, true) => Ok(Outcome::Done),
+        (false, false) => Ok(Outcome::CheckFailed),
     }
 }
 

@@ -200,10 +200,10 @@ impl fmt::Display for RenormalizeAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.flips.is_empty() {
             let mut table = listing(["episode", "t", "before", "after", "identification"]);
-            let name = |color: &Option<String>| visible(color.as_deref().unwrap_or("--")).to_string();
+            let name = |color: &Option<String>| visible(color.as_deref().unwrap_or("--"));
             for flip in &self.flips {
                 table.add_row([
-                    visible(&flip.episode_id).to_string(),
+                    visible(&flip.episode_id),
                     flip.t.to_string(),
                     name(&flip.before),
                     name(&flip.after),
@@ -234,7 +234,7 @@ impl RenormalizeAnswer {
 }
 
 fn shortened(text: &str) -> String {
-    let line = visible(text).to_string();
+    let line = visible(text);
     if line.chars().count() <= LONGEST {
         return line;
     }

@@ -96,9 +96,9 @@ pub(super) fn write<E: From<FormatError>>(
         });
         let given = given.and_then(|()| Ok(send(&mut gathered).map(drop)?));
         drop(give);
-        let encoded = encoder.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
+        let written = encoder.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
         given?;
-        encoded?.close().map_err(FormatError::from)?;
+        written?.close().map_err(FormatError::from)?;
         Ok(())
     })
 }

@@ -96,7 +96,7 @@ impl Columns {
         }
         let kind = match kind_of(value) {
             Ok(kind) => kind,
-            Err(fault) => return Some(fault),
+            Err(fault) => return Some(*fault),
         };
         if !self.own.contains_key(key) && self.own.len() == MOST_OWN {
             let found = "one more";
@@ -143,7 +143,7 @@ fn named(kind: Kind) -> &'static str {
     }
 }
 
-fn kind_of(value: &Value) -> Result<Option<Kind>, Fault> {
+fn kind_of(value: &Value) -> Result<Option<Kind>, Box<Fault>> {
     match value {
         Value::Null => Ok(None),
         Value::Bool(_) => Ok(Some(Kind::Bool)),
@@ -152,11 +152,11 @@ fn kind_of(value: &Value) -> Result<Option<Kind>, Fault> {
         Value::Text(_) => Ok(Some(Kind::String)),
         Value::LargeInt(_) => {
             let expected = format!("an integer of at most {}", i64::MAX);
-            Err(Fault::new(expected, value.shown(), "write it as text in every line"))
+            Err(Box::new(Fault::new(expected, value.shown(), "write it as text in every line")))
         }
         Value::List | Value::Object(_) => {
             let help = "give its parts keys of their own, write it as text, or leave it out";
-            Err(Fault::new("null, true or false, a number or a text", value.shown(), help))
+            Err(Box::new(Fault::new("null, true or false, a number or a text", value.shown(), help)))
         }
     }
 }

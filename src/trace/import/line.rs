@@ -50,23 +50,23 @@ impl Value {
 }
 
 /// The keys and values of a line; `ended` says whether a line feed was at its end.
-pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Fault> {
+pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
     let text = std::str::from_utf8(bytes).map_err(|error| {
         let found = format!("other bytes after the first {}", error.valid_up_to());
-        Fault::new("text in UTF-8", found, "write the file as UTF-8")
+        Box::new(Fault::new("text in UTF-8", found, "write the file as UTF-8"))
     })?;
     match serde_json::from_str(text.trim_end()) {
         Ok(Value::Object(members)) => unique(members),
-        Ok(other) => Err(Fault::new("a JSON object, one step", other.shown(), "write one object a line")),
-        Err(error) => Err(no_json(text.trim_end(), ended, &error)),
+        Ok(other) => Err(Box::new(Fault::new("a JSON object, one step", other.shown(), "write one object a line"))),
+        Err(error) => Err(Box::new(no_json(text.trim_end(), ended, &error))),
     }
 }
 
-fn unique(members: Members) -> Result<Members, Fault> {
+fn unique(members: Members) -> Result<Members, Box<Fault>> {
     let mut seen = HashSet::with_capacity(members.len());
     match members.iter().find(|(key, _)| !seen.insert(key.as_str())) {
         None => Ok(members),
-        Some((key, _)) => Err(Fault::new("each key once", "the key twice", "keep one of them").of_key(key)),
+        Some((key, _)) => Err(Box::new(Fault::new("each key once", "the key twice", "keep one of them").of_key(key))),
     }
 }
 

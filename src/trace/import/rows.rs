@@ -21,8 +21,8 @@ pub(super) struct Rows<W: Write + Send> {
     parquet: ArrowWriter<W>,
     layout: SchemaRef,
     columns: Vec<Gathered>,
-    gathered_rows: usize,
-    row_group_rows: usize,
+    gathered: usize,
+    in_row_group: usize,
 }
 
 /// The values of one column since the last batch.
@@ -45,7 +45,7 @@ impl<W: Write + Send> Rows<W> {
             ArrowWriterOptions::new().with_properties(properties(Some(recording))).with_skip_arrow_metadata(true);
         let parquet = ArrowWriter::try_new_with_options(out, Arc::clone(&layout), options).map_err(failed)?;
         let columns = kinds.into_iter().map(Gathered::new).collect();
-        Ok(Self { parquet, layout, columns, gathered_rows: 0, row_group_rows: 0 })
+        Ok(Self { parquet, layout, columns, gathered: 0, in_row_group: 0 })
     }
 
     /// Adds a step; an error if a value is not of its column's type.
@@ -55,17 +55,17 @@ impl<W: Write + Send> Rows<W> {
             let value = members.iter().find(|(key, _)| key == field.name()).map(|(_, value)| value);
             gathered.push(value.unwrap_or(&Value::Null))?;
         }
-        self.gathered_rows += 1;
+        self.gathered += 1;
         Ok(())
     }
 
     /// Says that the next step is another episode's.
     pub(super) fn end_episode(&mut self) -> Result<(), TraceError> {
-        if self.row_group_rows + self.gathered_rows >= ROW_GROUP_ROWS {
+        if self.in_row_group + self.gathered >= ROW_GROUP_ROWS {
             self.encode()?;
             self.parquet.flush().map_err(failed)?;
-            self.row_group_rows = 0;
-        } else if self.gathered_rows >= GATHERED_ROWS {
+            self.in_row_group = 0;
+        } else if self.gathered >= GATHERED_ROWS {
             self.encode()?;
         }
         Ok(())
@@ -78,7 +78,7 @@ impl<W: Write + Send> Rows<W> {
     }
 
     fn encode(&mut self) -> Result<(), TraceError> {
-        if self.gathered_rows == 0 {
+        if self.gathered == 0 {
             return Ok(());
         }
         let fields = self.layout.fields().iter();
@@ -86,8 +86,8 @@ impl<W: Write + Send> Rows<W> {
         let arrays = arrays.collect::<Result<Vec<_>, _>>();
         let batch = arrays.and_then(|arrays| RecordBatch::try_new(Arc::clone(&self.layout), arrays));
         self.parquet.write(&batch.map_err(|error| failed(error.into()))?).map_err(failed)?;
-        self.row_group_rows += self.gathered_rows;
-        self.gathered_rows = 0;
+        self.in_row_group += self.gathered;
+        self.gathered = 0;
         Ok(())
     }
 }

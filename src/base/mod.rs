@@ -2,6 +2,7 @@
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
+pub mod beside;
 pub mod bits;
 pub mod estimate;
 pub mod frame;

@@ -2,8 +2,7 @@
 
 use std::io::Write;
 use std::sync::Arc;
-use std::sync::mpsc::{self, Receiver};
-use std::thread;
+use std::sync::mpsc::{Receiver, SyncSender};
 
 use arrow::array::{
     Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Builder, RecordBatch, StringBuilder,
@@ -22,6 +21,7 @@ use super::FormatError;
 use super::csv::{KEYS, check_unique};
 use super::footer;
 use super::surroundings::Surroundings;
+use crate::base::beside::beside;
 use crate::metric::catalog::Catalog;
 use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
 use crate::trace::contain::contained;
@@ -75,32 +75,29 @@ pub(super) fn write<E: From<FormatError>>(
     let schema = Arc::new(schema(header));
     let properties = properties(&header.catalog)?;
     let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties)).map_err(FormatError::from)?;
-    thread::scope(|scope| {
-        let (give, take) = mpsc::sync_channel(WAITING);
-        let encoder = thread::Builder::new().name("parquet".into());
-        let encoder = encoder.spawn_scoped(scope, move || encode(parquet, take)).map_err(FormatError::Thread)?;
+    let feed = |give: SyncSender<RecordBatch>| {
         let mut gathered = Gathered::new(header);
-        // What ended the encoder is learnt when it is joined.
+        // What ended the encoder is learnt when it is done.
         let send = |gathered: &mut Gathered| {
             let batch = RecordBatch::try_new(Arc::clone(&schema), gathered.take());
             let batch = batch.map_err(|error| FormatError::Parquet(ParquetError::ArrowError(error.to_string())))?;
             Ok::<_, FormatError>(give.send(batch).is_ok())
         };
         let mut over = false;
-        let given = rows(&mut |row| {
+        rows(&mut |row| {
             if !over {
                 gathered.add(row);
                 over = gathered.seed.len() == GATHERED_ROWS && !send(&mut gathered)?;
             }
             Ok(())
-        });
-        let given = given.and_then(|()| Ok(send(&mut gathered).map(drop)?));
-        drop(give);
-        let written = encoder.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-        given?;
-        written?.close().map_err(FormatError::from)?;
-        Ok(())
-    })
+        })?;
+        send(&mut gathered).map(drop).map_err(E::from)
+    };
+    let (given, written) =
+        beside("parquet", WAITING, |batches| encode(parquet, batches), feed).map_err(FormatError::Thread)?;
+    given?;
+    written?.close().map_err(FormatError::from)?;
+    Ok(())
 }
 
 /// Encodes batches until there are no more; what comes back is to be closed, unless a row was lost.

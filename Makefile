@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench bench-world bench-agents sheet
+.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench bench-scores bench-world bench-agents bench-agents sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -49,6 +49,9 @@ calibrate:
 	cargo test --release --features sim --test agents -- --ignored twenty_one
 	@echo "The table is in reports/world/calibration.md."
 
+## All that is measured beside models: scoring, then the world.
+bench: bench-scores bench-world
+
 ## How fast scoring is beside other engines, and where the time goes: benches/RESULTS.md. BENCH_FEATURES=polars builds
 ## `--engine polars` in, which takes minutes more; LARGE=140000000 measures ten times the steps too.
 STEPS = 14000000
@@ -57,7 +60,7 @@ ROUNDS = 5
 LARGE = 0
 BENCH_FEATURES =
 BENCH_PYTHON = target/bench-python
-bench:
+bench-scores:
 	cargo build --release --no-default-features --features "$(BENCH_FEATURES)" --bin mirrorstats --example generate --example decode
 	python3 -m pip install --quiet --upgrade --target $(BENCH_PYTHON) duckdb polars pandas pyarrow
 	PYTHONPATH=$(BENCH_PYTHON) python3 scripts/bench/bench.py --program $${CARGO_TARGET_DIR:-target}/release/mirrorstats \

@@ -1,6 +1,6 @@
 """Measures `score` beside other engines on generated traces, in turn, and writes benches/RESULTS.md.
 
-`make bench` calls it; `--help` lists what may be changed. Times are wall-clock; of a process of ours, the whole
+`make bench-scores` calls it; `--help` lists what may be changed. Times are wall-clock; of a process of ours, the whole
 process; of a Python engine, the work without imports and without the start of the interpreter. Peak memory is the
 process's largest resident set.
 """
@@ -227,7 +227,7 @@ def main():
             split[count].append(bench.contenders()["native"](where, bench.data / "out-split.parquet"))
 
     lines = [
-        "# Results of `make bench`",
+        "# Results of `make bench-scores`",
         "",
         f"Machine: {machine()}.  ",
         f"Versions: {versions(bench.program)}.  ",
@@ -291,7 +291,7 @@ def main():
         "",
         "## How to repeat it",
         "",
-        "`make bench` (variables: `STEPS`, `FILES`, `ROUNDS`, `LARGE=140000000` for the larger set, which takes 5 GB of disk",
+        "`make bench-scores` (variables: `STEPS`, `FILES`, `ROUNDS`, `LARGE=140000000` for the larger set, which takes 5 GB of disk",
         "for a while; `BENCH_FEATURES=polars` builds `--engine polars` in, minutes). `cargo bench --bench kernels` measures",
         "the kernels alone.",
         "",

@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench bench-scores bench-world bench-agents bench-agents sheet
+.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench bench-scores bench-world bench-agents sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:

@@ -120,6 +120,13 @@ fn polars_gives_the_bytes_of_the_native_engine() {
 }
 
 #[test]
+fn evidence_is_not_said_to_be_of_another_engine() {
+    let (code, out, err) = run(&["score", FIXTURE, "--engine", "polars", "--explain", "E1/gpt-5-1/s1/r2"]);
+    assert_eq!((code, out.as_str()), (2, ""));
+    assert!(err.contains("--explain shows what the native engine decided by"), "{err}");
+}
+
+#[test]
 fn polars_refuses_damaged_traces_in_the_same_words() {
     let damaged = std::fs::read_dir("fixtures/damaged").unwrap().map(|entry| entry.unwrap().path());
     let mut seen = 0;

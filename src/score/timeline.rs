@@ -74,7 +74,7 @@ impl Moments {
 /// `None` where the definitions do not name the moments.
 ///
 /// # Errors
-/// As [`run::score`].
+/// As [`score`](super::run::score).
 pub fn timelines(
     traces: &TraceSet,
     definitions: &Definitions,

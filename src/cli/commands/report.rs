@@ -7,6 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
+use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
 use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
 use super::super::{output, scoring};
@@ -125,7 +126,8 @@ impl ReportArgs {
         if let Some(table) = main {
             out.write_all(terminal::render(table, terminal_now()).as_bytes())?;
         }
-        writeln!(io::stderr(), "{episodes} episodes; the report is in {}", self.out.display())?;
+        let episodes = counted(episodes as u64, "episode");
+        writeln!(io::stderr(), "{episodes}; the report is in {}", self.out.display())?;
         Ok(Outcome::Done)
     }
 }

@@ -8,6 +8,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::args::{EngineArgs, ScoringArgs, ThreadArgs, TraceArgs};
+use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
 use super::super::page::Made;
 use super::super::provenance;
@@ -191,7 +192,7 @@ impl RescoreArgs {
         if let Some(changes) = &changes {
             io::stdout().lock().write_all(changes::render(changes, Limit(self.limit)).as_bytes())?;
         }
-        writeln!(io::stderr(), "{episodes} episodes; the report is in {out}")?;
+        writeln!(io::stderr(), "{}; the report is in {out}", counted(episodes as u64, "episode"))?;
         Ok(Outcome::Done)
     }
 }

@@ -4,6 +4,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
+use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, scoring, spark};
 use crate::score::evidence;
@@ -77,7 +78,8 @@ impl ScoreArgs {
         if let Some(folder) = self.output.as_deref().filter(|output| spark::is_folder(output)) {
             let name = folder.to_string_lossy();
             let written = asked()?.write(&name)?;
-            writeln!(io::stderr(), "{} episodes; `mirrorstats report {name}` goes on from here", written.episodes)?;
+            let episodes = counted(written.episodes, "episode");
+            writeln!(io::stderr(), "{episodes}; `mirrorstats report {name}` goes on from here")?;
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;

@@ -1,77 +1,94 @@
 //! Records in the order of their bytes, more of them than memory should hold: sorted runs, put away and merged.
 //!
-//! Rule: a run that is put away is a temporary file without a name, gone with the process. Memory holds the run that
-//! grows and one record of each run that is merged. What a record means is the caller's business; one whose key must
+//! Rule: a run that is put away is a temporary file without a name, gone with the process. Memory holds the runs that
+//! are not put away and one record of each other run that is merged. What a record means is the caller's business; one whose key must
 //! decide the order begins with a form of it that no other key continues.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::collections::binary_heap::PeekMut;
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Cursor, Read, Seek as _, Write as _};
+use std::io::{self, BufReader, BufWriter, Read as _, Seek as _, Write};
+use std::ops::Range;
 
 use super::temporary;
 
 /// Runs that are merged at a time, each an open file; more of them are first made into one.
 const FAN_IN: usize = 64;
 
-/// Records one after the other, each with its length before it.
+/// Bytes of a file that are read or written at a time.
+const BUFFER: usize = 64 * 1024;
+
+/// Records in order, in memory.
 #[derive(Debug, Default)]
-pub struct Run(Vec<u8>);
+pub struct Run {
+    bytes: Vec<u8>,
+    records: Vec<Range<usize>>,
+}
 
 impl Run {
-    /// Adds a record, which must not come before the last one.
-    pub fn push(&mut self, record: &[u8]) {
-        let length = u32::try_from(record.len()).expect("a record is a few values of one row");
-        self.0.extend_from_slice(&length.to_le_bytes());
-        self.0.extend_from_slice(record);
+    /// The records at these places of some bytes, none before the one ahead of it.
+    pub fn new(bytes: Vec<u8>, records: Vec<Range<usize>>) -> Self {
+        Self { bytes, records }
+    }
+
+    /// The bytes of its records, and of whatever else lies between them.
+    pub fn size(&self) -> usize {
+        self.bytes.len()
     }
 }
 
-/// Runs that were put away.
+/// Runs that were put away: files of records, each with its length before it.
 #[derive(Debug, Default)]
 pub struct Runs(Vec<File>);
 
 impl Runs {
-    /// Puts a run away.
+    /// Whether nothing was put away.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Puts runs away, as one.
     ///
     /// # Errors
     /// When there is no place for temporary files, or no more of it.
-    pub fn put_away(&mut self, run: &Run) -> io::Result<()> {
+    pub fn put_away(&mut self, runs: Vec<Run>) -> io::Result<()> {
         if self.0.len() == FAN_IN {
-            let merged = merged_into_one(std::mem::take(&mut self.0))?;
-            self.0.push(merged);
+            let files = std::mem::take(&mut self.0);
+            self.0.push(merged_into_one(heads_of_files(files)?)?);
         }
-        let mut file = tempfile::tempfile().map_err(temporary::without_name)?;
-        file.write_all(&run.0)?;
-        self.0.push(file);
+        self.0.push(merged_into_one(heads_in_memory(runs))?);
         Ok(())
     }
 
-    /// All records, those of the last run among them, in order.
+    /// All records, those of the last runs among them, in order.
     ///
     /// # Errors
     /// When what was put away cannot be read.
-    pub fn merge(self, last: Run) -> io::Result<Merge> {
-        let mut sources = sources(self.0)?;
-        sources.push(Box::new(Cursor::new(last.0)));
-        Merge::of(sources)
+    pub fn merge(self, last: Vec<Run>) -> io::Result<Merge> {
+        let mut heads = heads_of_files(self.0)?;
+        heads.extend(heads_in_memory(last));
+        Merge::of(heads)
     }
 }
 
-fn sources(files: Vec<File>) -> io::Result<Vec<Box<dyn Read + Send>>> {
-    let source = |mut file: File| {
-        file.rewind()?;
-        Ok(Box::new(BufReader::with_capacity(64 * 1024, file)) as Box<dyn Read + Send>)
-    };
-    files.into_iter().map(source).collect()
+fn heads_in_memory(runs: Vec<Run>) -> Vec<Head> {
+    runs.into_iter().map(|run| Head::Memory { run, next: 0 }).collect()
 }
 
-fn merged_into_one(files: Vec<File>) -> io::Result<File> {
-    let mut out = BufWriter::new(tempfile::tempfile().map_err(temporary::without_name)?);
-    let mut merge = Merge::of(sources(files)?)?;
+fn heads_of_files(files: Vec<File>) -> io::Result<Vec<Head>> {
+    let head = |mut file: File| {
+        file.rewind()?;
+        Ok(Head::File { record: Vec::new(), rest: BufReader::with_capacity(BUFFER, file) })
+    };
+    files.into_iter().map(head).collect()
+}
+
+fn merged_into_one(heads: Vec<Head>) -> io::Result<File> {
+    let mut out = BufWriter::with_capacity(BUFFER, tempfile::tempfile().map_err(temporary::without_name)?);
+    let mut merge = Merge::of(heads)?;
     while let Some(record) = merge.next()? {
-        let length = u32::try_from(record.len()).expect("it was read with a length of 32 bits");
+        let length = u32::try_from(record.len()).expect("a record is a few values of one row");
         out.write_all(&length.to_le_bytes())?;
         out.write_all(record)?;
     }
@@ -86,10 +103,9 @@ pub struct Merge {
 }
 
 impl Merge {
-    fn of(sources: Vec<Box<dyn Read + Send>>) -> io::Result<Self> {
+    fn of(sources: Vec<Head>) -> io::Result<Self> {
         let mut heads = BinaryHeap::with_capacity(sources.len());
-        for rest in sources {
-            let mut head = Head { record: Vec::new(), rest };
+        for mut head in sources {
             if head.advance()? {
                 heads.push(head);
             }
@@ -110,34 +126,56 @@ impl Merge {
             PeekMut::pop(first);
         }
         self.taken = true;
-        Ok(self.heads.peek().map(|head| head.record.as_slice()))
+        Ok(self.heads.peek().map(Head::record))
     }
 }
 
 /// The first record of a run that is not behind yet, and those after it.
-struct Head {
-    record: Vec<u8>,
-    rest: Box<dyn Read + Send>,
+enum Head {
+    File {
+        record: Vec<u8>,
+        rest: BufReader<File>,
+    },
+    /// `next` is the record after the first one.
+    Memory {
+        run: Run,
+        next: usize,
+    },
 }
 
 impl Head {
+    fn record(&self) -> &[u8] {
+        match self {
+            Self::File { record, .. } => record,
+            Self::Memory { run, next } => &run.bytes[run.records[*next - 1].clone()],
+        }
+    }
+
     /// Goes on to the next record; whether there is one.
     fn advance(&mut self) -> io::Result<bool> {
-        let mut length = [0; 4];
-        match self.rest.read_exact(&mut length) {
-            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
-            result => result?,
+        match self {
+            Self::File { record, rest } => {
+                let mut length = [0; 4];
+                match rest.read_exact(&mut length) {
+                    Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
+                    result => result?,
+                }
+                record.resize(u32::from_le_bytes(length) as usize, 0);
+                rest.read_exact(record)?;
+                Ok(true)
+            }
+            Self::Memory { run, next } => {
+                *next += 1;
+                Ok(*next <= run.records.len())
+            }
         }
-        self.record.resize(u32::from_le_bytes(length) as usize, 0);
-        self.rest.read_exact(&mut self.record)?;
-        Ok(true)
     }
 }
 
 impl Ord for Head {
     /// The greatest head of a heap is the one whose record comes first.
     fn cmp(&self, other: &Self) -> Ordering {
-        other.record.cmp(&self.record)
+        other.record().cmp(self.record())
     }
 }
 
@@ -160,24 +198,32 @@ mod tests {
     use proptest::collection::vec;
     use proptest::prelude::*;
 
+    use std::ops::Range;
+
     use super::{FAN_IN, Run, Runs};
 
     fn run(records: &[Vec<u8>]) -> Run {
-        let mut sorted = records.to_vec();
-        sorted.sort();
-        let mut run = Run::default();
-        for record in &sorted {
-            run.push(record);
+        let mut places: Vec<Range<usize>> = Vec::new();
+        for record in records {
+            let start = places.last().map_or(0, |last| last.end);
+            places.push(start..start + record.len());
         }
-        run
+        let bytes = records.concat();
+        places.sort_by_key(|place| bytes[place.clone()].to_vec());
+        Run::new(bytes, places)
     }
 
-    fn merged(records: &[Vec<u8>], in_memory: usize) -> Vec<Vec<u8>> {
-        let mut chunks = records.chunks(in_memory).map(run);
-        let last = chunks.next_back().unwrap_or_default();
+    /// Put away so many runs at a time.
+    fn merged(records: &[Vec<u8>], in_memory: usize, at_a_time: usize) -> Vec<Vec<u8>> {
         let mut runs = Runs::default();
-        chunks.for_each(|chunk| runs.put_away(&chunk).unwrap());
-        let mut merge = runs.merge(last).unwrap();
+        let mut pending = Vec::new();
+        for chunk in records.chunks(in_memory) {
+            if pending.len() == at_a_time {
+                runs.put_away(std::mem::take(&mut pending)).unwrap();
+            }
+            pending.push(run(chunk));
+        }
+        let mut merge = runs.merge(pending).unwrap();
         let mut found = Vec::new();
         while let Some(record) = merge.next().unwrap() {
             found.push(record.to_vec());
@@ -188,11 +234,11 @@ mod tests {
     proptest! {
         #[test]
         fn records_come_in_order_whatever_fits_into_memory(
-            records in vec(vec(any::<u8>(), 0..4), 0..40), in_memory in 1_usize..50,
+            records in vec(vec(any::<u8>(), 0..4), 0..40), in_memory in 1_usize..50, at_a_time in 1_usize..4,
         ) {
             let mut expected = records.clone();
             expected.sort();
-            prop_assert_eq!(merged(&records, in_memory), expected);
+            prop_assert_eq!(merged(&records, in_memory, at_a_time), expected);
         }
     }
 
@@ -202,6 +248,6 @@ mod tests {
         assert!(records.len() > 3 * FAN_IN);
         let mut expected = records.clone();
         expected.reverse();
-        assert_eq!(merged(&records, 1), expected);
+        assert_eq!(merged(&records, 1, 1), expected);
     }
 }

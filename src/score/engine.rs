@@ -12,7 +12,7 @@ use arrow::array::{
     UInt32Array,
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
-use arrow::compute::kernels::{boolean, cmp, numeric, zip};
+use arrow::compute::kernels::{boolean, cmp, numeric};
 use arrow::compute::{cast, nullif, prep_null_mask_filter};
 use arrow::datatypes::{DataType, Float64Type, Int32Type};
 use arrow::error::ArrowError;
@@ -332,7 +332,7 @@ impl Evaluation<'_, '_> {
             Op::IsFalse(x) => truth(BooleanArray::new(truths(&boolean::not(of(*x).bools()).map_err(overflow)?), None)),
             Op::Arithmetic(op, x, y) => self.arithmetic(*op, node.ty, level, *x, *y).map_err(overflow)?,
             Op::Negate(x) => numbers(numeric::neg(of(*x).array()).map_err(overflow)?, node.ty),
-            Op::Case { branches, otherwise } => self.case(branches, *otherwise, node.ty, level).map_err(overflow)?,
+            Op::Case { branches, otherwise } => self.case(branches, *otherwise, node.ty, level),
             Op::Coalesce(values) => self.coalesce(values, level).map_err(overflow)?,
             Op::Matches(x, _) => {
                 let pattern = self.engine.patterns[id.index()].as_ref().expect("compiled with the engine");
@@ -421,6 +421,8 @@ impl Evaluation<'_, '_> {
             (Type::Text, _) => match (x.coded(), y.coded()) {
                 (Some(coded), _) if y.is_single() => Ok(one_text(comparison, coded, y)),
                 (_, Some(coded)) if x.is_single() => Ok(one_text(comparison, coded, x)),
+                (Some(coded), None) => Ok(coded.equal(y.symbols(), comparison == Comparison::Equal)),
+                (None, Some(coded)) => Ok(coded.equal(x.symbols(), comparison == Comparison::Equal)),
                 _ => compare(comparison, x, y),
             },
             _ => compare(comparison, x, y),
@@ -441,13 +443,7 @@ impl Evaluation<'_, '_> {
         Ok(numbers(result, ty))
     }
 
-    fn case(
-        &self,
-        branches: &[(NodeId, NodeId)],
-        otherwise: Option<NodeId>,
-        ty: Type,
-        level: Level,
-    ) -> Result<Values, ArrowError> {
+    fn case(&self, branches: &[(NodeId, NodeId)], otherwise: Option<NodeId>, ty: Type, level: Level) -> Values {
         let mut result = match otherwise {
             Some(id) => self.full(id, level),
             None => self.spread(&Values::constant(&Constant::Null, ty, &mut Symbols::default()), level),
@@ -455,9 +451,9 @@ impl Evaluation<'_, '_> {
         for (when, then) in branches.iter().rev() {
             let mask = self.full_bools(*when, level);
             let mask = if mask.null_count() > 0 { prep_null_mask_filter(&mask) } else { mask };
-            result = choose(&mask, self.of(*then), &result)?;
+            result = choose(&mask, self.of(*then), &result);
         }
-        Ok(result)
+        result
     }
 
     fn coalesce(&self, ids: &[NodeId], level: Level) -> Result<Values, ArrowError> {
@@ -466,7 +462,7 @@ impl Evaluation<'_, '_> {
         for id in before.iter().rev() {
             let values = self.full(*id, level);
             let mask = boolean::is_not_null(values.array())?;
-            result = choose(&mask, &values, &result)?;
+            result = choose(&mask, &values, &result);
         }
         Ok(result)
     }
@@ -543,14 +539,29 @@ impl Evaluation<'_, '_> {
 }
 
 /// The values of `then` where the mask, which has no null, is set, and those of `otherwise` elsewhere.
-fn choose(mask: &BooleanArray, then: &Values, otherwise: &Values) -> Result<Values, ArrowError> {
+fn choose(mask: &BooleanArray, then: &Values, otherwise: &Values) -> Values {
     let ty = otherwise.ty();
-    Ok(match ty {
-        Type::Bool => Values::shared(zip::zip(mask, then, otherwise)?, ty),
+    match ty {
+        Type::Bool => Values::new(choose_bools(mask.values(), then.bools(), otherwise.bools()), ty),
         Type::Int => Values::new(choose_numbers(mask, then.ints(), otherwise.ints()), ty),
         Type::Float => Values::new(choose_numbers(mask, then.floats(), otherwise.floats()), ty),
         Type::Text => Values::new(choose_numbers(mask, then.symbols(), otherwise.symbols()), ty),
-    })
+    }
+}
+
+/// As `zip`, on whole words of bits. One value of `then` stands for all.
+fn choose_bools(mask: &BooleanBuffer, then: &BooleanArray, otherwise: &BooleanArray) -> BooleanArray {
+    let then = if then.len() == 1 { repeat_bool(then, mask.len()) } else { then.clone() };
+    let others = !mask;
+    let chosen = |a: &BooleanBuffer, b: &BooleanBuffer| &(a & mask) | &(b & &others);
+    let nulls = (then.null_count() + otherwise.null_count() > 0).then(|| {
+        let valid = |array: &BooleanArray| match array.nulls() {
+            Some(nulls) => nulls.inner().clone(),
+            None => BooleanBuffer::new_set(array.len()),
+        };
+        NullBuffer::new(chosen(&valid(&then), &valid(otherwise)))
+    });
+    BooleanArray::new(chosen(then.values(), otherwise.values()), nulls)
 }
 
 /// As `zip`, which copies run by run; here the mask changes from row to row. One value of `then` stands for all.

@@ -23,7 +23,10 @@ use crate::base::runs::{Merge, Run, Runs};
 use crate::trace::scan::EPISODE_COLUMNS;
 
 /// Bytes of rows that are held in memory before they are put away.
-const MEMORY: usize = 8 << 20;
+const MEMORY: usize = 20 << 20;
+
+/// Bytes of rows that are sorted at a time.
+const SORTED: usize = 2 << 20;
 
 /// What a row takes, about.
 const USUAL_BYTES: usize = 96;
@@ -32,11 +35,30 @@ const USUAL_BYTES: usize = 96;
 #[derive(Debug, Default)]
 pub struct Rows {
     bytes: Vec<u8>,
-    records: Vec<Range<usize>>,
+    records: Vec<Record>,
+}
+
+/// Where a row is among the bytes.
+#[derive(Clone, Copy, Debug)]
+struct Record {
+    start: usize,
+    length: u32,
+    /// How far its experiment and model go.
+    names: u32,
+}
+
+impl Record {
+    fn range(self) -> Range<usize> {
+        self.start..self.start + self.length as usize
+    }
+
+    fn names(self) -> Range<usize> {
+        self.start..self.start + self.names as usize
+    }
 }
 
 impl Rows {
-    /// The scores of the episodes of one batch, in the order of their keys.
+    /// The scores of the episodes of one batch.
     pub fn of(episodes: &RecordBatch, scores: &Scores, labels: &[String]) -> Self {
         let keys = KeyColumns::of(episodes);
         let column = |name: &String| episodes.column_by_name(name).expect("the projection asks for this column");
@@ -45,54 +67,87 @@ impl Rows {
             bytes: Vec::with_capacity(scores.kept.len() * USUAL_BYTES),
             records: Vec::with_capacity(scores.kept.len()),
         };
+        // Experiment and model seldom change from row to row.
+        let mut before: Option<([Option<usize>; 2], Range<usize>)> = None;
         for (at, &row) in scores.kept.iter().enumerate() {
             let start = rows.bytes.len();
-            keys.put(&mut rows.bytes, row);
+            match &before {
+                Some((same, names)) if *same == keys.names(row) => rows.bytes.extend_from_within(names.clone()),
+                _ => keys.put_names(&mut rows.bytes, row),
+            }
+            let names = rows.bytes.len();
+            before = Some((keys.names(row), start..names));
+            keys.put_rest(&mut rows.bytes, row);
             for label in &labels {
                 put_label(&mut rows.bytes, shown(label, row).as_deref());
             }
             for metric in &scores.metrics {
                 put_metric(&mut rows.bytes, metric[at]);
             }
-            rows.records.push(start..rows.bytes.len());
+            let length = |end: usize| u32::try_from(end - start).expect("a row is a few names and numbers");
+            rows.records.push(Record { start, length: length(rows.bytes.len()), names: length(names) });
         }
-        rows.sort();
         rows
-    }
-
-    fn sort(&mut self) {
-        let bytes = &self.bytes;
-        self.records.sort_by(|a, b| bytes[a.clone()].cmp(&bytes[b.clone()]));
     }
 
     fn append(&mut self, other: &Self) {
         let offset = self.bytes.len();
         self.bytes.extend_from_slice(&other.bytes);
-        self.records.extend(other.records.iter().map(|record| record.start + offset..record.end + offset));
+        self.records.extend(other.records.iter().map(|record| Record { start: record.start + offset, ..*record }));
     }
 
     /// Takes all rows out as a sorted run.
     fn take(&mut self) -> Run {
-        self.sort();
-        let mut run = Run::default();
-        self.records.drain(..).for_each(|record| run.push(&self.bytes[record]));
-        self.bytes.clear();
-        run
+        let next =
+            Self { bytes: Vec::with_capacity(self.bytes.len()), records: Vec::with_capacity(self.records.len()) };
+        let Self { bytes, records } = std::mem::replace(self, next);
+        let order = order(&bytes, &records);
+        Run::new(bytes, order.into_iter().map(|at| records[at as usize].range()).collect())
     }
+}
+
+/// The positions of rows in the order of their bytes.
+///
+/// Few experiments and models have many rows: their names are compared once, then numbers.
+fn order(bytes: &[u8], records: &[Record]) -> Vec<u32> {
+    let names = |record: &Record| &bytes[record.names()];
+    let alike = || records.chunk_by(|a, b| names(a) == names(b));
+    let mut known: Vec<&[u8]> = alike().map(|rows| names(&rows[0])).collect();
+    known.sort_unstable();
+    known.dedup();
+    let mut order: Vec<(u32, u32, u64)> = Vec::with_capacity(records.len());
+    for rows in alike() {
+        let rank = narrow(known.partition_point(|name| *name < names(&rows[0])));
+        for record in rows {
+            let numbers = bytes[record.names().end..].first_chunk().expect("seed and run stand behind the names");
+            order.push((rank, narrow(order.len()), u64::from_be_bytes(*numbers)));
+        }
+    }
+    let rest = |at: u32| &bytes[records[at as usize].range()];
+    // Rows of one file mostly come in order, which this sort makes use of.
+    order.sort_by(|a, b| (a.0, a.2).cmp(&(b.0, b.2)).then_with(|| rest(a.1).cmp(rest(b.1))));
+    order.into_iter().map(|(_, at, _)| at).collect()
+}
+
+fn narrow(count: usize) -> u32 {
+    u32::try_from(count).expect("fewer than 2^32 rows are held in memory")
 }
 
 /// Sorts rows as they come, in bounded memory.
 pub struct RowSorter {
     header: Header,
     pending: Rows,
+    sorted: Vec<Run>,
     runs: Runs,
+    at_a_time: usize,
     memory: usize,
 }
 
 impl RowSorter {
     /// A sorter without rows.
     pub fn new(header: Header) -> Self {
-        Self { header, pending: Rows::default(), runs: Runs::default(), memory: MEMORY }
+        let (pending, sorted, runs) = (Rows::default(), Vec::new(), Runs::default());
+        Self { header, pending, sorted, runs, at_a_time: SORTED, memory: MEMORY }
     }
 
     /// Adds rows.
@@ -101,9 +156,11 @@ impl RowSorter {
     /// When rows cannot be put away.
     pub fn add(&mut self, rows: &Rows) -> io::Result<()> {
         self.pending.append(rows);
-        if self.pending.bytes.len() >= self.memory {
-            let run = self.pending.take();
-            self.runs.put_away(&run)?;
+        if self.pending.bytes.len() >= self.at_a_time {
+            self.sorted.push(self.pending.take());
+        }
+        if self.sorted.iter().map(Run::size).sum::<usize>() >= self.memory {
+            self.runs.put_away(std::mem::take(&mut self.sorted))?;
         }
         Ok(())
     }
@@ -113,8 +170,9 @@ impl RowSorter {
     /// # Errors
     /// When rows that were put away cannot be read.
     pub fn finish(mut self) -> io::Result<SortedRows> {
-        let merge = self.runs.merge(self.pending.take())?;
-        Ok(SortedRows { header: self.header, merge, row: EpisodeRow::default() })
+        self.sorted.push(self.pending.take());
+        let merge = self.runs.merge(self.sorted)?;
+        Ok(SortedRows { header: self.header, merge, row: EpisodeRow::default(), names: Vec::new() })
     }
 }
 
@@ -123,6 +181,8 @@ pub struct SortedRows {
     header: Header,
     merge: Merge,
     row: EpisodeRow,
+    /// The bytes of its experiment and model.
+    names: Vec<u8>,
 }
 
 impl SortedRows {
@@ -137,11 +197,18 @@ impl SortedRows {
     /// When rows that were put away cannot be read.
     pub fn next_row(&mut self) -> io::Result<Option<&EpisodeRow>> {
         let Some(record) = self.merge.next()? else { return Ok(None) };
-        let mut record = Record(record);
         let EpisodeRow { key, labels, metrics } = &mut self.row;
         let EpisodeKey { experiment, model, seed, run, episode_id } = key;
-        record.text(experiment)?;
-        record.text(model)?;
+        let mut rest = Bytes(record);
+        if !self.names.is_empty() && record.starts_with(&self.names) {
+            rest.take(self.names.len())?;
+        } else {
+            rest.text(experiment)?;
+            rest.text(model)?;
+            self.names.clear();
+            self.names.extend_from_slice(&record[..record.len() - rest.0.len()]);
+        }
+        let mut record = rest;
         *seed = record.int()?;
         *run = record.int()?;
         record.text(episode_id)?;
@@ -199,9 +266,17 @@ impl<'a> KeyColumns<'a> {
         i32::try_from(self.run.value(row)).unwrap_or_default()
     }
 
-    fn put(&self, bytes: &mut Vec<u8>, row: usize) {
+    /// Experiment and model as keys of this batch.
+    fn names(&self, row: usize) -> [Option<usize>; 2] {
+        [self.experiment.key(row), self.model.key(row)]
+    }
+
+    fn put_names(&self, bytes: &mut Vec<u8>, row: usize) {
         put_text(bytes, text(self.experiment, row).unwrap_or_default());
         put_text(bytes, text(self.model, row).unwrap_or_default());
+    }
+
+    fn put_rest(&self, bytes: &mut Vec<u8>, row: usize) {
         // The scan has checked that seed and run fit.
         put_int(bytes, self.seed(row));
         put_int(bytes, self.run(row));
@@ -279,9 +354,9 @@ fn put_metric(bytes: &mut Vec<u8>, metric: Option<i64>) {
 }
 
 /// What is left of a row's bytes.
-struct Record<'a>(&'a [u8]);
+struct Bytes<'a>(&'a [u8]);
 
-impl Record<'_> {
+impl Bytes<'_> {
     fn take(&mut self, length: usize) -> io::Result<&[u8]> {
         let (taken, rest) = self.0.split_at_checked(length).ok_or_else(damaged)?;
         self.0 = rest;
@@ -392,9 +467,9 @@ mod tests {
     proptest! {
         #[test]
         fn rows_come_out_as_they_went_in_and_in_the_order_of_keys(
-            rows in vec(row(), 1..30), batches in 1_usize..10, memory in 1_usize..400,
+            rows in vec(row(), 1..30), batches in 1_usize..10, at_a_time in 1_usize..200, memory in 1_usize..400,
         ) {
-            let mut sorter = RowSorter { memory, ..RowSorter::new(header()) };
+            let mut sorter = RowSorter { at_a_time, memory, ..RowSorter::new(header()) };
             for some in rows.chunks(rows.len().div_ceil(batches)) {
                 sorter.add(&batch(some)).unwrap();
             }

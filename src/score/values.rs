@@ -144,6 +144,14 @@ impl Coded {
         UInt32Array::new(keys.values().iter().map(symbol).collect(), keys.nulls().cloned())
     }
 
+    /// Where the texts are equal to others, or where they are not; null where one of them is.
+    pub(super) fn equal(&self, others: &UInt32Array, equal: bool) -> BooleanArray {
+        let (keys, others, nulls) =
+            (self.keys.values(), others.values(), NullBuffer::union(self.keys.nulls(), others.nulls()));
+        let symbol = |row: usize| self.symbols.get(keys[row] as usize).copied().unwrap_or(0);
+        BooleanArray::new(BooleanBuffer::collect_bool(keys.len(), |row| (symbol(row) == others[row]) == equal), nulls)
+    }
+
     /// The rows whose symbol fulfils `test`, null where the text is null.
     pub(super) fn test(&self, test: impl FnMut(u32) -> bool) -> BooleanArray {
         let fulfilled: Vec<bool> = self.symbols.iter().copied().map(test).collect();

@@ -1,9 +1,10 @@
-//! A column of some rows as it is held: a value a row, or a value a run of rows.
+//! A column of some rows as it is held: a value a row, a value a run of rows, or a key a row.
 //!
-//! Rule: both forms say the same. What asks for single rows may take either; what needs an array asks for one
+//! Rule: all forms say the same. What asks for single rows may take either; what needs an array asks for one
 //! ([`Column::flat`]), which costs as much as the rows are many.
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, UInt32Array};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, Int32Array, UInt32Array};
+use arrow::buffer::ScalarBuffer;
 use arrow::compute::{cast, concat, take};
 use arrow::datatypes::{DataType, Int32Type, Int64Type};
 use arrow::error::ArrowError;
@@ -17,6 +18,16 @@ pub(super) enum Column {
     Flat(ArrayRef),
     /// A value a run.
     Runs(Runs),
+    /// A key a row: integers of which few are different. No null.
+    Keys(Keys),
+}
+
+/// Rows as keys into values.
+#[derive(Clone, Debug)]
+pub(super) struct Keys {
+    keys: ScalarBuffer<i32>,
+    /// A value for each key.
+    values: ArrayRef,
 }
 
 /// Rows of which many in a row are equal: columns that are constant in an episode.
@@ -36,6 +47,7 @@ impl Column {
         match self {
             Self::Flat(values) => values.len(),
             Self::Runs(runs) => runs.length,
+            Self::Keys(keyed) => keyed.keys.len(),
         }
     }
 
@@ -44,6 +56,9 @@ impl Column {
         match self {
             Self::Flat(values) => Self::Flat(values.slice(start, length)),
             Self::Runs(runs) => Self::Runs(runs.slice(start, length)),
+            Self::Keys(Keys { keys, values }) => {
+                Self::Keys(Keys { keys: keys.slice(start, length), values: values.clone() })
+            }
         }
     }
 
@@ -52,6 +67,7 @@ impl Column {
         match self {
             Self::Flat(values) => Ok(values.clone()),
             Self::Runs(runs) => runs.at(0..runs.length),
+            Self::Keys(keyed) => take(&keyed.values, &Int32Array::new(keyed.keys.clone(), None), None),
         }
     }
 
@@ -63,14 +79,29 @@ impl Column {
                 take(values, &rows, None)
             }
             Self::Runs(runs) => runs.at(rows.iter().copied()),
+            Self::Keys(keyed) => {
+                let keys: Int32Array = rows.iter().map(|row| keyed.keys[*row]).collect::<Vec<_>>().into();
+                take(&keyed.values, &keys, None)
+            }
         }
     }
 
     /// The text at a row of a text column; `None` for null.
     pub(super) fn text(&self, row: usize) -> Option<&str> {
         let (values, row) = self.place(row);
-        let values = values.as_dictionary::<Int32Type>();
-        Some(values.values().as_string::<i32>().value(values.key(row)?))
+        text_at(values, row)
+    }
+
+    /// The texts at some rows, which ascend, of a text column; `None` for null.
+    pub(super) fn texts<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = Option<&'a str>> {
+        let mut run = if let Self::Runs(runs) = self { runs.run_of(0) } else { 0 };
+        rows.iter().map(move |row| match self {
+            Self::Runs(runs) => {
+                runs.advance(&mut run, *row);
+                text_at(&runs.values, run)
+            }
+            _ => self.text(*row),
+        })
     }
 
     /// The integer at a row of an integer column; `None` for null.
@@ -84,6 +115,7 @@ impl Column {
         match self {
             Self::Flat(values) => (values, row),
             Self::Runs(runs) => (&runs.values, runs.run_of(row)),
+            Self::Keys(Keys { keys, values }) => (values, usize::try_from(keys[row]).unwrap_or(usize::MAX)),
         }
     }
 
@@ -111,6 +143,33 @@ impl From<ArrayRef> for Column {
     }
 }
 
+impl Keys {
+    /// Rows with these keys; `None` where one has no value.
+    pub(super) fn new(keys: Vec<i32>, values: ArrayRef) -> Option<Self> {
+        // A negative key counts as the largest of all.
+        let largest = keys.iter().map(|key| key.cast_unsigned()).max();
+        let within = largest.is_none_or(|key| (key as usize) < values.len());
+        (within && values.null_count() == 0).then(|| Self { keys: keys.into(), values })
+    }
+
+    /// Whether the integers of each stretch of rows, bounded by `offsets`, are 1, 2, and so on. May say no where they
+    /// are, if a value has two keys.
+    pub(super) fn count_from_one(&self, offsets: &[usize]) -> bool {
+        let mut counting = Vec::new();
+        let mut keys: Vec<(i64, i32)> =
+            self.values.as_primitive::<Int64Type>().values().iter().copied().zip(0..).collect();
+        keys.sort_unstable();
+        let mut next = 1;
+        for (value, key) in keys {
+            if value == next {
+                counting.push(key);
+                next += 1;
+            }
+        }
+        offsets.windows(2).all(|ends| counting.get(..ends[1] - ends[0]) == Some(&self.keys[ends[0]..ends[1]]))
+    }
+}
+
 impl Runs {
     /// Runs of these values; each ends before the row of `ends` at its place.
     pub(super) fn new(values: ArrayRef, ends: Vec<u32>) -> Self {
@@ -118,12 +177,41 @@ impl Runs {
         Self { values, ends: ends.into(), start: 0, length }
     }
 
-    fn slice(&self, start: usize, length: usize) -> Self {
+    /// `length` rows from row `start`; nothing is copied.
+    pub(super) fn slice(&self, start: usize, length: usize) -> Self {
         Self { start: self.start + start, length, ..self.clone() }
     }
 
     fn run_of(&self, row: usize) -> usize {
         self.ends.values().partition_point(|end| *end as usize <= self.start + row)
+    }
+
+    /// Goes on from a run to that of a row behind its start.
+    fn advance(&self, run: &mut usize, row: usize) {
+        let ends = self.ends.values();
+        while ends[*run] as usize <= self.start + row {
+            *run += 1;
+        }
+    }
+
+    /// The rows at which the text is another one than in the row before; row 0 is none of them.
+    pub(super) fn text_changes(&self) -> impl Iterator<Item = usize> + '_ {
+        let differs = |(_, run): &(usize, usize)| text_at(&self.values, *run) != text_at(&self.values, run - 1);
+        self.starts().skip(1).filter(differs).map(|(start, _)| start)
+    }
+
+    /// The text at a row; `None` for null.
+    pub(super) fn text(&self, row: usize) -> Option<&str> {
+        text_at(&self.values, self.run_of(row))
+    }
+
+    /// How many rows from `first` on, `most` of them at most, end with a run; `most` where no run ends.
+    pub(super) fn until(&self, first: usize, most: usize) -> usize {
+        let most = most.min(self.length - first);
+        let first = self.start + first;
+        let ended = self.ends.values().partition_point(|end| *end as usize <= first + most);
+        let last = ended.checked_sub(1).map_or(0, |run| self.ends.value(run) as usize);
+        if last > first { last - first } else { most }
     }
 
     /// The row at which each run starts, and the position of its value; the first starts at row 0.
@@ -147,16 +235,19 @@ impl Runs {
 
     /// The values of some rows, ascending.
     fn at(&self, rows: impl IntoIterator<Item = usize>) -> Result<ArrayRef, ArrowError> {
-        let ends = self.ends.values();
         let mut run = self.run_of(0);
         let runs = rows.into_iter().map(|row| {
-            while ends[run] as usize <= self.start + row {
-                run += 1;
-            }
+            self.advance(&mut run, row);
             narrow(run)
         });
         take(&self.values, &UInt32Array::from(runs.collect::<Vec<_>>()), None)
     }
+}
+
+/// The text at a row of a dictionary; `None` for null.
+pub(super) fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
+    let column = column.as_dictionary::<Int32Type>();
+    Some(column.values().as_string::<i32>().value(column.key(row)?))
 }
 
 fn narrow(row: usize) -> u32 {

@@ -5,25 +5,26 @@
 use std::fs::File;
 use std::sync::Arc;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, new_null_array};
-use arrow::compute::cast;
+use arrow::array::{Array, ArrayRef, AsArray as _, new_null_array};
+use arrow::compute::{cast, concat};
 use arrow::datatypes::{DataType, Int32Type, UInt64Type};
-use arrow::record_batch::RecordBatch;
+use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowSelection, RowSelector,
 };
 
+use super::ahead::Ids;
 use super::column::Column;
 use super::contain::contained;
 use super::finding::{Code, Finding};
 use super::layout::{EPISODE_ID, Layout, T};
 use super::open::{TraceFile, plain, text_type};
-use super::pages::{Cursor, Unfit};
+use super::pages::{Cursor, Form, Unfit};
 use super::schema::Kind;
 
-/// Rows that are decoded at a time.
-const BATCH_ROWS: usize = 64 * 1024;
+/// Rows that are decoded at a time: the columns of so many stay in a core's cache.
+const BATCH_ROWS: usize = 32 * 1024;
 
 /// Some rows of one row group: a column for each of the layout, in its order.
 #[derive(Clone, Debug)]
@@ -32,6 +33,8 @@ pub(super) struct Rows {
     pub(super) row_group: usize,
     /// Where they start in the row group.
     pub(super) first: usize,
+    /// Whether the last episode is known to end with them.
+    pub(super) whole: bool,
 }
 
 impl Rows {
@@ -42,7 +45,8 @@ impl Rows {
     /// `length` rows from row `start`; nothing is copied.
     pub(super) fn slice(&self, start: usize, length: usize) -> Self {
         let columns = self.columns.iter().map(|column| column.slice(start, length)).collect();
-        Self { columns, row_group: self.row_group, first: self.first + start }
+        let whole = self.whole && start + length == self.len();
+        Self { columns, row_group: self.row_group, first: self.first + start, whole }
     }
 
     /// The episode of a row.
@@ -51,17 +55,13 @@ impl Rows {
     }
 }
 
-/// The text at a row of a text column; `None` for null.
-pub(super) fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
-    let column = column.as_dictionary::<Int32Type>();
-    Some(column.values().as_string::<i32>().value(column.key(row)?))
-}
-
 /// The rows of one row group, in order, until its end or its first fault.
 pub(super) struct RowGroup<'a> {
     file: &'a TraceFile,
     layout: &'a Layout,
     index: usize,
+    /// The ids of the episodes, if they are known already.
+    ids: Option<Ids>,
     /// Where the values of each column of the layout come from.
     sources: Vec<Source>,
     /// Where the next rows start in the row group.
@@ -74,23 +74,61 @@ pub(super) struct RowGroup<'a> {
 enum Source {
     /// The file does not have the column.
     Absent,
+    /// The ids of the episodes, which are known already.
+    Ahead,
     /// Its pages.
     Pages { root: usize, cursor: Box<Cursor> },
     /// The Parquet library.
-    Library(Box<ParquetRecordBatchReader>),
+    Library(Box<Library>),
+}
+
+/// A column as the Parquet library decodes it, so many rows at a time.
+struct Library {
+    reader: ParquetRecordBatchReader,
+    /// Decoded rows that are still to be given.
+    held: Vec<ArrayRef>,
+}
+
+impl Library {
+    fn rows(&self) -> usize {
+        self.held.iter().map(Array::len).sum()
+    }
+
+    /// The next rows, of which that many are held.
+    fn take(&mut self, count: usize) -> Result<ArrayRef, ArrowError> {
+        if let [values] = self.held.as_slice() {
+            let (values, rest) = (values.slice(0, count), values.slice(count, values.len() - count));
+            self.held.clear();
+            self.held.extend((!rest.is_empty()).then_some(rest));
+            return Ok(values);
+        }
+        let all: Vec<&dyn Array> = self.held.iter().map(AsRef::as_ref).collect();
+        self.held = vec![concat(&all)?];
+        self.take(count)
+    }
 }
 
 impl<'a> RowGroup<'a> {
     pub(super) fn open(file: &'a TraceFile, layout: &'a Layout, row_group: usize) -> Result<Self, Box<Finding>> {
+        Self::after(file, layout, row_group, None)
+    }
+
+    /// A row group of which the ids of the episodes may be known already.
+    pub(super) fn after(
+        file: &'a TraceFile,
+        layout: &'a Layout,
+        row_group: usize,
+        ids: Option<Ids>,
+    ) -> Result<Self, Box<Finding>> {
         let handle = file.reader().map_err(|error| {
             Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
         })?;
-        let mut rows = Self { file, layout, index: row_group, sources: Vec::new(), first: 0, over: false };
-        for (at, wanted) in layout.columns.iter().enumerate() {
-            let root = file.columns().iter().position(|column| column.name == wanted.name);
-            let source = match root {
+        let mut rows = Self { file, layout, index: row_group, ids, sources: Vec::new(), first: 0, over: false };
+        for at in 0..layout.columns.len() {
+            let source = match root(file, layout, at) {
                 None => Source::Absent,
-                Some(root) => match contained(|| cursor(file, &handle, root, row_group, held_as_runs(layout, at))) {
+                Some(_) if at == EPISODE_ID && rows.ids.is_some() => Source::Ahead,
+                Some(root) => match contained(|| cursor(file, &handle, root, row_group, form(layout, at))) {
                     Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
                     Ok(Err(Unfit)) | Err(_) => rows.library(root)?,
                 },
@@ -107,18 +145,25 @@ impl<'a> RowGroup<'a> {
             Box::new(Finding::new(Code::Unreadable, self.file.name(), "a file that can be read", error.to_string()))
         })?;
         let reader = contained(|| reader(self.file, handle, root, self.index, self.first)).map_err(corrupt)?;
-        Ok(Source::Library(Box::new(reader.map_err(|error| corrupt(plain(&error)))?)))
+        let reader = reader.map_err(|error| corrupt(plain(&error)))?;
+        Ok(Source::Library(Box::new(Library { reader, held: Vec::new() })))
     }
 
     fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
-        let expected = self.file.row_group_rows(self.index);
-        let count = BATCH_ROWS.min(expected - self.first);
+        let left = self.file.row_group_rows(self.index) - self.first;
+        // Whole episodes where it is known where they end.
+        let most = BATCH_ROWS.min(left);
+        let count = self.ids.as_ref().filter(|_| left > 0).map_or(most, |ids| ids.runs.until(self.first, most));
         let columns = (0..self.sources.len()).map(|at| self.column(at, count));
         let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
         if count == 0 {
             return Ok(None);
         }
-        let rows = Rows { columns, row_group: self.index, first: self.first };
+        let whole = self.ids.as_ref().is_some_and(|ids| match left - count {
+            0 => ids.ends,
+            _ => ids.runs.text(self.first + count - 1) != ids.runs.text(self.first + count),
+        });
+        let rows = Rows { columns, row_group: self.index, first: self.first, whole };
         self.first += count;
         Ok(Some(rows))
     }
@@ -137,30 +182,51 @@ impl<'a> RowGroup<'a> {
                 }
             }
         }
-        let Source::Library(reader) = &mut self.sources[at] else {
+        if let (Source::Ahead, Some(ids)) = (&self.sources[at], &self.ids) {
+            return Ok(Column::Runs(ids.runs.slice(self.first, count)));
+        }
+        let Source::Library(library) = &mut self.sources[at] else {
             return Ok(new_null_array(&held_as(kind), count).into());
         };
-        let batch = contained(|| reader.next())
-            .and_then(|next| next.transpose().map_err(|error| error.to_string()))
-            .map_err(|error| corrupt(self.file, self.index, &error))?;
-        let found = batch.as_ref().map_or(0, RecordBatch::num_rows);
-        let column = match batch {
-            Some(batch) if found == count => Arc::clone(batch.column(0)),
-            None if count == 0 => new_null_array(&held_as(kind), 0),
-            _ => {
-                let expected = format!("{} rows", self.file.row_group_rows(self.index));
-                let finding =
-                    Finding::new(Code::CorruptData, self.file.name(), expected, (self.first + found).to_string());
-                return Err(Box::new(finding.in_row_group(self.index)));
+        loop {
+            let held = library.rows();
+            if count == 0 && held > 0 {
+                return Err(self.other_rows(self.first + held));
             }
-        };
-        contained(|| normal_column(&column, kind))
-            .unwrap_or_else(|panic| Err(Refused::Unreadable(panic)))
-            .map(Column::Flat)
-            .map_err(|refused| self.refusal(refused, at))
+            if held >= count && count > 0 {
+                let column = library.take(count);
+                return column.map(Column::Flat).map_err(|error| corrupt(self.file, self.index, &error.to_string()));
+            }
+            let batch = contained(|| library.reader.next())
+                .and_then(|next| next.transpose().map_err(|error| error.to_string()))
+                .map_err(|error| corrupt(self.file, self.index, &error))?;
+            let Some(batch) = batch else {
+                if count == 0 {
+                    return Ok(new_null_array(&held_as(kind), 0).into());
+                }
+                return Err(self.other_rows(self.first + held));
+            };
+            if count == 0 {
+                return Err(self.other_rows(self.first + held + batch.num_rows()));
+            }
+            let column = contained(|| normal_column(batch.column(0), kind))
+                .unwrap_or_else(|panic| Err(Refused::Unreadable(panic)));
+            match column {
+                Ok(column) => library.held.push(column),
+                Err(refused) => return Err(self.refusal(refused, at, self.first + held)),
+            }
+        }
     }
 
-    fn refusal(&self, refused: Refused, column: usize) -> Box<Finding> {
+    /// A column ends early, or goes on.
+    fn other_rows(&self, found: usize) -> Box<Finding> {
+        let expected = format!("{} rows", self.file.row_group_rows(self.index));
+        let finding = Finding::new(Code::CorruptData, self.file.name(), expected, found.to_string());
+        Box::new(finding.in_row_group(self.index))
+    }
+
+    /// Why a column is refused whose rows from `first` on were decoded.
+    fn refusal(&self, refused: Refused, column: usize, first: usize) -> Box<Finding> {
         let at_column = |finding: Finding| Box::new(finding.in_column(&self.layout.columns[column].name));
         match refused {
             Refused::Unreadable(why) => at_column(*corrupt(self.file, self.index, &why)),
@@ -168,20 +234,19 @@ impl<'a> RowGroup<'a> {
                 let expected = format!("a number up to {}", i64::MAX);
                 let finding = Finding::new(Code::OutOfRange, self.file.name(), expected, value.to_string());
                 let mut finding = finding.in_row_group(self.index);
-                finding.episode = self.anew(EPISODE_ID).and_then(|ids| ids.text(row).map(str::to_owned));
-                finding = finding.at(self.anew(T).and_then(|t| t.int(row)));
+                finding.episode = self.anew(EPISODE_ID, first).and_then(|ids| ids.text(row).map(str::to_owned));
+                finding = finding.at(self.anew(T, first).and_then(|t| t.int(row)));
                 at_column(finding)
             }
         }
     }
 
-    /// A column of the rows under way, read once more.
-    fn anew(&self, at: usize) -> Option<Column> {
-        let column = &self.layout.columns[at];
-        let root = self.file.columns().iter().position(|known| known.name == column.name)?;
+    /// A column from a row on, read once more.
+    fn anew(&self, at: usize, first: usize) -> Option<Column> {
+        let root = root(self.file, self.layout, at)?;
         let handle = self.file.reader().ok()?;
-        let decoded = contained(|| reader(self.file, handle, root, self.index, self.first).ok()?.next()?.ok()).ok()?;
-        normal_column(decoded?.column(0), column.kind).ok().map(Column::Flat)
+        let decoded = contained(|| reader(self.file, handle, root, self.index, first).ok()?.next()?.ok()).ok()?;
+        normal_column(decoded?.column(0), self.layout.columns[at].kind).ok().map(Column::Flat)
     }
 }
 
@@ -198,18 +263,35 @@ impl Iterator for RowGroup<'_> {
     }
 }
 
-/// Whether a column is likely to be the same for many rows.
-fn held_as_runs(layout: &Layout, at: usize) -> bool {
-    at == EPISODE_ID || layout.columns[at].constant
+/// The ids of the episodes of a row group, if its pages are such that they can be had without the other columns.
+pub(super) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
+    let root = root(file, layout, EPISODE_ID)?;
+    let handle = file.reader().ok()?;
+    let read = || cursor(file, &handle, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
+    contained(read).ok()?.ok()
 }
 
-fn cursor(file: &TraceFile, handle: &File, root: usize, row_group: usize, runs: bool) -> Result<Cursor, Unfit> {
+/// Where a file has a column.
+fn root(file: &TraceFile, layout: &Layout, at: usize) -> Option<usize> {
+    file.columns().iter().position(|column| column.name == layout.columns[at].name)
+}
+
+/// How a column is best held.
+fn form(layout: &Layout, at: usize) -> Form {
+    match at {
+        T => Form::Keys,
+        _ if at == EPISODE_ID || layout.columns[at].constant => Form::Runs,
+        _ => Form::Rows,
+    }
+}
+
+fn cursor(file: &TraceFile, handle: &File, root: usize, row_group: usize, form: Form) -> Result<Cursor, Unfit> {
     let metadata = file.reader_metadata();
     let schema = metadata.parquet_schema();
     let leaf = (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root).ok_or(Unfit)?;
     let column = metadata.metadata().row_group(row_group).column(leaf);
     let stored = metadata.schema().field(root).data_type();
-    Cursor::open(handle, column, stored, file.row_group_rows(row_group), runs)
+    Cursor::open(handle, column, stored, file.row_group_rows(row_group), form)
 }
 
 /// A reader of one column, from a row on.

@@ -3,8 +3,8 @@
 //! Rule: exact. Of each episode its id's hash and its place are kept, beyond a fixed number of them in temporary files
 //! ([`crate::base::runs`]). Where two hashes are equal, the ids themselves are read again and compared.
 
-use std::collections::HashMap;
-use std::hash::{DefaultHasher, Hasher as _};
+use std::collections::{HashMap, HashSet};
+use std::hash::{BuildHasherDefault, DefaultHasher, Hasher};
 use std::io;
 
 use super::decode::RowGroup;
@@ -16,7 +16,7 @@ use super::rules::Located;
 use crate::base::runs::{Run, Runs};
 
 /// Episodes that are held in memory before they are put away.
-const MEMORY: usize = 64 * 1024;
+const MEMORY: usize = 256 * 1024;
 
 /// Where an episode begins. The order is that of files and rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -41,20 +41,22 @@ pub(super) struct Print {
 }
 
 impl Print {
+    const BYTES: usize = 24;
+
     /// The prints of the episodes that begin at a row up to `last`; an episode without an id has none.
     pub(super) fn of(episodes: &Episodes, last: usize) -> Vec<Self> {
-        let begins = episodes.offsets[..episodes.len()].iter().take_while(|row| **row <= last);
-        let print = |&row: &usize| {
-            let id = episodes.id(row)?;
-            let (row_group, row) = episodes.place(row);
-            Some(Self { hash: hash(id), place: Place::new(episodes.file, row_group, row) })
+        let firsts = &episodes.offsets[..episodes.len()];
+        let begins = &firsts[..firsts.partition_point(|row| *row <= last)];
+        let print = |(id, row): (Option<&str>, &usize)| {
+            let (row_group, row) = episodes.place(*row);
+            Some(Self { hash: hash(id?), place: Place::new(episodes.file, row_group, row) })
         };
-        begins.filter_map(print).collect()
+        episodes.ids(begins).zip(begins).filter_map(print).collect()
     }
 
     /// Bytes that compare as prints do.
-    fn to_bytes(self) -> [u8; 24] {
-        let mut bytes = [0; 24];
+    fn to_bytes(self) -> [u8; Self::BYTES] {
+        let mut bytes = [0; Self::BYTES];
         bytes[..8].copy_from_slice(&self.hash.to_be_bytes());
         bytes[8..12].copy_from_slice(&self.place.file.to_be_bytes());
         bytes[12..16].copy_from_slice(&self.place.row_group.to_be_bytes());
@@ -62,7 +64,7 @@ impl Print {
         bytes
     }
 
-    fn from_bytes(bytes: [u8; 24]) -> Self {
+    fn from_bytes(bytes: [u8; Self::BYTES]) -> Self {
         let mut words =
             bytes.chunks_exact(4).map(|word| word.iter().fold(0, |value, &byte| value << 8 | u32::from(byte)));
         let mut word = || words.next().unwrap_or_default();
@@ -70,6 +72,26 @@ impl Print {
         let hash = wide(word(), word());
         let place = Place { file: word(), row_group: word(), row: wide(word(), word()) };
         Self { hash, place }
+    }
+}
+
+/// The hash of a hash.
+#[derive(Default)]
+struct Itself(u64);
+
+impl Hasher for Itself {
+    fn write(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            self.0 = self.0 << 8 | u64::from(*byte);
+        }
+    }
+
+    fn write_u64(&mut self, hash: u64) {
+        self.0 = hash;
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
     }
 }
 
@@ -83,30 +105,38 @@ fn hash(id: &str) -> u64 {
 /// The episodes met so far.
 pub(super) struct Prints {
     pending: Vec<Print>,
+    /// The hashes of those.
+    met: HashSet<u64, BuildHasherDefault<Itself>>,
+    /// Whether one of them was met twice.
+    again: bool,
     runs: Runs,
     memory: usize,
 }
 
 impl Prints {
     pub(super) fn new() -> Self {
-        Self { pending: Vec::new(), runs: Runs::default(), memory: MEMORY }
+        Self { pending: Vec::new(), met: HashSet::default(), again: false, runs: Runs::default(), memory: MEMORY }
     }
 
     /// Takes note of episodes.
     pub(super) fn add(&mut self, prints: &[Print]) -> Result<(), TraceError> {
         self.pending.extend_from_slice(prints);
+        for print in prints {
+            self.again |= !self.met.insert(print.hash);
+        }
         if self.pending.len() >= self.memory {
             let run = self.take();
-            self.runs.put_away(&run).map_err(TraceError::Spill)?;
+            self.runs.put_away(vec![run]).map_err(TraceError::Spill)?;
         }
         Ok(())
     }
 
     fn take(&mut self) -> Run {
         self.pending.sort_unstable();
-        let mut run = Run::default();
-        self.pending.drain(..).for_each(|print| run.push(&print.to_bytes()));
-        run
+        self.met.clear();
+        let bytes: Vec<u8> = self.pending.drain(..).flat_map(Print::to_bytes).collect();
+        let records = (0..bytes.len()).step_by(Print::BYTES).map(|start| start..start + Print::BYTES).collect();
+        Run::new(bytes, records)
     }
 
     /// The first episode by file and row whose id an episode before it has, if there is one.
@@ -115,6 +145,9 @@ impl Prints {
         files: &[TraceFile],
         layout: &Layout,
     ) -> Result<Option<Box<Finding>>, TraceError> {
+        if self.runs.is_empty() && !self.again {
+            return Ok(None);
+        }
         let last = self.take();
         let mut alike = alike(self.runs, last).map_err(TraceError::Spill)?;
         // Equal hashes nearly always are equal ids, so that hardly more than the first two are read again.
@@ -160,7 +193,7 @@ fn first_equal<E>(places: &[Place], id_at: impl Fn(Place) -> Result<String, E>) 
 
 /// The places of episodes whose hashes are equal, ascending, two or more for each such hash.
 fn alike(runs: Runs, last: Run) -> io::Result<Vec<Vec<Place>>> {
-    let mut merge = runs.merge(last)?;
+    let mut merge = runs.merge(vec![last])?;
     let mut found: Vec<Vec<Place>> = Vec::new();
     let (mut hash, mut places) = (0, Vec::new());
     while let Some(record) = merge.next()? {
@@ -239,12 +272,11 @@ impl Ids {
 
 /// The episodes' starts, without those that have no id.
 pub(super) fn starts(episodes: &Episodes) -> Vec<Start> {
-    let rows = episodes.offsets[..episodes.len()].iter();
-    let start = |&row: &usize| {
-        let id = episodes.id(row)?.to_owned();
-        Some(Start { id, row, row_group: episodes.row_group(row) })
+    let rows = &episodes.offsets[..episodes.len()];
+    let start = |(id, &row): (Option<&str>, &usize)| {
+        Some(Start { id: id?.to_owned(), row, row_group: episodes.row_group(row) })
     };
-    rows.filter_map(start).collect()
+    episodes.ids(rows).zip(rows).filter_map(start).collect()
 }
 
 #[cfg(test)]

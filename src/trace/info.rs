@@ -7,7 +7,7 @@ use std::num::NonZeroUsize;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::decode::text_at;
+use super::column::text_at;
 use super::finding::TraceError;
 use super::open::{TraceFile, TraceSet};
 use super::rules::int_at;

@@ -2,6 +2,7 @@
 //!
 //! Rule: only this room opens traces. It knows no metric.
 
+mod ahead;
 mod column;
 pub(crate) mod contain;
 mod decode;

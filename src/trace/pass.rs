@@ -1,8 +1,8 @@
 //! One pass over traces: row groups decoded in parallel, whole episodes handed on in the order of the files.
 //!
-//! Each row group is one job. A worker decodes it and works on the episodes that lie wholly inside; the episodes at
-//! its two ends may go on in the neighbouring row groups, so their rows travel to the receiving thread, which joins
-//! them. What the receiver sees, and in which order, depends on the files alone, never on threads. A few row groups are
+//! Each row group is one job. A worker decodes it and works on the episodes that lie wholly inside. Where the episodes at
+//! its two ends go on in the neighbouring row groups, or may do so, their rows travel to the receiving thread, which
+//! joins them. What the receiver sees, and in which order, depends on the files alone, never on threads. A few row groups are
 //! under way at a time, so memory does not grow with the data.
 
 use std::collections::VecDeque;
@@ -14,6 +14,7 @@ use std::thread;
 use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Int32Type;
 
+use super::ahead::{Ahead, Ids};
 use super::column::Column;
 use super::decode::{RowGroup, Rows};
 use super::finding::{Code, Finding, TraceError};
@@ -64,6 +65,11 @@ impl Episodes {
     pub(super) fn id(&self, row: usize) -> Option<&str> {
         self.columns[EPISODE_ID].text(row)
     }
+
+    /// The ids of the episodes of some rows, which ascend; `None` for null.
+    pub(super) fn ids<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = Option<&'a str>> {
+        self.columns[EPISODE_ID].texts(rows)
+    }
 }
 
 /// What a pass meets.
@@ -113,6 +119,7 @@ pub(super) fn pass<T: Send, E: From<TraceError>>(
     let (give, take) = mpsc::channel::<Order<T>>();
     // Only workers hold on to it, so that nobody waits for orders when all of them have panicked.
     let take = Arc::new(Mutex::new(take));
+    let ahead = &Ahead::new(files, layout);
     thread::scope(|scope| {
         // Dropped when this closure returns, early or not: workers then find no job and end.
         let (give, take) = (give, take);
@@ -120,7 +127,7 @@ pub(super) fn pass<T: Send, E: From<TraceError>>(
         for started in 0..wanted {
             let worker = thread::Builder::new().name("trace".into());
             let take = Arc::clone(&take);
-            let spawned = worker.spawn_scoped(scope, move || run_jobs(&take, files, layout, work));
+            let spawned = worker.spawn_scoped(scope, move || run_jobs(&take, files, layout, ahead, work));
             match spawned {
                 Err(source) if started == 0 => return Err(TraceError::Threads { threads: wanted, source }.into()),
                 // Fewer threads give the same results.
@@ -133,10 +140,17 @@ pub(super) fn pass<T: Send, E: From<TraceError>>(
     })
 }
 
-fn run_jobs<T>(take: &Mutex<Receiver<Order<T>>>, files: &[TraceFile], layout: &Layout, work: &impl Fn(Episodes) -> T) {
+fn run_jobs<T>(
+    take: &Mutex<Receiver<Order<T>>>,
+    files: &[TraceFile],
+    layout: &Layout,
+    ahead: &Ahead,
+    work: &impl Fn(Episodes) -> T,
+) {
     loop {
         let next = take.lock().unwrap_or_else(PoisonError::into_inner).recv();
         let Ok((job, parts)) = next else { return };
+        let ids = ahead.take(job.file, job.row_group);
         Splitter {
             file: &files[job.file],
             layout,
@@ -144,9 +158,9 @@ fn run_jobs<T>(take: &Mutex<Receiver<Order<T>>>, files: &[TraceFile], layout: &L
             work,
             parts: &parts,
             open: Vec::new(),
-            headed: job.row_group == 0,
+            headed: job.row_group == 0 || ids.as_ref().is_some_and(|ids| ids.begins),
         }
-        .run();
+        .run(ids);
     }
 }
 
@@ -167,8 +181,8 @@ struct Splitter<'a, T, W> {
 struct Abandoned;
 
 impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
-    fn run(mut self) {
-        let result = match RowGroup::open(self.file, self.layout, self.job.row_group) {
+    fn run(mut self, ids: Option<Ids>) {
+        let result = match RowGroup::after(self.file, self.layout, self.job.row_group, ids) {
             Ok(rows) => self.split(rows),
             Err(finding) => self.send(Part::Fault(finding)),
         };
@@ -184,13 +198,12 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
             }
         }
         if self.job.row_group + 1 == self.file.row_groups() {
-            self.close()
-        } else if self.headed {
-            let open = std::mem::take(&mut self.open);
-            self.send(Part::Tail(open))
-        } else {
-            let open = std::mem::take(&mut self.open);
-            self.send(Part::Head(open))
+            return self.close();
+        }
+        match std::mem::take(&mut self.open) {
+            open if open.is_empty() => Ok(()),
+            open if self.headed => self.send(Part::Tail(open)),
+            open => self.send(Part::Head(open)),
         }
     }
 
@@ -199,6 +212,9 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
         let goes_on = self.open.first().is_some_and(|open| open.episode(0) == rows.episode(0));
         if !goes_on {
             self.close()?;
+        }
+        if rows.whole {
+            starts.push(rows.len());
         }
         let Some(last) = starts.pop().filter(|last| *last > 0) else {
             self.open.push(rows.clone());
@@ -220,7 +236,9 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
                 columns: inside.columns,
             })?;
         }
-        self.open.push(rows.slice(last, rows.len() - last));
+        if last < rows.len() {
+            self.open.push(rows.slice(last, rows.len() - last));
+        }
         Ok(())
     }
 
@@ -361,13 +379,13 @@ fn starts(rows: &Rows) -> Vec<usize> {
     let differ = |row: &usize| rows.episode(*row) != rows.episode(row - 1);
     let mut starts = vec![0];
     match &rows.columns[EPISODE_ID] {
-        Column::Runs(ids) => starts.extend(ids.starts().map(|(start, _)| start).skip(1).filter(differ)),
+        Column::Runs(ids) => starts.extend(ids.text_changes()),
         Column::Flat(ids) if ids.null_count() == 0 => {
             // Equal keys are equal ids; a dictionary may still hold one id under two keys.
             let keys = ids.as_dictionary::<Int32Type>().keys().values();
             starts.extend((1..keys.len()).filter(|row| keys[*row] != keys[row - 1]).filter(differ));
         }
-        Column::Flat(ids) => starts.extend((1..ids.len()).filter(differ)),
+        ids => starts.extend((1..ids.len()).filter(differ)),
     }
     starts
 }

@@ -6,8 +6,8 @@
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 
+use super::column::text_at;
 use super::column::{Column as Held, Runs};
-use super::decode::text_at;
 use super::finding::{Code, Finding};
 use super::layout::{EPISODE_ID, EXPERIMENT, Layout, LayoutColumn, T};
 use super::pass::Episodes;
@@ -44,6 +44,12 @@ impl Rules<'_> {
             let held = &episodes.columns[at];
             if let Held::Runs(runs) = held
                 && self.keeps(at, runs, &episodes.offsets)
+            {
+                continue;
+            }
+            if let Held::Keys(keys) = held
+                && at == T
+                && keys.count_from_one(&episodes.offsets)
             {
                 continue;
             }

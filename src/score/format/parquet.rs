@@ -11,10 +11,10 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
-use parquet::basic::{Compression, ZstdLevel};
+use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::ChunkReader;
 
 use super::FormatError;
@@ -22,7 +22,6 @@ use super::csv::{KEYS, check_unique};
 use super::footer;
 use super::surroundings::Surroundings;
 use crate::base::beside::beside;
-use crate::metric::catalog::Catalog;
 use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
 use crate::trace::contain::contained;
 
@@ -73,7 +72,7 @@ pub(super) fn write<E: From<FormatError>>(
     rows: impl FnOnce(&mut dyn FnMut(&EpisodeRow) -> Result<(), FormatError>) -> Result<(), E>,
 ) -> Result<(), E> {
     let schema = Arc::new(schema(header));
-    let properties = properties(&header.catalog)?;
+    let properties = properties(header)?;
     let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties)).map_err(FormatError::from)?;
     let feed = |give: SyncSender<RecordBatch>| {
         let mut gathered = Gathered::new(header);
@@ -111,19 +110,30 @@ fn encode<W: Write + Send>(
     Ok(parquet)
 }
 
-fn properties(catalog: &Catalog) -> Result<WriterProperties, FormatError> {
-    let definitions = serde_json::to_string(catalog).map_err(|error| FormatError::Definitions(error.to_string()))?;
+fn properties(header: &Header) -> Result<WriterProperties, FormatError> {
+    let definitions =
+        serde_json::to_string(&header.catalog).map_err(|error| FormatError::Definitions(error.to_string()))?;
     let pair = |key: &str, value: &str| KeyValue::new(key.to_owned(), value.to_owned());
     let metadata = vec![
         pair(KIND_KEY, SCORES_KIND),
         pair("mirrorstats.writer", concat!("mirrorstats ", env!("CARGO_PKG_VERSION"))),
-        pair(HASH_KEY, &catalog.hash),
+        pair(HASH_KEY, &header.catalog.hash),
         pair(DEFINITIONS_KEY, &definitions),
     ];
-    let properties = WriterProperties::builder()
+    let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        // No two episodes have the same id.
+        .set_column_dictionary_enabled(KEYS[0].into(), false)
+        .set_column_statistics_enabled(KEYS[0].into(), EnabledStatistics::None)
+        .set_statistics_enabled(EnabledStatistics::Chunk)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_key_value_metadata(Some(metadata));
+    // Small numbers take few bits without a dictionary, too.
+    for name in header.metrics.iter().chain([&KEYS[3].to_owned(), &KEYS[4].to_owned()]) {
+        properties = properties
+            .set_column_dictionary_enabled(name.as_str().into(), false)
+            .set_column_encoding(name.as_str().into(), Encoding::DELTA_BINARY_PACKED);
+    }
     Ok(properties.build())
 }
 

@@ -18,14 +18,24 @@ use super::chunk::pages;
 use super::dictionary::Dictionary;
 use super::hybrid::{Hybrid, Span};
 
+/// How rows are to be held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in super::super) enum Form {
+    /// A value a row.
+    Rows,
+    /// A value a run.
+    Runs,
+    /// A key a row, if there is no null.
+    Keys,
+}
+
 /// Where the reading of a column is.
 pub(in super::super) struct Cursor {
     pages: Box<dyn PageReader>,
     physical: Physical,
     /// Whether there may be nulls.
     optional: bool,
-    /// Whether rows are to be held as runs.
-    runs: bool,
+    form: Form,
     dictionary: Option<Dictionary>,
     page: Option<DataPage>,
     /// Rows of the column that no page has given yet.
@@ -57,13 +67,13 @@ struct Rows {
 }
 
 impl Cursor {
-    /// A column that is stored as `stored` and read as rows or as runs.
+    /// A column that is stored as `stored`.
     pub(in super::super) fn open(
         file: &File,
         column: &ColumnChunkMetaData,
         stored: &DataType,
         rows: usize,
-        runs: bool,
+        form: Form,
     ) -> Result<Self, Unfit> {
         let about = column.column_descr();
         let physical = about.physical_type();
@@ -84,7 +94,7 @@ impl Cursor {
             pages: pages(file, column, rows)?,
             physical,
             optional: about.max_def_level() == 1,
-            runs: runs && physical != Physical::BOOLEAN,
+            form: if physical == Physical::BOOLEAN { Form::Rows } else { form },
             dictionary: None,
             page: None,
             unread: rows,
@@ -95,7 +105,11 @@ impl Cursor {
     pub(in super::super) fn read(&mut self, count: usize) -> Result<Column, Unfit> {
         let mut rows = Rows {
             nulls: self.optional.then(|| BooleanBufferBuilder::new(count)),
-            keys: Vec::with_capacity(if self.runs || self.physical == Physical::BOOLEAN { 0 } else { count }),
+            keys: Vec::with_capacity(if self.form == Form::Runs || self.physical == Physical::BOOLEAN {
+                0
+            } else {
+                count
+            }),
             ends: Vec::new(),
             bits: BooleanBufferBuilder::new(if self.physical == Physical::BOOLEAN { count } else { 0 }),
         };
@@ -197,9 +211,9 @@ impl Cursor {
         };
         if self.physical == Physical::BOOLEAN {
             page.values.bits(values, &mut rows.bits)
-        } else if self.runs && values == count {
+        } else if self.form == Form::Runs && values == count {
             page.values.runs(values, rows)
-        } else if self.runs {
+        } else if self.form == Form::Runs {
             // Nulls among rows that are to be runs: rare, and the library's to decode.
             Err(Unfit)
         } else {
@@ -215,8 +229,11 @@ impl Cursor {
             return Ok(Column::Flat(Arc::new(BooleanArray::new(bits, nulls)) as ArrayRef));
         }
         let dictionary = self.dictionary.as_ref().ok_or(Unfit)?;
-        if self.runs {
+        if self.form == Form::Runs {
             return Ok(Column::Runs(Runs::new(dictionary.values(rows.keys, None)?, rows.ends)));
+        }
+        if self.form == Form::Keys && nulls.is_none() && rows.keys.len() == count {
+            return dictionary.keys(rows.keys).map(Column::Keys);
         }
         let keys = match &nulls {
             Some(nulls) => spread_keys(&rows.keys, nulls.inner()),

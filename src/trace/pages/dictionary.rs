@@ -6,6 +6,7 @@ use arrow::array::{ArrayRef, AsArray as _, DictionaryArray, Int32Array, Int64Arr
 use arrow::buffer::{NullBuffer, ScalarBuffer};
 use arrow::datatypes::{Int32Type, Int64Type};
 
+use super::super::column::Keys;
 use super::Unfit;
 
 /// What the keys of a column stand for.
@@ -41,6 +42,12 @@ impl Dictionary {
         };
         let ints = ints.get(..count).ok_or(Unfit)?;
         Ok(Self::Ints(Arc::new(Int64Array::from(ints.to_vec()))))
+    }
+
+    /// Keys and their values.
+    pub(super) fn keys(&self, keys: Vec<i32>) -> Result<Keys, Unfit> {
+        let (Self::Texts(values) | Self::Ints(values)) = self;
+        Keys::new(keys, values.clone()).ok_or(Unfit)
     }
 
     /// The values of keys; a null's key is 0.

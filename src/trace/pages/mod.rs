@@ -9,7 +9,7 @@ mod cursor;
 mod dictionary;
 mod hybrid;
 
-pub(super) use cursor::Cursor;
+pub(super) use cursor::{Cursor, Form};
 
 /// Pages that the short cut does not take.
 pub(super) struct Unfit;

@@ -94,7 +94,12 @@ fn batch(rows: &[Row], style: Style) -> RecordBatch {
 
 /// Writes a file with these row groups.
 fn write(path: &Path, groups: &[RecordBatch]) -> Input {
-    let properties = WriterProperties::builder().set_dictionary_page_size_limit(64).build();
+    write_keyed(path, groups, 64)
+}
+
+/// Writes a file with these row groups, columns as keys as long as their distinct values take no more bytes than that.
+fn write_keyed(path: &Path, groups: &[RecordBatch], bytes: usize) -> Input {
+    let properties = WriterProperties::builder().set_dictionary_page_size_limit(bytes).build();
     let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), groups[0].schema(), Some(properties)).unwrap();
     for group in groups {
         writer.write(group).unwrap();
@@ -218,6 +223,61 @@ fn an_episode_longer_than_a_batch_is_whole() {
     let groups = [batch(&long[..150_000], Style::Plain), batch(&long[150_000..], Style::Plain)];
     let input = write(&file(&folder, "long.parquet"), &groups);
     assert!(scan(&[input], &projection(), 2).unwrap() == long);
+}
+
+/// Episodes of 1 to 90 steps, more rows than are decoded at a time, in row groups of which only one ends with an episode.
+fn many() -> (Vec<Row>, Vec<std::ops::Range<usize>>) {
+    let ids: Vec<String> = (0..2500).map(|i| format!("{}-{i:05}", ["a", "b"][i % 2])).collect();
+    let episodes: Vec<_> = ids.iter().enumerate().map(|(i, id)| (id.as_str(), 1 + i * 7 % 90)).collect();
+    let rows = rows(&episodes);
+    let starts: Vec<usize> = (1..rows.len()).filter(|row| rows[*row].t == 1).collect();
+    let inside = |row: usize| (row..).find(|row| rows[*row].t > 1).unwrap();
+    let whole = starts[starts.partition_point(|start| *start < 80_000)];
+    let cuts = [0, inside(40_000), inside(41_000), whole, rows.len()];
+    let groups = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
+    (rows, groups)
+}
+
+#[test]
+fn many_short_episodes_are_whole_however_their_ids_are_stored() {
+    let (rows, groups) = many();
+    assert!(rows.len() > 100_000 && rows[groups[3].start].t == 1);
+    let groups: Vec<_> = groups.into_iter().map(|group| batch(&rows[group], Style::Plain)).collect();
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in [("keys.parquet", 1 << 20), ("some-keys.parquet", 12_000), ("texts.parquet", 64)] {
+        let input = write_keyed(&file(&folder, name), &groups, bytes);
+        for n in [1, 2, 8] {
+            assert!(scan(std::slice::from_ref(&input), &projection(), n).unwrap() == rows, "{name} on {n} threads");
+        }
+    }
+}
+
+#[test]
+fn a_fault_in_a_late_batch_is_refused_where_it_is() {
+    let (rows, groups) = many();
+    let groups: Vec<_> = groups.into_iter().map(|group| (batch(&rows[group.clone()], Style::Plain), group)).collect();
+    let bad = (113_000..).find(|row| rows[*row].t > 1).unwrap();
+    let place = format!("row group 3, episode `{}`, t = {}, column", rows[bad].id.as_ref().unwrap(), rows[bad].t);
+    let folder = tempfile::tempdir().unwrap();
+    for bytes in [1 << 20, 64] {
+        let large = |row: usize| if row == bad { u64::MAX } else { row as u64 };
+        let own = |group: &std::ops::Range<usize>| Arc::new(group.clone().map(large).collect::<UInt64Array>());
+        let with: Vec<_> = groups.iter().map(|(batch, group)| with_column(batch, "own", own(group))).collect();
+        let input = write_keyed(&file(&folder, "large.parquet"), &with, bytes);
+        let mut with_own = projection();
+        with_own.steps.push("own".into());
+        let (code, text) = fault(&[input], &with_own);
+        assert_eq!(code, Code::OutOfRange);
+        assert!(text.contains(&format!("{place} `own`")), "{text}");
+
+        let mut gap = rows.clone();
+        gap[bad].t += 1;
+        let gap: Vec<_> = groups.iter().map(|(_, group)| batch(&gap[group.clone()], Style::Plain)).collect();
+        let input = write_keyed(&file(&folder, "gap.parquet"), &gap, bytes);
+        let (code, text) = fault(&[input], &projection());
+        assert_eq!(code, Code::TGap);
+        assert!(text.contains("row group 3") && text.contains(rows[bad].id.as_ref().unwrap()), "{text}");
+    }
 }
 
 #[test]

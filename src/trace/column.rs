@@ -205,9 +205,12 @@ impl Runs {
         text_at(&self.values, self.run_of(row))
     }
 
-    /// How many rows from `first` on, `most` of them at most, end with a run; `most` where no run ends.
+    /// How many rows from `first` on, `most` of them at most, end with a run or with the last row; `most`
+    /// where none ends.
     pub(super) fn until(&self, first: usize, most: usize) -> usize {
-        let most = most.min(self.length - first);
+        if most >= self.length - first {
+            return self.length - first;
+        }
         let first = self.start + first;
         let ended = self.ends.values().partition_point(|end| *end as usize <= first + most);
         let last = ended.checked_sub(1).map_or(0, |run| self.ends.value(run) as usize);
@@ -262,9 +265,10 @@ mod tests {
     use arrow::array::{ArrayRef, AsArray as _, Int64Array};
     use arrow::datatypes::Int64Type;
     use proptest::collection::vec;
+    use proptest::option;
     use proptest::prelude::*;
 
-    use super::{Column, Runs};
+    use super::{Column, Keys, Runs};
 
     fn both(runs: &[(i64, u32)]) -> (Column, Column) {
         let values = |values: Vec<i64>| Arc::new(Int64Array::from(values)) as ArrayRef;
@@ -299,6 +303,41 @@ mod tests {
             prop_assert!(changes.iter().all(|change| starts.contains(change)));
             prop_assert!(coded.start_only_at(&starts));
             prop_assert_eq!(coded.start_only_at(&[0]), starts.len() == 1);
+            for most in 1..=length {
+                let rows = coded.until(0, most);
+                let ends: Vec<usize> = starts.iter().copied().skip(1).chain([length]).collect();
+                let expected = ends.into_iter().rfind(|end| *end <= most).unwrap_or(most);
+                prop_assert_eq!(rows, expected);
+            }
         }
+
+        #[test]
+        fn keys_count_as_their_integers_do(
+            values in Just((0..6_i64).collect::<Vec<_>>()).prop_shuffle(), lengths in vec(1..5_i64, 1..4), odd in option::of(0..8_usize),
+        ) {
+            let mut rows: Vec<i64> = lengths.iter().flat_map(|length| 1..=*length).collect();
+            let counted = odd.filter(|row| *row < rows.len()).map(|row| rows[row] = 0).is_none();
+            let keys = rows.iter().map(|row| i32::try_from(values.iter().position(|value| value == row).unwrap()).unwrap());
+            let keys = Keys::new(keys.collect(), Arc::new(Int64Array::from(values))).unwrap();
+            let mut offsets = vec![0];
+            for length in &lengths {
+                offsets.push(offsets.last().unwrap() + usize::try_from(*length).unwrap());
+            }
+            prop_assert_eq!(keys.count_from_one(&offsets), counted);
+            let column = Column::Keys(keys);
+            let flat = Column::Flat(Arc::new(Int64Array::from(rows)));
+            prop_assert_eq!(&column.flat().unwrap(), &flat.flat().unwrap());
+            let (column, flat) = (column.slice(1, flat.len() - 1), flat.slice(1, flat.len() - 1));
+            let odd: Vec<usize> = (0..flat.len()).step_by(2).collect();
+            prop_assert_eq!(&column.at(&odd).unwrap(), &flat.at(&odd).unwrap());
+            prop_assert!((0..flat.len()).all(|row| column.int(row) == flat.int(row)));
+        }
+    }
+
+    #[test]
+    fn keys_without_a_value_are_refused() {
+        let values = || Arc::new(Int64Array::from(vec![1, 2])) as ArrayRef;
+        assert!(Keys::new(vec![0, 1], values()).is_some() && Keys::new(Vec::new(), values()).is_some());
+        assert!(Keys::new(vec![0, 2], values()).is_none() && Keys::new(vec![-1], values()).is_none());
     }
 }

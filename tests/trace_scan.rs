@@ -231,7 +231,7 @@ fn many() -> (Vec<Row>, Vec<std::ops::Range<usize>>) {
     let episodes: Vec<_> = ids.iter().enumerate().map(|(i, id)| (id.as_str(), 1 + i * 7 % 90)).collect();
     let rows = rows(&episodes);
     let starts: Vec<usize> = (1..rows.len()).filter(|row| rows[*row].t == 1).collect();
-    let inside = |row: usize| (row..).find(|row| rows[*row].t > 1).unwrap();
+    let inside = |row: usize| (row..rows.len()).find(|row| rows[*row].t > 1).unwrap();
     let whole = starts[starts.partition_point(|start| *start < 80_000)];
     let cuts = [0, inside(40_000), inside(41_000), whole, rows.len()];
     let groups = cuts.windows(2).map(|ends| ends[0]..ends[1]).collect();
@@ -256,7 +256,7 @@ fn many_short_episodes_are_whole_however_their_ids_are_stored() {
 fn a_fault_in_a_late_batch_is_refused_where_it_is() {
     let (rows, groups) = many();
     let groups: Vec<_> = groups.into_iter().map(|group| (batch(&rows[group.clone()], Style::Plain), group)).collect();
-    let bad = (113_000..).find(|row| rows[*row].t > 1).unwrap();
+    let bad = (113_000..rows.len()).find(|row| rows[*row].t > 1).unwrap();
     let place = format!("row group 3, episode `{}`, t = {}, column", rows[bad].id.as_ref().unwrap(), rows[bad].t);
     let folder = tempfile::tempdir().unwrap();
     for bytes in [1 << 20, 64] {

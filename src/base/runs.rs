@@ -8,7 +8,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::collections::binary_heap::PeekMut;
 use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Read as _, Seek as _, Write};
+use std::io::{self, BufReader, BufWriter, Read as _, Seek as _, Write as _};
 use std::ops::Range;
 
 use super::temporary;
@@ -53,11 +53,26 @@ impl Runs {
     /// # Errors
     /// When there is no place for temporary files, or no more of it.
     pub fn put_away(&mut self, runs: Vec<Run>) -> io::Result<()> {
+        let run = merged_into_one(heads_in_memory(runs))?;
+        self.add(run)
+    }
+
+    /// Puts records away, none of which comes before the one ahead of it.
+    ///
+    /// # Errors
+    /// When there is no place for temporary files, or no more of it.
+    pub fn put_away_records<R: AsRef<[u8]>>(&mut self, records: impl IntoIterator<Item = R>) -> io::Result<()> {
+        let mut out = Out::new()?;
+        records.into_iter().try_for_each(|record| out.put(record.as_ref()))?;
+        self.add(out.finish()?)
+    }
+
+    fn add(&mut self, run: File) -> io::Result<()> {
         if self.0.len() == FAN_IN {
             let files = std::mem::take(&mut self.0);
             self.0.push(merged_into_one(heads_of_files(files)?)?);
         }
-        self.0.push(merged_into_one(heads_in_memory(runs))?);
+        self.0.push(run);
         Ok(())
     }
 
@@ -85,14 +100,32 @@ fn heads_of_files(files: Vec<File>) -> io::Result<Vec<Head>> {
 }
 
 fn merged_into_one(heads: Vec<Head>) -> io::Result<File> {
-    let mut out = BufWriter::with_capacity(BUFFER, tempfile::tempfile().map_err(temporary::without_name)?);
+    let mut out = Out::new()?;
     let mut merge = Merge::of(heads)?;
     while let Some(record) = merge.next()? {
-        let length = u32::try_from(record.len()).expect("a record is a few values of one row");
-        out.write_all(&length.to_le_bytes())?;
-        out.write_all(record)?;
+        out.put(record)?;
     }
-    out.into_inner().map_err(io::IntoInnerError::into_error)
+    out.finish()
+}
+
+/// A run on its way into a file.
+struct Out(BufWriter<File>);
+
+impl Out {
+    fn new() -> io::Result<Self> {
+        let file = tempfile::tempfile().map_err(temporary::without_name)?;
+        Ok(Self(BufWriter::with_capacity(BUFFER, file)))
+    }
+
+    fn put(&mut self, record: &[u8]) -> io::Result<()> {
+        let length = u32::try_from(record.len()).expect("a record is a few values of one row");
+        self.0.write_all(&length.to_le_bytes())?;
+        self.0.write_all(record)
+    }
+
+    fn finish(self) -> io::Result<File> {
+        self.0.into_inner().map_err(io::IntoInnerError::into_error)
+    }
 }
 
 /// The records of some runs, merged.
@@ -220,6 +253,12 @@ mod tests {
         for chunk in records.chunks(in_memory) {
             if pending.len() == at_a_time {
                 runs.put_away(std::mem::take(&mut pending)).unwrap();
+            }
+            if chunk.len() == 3 {
+                let mut chunk = chunk.to_vec();
+                chunk.sort();
+                runs.put_away_records(chunk).unwrap();
+                continue;
             }
             pending.push(run(chunk));
         }

@@ -23,10 +23,10 @@ use crate::base::runs::{Merge, Run, Runs};
 use crate::trace::scan::EPISODE_COLUMNS;
 
 /// Bytes of rows that are held in memory before they are put away.
-const MEMORY: usize = 20 << 20;
+const MEMORY: usize = 8 << 20;
 
 /// Bytes of rows that are sorted at a time.
-const SORTED: usize = 2 << 20;
+const SORTED: usize = 1 << 20;
 
 /// What a row takes, about.
 const USUAL_BYTES: usize = 96;
@@ -96,13 +96,17 @@ impl Rows {
         self.records.extend(other.records.iter().map(|record| Record { start: record.start + offset, ..*record }));
     }
 
-    /// Takes all rows out as a sorted run.
-    fn take(&mut self) -> Run {
-        let next =
-            Self { bytes: Vec::with_capacity(self.bytes.len()), records: Vec::with_capacity(self.records.len()) };
-        let Self { bytes, records } = std::mem::replace(self, next);
-        let order = order(&bytes, &records);
-        Run::new(bytes, order.into_iter().map(|at| records[at as usize].range()).collect())
+    /// No rows yet, and room for some bytes of them: the same room each time, so that memory that was given back fits.
+    fn with_room(bytes: usize) -> Self {
+        Self { bytes: Vec::with_capacity(bytes), records: Vec::with_capacity(bytes / USUAL_BYTES) }
+    }
+
+    /// A sorted run of all rows.
+    fn sorted(self) -> Run {
+        let Self { bytes, records } = self;
+        let mut places = Vec::with_capacity(records.capacity());
+        places.extend(order(&bytes, &records).into_iter().map(|at| records[at as usize].range()));
+        Run::new(bytes, places)
     }
 }
 
@@ -155,10 +159,11 @@ impl RowSorter {
     /// # Errors
     /// When rows cannot be put away.
     pub fn add(&mut self, rows: &Rows) -> io::Result<()> {
-        self.pending.append(rows);
-        if self.pending.bytes.len() >= self.at_a_time {
-            self.sorted.push(self.pending.take());
+        if self.pending.bytes.len() + rows.bytes.len() > self.at_a_time {
+            let pending = std::mem::replace(&mut self.pending, Rows::with_room(self.at_a_time));
+            self.sorted.push(pending.sorted());
         }
+        self.pending.append(rows);
         if self.sorted.iter().map(Run::size).sum::<usize>() >= self.memory {
             self.runs.put_away(std::mem::take(&mut self.sorted))?;
         }
@@ -170,7 +175,7 @@ impl RowSorter {
     /// # Errors
     /// When rows that were put away cannot be read.
     pub fn finish(mut self) -> io::Result<SortedRows> {
-        self.sorted.push(self.pending.take());
+        self.sorted.push(self.pending.sorted());
         let merge = self.runs.merge(self.sorted)?;
         Ok(SortedRows { header: self.header, merge, row: EpisodeRow::default(), names: Vec::new() })
     }

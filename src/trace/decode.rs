@@ -11,15 +11,17 @@ use arrow::datatypes::{DataType, Int32Type, UInt64Type};
 use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
-    ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowSelection, RowSelector,
+    ArrowReaderMetadata, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowSelection, RowSelector,
 };
+use parquet::file::metadata::RowGroupMetaData;
 
 use super::ahead::Ids;
 use super::column::Column;
 use super::contain::contained;
 use super::finding::{Code, Finding};
+use super::footer::plain;
 use super::layout::{EPISODE_ID, Layout, T};
-use super::open::{TraceFile, plain, text_type};
+use super::open::{TraceFile, text_type};
 use super::pages::{Cursor, Form, Unfit};
 use super::schema::Kind;
 
@@ -59,6 +61,7 @@ impl Rows {
 pub(super) struct RowGroup<'a> {
     file: &'a TraceFile,
     layout: &'a Layout,
+    footer: Arc<ArrowReaderMetadata>,
     index: usize,
     /// The ids of the episodes, if they are known already.
     ids: Option<Ids>,
@@ -123,12 +126,13 @@ impl<'a> RowGroup<'a> {
         let handle = file.reader().map_err(|error| {
             Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
         })?;
-        let mut rows = Self { file, layout, index: row_group, ids, sources: Vec::new(), first: 0, over: false };
+        let footer = file.footer()?;
+        let mut rows = Self { file, layout, footer, index: row_group, ids, sources: Vec::new(), first: 0, over: false };
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {
                 None => Source::Absent,
                 Some(_) if at == EPISODE_ID && rows.ids.is_some() => Source::Ahead,
-                Some(root) => match contained(|| cursor(file, &handle, root, row_group, form(layout, at))) {
+                Some(root) => match contained(|| cursor(&rows.footer, &handle, root, row_group, form(layout, at))) {
                     Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
                     Ok(Err(Unfit)) | Err(_) => rows.library(root)?,
                 },
@@ -144,7 +148,7 @@ impl<'a> RowGroup<'a> {
         let handle = self.file.reader().map_err(|error| {
             Box::new(Finding::new(Code::Unreadable, self.file.name(), "a file that can be read", error.to_string()))
         })?;
-        let reader = contained(|| reader(self.file, handle, root, self.index, self.first)).map_err(corrupt)?;
+        let reader = contained(|| reader(&self.footer, handle, root, self.index, self.first)).map_err(corrupt)?;
         let reader = reader.map_err(|error| corrupt(plain(&error)))?;
         Ok(Source::Library(Box::new(Library { reader, held: Vec::new() })))
     }
@@ -245,7 +249,7 @@ impl<'a> RowGroup<'a> {
     fn anew(&self, at: usize, first: usize) -> Option<Column> {
         let root = root(self.file, self.layout, at)?;
         let handle = self.file.reader().ok()?;
-        let decoded = contained(|| reader(self.file, handle, root, self.index, first).ok()?.next()?.ok()).ok()?;
+        let decoded = contained(|| reader(&self.footer, handle, root, self.index, first).ok()?.next()?.ok()).ok()?;
         normal_column(decoded?.column(0), self.layout.columns[at].kind).ok().map(Column::Flat)
     }
 }
@@ -266,8 +270,8 @@ impl Iterator for RowGroup<'_> {
 /// The ids of the episodes of a row group, if its pages are such that they can be had without the other columns.
 pub(super) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
     let root = root(file, layout, EPISODE_ID)?;
-    let handle = file.reader().ok()?;
-    let read = || cursor(file, &handle, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
+    let (handle, footer) = (file.reader().ok()?, file.footer().ok()?);
+    let read = || cursor(&footer, &handle, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
     contained(read).ok()?.ok()
 }
 
@@ -285,34 +289,42 @@ fn form(layout: &Layout, at: usize) -> Form {
     }
 }
 
-fn cursor(file: &TraceFile, handle: &File, root: usize, row_group: usize, form: Form) -> Result<Cursor, Unfit> {
-    let metadata = file.reader_metadata();
-    let schema = metadata.parquet_schema();
+fn cursor(
+    footer: &ArrowReaderMetadata,
+    handle: &File,
+    root: usize,
+    row_group: usize,
+    form: Form,
+) -> Result<Cursor, Unfit> {
+    let schema = footer.parquet_schema();
     let leaf = (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root).ok_or(Unfit)?;
-    let column = metadata.metadata().row_group(row_group).column(leaf);
-    let stored = metadata.schema().field(root).data_type();
-    Cursor::open(handle, column, stored, file.row_group_rows(row_group), form)
+    let row_group = footer.metadata().row_group(row_group);
+    let stored = footer.schema().field(root).data_type();
+    Cursor::open(handle, row_group.column(leaf), stored, rows_of(row_group), form)
 }
 
 /// A reader of one column, from a row on.
 fn reader(
-    file: &TraceFile,
+    footer: &ArrowReaderMetadata,
     handle: File,
     root: usize,
     row_group: usize,
     first: usize,
 ) -> parquet::errors::Result<ParquetRecordBatchReader> {
-    let metadata = file.reader_metadata();
-    let rows = file.row_group_rows(row_group);
-    let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(handle, metadata.clone())
+    let rows = rows_of(footer.metadata().row_group(row_group));
+    let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(handle, footer.clone())
         .with_row_groups(vec![row_group])
-        .with_projection(ProjectionMask::roots(metadata.parquet_schema(), [root]))
+        .with_projection(ProjectionMask::roots(footer.parquet_schema(), [root]))
         .with_batch_size(rows.clamp(1, BATCH_ROWS));
     if first == 0 {
         return reader.build();
     }
     let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
     reader.with_row_selection(RowSelection::from(rest)).build()
+}
+
+fn rows_of(row_group: &RowGroupMetaData) -> usize {
+    usize::try_from(row_group.num_rows()).unwrap_or_default()
 }
 
 fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {

@@ -13,7 +13,7 @@ use super::layout::Layout;
 use super::open::TraceFile;
 use super::pass::Episodes;
 use super::rules::Located;
-use crate::base::runs::{Run, Runs};
+use crate::base::runs::Runs;
 
 /// Episodes that are held in memory before they are put away.
 const MEMORY: usize = 256 * 1024;
@@ -115,7 +115,13 @@ pub(super) struct Prints {
 
 impl Prints {
     pub(super) fn new() -> Self {
-        Self { pending: Vec::new(), met: HashSet::default(), again: false, runs: Runs::default(), memory: MEMORY }
+        Self {
+            pending: Vec::new(),
+            met: HashSet::with_capacity_and_hasher(MEMORY, BuildHasherDefault::default()),
+            again: false,
+            runs: Runs::default(),
+            memory: MEMORY,
+        }
     }
 
     /// Takes note of episodes.
@@ -125,18 +131,15 @@ impl Prints {
             self.again |= !self.met.insert(print.hash);
         }
         if self.pending.len() >= self.memory {
-            let run = self.take();
-            self.runs.put_away(vec![run]).map_err(TraceError::Spill)?;
+            self.put_away().map_err(TraceError::Spill)?;
         }
         Ok(())
     }
 
-    fn take(&mut self) -> Run {
+    fn put_away(&mut self) -> io::Result<()> {
         self.pending.sort_unstable();
         self.met.clear();
-        let bytes: Vec<u8> = self.pending.drain(..).flat_map(Print::to_bytes).collect();
-        let records = (0..bytes.len()).step_by(Print::BYTES).map(|start| start..start + Print::BYTES).collect();
-        Run::new(bytes, records)
+        self.runs.put_away_records(self.pending.drain(..).map(Print::to_bytes))
     }
 
     /// The first episode by file and row whose id an episode before it has, if there is one.
@@ -148,8 +151,8 @@ impl Prints {
         if self.runs.is_empty() && !self.again {
             return Ok(None);
         }
-        let last = self.take();
-        let mut alike = alike(self.runs, last).map_err(TraceError::Spill)?;
+        self.put_away().map_err(TraceError::Spill)?;
+        let mut alike = alike(self.runs).map_err(TraceError::Spill)?;
         // Equal hashes nearly always are equal ids, so that hardly more than the first two are read again.
         alike.sort_unstable_by_key(|places| places[1]);
         let mut first: Option<Repeated> = None;
@@ -192,8 +195,8 @@ fn first_equal<E>(places: &[Place], id_at: impl Fn(Place) -> Result<String, E>) 
 }
 
 /// The places of episodes whose hashes are equal, ascending, two or more for each such hash.
-fn alike(runs: Runs, last: Run) -> io::Result<Vec<Vec<Place>>> {
-    let mut merge = runs.merge(vec![last])?;
+fn alike(runs: Runs) -> io::Result<Vec<Vec<Place>>> {
+    let mut merge = runs.merge(Vec::new())?;
     let mut found: Vec<Vec<Place>> = Vec::new();
     let (mut hash, mut places) = (0, Vec::new());
     while let Some(record) = merge.next()? {
@@ -302,8 +305,8 @@ mod tests {
                 places.sort();
             }
             let expected: HashSet<_> = expected.into_values().filter(|places| places.len() > 1).collect();
-            let last = prints.take();
-            let found = alike(prints.runs, last).unwrap();
+            prints.put_away().unwrap();
+            let found = alike(prints.runs).unwrap();
             prop_assert_eq!(found.into_iter().collect::<HashSet<_>>(), expected);
         }
     }

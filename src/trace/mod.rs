@@ -9,6 +9,7 @@ mod decode;
 pub mod describe;
 pub mod episode;
 pub mod finding;
+mod footer;
 mod ids;
 pub mod import;
 pub mod info;

@@ -1,23 +1,23 @@
 //! Opens traces: reads every footer, checks it against the schema, and knows what each column is over all files.
 //!
-//! No row is read here. A file is held by its name and footer, never by an open handle, so that any number of files
-//! can be open at once.
+//! No row is read here. A file is held by its name and what it is made of, never by an open handle, so that any number of
+//! files can be open at once.
 
 use std::fs::File;
-use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use arrow::datatypes::{DataType, Schema};
-use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+use arrow::datatypes::DataType;
+use parquet::arrow::arrow_reader::ArrowReaderMetadata;
 use parquet::arrow::parquet_to_arrow_schema;
 use parquet::basic::ConvertedType;
-use parquet::errors::ParquetError;
-use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 
 use super::contain::contained;
 use super::finding::{Code, Finding, TraceError};
+use super::footer::{Extent, footer, plain, readable};
 use super::inputs::Input;
 use super::schema::{self, COLUMNS, Kind};
 use crate::base::near::nearest;
@@ -35,7 +35,11 @@ pub struct TraceFile {
     path: PathBuf,
     bytes: u64,
     columns: Vec<FileColumn>,
-    metadata: ArrowReaderMetadata,
+    /// The rows of each row group.
+    rows: Vec<usize>,
+    pairs: Vec<KeyValue>,
+    /// What a reader needs, while somebody reads: footers of many row groups are large.
+    footer: Mutex<Weak<ArrowReaderMetadata>>,
 }
 
 /// A column of one file.
@@ -130,7 +134,7 @@ impl TraceFile {
     /// # Errors
     /// Everything that is wrong with it; never empty.
     pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
-        let (bytes, metadata) = footer(input).map_err(|finding| vec![*finding])?;
+        let (bytes, metadata) = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
         check_version(&input.name, &metadata).map_err(|finding| vec![*finding])?;
         let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
         let mut findings = check_columns(&input.name, &columns);
@@ -138,9 +142,12 @@ impl TraceFile {
         if !findings.is_empty() {
             return Err(findings);
         }
-        let metadata = readable(metadata, &columns)
+        let rows = rows_of(&metadata);
+        let pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
-        Ok(Self { name: input.name.clone(), path: input.path.clone(), bytes, columns, metadata })
+        let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
+        Ok(Self { name, path, bytes, columns, rows, pairs, footer })
     }
 
     /// The name in messages and outputs.
@@ -178,12 +185,12 @@ impl TraceFile {
 
     /// The number of rows.
     pub fn rows(&self) -> u64 {
-        (0..self.row_groups()).map(|row_group| self.row_group_rows(row_group) as u64).sum()
+        self.rows.iter().map(|rows| *rows as u64).sum()
     }
 
     /// The number of row groups.
     pub fn row_groups(&self) -> usize {
-        self.metadata.metadata().num_row_groups()
+        self.rows.len()
     }
 
     /// The number of rows in a row group.
@@ -191,87 +198,58 @@ impl TraceFile {
     /// # Panics
     /// For a row group that the file has not.
     pub fn row_group_rows(&self, row_group: usize) -> usize {
-        usize::try_from(self.metadata.metadata().row_group(row_group).num_rows())
-            .expect("opening checked that it is not negative")
+        self.rows[row_group]
+    }
+
+    /// The footer's key-value metadata.
+    pub(super) fn pairs(&self) -> &[KeyValue] {
+        &self.pairs
     }
 
     /// A value of the footer's key-value metadata.
     pub fn metadata_value(&self, key: &str) -> Option<&str> {
-        value(self.metadata.metadata(), key)
+        value(&self.pairs, key)
     }
 
-    /// What a reader needs; strings are read as dictionaries.
-    pub(super) fn reader_metadata(&self) -> &ArrowReaderMetadata {
-        &self.metadata
-    }
-}
-
-fn value<'a>(metadata: &'a ParquetMetaData, key: &str) -> Option<&'a str> {
-    let pairs = metadata.file_metadata().key_value_metadata()?;
-    pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
-}
-
-const MAGIC: [u8; 4] = *b"PAR1";
-const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
-/// A magic number at each end, and the footer's length.
-const SMALLEST: u64 = 12;
-
-/// The file's size and decoded footer.
-fn footer(input: &Input) -> Result<(u64, ParquetMetaData), Box<Finding>> {
-    let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
-    let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
-    let mut file = File::open(&input.path).map_err(unreadable)?;
-    let about = file.metadata().map_err(unreadable)?;
-    if about.is_dir() {
-        return Err(finding(Code::NotParquet, "a Parquet file", "a folder".into()));
-    }
-    let bytes = about.len();
-    if bytes == 0 {
-        return Err(finding(Code::EmptyFile, "a Parquet file", "0 bytes".into()));
-    }
-    let start = magic(&mut file, SeekFrom::Start(0)).map_err(unreadable)?;
-    match start {
-        Some(MAGIC) => {}
-        Some(ENCRYPTED_MAGIC) => {
-            return Err(finding(Code::NotParquet, "a Parquet file that is not encrypted", "an encrypted one".into()));
+    /// What a reader needs; strings are read as dictionaries. Read again unless somebody holds it.
+    pub(super) fn footer(&self) -> Result<Arc<ArrowReaderMetadata>, Box<Finding>> {
+        let mut held = self.footer.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(footer) = held.upgrade() {
+            return Ok(footer);
         }
-        _ => return Err(finding(Code::NotParquet, "a Parquet file, which starts with `PAR1`", "another start".into())),
+        let metadata = self.footer_again(Extent::Pages)?;
+        let corrupt = |error| Box::new(Finding::new(Code::CorruptFooter, &self.name, "a readable schema", error));
+        let footer = Arc::new(readable(metadata, &self.columns).map_err(corrupt)?);
+        *held = Arc::downgrade(&footer);
+        Ok(footer)
     }
-    let end = magic(&mut file, SeekFrom::End(-4)).map_err(unreadable)?;
-    if bytes < SMALLEST || end != Some(MAGIC) {
-        let found = format!("{bytes} bytes that end without it");
-        return Err(finding(Code::Truncated, "a footer at the end, closed with `PAR1`", found));
-    }
-    match contained(|| ParquetMetaDataReader::new().parse_and_finish(&file)) {
-        Ok(Ok(metadata)) => Ok((bytes, metadata)),
-        Ok(Err(error)) => Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
-        Err(panic) => Err(finding(Code::CorruptFooter, "a readable footer", panic)),
+
+    /// The footer once more.
+    pub(super) fn footer_again(&self, extent: Extent) -> Result<ParquetMetaData, Box<Finding>> {
+        let input = Input { name: self.name.clone(), ..Input::new(&self.path) };
+        let (bytes, metadata) = footer(&input, extent)?;
+        let columns = columns_of(&self.name, metadata.file_metadata().schema_descr()).ok();
+        if bytes == self.bytes && rows_of(&metadata) == self.rows && columns.as_ref() == Some(&self.columns) {
+            return Ok(metadata);
+        }
+        let expected = "the file as it was when it was opened";
+        Err(Box::new(Finding::new(Code::Unreadable, &self.name, expected, "another one in its place")))
     }
 }
 
-fn magic(file: &mut File, at: SeekFrom) -> io::Result<Option<[u8; 4]>> {
-    let mut found = [0; 4];
-    let read = file.seek(at).and_then(|_| file.read_exact(&mut found));
-    match read {
-        Ok(()) => Ok(Some(found)),
-        // Shorter than four bytes.
-        Err(error) if matches!(error.kind(), io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput) => Ok(None),
-        Err(error) => Err(error),
-    }
+/// The rows of each row group; [`check_rows`] refuses those that are none.
+fn rows_of(metadata: &ParquetMetaData) -> Vec<usize> {
+    metadata.row_groups().iter().map(|group| usize::try_from(group.num_rows()).unwrap_or_default()).collect()
 }
 
-/// A decoder's message without its own prefix, in one line.
-pub(super) fn plain(error: &ParquetError) -> String {
-    let text = match error {
-        ParquetError::General(text) | ParquetError::EOF(text) | ParquetError::ArrowError(text) => text.clone(),
-        other => other.to_string(),
-    };
-    text.split_whitespace().collect::<Vec<_>>().join(" ")
+fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {
+    pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
 }
 
 fn check_version(file: &str, metadata: &ParquetMetaData) -> Result<(), Box<Finding>> {
     // A file of another writer has none; its columns are checked all the same.
-    let Some(text) = value(metadata, schema::VERSION_KEY) else { return Ok(()) };
+    let pairs = metadata.file_metadata().key_value_metadata();
+    let Some(text) = pairs.and_then(|pairs| value(pairs, schema::VERSION_KEY)) else { return Ok(()) };
     match text.parse::<u32>() {
         Ok(version) if version > schema::SCHEMA_VERSION => {
             let expected = format!("schema version {} or older", schema::SCHEMA_VERSION);
@@ -366,20 +344,6 @@ fn check_rows(file: &str, bytes: u64, metadata: &ParquetMetaData) -> Option<Find
         }
     }
     (declared == 0).then(|| Finding::new(Code::NoEpisodes, file, "at least one episode", "no row"))
-}
-
-/// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
-fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
-    let make = || {
-        let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
-        let fields = plain_schema.fields().iter().zip(columns).map(|(field, column)| match column.kind {
-            Some(Kind::String) => Arc::new(field.as_ref().clone().with_data_type(text_type())),
-            _ => Arc::clone(field),
-        });
-        let wanted = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
-        ArrowReaderMetadata::try_new(Arc::new(metadata), ArrowReaderOptions::new().with_schema(wanted))
-    };
-    contained(make)?.map_err(|error| plain(&error))
 }
 
 /// How text is held in memory: keys into the distinct values.

@@ -13,6 +13,7 @@ use std::thread;
 
 use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Int32Type;
+use parquet::arrow::arrow_reader::ArrowReaderMetadata;
 
 use super::ahead::{Ahead, Ids};
 use super::column::Column;
@@ -266,6 +267,14 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
     }
 }
 
+/// A row group under way.
+struct Started<T> {
+    job: Job,
+    parts: Receiver<Part<T>>,
+    /// Held, so that a file's footer is read once for all its row groups.
+    _footer: Option<Arc<ArrowReaderMetadata>>,
+}
+
 /// Puts the parts of the row groups together again, on the receiving thread.
 struct Joiner<'a, W, R> {
     files: &'a [TraceFile],
@@ -280,17 +289,18 @@ struct Joiner<'a, W, R> {
 
 impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> Result<(), E>> Joiner<'_, W, R> {
     fn run(mut self, give: &Sender<Order<T>>, mut jobs: VecDeque<Job>, under_way: usize) -> Result<(), E> {
-        let mut started: VecDeque<(Job, Receiver<Part<T>>)> = VecDeque::new();
+        let mut started: VecDeque<Started<T>> = VecDeque::new();
         loop {
             while started.len() < under_way {
                 let Some(job) = jobs.pop_front() else { break };
+                let footer = self.files[job.file].footer().ok();
                 let (parts, listen) = mpsc::sync_channel(QUEUED_PARTS);
                 if give.send((job, parts)).is_err() {
                     break;
                 }
-                started.push_back((job, listen));
+                started.push_back(Started { job, parts: listen, _footer: footer });
             }
-            let Some((job, parts)) = started.pop_front() else { break };
+            let Some(Started { job, parts, .. }) = started.pop_front() else { break };
             self.enter(job.file)?;
             for part in parts {
                 if !self.failed {

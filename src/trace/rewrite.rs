@@ -20,6 +20,7 @@ use parquet::schema::types::{SchemaDescriptor, Type, TypePtr};
 use super::contain::contained;
 use super::decode::RowGroup;
 use super::finding::TraceError;
+use super::footer::Extent;
 use super::layout::{Layout, T};
 use super::open::{TraceFile, TraceSet};
 use super::schema::RECORDING_KEY;
@@ -60,7 +61,7 @@ pub fn rewrite<W: Write + Send>(
     let layout = Layout::new(set, [columns.source, columns.target], [])?;
     let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
-    let metadata = file.reader_metadata().metadata();
+    let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?;
     let schema = with_text(metadata.file_metadata().schema_descr(), columns.target).map_err(failed)?;
     let mut writer = SerializedFileWriter::new(out, schema, properties(file, recording)).map_err(failed)?;
     let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
@@ -157,8 +158,7 @@ fn with_text(schema: &SchemaDescriptor, target: &str) -> parquet::errors::Result
 
 /// The footer's own keys as they are, but for the recording.
 fn properties(file: &TraceFile, recording: &serde_json::Value) -> WriterPropertiesPtr {
-    let pairs = file.reader_metadata().metadata().file_metadata().key_value_metadata();
-    let mut pairs = pairs.cloned().unwrap_or_default();
+    let mut pairs = file.pairs().to_vec();
     let value = Some(recording.to_string());
     match pairs.iter_mut().find(|pair| pair.key == RECORDING_KEY) {
         Some(pair) => pair.value = value,

@@ -5,8 +5,9 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender};
 
 use arrow::array::{
-    Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Builder, RecordBatch, StringBuilder,
+    Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Array, RecordBatch, StringBuilder,
 };
+use arrow::buffer::NullBuffer;
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
@@ -151,7 +152,28 @@ struct Gathered {
     seed: Int32Builder,
     run: Int32Builder,
     labels: Vec<StringBuilder>,
-    metrics: Vec<Int64Builder>,
+    metrics: Vec<Numbers>,
+}
+
+/// Integers of which some are not there.
+#[derive(Default)]
+struct Numbers {
+    values: Vec<i64>,
+    absent: usize,
+    valid: Vec<bool>,
+}
+
+impl Numbers {
+    fn add(&mut self, number: Option<i64>) {
+        self.values.push(number.unwrap_or_default());
+        self.valid.push(number.is_some());
+        self.absent += usize::from(number.is_none());
+    }
+
+    fn take(&mut self) -> Int64Array {
+        let Self { values, absent, valid } = std::mem::take(self);
+        Int64Array::new(values.into(), (absent > 0).then(|| NullBuffer::from(valid)))
+    }
 }
 
 impl Gathered {
@@ -161,7 +183,7 @@ impl Gathered {
             seed: Int32Builder::new(),
             run: Int32Builder::new(),
             labels: header.labels.iter().map(|_| StringBuilder::new()).collect(),
-            metrics: header.metrics.iter().map(|_| Int64Builder::new()).collect(),
+            metrics: header.metrics.iter().map(|_| Numbers::default()).collect(),
         }
     }
 
@@ -176,7 +198,7 @@ impl Gathered {
             column.append_option(label.as_deref());
         }
         for (column, metric) in self.metrics.iter_mut().zip(&row.metrics) {
-            column.append_option(*metric);
+            column.add(*metric);
         }
     }
 
@@ -186,7 +208,7 @@ impl Gathered {
         columns.extend(self.texts.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef));
         columns.extend([&mut self.seed, &mut self.run].map(|column| Arc::new(column.finish()) as ArrayRef));
         columns.extend(self.labels.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef));
-        columns.extend(self.metrics.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef));
+        columns.extend(self.metrics.iter_mut().map(|column| Arc::new(column.take()) as ArrayRef));
         columns
     }
 }

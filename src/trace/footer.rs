@@ -1,0 +1,113 @@
+//! Reads footers: where a file's columns lie, and what stands in its key-value metadata.
+
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::sync::Arc;
+
+use arrow::datatypes::Schema;
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+use parquet::arrow::parquet_to_arrow_schema;
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{
+    ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy,
+};
+
+use super::contain::contained;
+use super::finding::{Code, Finding};
+use super::inputs::Input;
+use super::open::{FileColumn, text_type};
+use super::schema::Kind;
+
+const MAGIC: [u8; 4] = *b"PAR1";
+const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
+/// A magic number at each end, and the footer's length.
+const SMALLEST: u64 = 12;
+
+/// How much of a footer is decoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Extent {
+    /// What reading takes.
+    Pages,
+    /// Statistics too.
+    Whole,
+}
+
+impl Extent {
+    fn options(self) -> ParquetMetaDataOptions {
+        match self {
+            Self::Whole => ParquetMetaDataOptions::new(),
+            Self::Pages => ParquetMetaDataOptions::new()
+                .with_column_stats_policy(ParquetStatisticsPolicy::SkipAll)
+                .with_encoding_stats_policy(ParquetStatisticsPolicy::SkipAll)
+                .with_size_stats_policy(ParquetStatisticsPolicy::SkipAll),
+        }
+    }
+}
+
+/// The file's size and decoded footer.
+pub(super) fn footer(input: &Input, extent: Extent) -> Result<(u64, ParquetMetaData), Box<Finding>> {
+    let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
+    let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
+    let mut file = File::open(&input.path).map_err(unreadable)?;
+    let about = file.metadata().map_err(unreadable)?;
+    if about.is_dir() {
+        return Err(finding(Code::NotParquet, "a Parquet file", "a folder".into()));
+    }
+    let bytes = about.len();
+    if bytes == 0 {
+        return Err(finding(Code::EmptyFile, "a Parquet file", "0 bytes".into()));
+    }
+    let start = magic(&mut file, SeekFrom::Start(0)).map_err(unreadable)?;
+    match start {
+        Some(MAGIC) => {}
+        Some(ENCRYPTED_MAGIC) => {
+            return Err(finding(Code::NotParquet, "a Parquet file that is not encrypted", "an encrypted one".into()));
+        }
+        _ => return Err(finding(Code::NotParquet, "a Parquet file, which starts with `PAR1`", "another start".into())),
+    }
+    let end = magic(&mut file, SeekFrom::End(-4)).map_err(unreadable)?;
+    if bytes < SMALLEST || end != Some(MAGIC) {
+        let found = format!("{bytes} bytes that end without it");
+        return Err(finding(Code::Truncated, "a footer at the end, closed with `PAR1`", found));
+    }
+    let reader = || ParquetMetaDataReader::new().with_metadata_options(Some(extent.options()));
+    match contained(|| reader().parse_and_finish(&file)) {
+        Ok(Ok(metadata)) => Ok((bytes, metadata)),
+        Ok(Err(error)) => Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
+        Err(panic) => Err(finding(Code::CorruptFooter, "a readable footer", panic)),
+    }
+}
+
+fn magic(file: &mut File, at: SeekFrom) -> io::Result<Option<[u8; 4]>> {
+    let mut found = [0; 4];
+    let read = file.seek(at).and_then(|_| file.read_exact(&mut found));
+    match read {
+        Ok(()) => Ok(Some(found)),
+        // Shorter than four bytes.
+        Err(error) if matches!(error.kind(), io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// A decoder's message without its own prefix, in one line.
+pub(super) fn plain(error: &ParquetError) -> String {
+    let text = match error {
+        ParquetError::General(text) | ParquetError::EOF(text) | ParquetError::ArrowError(text) => text.clone(),
+        other => other.to_string(),
+    };
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
+pub(super) fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
+    let make = || {
+        let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
+        let fields = plain_schema.fields().iter().zip(columns).map(|(field, column)| match column.kind {
+            Some(Kind::String) => Arc::new(field.as_ref().clone().with_data_type(text_type())),
+            _ => Arc::clone(field),
+        });
+        let wanted = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+        ArrowReaderMetadata::try_new(Arc::new(metadata), ArrowReaderOptions::new().with_schema(wanted))
+    };
+    contained(make)?.map_err(|error| plain(&error))
+}

@@ -1,8 +1,10 @@
 """The other engines, one a process: `engines.py ENGINE FOLDER OUT [SQL_FILE]` prints the seconds that the work took.
 
 Imports and the start of the interpreter are not counted. Each writes the episode table as Parquet, as `score` does.
+`engines.py sums TABLE KEYS` prints the rows of such a table, then the count and sum of each column behind its keys.
 """
 
+import json
 import sys
 import time
 
@@ -88,10 +90,23 @@ def paper(pandas, steps):
     return result
 
 
+def sums(path, keys):
+    """Rows of an episode table, then the count and sum of each column behind its keys."""
+    import duckdb
+
+    connection = duckdb.connect()
+    columns = [row[0] for row in connection.execute(f"DESCRIBE SELECT * FROM '{path}'").fetchall()][keys:]
+    parts = ", ".join(f'count("{column}"), CAST(sum("{column}") AS BIGINT)' for column in columns)
+    return connection.execute(f"SELECT count(*), {parts} FROM '{path}'").fetchone()
+
+
 ENGINES = {"duckdb": duckdb_engine, "polars": polars_engine, "pandas": pandas_engine}
 
 
 def main():
+    if sys.argv[1] == "sums":
+        print(json.dumps(sums(sys.argv[2], int(sys.argv[3]))))
+        return
     engine, folder, out, *sql = sys.argv[1:]
     text = open(sql[0], encoding="utf-8").read() if sql else ""
     print(ENGINES[engine](folder, out, text))

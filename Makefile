@@ -38,6 +38,7 @@ end-to-end:
 bless:
 	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --all-features --no-fail-fast
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
+	cd reports/paper && sha256sum report.html >../report.html.sha256
 
 ## The bundled recordings anew: fixtures/recorded.
 recorded:

@@ -1,8 +1,8 @@
 //! Records in the order of their bytes, more of them than memory should hold: sorted runs, put away and merged.
 //!
 //! Rule: a run that is put away is a temporary file without a name, gone with the process. Memory holds the runs that
-//! are not put away and one record of each other run that is merged. What a record means is the caller's business; one whose key must
-//! decide the order begins with a form of it that no other key continues.
+//! are not put away and one record of each other run that is merged. What a record means is the caller's business; one
+//! whose key must decide the order begins with a form of it that no other key continues.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;

@@ -52,11 +52,11 @@ impl<'a> Ahead<'a> {
         let has_rows = |row_group: &usize| self.files[file].row_group_rows(*row_group) > 0;
         let before = (0..row_group).rev().find(has_rows);
         let after = (row_group + 1..self.files[file].row_groups()).find(has_rows);
-        let differs = |other: usize, differs: &dyn Fn(&Group) -> bool| self.group(file, other).is_some_and(differs);
+        let known = |other: usize| self.group(file, other);
         Some(Ids {
             runs,
-            begins: before.is_none_or(|before| differs(before, &|other| other.last != group.first)),
-            ends: after.is_none_or(|after| differs(after, &|other| other.first != group.last)),
+            begins: before.is_none_or(|before| known(before).is_some_and(|other| other.last != group.first)),
+            ends: after.is_none_or(|after| known(after).is_some_and(|other| other.first != group.last)),
         })
     }
 

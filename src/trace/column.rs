@@ -146,27 +146,22 @@ impl From<ArrayRef> for Column {
 impl Keys {
     /// Rows with these keys; `None` where one has no value.
     pub(super) fn new(keys: Vec<i32>, values: ArrayRef) -> Option<Self> {
-        // A negative key counts as the largest of all.
-        let largest = keys.iter().map(|key| key.cast_unsigned()).max();
-        let within = largest.is_none_or(|key| (key as usize) < values.len());
-        (within && values.null_count() == 0).then(|| Self { keys: keys.into(), values })
+        (all_within(&keys, values.len()) && values.null_count() == 0).then(|| Self { keys: keys.into(), values })
     }
 
     /// Whether the integers of each stretch of rows, bounded by `offsets`, are 1, 2, and so on. May say no where they
     /// are, if a value has two keys.
     pub(super) fn count_from_one(&self, offsets: &[usize]) -> bool {
-        let mut counting = Vec::new();
-        let mut keys: Vec<(i64, i32)> =
-            self.values.as_primitive::<Int64Type>().values().iter().copied().zip(0..).collect();
-        keys.sort_unstable();
-        let mut next = 1;
-        for (value, key) in keys {
-            if value == next {
-                counting.push(key);
-                next += 1;
+        let stretches = || offsets.windows(2).map(|ends| ends[0]..ends[1]);
+        // The keys of 1, 2, and so on; no key is negative.
+        let mut counting = vec![-1; stretches().map(|rows| rows.len()).max().unwrap_or(0)];
+        for (value, key) in self.values.as_primitive::<Int64Type>().values().iter().zip(0..) {
+            let place = usize::try_from(*value).ok().and_then(|value| value.checked_sub(1));
+            if let Some(counted) = place.and_then(|place| counting.get_mut(place)) {
+                *counted = key;
             }
         }
-        offsets.windows(2).all(|ends| counting.get(..ends[1] - ends[0]) == Some(&self.keys[ends[0]..ends[1]]))
+        stretches().all(|rows| counting[..rows.len()] == self.keys[rows])
     }
 }
 
@@ -245,6 +240,12 @@ impl Runs {
         });
         take(&self.values, &UInt32Array::from(runs.collect::<Vec<_>>()), None)
     }
+}
+
+/// Whether every key is one of `count` values.
+pub(super) fn all_within(keys: &[i32], count: usize) -> bool {
+    // A negative key counts as the largest of all.
+    keys.iter().map(|key| key.cast_unsigned()).max().is_none_or(|largest| (largest as usize) < count)
 }
 
 /// The text at a row of a dictionary; `None` for null.

@@ -13,13 +13,12 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowSelection, RowSelector,
 };
-use parquet::file::metadata::RowGroupMetaData;
 
 use super::ahead::Ids;
-use super::column::Column;
+use super::column::{Column, all_within};
 use super::contain::contained;
 use super::finding::{Code, Finding};
-use super::footer::plain;
+use super::footer::{plain, rows_of};
 use super::layout::{EPISODE_ID, Layout, T};
 use super::open::{TraceFile, text_type};
 use super::pages::{Cursor, Form, Unfit};
@@ -123,9 +122,7 @@ impl<'a> RowGroup<'a> {
         row_group: usize,
         ids: Option<Ids>,
     ) -> Result<Self, Box<Finding>> {
-        let handle = file.reader().map_err(|error| {
-            Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
-        })?;
+        let handle = handle(file)?;
         let footer = file.footer()?;
         let mut rows = Self { file, layout, footer, index: row_group, ids, sources: Vec::new(), first: 0, over: false };
         for at in 0..layout.columns.len() {
@@ -145,9 +142,7 @@ impl<'a> RowGroup<'a> {
     /// A column as the library decodes it, from the next row on.
     fn library(&self, root: usize) -> Result<Source, Box<Finding>> {
         let corrupt = |error: String| corrupt(self.file, self.index, &error);
-        let handle = self.file.reader().map_err(|error| {
-            Box::new(Finding::new(Code::Unreadable, self.file.name(), "a file that can be read", error.to_string()))
-        })?;
+        let handle = handle(self.file)?;
         let reader = contained(|| reader(&self.footer, handle, root, self.index, self.first)).map_err(corrupt)?;
         let reader = reader.map_err(|error| corrupt(plain(&error)))?;
         Ok(Source::Library(Box::new(Library { reader, held: Vec::new() })))
@@ -176,15 +171,11 @@ impl<'a> RowGroup<'a> {
     fn column(&mut self, at: usize, count: usize) -> Result<Column, Box<Finding>> {
         let kind = self.layout.columns[at].kind;
         if let Source::Pages { root, cursor } = &mut self.sources[at] {
-            match contained(|| cursor.read(count)) {
-                Ok(Ok(column)) => return Ok(column),
-                Ok(Err(Unfit)) | Err(_) => {
-                    self.sources[at] = {
-                        let root = *root;
-                        self.library(root)?
-                    }
-                }
+            if let Ok(Ok(column)) = contained(|| cursor.read(count)) {
+                return Ok(column);
             }
+            let root = *root;
+            self.sources[at] = self.library(root)?;
         }
         if let (Source::Ahead, Some(ids)) = (&self.sources[at], &self.ids) {
             return Ok(Column::Runs(ids.runs.slice(self.first, count)));
@@ -275,6 +266,12 @@ pub(super) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option
     contained(read).ok()?.ok()
 }
 
+fn handle(file: &TraceFile) -> Result<File, Box<Finding>> {
+    file.reader().map_err(|error| {
+        Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
+    })
+}
+
 /// Where a file has a column.
 fn root(file: &TraceFile, layout: &Layout, at: usize) -> Option<usize> {
     file.columns().iter().position(|column| column.name == layout.columns[at].name)
@@ -321,10 +318,6 @@ fn reader(
     }
     let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
     reader.with_row_selection(RowSelection::from(rest)).build()
-}
-
-fn rows_of(row_group: &RowGroupMetaData) -> usize {
-    usize::try_from(row_group.num_rows()).unwrap_or_default()
 }
 
 fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {
@@ -379,11 +372,6 @@ fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
     let within = |key: i32| usize::try_from(key).is_ok_and(|key| key < count);
     // What stands in the place of nulls is nearly always within, too, and then there is no need to look at them.
     let good = column.values().null_count() == 0
-        && (largest(column.keys().values()).is_none_or(within) || column.keys().iter().flatten().all(within));
+        && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
     if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
-}
-
-/// The largest key, a negative one counting as the largest of all.
-fn largest(keys: &[i32]) -> Option<i32> {
-    keys.iter().map(|key| key.cast_unsigned()).max().map(u32::cast_signed)
 }

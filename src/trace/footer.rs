@@ -9,7 +9,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 use parquet::arrow::parquet_to_arrow_schema;
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{
-    ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy,
+    ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy, RowGroupMetaData,
 };
 
 use super::contain::contained;
@@ -96,6 +96,11 @@ pub(super) fn plain(error: &ParquetError) -> String {
         other => other.to_string(),
     };
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The rows of a row group; opening refuses a number that is none.
+pub(super) fn rows_of(row_group: &RowGroupMetaData) -> usize {
+    usize::try_from(row_group.num_rows()).unwrap_or_default()
 }
 
 /// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.

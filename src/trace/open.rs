@@ -17,7 +17,7 @@ use parquet::schema::types::SchemaDescriptor;
 
 use super::contain::contained;
 use super::finding::{Code, Finding, TraceError};
-use super::footer::{Extent, footer, plain, readable};
+use super::footer::{Extent, footer, plain, readable, rows_of};
 use super::inputs::Input;
 use super::schema::{self, COLUMNS, Kind};
 use crate::base::near::nearest;
@@ -142,7 +142,7 @@ impl TraceFile {
         if !findings.is_empty() {
             return Err(findings);
         }
-        let rows = rows_of(&metadata);
+        let rows = metadata.row_groups().iter().map(rows_of).collect();
         let pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
@@ -229,17 +229,13 @@ impl TraceFile {
         let input = Input { name: self.name.clone(), ..Input::new(&self.path) };
         let (bytes, metadata) = footer(&input, extent)?;
         let columns = columns_of(&self.name, metadata.file_metadata().schema_descr()).ok();
-        if bytes == self.bytes && rows_of(&metadata) == self.rows && columns.as_ref() == Some(&self.columns) {
+        let has_rows = metadata.row_groups().iter().map(rows_of).eq(self.rows.iter().copied());
+        if bytes == self.bytes && has_rows && columns.as_ref() == Some(&self.columns) {
             return Ok(metadata);
         }
         let expected = "the file as it was when it was opened";
         Err(Box::new(Finding::new(Code::Unreadable, &self.name, expected, "another one in its place")))
     }
-}
-
-/// The rows of each row group; [`check_rows`] refuses those that are none.
-fn rows_of(metadata: &ParquetMetaData) -> Vec<usize> {
-    metadata.row_groups().iter().map(|group| usize::try_from(group.num_rows()).unwrap_or_default()).collect()
 }
 
 fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {

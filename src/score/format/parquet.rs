@@ -7,7 +7,6 @@ use std::sync::mpsc::{Receiver, SyncSender};
 use arrow::array::{
     Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Array, RecordBatch, StringBuilder,
 };
-use arrow::buffer::NullBuffer;
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
@@ -24,6 +23,7 @@ use super::footer;
 use super::surroundings::Surroundings;
 use crate::base::beside::beside;
 use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
+use crate::score::values::nulls_of;
 use crate::trace::contain::contained;
 
 /// The footer key that tells scores from traces.
@@ -130,10 +130,10 @@ fn properties(header: &Header) -> Result<WriterProperties, FormatError> {
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_key_value_metadata(Some(metadata));
     // Small numbers take few bits without a dictionary, too.
-    for name in header.metrics.iter().chain([&KEYS[3].to_owned(), &KEYS[4].to_owned()]) {
+    for name in header.metrics.iter().map(String::as_str).chain([KEYS[3], KEYS[4]]) {
         properties = properties
-            .set_column_dictionary_enabled(name.as_str().into(), false)
-            .set_column_encoding(name.as_str().into(), Encoding::DELTA_BINARY_PACKED);
+            .set_column_dictionary_enabled(name.into(), false)
+            .set_column_encoding(name.into(), Encoding::DELTA_BINARY_PACKED);
     }
     Ok(properties.build())
 }
@@ -159,7 +159,6 @@ struct Gathered {
 #[derive(Default)]
 struct Numbers {
     values: Vec<i64>,
-    absent: usize,
     valid: Vec<bool>,
 }
 
@@ -167,12 +166,11 @@ impl Numbers {
     fn add(&mut self, number: Option<i64>) {
         self.values.push(number.unwrap_or_default());
         self.valid.push(number.is_some());
-        self.absent += usize::from(number.is_none());
     }
 
     fn take(&mut self) -> Int64Array {
-        let Self { values, absent, valid } = std::mem::take(self);
-        Int64Array::new(values.into(), (absent > 0).then(|| NullBuffer::from(valid)))
+        let Self { values, valid } = std::mem::take(self);
+        Int64Array::new(values.into(), nulls_of(valid))
     }
 }
 

@@ -46,7 +46,7 @@ impl Dictionary {
 
     /// Keys and their values.
     pub(super) fn keys(&self, keys: Vec<i32>) -> Result<Keys, Unfit> {
-        let (Self::Texts(values) | Self::Ints(values)) = self;
+        let Self::Ints(values) = self else { return Err(Unfit) };
         Keys::new(keys, values.clone()).ok_or(Unfit)
     }
 

@@ -50,7 +50,7 @@ mirrorstats score fixtures/paper >"$out/native.csv"
 mirrorstats score fixtures/paper --engine polars >"$out/polars.csv"
 cmp "$out/native.csv" "$out/polars.csv"
 mirrorstats report fixtures/paper --style paper --engine polars --out "$out/polars" >/dev/null
-diff -r reports/paper "$out/polars"
+diff -r "$out/paper" "$out/polars"
 
 echo "end-to-end: requests to models are those of the official client libraries"
 # From 2.0 on, Anthropic's library speaks a version of the API that refuses a temperature.

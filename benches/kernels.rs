@@ -14,6 +14,7 @@ use mirrorstats::score::rows::{RowSorter, Rows};
 use mirrorstats::score::run::schema_columns;
 use mirrorstats::score::segments::Segments;
 use mirrorstats::score::table::Header;
+use mirrorstats::trace::scan::Texts;
 
 const STEPS: usize = 64 * 1024;
 const LENGTH: usize = 70;
@@ -34,6 +35,7 @@ const EXPRESSIONS: [(&str, &str); 8] = [
 struct Sample {
     offsets: Vec<usize>,
     steps: RecordBatch,
+    texts: Vec<Texts>,
     episodes: RecordBatch,
 }
 
@@ -48,10 +50,17 @@ impl Sample {
         let one = |of: &[&str], at: usize| Some(of[at % of.len()].to_owned());
         let numbers = |count: usize, of: &dyn Fn(usize) -> i64| Arc::new((0..count).map(of).collect::<Int64Array>());
         let colors = ["unknown", "red", "blue", "green"];
+        let bytes = |name: &str, known: &[&str], of: &dyn Fn(usize) -> usize| Texts {
+            name: name.to_owned(),
+            keys: (0..STEPS).map(|at| u8::try_from(of(at) % known.len()).ok()).collect(),
+            texts: known.iter().map(|text| Some(*text)).collect(),
+        };
+        let byte_texts = vec![
+            bytes("action", &["move_forward", "turn_left", "done"], &mixed),
+            bytes("self_color", &colors, &|at| at / 9),
+            bytes("selected_cube", &["none", "red", "blue"], &|at| at / 11),
+        ];
         let steps = RecordBatch::try_from_iter_with_nullable([
-            ("action", texts(STEPS, &|at| one(&["move_forward", "turn_left", "done"], mixed(at))), true),
-            ("self_color", texts(STEPS, &|at| one(&colors, at / 9)), true),
-            ("selected_cube", texts(STEPS, &|at| one(&["none", "red", "blue"], at / 11)), true),
             (
                 "mirror_visible",
                 Arc::new((0..STEPS).map(|at| Some(at / 5 % 3 == 0)).collect::<BooleanArray>()) as _,
@@ -67,11 +76,16 @@ impl Sample {
             ("run", numbers(episodes, &|at| i64::try_from(at % 7).unwrap()) as _, false),
             ("body_color", texts(episodes, &|at| one(&colors[1..], at)), false),
         ]);
-        Self { offsets, steps: steps.unwrap(), episodes: constants.unwrap() }
+        Self { offsets, steps: steps.unwrap(), texts: byte_texts, episodes: constants.unwrap() }
     }
 
     fn batch(&self) -> Batch<'_> {
-        Batch { segments: Segments::new(&self.offsets), steps: &self.steps, episodes: &self.episodes }
+        Batch {
+            segments: Segments::new(&self.offsets),
+            steps: &self.steps,
+            texts: &self.texts,
+            episodes: &self.episodes,
+        }
     }
 }
 

@@ -132,6 +132,11 @@ fn rows_of(batch: &EpisodeBatch) -> Vec<Row> {
         let column = batch.column_by_name(name).unwrap().as_primitive::<Int64Type>();
         column.is_valid(row).then(|| column.value(row))
     };
+    let action = |row: usize| match batch.texts.as_slice() {
+        [] => text(&batch.steps, "action", row),
+        [action] => action.keys.is_valid(row).then(|| action.texts.value(action.keys.value(row).into()).to_owned()),
+        more => panic!("there is one text among the columns of steps, not {}", more.len()),
+    };
     let mut rows = Vec::new();
     for (episode, ends) in batch.offsets.windows(2).enumerate() {
         assert_eq!(text(&batch.episodes, "body_color", episode).as_deref(), Some("red"));
@@ -141,7 +146,7 @@ fn rows_of(batch: &EpisodeBatch) -> Vec<Row> {
             model: text(&batch.episodes, "model", episode).unwrap(),
             seed: int(&batch.episodes, "seed", episode).unwrap(),
             t: int(&batch.steps, "t", row).unwrap(),
-            action: text(&batch.steps, "action", row),
+            action: action(row),
             px: int(&batch.steps, "mirror_px", row),
             visible: batch.steps.column_by_name("mirror_visible").unwrap().as_boolean().value(row),
         }));

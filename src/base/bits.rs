@@ -22,6 +22,20 @@ fn words(data: &[u8], start: usize, length: usize) -> impl DoubleEndedIterator<I
     })
 }
 
+/// The bits of some truth values, eight of them a byte; the last byte is filled with zeros.
+pub fn pack(truths: &[bool]) -> Vec<u8> {
+    /// Moves the lowest bit of each byte of a word to its own place in the highest byte.
+    const GATHER: u64 = 0x0102_0408_1020_4080;
+    let (words, rest) = truths.as_chunks::<8>();
+    let byte =
+        |eight: &[bool; 8]| (u64::from_le_bytes(eight.map(u8::from)).wrapping_mul(GATHER) >> 56).to_le_bytes()[0];
+    let mut bytes: Vec<u8> = words.iter().map(byte).collect();
+    if !rest.is_empty() {
+        bytes.push(rest.iter().rev().fold(0, |byte, truth| byte << 1 | u8::from(*truth)));
+    }
+    bytes
+}
+
 /// How many of `length` bits from `start` are set.
 pub fn count(data: &[u8], start: usize, length: usize) -> usize {
     words(data, start, length).map(|(_, word)| word.count_ones() as usize).sum()
@@ -29,8 +43,14 @@ pub fn count(data: &[u8], start: usize, length: usize) -> usize {
 
 /// The position of the first set bit, counted from `start`.
 pub fn first(data: &[u8], start: usize, length: usize) -> Option<usize> {
-    let set = words(data, start, length).find(|(_, word)| *word != 0);
-    set.map(|(at, word)| at + word.trailing_zeros() as usize)
+    // Bits behind the last one may be looked at, too, and count for nothing.
+    (0..length)
+        .step_by(STEP)
+        .find_map(|at| {
+            let found = word(data, (start + at) / 8) >> ((start + at) % 8);
+            (found != 0).then(|| at + found.trailing_zeros() as usize)
+        })
+        .filter(|at| *at < length)
 }
 
 /// The position of the last set bit, counted from `start`.
@@ -44,9 +64,17 @@ mod tests {
     use proptest::collection::vec;
     use proptest::prelude::*;
 
-    use super::{count, first, last};
+    use super::{count, first, last, pack};
 
     proptest! {
+        #[test]
+        fn bits_are_packed_in_order(truths in vec(any::<bool>(), 0..40)) {
+            let bytes = pack(&truths);
+            prop_assert_eq!(bytes.len(), truths.len().div_ceil(8));
+            let bit = |at: usize| bytes[at / 8] >> (at % 8) & 1 == 1;
+            prop_assert!((0..bytes.len() * 8).all(|at| bit(at) == truths.get(at).is_some_and(|truth| *truth)));
+        }
+
         #[test]
         fn searches_find_what_a_look_at_each_bit_finds(data in vec(prop_oneof![Just(0_u8), any::<u8>()], 1..40), cut in any::<(prop::sample::Index, prop::sample::Index)>()) {
             let start = cut.0.index(data.len() * 8);

@@ -13,16 +13,17 @@ use arrow::array::{
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::compute::kernels::{boolean, cmp, numeric};
-use arrow::compute::{cast, nullif, prep_null_mask_filter};
-use arrow::datatypes::{DataType, Float64Type, Int32Type};
+use arrow::compute::{cast, filter as select, nullif, prep_null_mask_filter};
+use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use arrow::error::ArrowError;
 use regex::Regex;
 
-use super::segments::{Segments, repeat, repeat_bool, test_symbols};
+use super::segments::{Segments, Stretch, repeat, repeat_bool, test_symbols};
 use super::values::{Coded, Symbols, Values, canonical, truths};
 use crate::metric::catalog::Kind;
 use crate::metric::columns::{Level, Type};
 use crate::metric::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Op, Output, Plan};
+use crate::trace::scan::Texts;
 
 /// Whole episodes in columns: one batch with a row a step, one with a row an episode.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +32,8 @@ pub struct Batch<'a> {
     pub segments: Segments<'a>,
     /// Step-level columns by name: booleans, 64-bit integers, doubles, dictionaries of text with 32-bit keys.
     pub steps: &'a RecordBatch,
+    /// Step-level columns of text that are not among those.
+    pub texts: &'a [Texts],
     /// Columns that are constant in an episode, a row an episode; the same types.
     pub episodes: &'a RecordBatch,
 }
@@ -40,8 +43,8 @@ pub struct Batch<'a> {
 pub struct Scores {
     /// The positions of the episodes that the filter keeps, ascending.
     pub kept: Vec<usize>,
-    /// A column a metric of the plan, a value for each episode kept; `None` where the metric is undefined.
-    pub metrics: Vec<Vec<Option<i64>>>,
+    /// A column a metric of the plan, a value for each episode kept; null where the metric is undefined.
+    pub metrics: Vec<Int64Array>,
 }
 
 /// What keeps a batch from being scored.
@@ -120,17 +123,24 @@ impl<'p> Engine<'p> {
     /// When a column is missing or of another type, when a number leaves 64 bits, when a rate is not 0 or 1.
     pub fn score(&self, batch: &Batch) -> Result<Scores, EngineError> {
         let values = self.evaluate(batch)?;
-        let kept = match self.plan.filter {
-            Some(node) => truths(values.of(node).bools()).set_indices().collect(),
-            None => (0..batch.segments.len()).collect::<Vec<_>>(),
+        let filter = self.plan.filter.map(|node| BooleanArray::new(truths(values.of(node).bools()), None));
+        let kept = match &filter {
+            Some(kept) => kept.values().set_indices().collect(),
+            None => (0..batch.segments.len()).collect(),
         };
         let metric = |output: &Output| {
-            let column = integers(values.of(output.node), &kept);
-            let strange = column.iter().flatten().find(|&&value| output.kind == Kind::Rate && !matches!(value, 0 | 1));
-            match strange {
-                Some(&value) => Err(EngineError::NotARate { metric: output.name.clone(), value }),
-                None => Ok(column),
+            let overflow = |error| self.overflow(output.node, &error);
+            let values = values.of(output.node);
+            let column = cast(values.array(), &DataType::Int64).map_err(overflow)?;
+            let column = filter.as_ref().map_or(Ok(column.clone()), |kept| select(&column, kept)).map_err(overflow)?;
+            let column = column.as_primitive::<Int64Type>();
+            if output.kind == Kind::Rate
+                && values.ty() != Type::Bool
+                && let Some(value) = column.iter().flatten().find(|value| !matches!(value, 0 | 1))
+            {
+                return Err(EngineError::NotARate { metric: output.name.clone(), value });
             }
+            Ok(column.clone())
         };
         let metrics = self.plan.outputs.iter().map(metric).collect::<Result<_, _>>()?;
         Ok(Scores { kept, metrics })
@@ -144,6 +154,7 @@ impl<'p> Engine<'p> {
             symbols: Symbols::default(),
             values: vec![None; self.plan.nodes().len()],
             moments: None,
+            whole: batch.segments.whole(),
         };
         for &id in &self.order {
             let value = evaluation.node(id)?;
@@ -170,6 +181,17 @@ fn window(plan: &Plan, op: &Op) -> Option<(Comparison, NodeId)> {
         },
         _ => None,
     }
+}
+
+/// Whether a column of texts is equal to a text of the episode, or is not: the column and that text, which is not written
+/// out for each step.
+fn beside_its_episode(plan: &Plan, op: &Op) -> Option<(NodeId, NodeId)> {
+    let Op::Compare(Comparison::Equal | Comparison::NotEqual, x, y) = op else { return None };
+    let pair = |column: NodeId, text: NodeId| match (&plan.node(column).op, &plan.node(text).op) {
+        (Op::Column(_), Op::Spread(text)) if plan.node(column).ty == Type::Text => Some((column, *text)),
+        _ => None,
+    };
+    pair(*x, *y).or_else(|| pair(*y, *x))
 }
 
 /// A condition on steps of which parts are windows: any other part, if there is one, and the windows.
@@ -233,7 +255,11 @@ fn needs(plan: &Plan, id: NodeId) -> Vec<NodeId> {
             let operands = inner.iter().flat_map(|id| plan.node(*id).op.operands());
             operands.filter(|id| is_leaf(plan, *id)).chain([*moment]).collect()
         }
-        _ => window(plan, op).map_or_else(|| op.operands(), |(_, moment)| vec![moment]),
+        _ => match (window(plan, op), beside_its_episode(plan, op)) {
+            (Some((_, moment)), _) => vec![moment],
+            (None, Some((column, text))) => vec![column, text],
+            (None, None) => op.operands(),
+        },
     }
 }
 
@@ -275,18 +301,6 @@ fn known(values: &[Option<Values>], id: NodeId) -> &Values {
     values[id.index()].as_ref().expect("operands come before their users in the order of evaluation")
 }
 
-/// An episode-level column as integers, the episodes kept alone.
-fn integers(values: &Values, kept: &[usize]) -> Vec<Option<i64>> {
-    let nulls = values.array().nulls();
-    let valid = |row: usize| nulls.is_none_or(|nulls| nulls.is_valid(row));
-    if values.ty() == Type::Bool {
-        let bools = values.bools().values();
-        return kept.iter().map(|&row| valid(row).then(|| i64::from(bools.value(row)))).collect();
-    }
-    let ints = values.ints().values();
-    kept.iter().map(|&row| valid(row).then(|| ints[row])).collect()
-}
-
 /// One batch underway.
 struct Evaluation<'e, 'p> {
     engine: &'e Engine<'p>,
@@ -296,6 +310,8 @@ struct Evaluation<'e, 'p> {
     /// The timesteps looked up, a value an episode, where a lookup is evaluated: step-level nodes have a value an
     /// episode then, that at its timestep.
     moments: Option<Int64Array>,
+    /// All rows of each episode.
+    whole: Vec<Stretch>,
 }
 
 impl Evaluation<'_, '_> {
@@ -353,6 +369,11 @@ impl Evaluation<'_, '_> {
     }
 
     fn column(&mut self, name: &str, level: Level) -> Result<Values, EngineError> {
+        if level == Level::Step
+            && let Some(texts) = self.batch.texts.iter().find(|texts| texts.name == name)
+        {
+            return Ok(self.symbols.of_texts(texts));
+        }
         let table = if level == Level::Step { self.batch.steps } else { self.batch.episodes };
         let column = table.column_by_name(name).ok_or_else(|| EngineError::MissingColumn(name.to_owned()))?;
         match column.data_type() {
@@ -360,7 +381,7 @@ impl Evaluation<'_, '_> {
             DataType::Int64 => Ok(Values::shared(column.clone(), Type::Int)),
             DataType::Float64 => Ok(numbers(column.clone(), Type::Float)),
             DataType::Dictionary(key, value) if **key == DataType::Int32 && **value == DataType::Utf8 => {
-                Ok(self.symbols.of_column(column.as_dictionary::<Int32Type>()))
+                Ok(self.symbols.of_column(column.as_dictionary()))
             }
             other => Err(EngineError::ColumnType { column: name.to_owned(), found: other.to_string() }),
         }
@@ -408,6 +429,15 @@ impl Evaluation<'_, '_> {
         {
             return Ok(self.batch.segments.window(comparison, self.full(moment, Level::Episode).ints()));
         }
+        if self.moments.is_none()
+            && let Some((column, text)) = beside_its_episode(self.engine.plan, op)
+        {
+            let texts = self.full(text, Level::Episode);
+            return match self.of(column).coded() {
+                Some(coded) => Ok(coded.compare(self.batch.segments, texts.symbols(), comparison == Comparison::Equal)),
+                None => compare(comparison, self.of(column), &self.spread(&texts, Level::Step)),
+            };
+        }
         let (x, y) = (self.of(x), self.of(y));
         match (x.ty(), comparison) {
             (Type::Text, Comparison::Less | Comparison::LessEqual | Comparison::Greater | Comparison::GreaterEqual) => {
@@ -421,8 +451,6 @@ impl Evaluation<'_, '_> {
             (Type::Text, _) => match (x.coded(), y.coded()) {
                 (Some(coded), _) if y.is_single() => Ok(one_text(comparison, coded, y)),
                 (_, Some(coded)) if x.is_single() => Ok(one_text(comparison, coded, x)),
-                (Some(coded), None) => Ok(coded.equal(y.symbols(), comparison == Comparison::Equal)),
-                (None, Some(coded)) => Ok(coded.equal(x.symbols(), comparison == Comparison::Equal)),
                 _ => compare(comparison, x, y),
             },
             _ => compare(comparison, x, y),
@@ -489,10 +517,16 @@ impl Evaluation<'_, '_> {
         let (rest, windows) = windowed(self.engine.plan, condition);
         let moments = |moment: NodeId| self.full(moment, Level::Episode).ints().clone();
         let windows: Vec<_> = windows.into_iter().map(|(comparison, moment)| (comparison, moments(moment))).collect();
-        let stretches = self.batch.segments.within(&windows);
+        let inside;
+        let stretches = if windows.is_empty() {
+            &self.whole
+        } else {
+            inside = self.batch.segments.within(&windows);
+            &inside
+        };
         let ty = if aggregate == Aggregate::Any { Type::Bool } else { Type::Int };
         let predicate = self.full_bools(rest, Level::Step);
-        Values::shared(Segments::aggregate(aggregate, &predicate, &stretches), ty)
+        Values::shared(Segments::aggregate(aggregate, &predicate, stretches), ty)
     }
 
     /// A value at a timestep of each episode, computed from what its columns hold there.
@@ -505,6 +539,7 @@ impl Evaluation<'_, '_> {
             symbols: std::mem::take(&mut self.symbols),
             values: vec![None; plan.nodes().len()],
             moments: Some(moments.clone()),
+            whole: Vec::new(),
         };
         for leaf in inner.iter().flat_map(|id| plan.node(*id).op.operands()).filter(|id| is_leaf(plan, *id)) {
             let values = self.of(leaf);
@@ -527,7 +562,7 @@ impl Evaluation<'_, '_> {
     fn at(&self, values: &Values, moments: &Int64Array) -> Values {
         let (segments, ty) = (self.batch.segments, values.ty());
         if let Some(coded) = values.coded() {
-            return Values::new(coded.of(&segments.at(coded.keys(), moments)), ty);
+            return Values::new(coded.at(segments, moments), ty);
         }
         match ty {
             Type::Bool => Values::new(segments.bools_at(values.bools(), moments), ty),
@@ -584,7 +619,7 @@ fn choose_numbers<T: ArrowPrimitiveType>(
 fn one_text(comparison: Comparison, coded: &Coded, single: &Values) -> BooleanArray {
     let text = single.symbols();
     if text.is_null(0) {
-        return BooleanArray::new_null(coded.keys().len());
+        return BooleanArray::new_null(coded.len());
     }
     let (wanted, equal) = (text.value(0), comparison == Comparison::Equal);
     coded.test(|symbol| (symbol == wanted) == equal)

@@ -182,7 +182,8 @@ fn of_episode(
     let offsets = [0, end - start];
     let segments = Segments::new(&offsets);
     let (steps, episodes) = (batch.steps.slice(start, end - start), batch.episodes.slice(episode, 1));
-    let values = engine.evaluate(&Batch { segments, steps: &steps, episodes: &episodes })?;
+    let texts: Vec<_> = batch.texts.iter().map(|texts| texts.slice(start, end - start)).collect();
+    let values = engine.evaluate(&Batch { segments, steps: &steps, texts: &texts, episodes: &episodes })?;
     let reading = Reading { definitions, values, segments };
     let metrics = definitions.plan.outputs.iter().map(|output| reading.metric(&output.name, output.node)).collect();
     Ok(Evidence { episode_id: episode_id.to_owned(), length: segments.lengths().value(0), metrics })

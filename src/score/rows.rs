@@ -13,7 +13,9 @@ use std::borrow::Cow;
 use std::io;
 use std::ops::Range;
 
-use arrow::array::{Array, ArrayRef, AsArray as _, DictionaryArray, Int64Array, RecordBatch};
+use arrow::array::{
+    Array, ArrayAccessor as _, ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray, TypedDictionaryArray,
+};
 use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
 use memchr::memchr;
 
@@ -68,7 +70,7 @@ impl Rows {
             records: Vec::with_capacity(scores.kept.len()),
         };
         // Experiment and model seldom change from row to row.
-        let mut before: Option<([Option<usize>; 2], Range<usize>)> = None;
+        let mut before: Option<([Option<i32>; 2], Range<usize>)> = None;
         for (at, &row) in scores.kept.iter().enumerate() {
             let start = rows.bytes.len();
             match &before {
@@ -82,7 +84,7 @@ impl Rows {
                 put_label(&mut rows.bytes, shown(label, row).as_deref());
             }
             for metric in &scores.metrics {
-                put_metric(&mut rows.bytes, metric[at]);
+                put_metric(&mut rows.bytes, metric.is_valid(at).then(|| metric.value(at)));
             }
             let length = |end: usize| u32::try_from(end - start).expect("a row is a few names and numbers");
             rows.records.push(Record { start, length: length(rows.bytes.len()), names: length(names) });
@@ -230,7 +232,7 @@ impl SortedRows {
 /// The keys of some rows of [`crate::trace::scan::EpisodeBatch::episodes`].
 pub(super) fn keys(episodes: &RecordBatch, rows: impl IntoIterator<Item = usize>) -> Vec<EpisodeKey> {
     let columns = KeyColumns::of(episodes);
-    let owned = |column: &DictionaryArray<Int32Type>, row| text(column, row).unwrap_or_default().to_owned();
+    let owned = |column: TextColumn<'_>, row| text(column, row).unwrap_or_default().to_owned();
     let key = |row: usize| EpisodeKey {
         experiment: owned(columns.experiment, row),
         model: owned(columns.model, row),
@@ -243,23 +245,26 @@ pub(super) fn keys(episodes: &RecordBatch, rows: impl IntoIterator<Item = usize>
 
 /// The key columns of a batch.
 struct KeyColumns<'a> {
-    experiment: &'a DictionaryArray<Int32Type>,
-    model: &'a DictionaryArray<Int32Type>,
+    experiment: TextColumn<'a>,
+    model: TextColumn<'a>,
     seed: &'a Int64Array,
     run: &'a Int64Array,
-    episode_id: &'a DictionaryArray<Int32Type>,
+    episode_id: TextColumn<'a>,
 }
+
+/// A dictionary whose values are known to be texts.
+type TextColumn<'a> = TypedDictionaryArray<'a, Int32Type, StringArray>;
 
 impl<'a> KeyColumns<'a> {
     fn of(episodes: &'a RecordBatch) -> Self {
         let column = |name: &str| episodes.column_by_name(name).expect("every batch has the key columns");
         let [episode_id, model, experiment, seed, run] = EPISODE_COLUMNS.map(column);
         Self {
-            experiment: experiment.as_dictionary(),
-            model: model.as_dictionary(),
+            experiment: texts(experiment),
+            model: texts(model),
             seed: seed.as_primitive(),
             run: run.as_primitive(),
-            episode_id: episode_id.as_dictionary(),
+            episode_id: texts(episode_id),
         }
     }
 
@@ -272,8 +277,8 @@ impl<'a> KeyColumns<'a> {
     }
 
     /// Experiment and model as keys of this batch.
-    fn names(&self, row: usize) -> [Option<usize>; 2] {
-        [self.experiment.key(row), self.model.key(row)]
+    fn names(&self, row: usize) -> [Option<i32>; 2] {
+        [self.experiment, self.model].map(|column| column.keys().is_valid(row).then(|| column.keys().value(row)))
     }
 
     fn put_names(&self, bytes: &mut Vec<u8>, row: usize) {
@@ -289,11 +294,13 @@ impl<'a> KeyColumns<'a> {
     }
 }
 
+fn texts(column: &ArrayRef) -> TextColumn<'_> {
+    column.as_dictionary().downcast_dict().expect("the values of every text column are texts")
+}
+
 /// The text at a row of a text column; `None` for null.
-fn text(column: &DictionaryArray<Int32Type>, row: usize) -> Option<&str> {
-    let texts = column.values().as_string::<i32>();
-    let key = column.key(row).filter(|&key| texts.is_valid(key))?;
-    Some(texts.value(key))
+fn text(column: TextColumn<'_>, row: usize) -> Option<&str> {
+    column.is_valid(row).then(|| column.value(row))
 }
 
 /// The value at a row of any column as text; `None` for null.
@@ -305,7 +312,7 @@ fn shown(column: &ArrayRef, row: usize) -> Option<Cow<'_, str>> {
         DataType::Boolean => Some(column.as_boolean().value(row).to_string().into()),
         DataType::Int64 => Some(column.as_primitive::<Int64Type>().value(row).to_string().into()),
         DataType::Float64 => Some(column.as_primitive::<Float64Type>().value(row).to_string().into()),
-        _ => text(column.as_dictionary(), row).map(Cow::from),
+        _ => text(texts(column), row).map(Cow::from),
     }
 }
 

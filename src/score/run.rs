@@ -262,7 +262,12 @@ fn table(mut rows: SortedRows) -> Result<EpisodeTable, ScoreError> {
 
 /// A batch as the engine takes it.
 pub(super) fn view(batch: &EpisodeBatch) -> Batch<'_> {
-    Batch { segments: Segments::new(&batch.offsets), steps: &batch.steps, episodes: &batch.episodes }
+    Batch {
+        segments: Segments::new(&batch.offsets),
+        steps: &batch.steps,
+        texts: &batch.texts,
+        episodes: &batch.episodes,
+    }
 }
 
 /// The columns to read.

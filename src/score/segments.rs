@@ -10,6 +10,7 @@ use arrow::array::{
     Array, ArrayRef, ArrowPrimitiveType, BooleanArray, BooleanBufferBuilder, Int64Array, PrimitiveArray, UInt32Array,
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
+use arrow::datatypes::Int64Type;
 use arrow::error::ArrowError;
 
 use super::values::{nulls_of, truths};
@@ -44,7 +45,7 @@ impl<'a> Segments<'a> {
     }
 
     /// The first row and the length of each episode.
-    fn each(self) -> impl Iterator<Item = (usize, usize)> + use<'a> {
+    pub(super) fn each(self) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         self.offsets.windows(2).map(|pair| (pair[0], pair[1] - pair[0]))
     }
 
@@ -83,7 +84,7 @@ impl<'a> Segments<'a> {
         rows.finish()
     }
 
-    fn spread_nulls(self, nulls: Option<&NullBuffer>) -> Option<NullBuffer> {
+    pub(super) fn spread_nulls(self, nulls: Option<&NullBuffer>) -> Option<NullBuffer> {
         nulls.map(|nulls| NullBuffer::new(self.spread_bits(nulls.inner())))
     }
 
@@ -103,13 +104,13 @@ impl<'a> Segments<'a> {
     }
 
     /// All rows of each episode.
-    pub(super) fn whole(self) -> Stretches {
+    pub(super) fn whole(self) -> Vec<Stretch> {
         self.each().map(|(start, length)| (start, 0..length)).collect()
     }
 
     /// The rows of each episode that lie in all these windows, which compare the timestep with a moment of the
     /// episode by anything but `NotEqual`; none where a moment is null.
-    pub(super) fn within(self, windows: &[(Comparison, Int64Array)]) -> Stretches {
+    pub(super) fn within(self, windows: &[(Comparison, Int64Array)]) -> Vec<Stretch> {
         let mut stretches = self.whole();
         for (comparison, moments) in windows {
             for (episode, (_, rows)) in stretches.iter_mut().enumerate() {
@@ -126,18 +127,18 @@ impl<'a> Segments<'a> {
     ///
     /// First, last and count give a number of steps or a timestep, anything else whether the predicate holds at some
     /// row.
-    pub(super) fn aggregate(aggregate: Aggregate, predicate: &BooleanArray, stretches: &Stretches) -> ArrayRef {
+    pub(super) fn aggregate(aggregate: Aggregate, predicate: &BooleanArray, stretches: &[Stretch]) -> ArrayRef {
         let truths = truths(predicate);
         let (data, offset) = (truths.values(), truths.offset());
         let rows = stretches.iter().map(|(start, rows)| (offset + start + rows.start, rows.len(), rows.start + 1));
         match aggregate {
             Aggregate::First => {
                 let first = rows.map(|(start, length, t)| bits::first(data, start, length).map(|at| as_t(t + at)));
-                Arc::new(first.collect::<Int64Array>())
+                Arc::new(optional::<Int64Type>(first))
             }
             Aggregate::Last => {
                 let last = rows.map(|(start, length, t)| bits::last(data, start, length).map(|at| as_t(t + at)));
-                Arc::new(last.collect::<Int64Array>())
+                Arc::new(optional::<Int64Type>(last))
             }
             Aggregate::Count => {
                 let count = rows.map(|(start, length, _)| as_t(bits::count(data, start, length)));
@@ -212,7 +213,7 @@ impl<'a> Segments<'a> {
         moments: &Int64Array,
     ) -> PrimitiveArray<T> {
         let value = |row: Option<usize>| row.filter(|&row| values.is_valid(row)).map(|row| values.value(row));
-        self.rows_at(moments).map(value).collect()
+        optional(self.rows_at(moments).map(value))
     }
 
     /// The truth value at a timestep of each episode.
@@ -226,6 +227,13 @@ impl<'a> Segments<'a> {
         let (start, length) = (self.offsets[episode], self.offsets[episode + 1] - self.offsets[episode]);
         truths(predicate).slice(start, length).set_indices().map(|at| as_t(at + 1)).collect()
     }
+}
+
+/// Numbers of which some are not there.
+fn optional<T: ArrowPrimitiveType>(numbers: impl Iterator<Item = Option<T::Native>>) -> PrimitiveArray<T> {
+    let (values, valid): (Vec<_>, Vec<_>) =
+        numbers.map(|number| (number.unwrap_or_default(), number.is_some())).unzip();
+    PrimitiveArray::new(values.into(), nulls_of(&valid))
 }
 
 /// Repeats one value: a constant for each row or episode.
@@ -259,7 +267,7 @@ pub(super) fn test_symbols(symbols: &UInt32Array, mut test: impl FnMut(u32) -> b
         }
         *known[symbol].get_or_insert_with(|| test(symbols.value(row)))
     });
-    BooleanArray::new(bits, nulls_of(valid))
+    BooleanArray::new(bits, nulls_of(&valid))
 }
 
 /// A moment as a number of rows from the start of an episode.
@@ -272,8 +280,8 @@ fn as_t(rows: usize) -> i64 {
     i64::try_from(rows).expect("a batch has fewer than 2^63 rows")
 }
 
-/// Rows of each episode: the row at which the episode starts, and the rows among its own.
-pub(super) type Stretches = Vec<(usize, Range<usize>)>;
+/// Rows of an episode: the row at which the episode starts, and the rows among its own.
+pub(super) type Stretch = (usize, Range<usize>);
 
 /// The rows of an episode of `length` whose timestep compares with a moment as asked, for all but `NotEqual`.
 fn inside(comparison: Comparison, moment: i64, length: usize) -> Range<usize> {

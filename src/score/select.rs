@@ -74,7 +74,7 @@ fn filtered(table: EpisodeTable, condition: &str) -> Result<EpisodeTable, Select
         vec![],
         &RecordBatchOptions::new().with_row_count(Some(table.len())),
     )?;
-    let batch = Batch { segments: Segments::new(&offsets), steps: &steps, episodes: &episodes };
+    let batch = Batch { segments: Segments::new(&offsets), steps: &steps, texts: &[], episodes: &episodes };
     let kept = Engine::new(&definitions.plan).score(&batch)?.kept;
     Ok(only(table, &kept))
 }

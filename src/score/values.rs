@@ -1,16 +1,20 @@
 //! Columns of values while a plan is evaluated, and the texts of a batch as small integers.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::{Arc, OnceLock};
 
 use arrow::array::{
-    Array, ArrayRef, AsArray as _, BooleanArray, Datum, DictionaryArray, Float64Array, Int64Array, UInt32Array,
+    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Datum, DictionaryArray, Float64Array, Int32Array,
+    Int64Array, PrimitiveArray, StringArray, UInt8Array, UInt32Array,
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
-use arrow::datatypes::{Float64Type, Int32Type, Int64Type, UInt32Type};
+use arrow::datatypes::{ArrowNativeType, Float64Type, Int32Type, Int64Type, UInt32Type};
 
+use super::segments::Segments;
+use crate::base::bits;
 use crate::metric::columns::Type;
 use crate::metric::plan::Constant;
+use crate::trace::scan::Texts;
 
 /// The values of one node: one a step, one an episode, or a single one that stands for all.
 #[derive(Clone, Debug)]
@@ -82,7 +86,7 @@ impl Values {
 
     /// An array that is null where the values are.
     pub(super) fn validity(&self) -> &dyn Array {
-        self.coded().map_or_else(|| self.array().as_ref(), |coded| &coded.keys)
+        self.coded().map_or_else(|| self.array().as_ref(), |coded| coded.keys.array())
     }
 
     /// Whether one value stands for all.
@@ -114,63 +118,124 @@ impl Values {
 /// A column of texts: a key a row, and what each key stands for.
 #[derive(Debug)]
 pub(super) struct Coded {
-    keys: UInt32Array,
-    /// The symbol of each key; two keys may have one symbol.
+    keys: Keys,
+    /// The symbol of each key; no two are the same.
     symbols: Vec<u32>,
     /// The symbols of the rows, once they are asked for.
     array: OnceLock<ArrayRef>,
 }
 
+/// The keys of rows: bytes, where that is enough.
+#[derive(Debug)]
+enum Keys {
+    Narrow(UInt8Array),
+    Wide(Int32Array),
+}
+
+impl Keys {
+    fn array(&self) -> &dyn Array {
+        match self {
+            Self::Narrow(keys) => keys,
+            Self::Wide(keys) => keys,
+        }
+    }
+}
+
 impl Coded {
-    /// The column of texts.
-    pub(super) fn values(keys: UInt32Array, symbols: Vec<u32>) -> Values {
+    fn values(keys: Keys, symbols: Vec<u32>) -> Values {
         let coded = Self { keys, symbols, array: OnceLock::new() };
         Values { held: Held::Coded(Arc::new(coded)), ty: Type::Text, single: false }
     }
 
+    /// The number of rows.
+    pub(super) fn len(&self) -> usize {
+        self.keys.array().len()
+    }
+
     fn array(&self) -> &ArrayRef {
-        self.array.get_or_init(|| Arc::new(self.of(&self.keys)))
+        self.array.get_or_init(|| {
+            Arc::new(match &self.keys {
+                Keys::Narrow(keys) => self.symbols_of(keys),
+                Keys::Wide(keys) => self.symbols_of(keys),
+            })
+        })
     }
 
-    /// The keys of the rows.
-    pub(super) fn keys(&self) -> &UInt32Array {
-        &self.keys
+    /// The symbols at a timestep of each episode.
+    pub(super) fn at(&self, segments: Segments<'_>, moments: &Int64Array) -> UInt32Array {
+        match &self.keys {
+            Keys::Narrow(keys) => self.symbols_of(&segments.at(keys, moments)),
+            Keys::Wide(keys) => self.symbols_of(&segments.at(keys, moments)),
+        }
     }
 
-    /// The symbols of some keys.
-    pub(super) fn of(&self, keys: &UInt32Array) -> UInt32Array {
+    fn symbols_of<K: ArrowPrimitiveType>(&self, keys: &PrimitiveArray<K>) -> UInt32Array {
         // A null's key may be anything; it is masked by the null buffer.
-        let symbol = |key: &u32| self.symbols.get(*key as usize).copied().unwrap_or(0);
+        let symbol = |key: &K::Native| self.symbols.get(key.as_usize()).copied().unwrap_or(0);
         UInt32Array::new(keys.values().iter().map(symbol).collect(), keys.nulls().cloned())
     }
 
-    /// Where the texts are equal to others, or where they are not; null where one of them is.
-    pub(super) fn equal(&self, others: &UInt32Array, equal: bool) -> BooleanArray {
-        let (keys, others, nulls) =
-            (self.keys.values(), others.values(), NullBuffer::union(self.keys.nulls(), others.nulls()));
-        let symbol = |row: usize| self.symbols.get(keys[row] as usize).copied().unwrap_or(0);
-        BooleanArray::new(BooleanBuffer::collect_bool(keys.len(), |row| (symbol(row) == others[row]) == equal), nulls)
+    /// Where the texts are equal to that of their episode, or where they are not; null where one of them is.
+    pub(super) fn compare(&self, segments: Segments<'_>, texts: &UInt32Array, equal: bool) -> BooleanArray {
+        let mut keys_of = vec![None; self.symbols.iter().max().map_or(0, |last| *last as usize + 1)];
+        self.symbols.iter().enumerate().for_each(|(key, symbol)| keys_of[*symbol as usize] = Some(key));
+        let wanted = texts.values().iter().map(|symbol| *keys_of.get(*symbol as usize)?);
+        let truths = match &self.keys {
+            Keys::Narrow(keys) => equal_to(keys.values(), segments, wanted),
+            Keys::Wide(keys) => equal_to(keys.values(), segments, wanted),
+        };
+        let nulls = segments.spread_nulls(texts.nulls());
+        let bits = packed(&truths);
+        BooleanArray::new(
+            if equal { bits } else { !&bits },
+            NullBuffer::union(self.keys.array().nulls(), nulls.as_ref()),
+        )
     }
 
     /// The rows whose symbol fulfils `test`, null where the text is null.
     pub(super) fn test(&self, test: impl FnMut(u32) -> bool) -> BooleanArray {
         let fulfilled: Vec<bool> = self.symbols.iter().copied().map(test).collect();
-        let keys = self.keys.values();
-        let alone = |wanted: bool| {
-            let mut keys = fulfilled.iter().zip(0..).filter(|(found, _)| **found == wanted).map(|(_, key)| key);
-            keys.next().filter(|_| keys.next().is_none())
+        let truths = match &self.keys {
+            Keys::Narrow(keys) => look_up(keys.values(), &fulfilled),
+            Keys::Wide(keys) => look_up(keys.values(), &fulfilled),
         };
-        let bits = match (alone(true), alone(false)) {
-            (Some(key), _) => compare_with(keys, |found| found == key),
-            (None, Some(key)) => compare_with(keys, |found| found != key),
-            (None, None) => compare_with(keys, |found| fulfilled.get(found as usize) == Some(&true)),
-        };
-        BooleanArray::new(bits, self.keys.nulls().cloned())
+        BooleanArray::new(packed(&truths), self.keys.array().nulls().cloned())
     }
 }
 
-fn compare_with(keys: &[u32], holds: impl Fn(u32) -> bool) -> BooleanBuffer {
-    BooleanBuffer::collect_bool(keys.len(), |row| holds(keys[row]))
+/// Where keys are that of their episode, if it has one.
+fn equal_to<N: ArrowNativeType>(
+    keys: &[N],
+    segments: Segments<'_>,
+    wanted: impl Iterator<Item = Option<usize>>,
+) -> Vec<bool> {
+    let mut truths = vec![false; keys.len()];
+    for ((start, length), wanted) in segments.each().zip(wanted) {
+        if let Some(wanted) = wanted.and_then(N::from_usize) {
+            let rows = start..start + length;
+            for (truth, key) in truths[rows.clone()].iter_mut().zip(&keys[rows]) {
+                *truth = *key == wanted;
+            }
+        }
+    }
+    truths
+}
+
+/// What each row's key stands for. Mostly it is one key that fulfils something, or one that does not.
+fn look_up<N: ArrowNativeType>(keys: &[N], fulfilled: &[bool]) -> Vec<bool> {
+    let alone = |wanted: bool| {
+        let mut keys = (0..fulfilled.len()).filter(|key| fulfilled[*key] == wanted);
+        keys.next().filter(|_| keys.next().is_none()).and_then(N::from_usize)
+    };
+    match (alone(true), alone(false)) {
+        (Some(one), _) => keys.iter().map(|key| *key == one).collect(),
+        (None, Some(one)) => keys.iter().map(|key| *key != one).collect(),
+        (None, None) => keys.iter().map(|key| fulfilled.get(key.as_usize()) == Some(&true)).collect(),
+    }
+}
+
+fn packed(truths: &[bool]) -> BooleanBuffer {
+    BooleanBuffer::new(bits::pack(truths).into(), 0, truths.len())
 }
 
 /// One NaN, and one zero: comparisons are by total order, in which these have several forms.
@@ -212,18 +277,28 @@ impl Symbols {
         ranks
     }
 
+    /// A column of texts with keys of a byte.
+    pub(super) fn of_texts(&mut self, texts: &Texts) -> Values {
+        self.of_keys(Keys::Narrow(texts.keys.clone()), &texts.texts)
+    }
+
     /// A column of texts.
     pub(super) fn of_column(&mut self, column: &DictionaryArray<Int32Type>) -> Values {
-        let texts = column.values().as_string::<i32>();
+        self.of_keys(Keys::Wide(column.keys().clone()), column.values().as_string())
+    }
+
+    fn of_keys(&mut self, keys: Keys, texts: &StringArray) -> Values {
         let symbols: Vec<Option<u32>> = texts.iter().map(|text| text.map(|text| self.intern(text))).collect();
-        let keys = column.keys();
-        if texts.null_count() > 0 {
-            let symbol = |key: Option<i32>| symbols[usize::try_from(key?).ok()?];
-            return Values::new(keys.iter().map(symbol).collect::<UInt32Array>(), Type::Text);
+        let mut known = HashSet::new();
+        if symbols.iter().all(|symbol| symbol.is_some_and(|symbol| known.insert(symbol))) {
+            return Coded::values(keys, symbols.into_iter().flatten().collect());
         }
-        // A valid key is not negative; what stands in the place of nulls does not matter.
-        let unsigned = UInt32Array::new(keys.values().inner().clone().into(), keys.nulls().cloned());
-        Coded::values(unsigned, symbols.into_iter().flatten().collect())
+        let symbol = |key: Option<usize>| symbols[key?];
+        let symbols: UInt32Array = match &keys {
+            Keys::Narrow(keys) => keys.iter().map(|key| symbol(key.map(ArrowNativeType::as_usize))).collect(),
+            Keys::Wide(keys) => keys.iter().map(|key| symbol(key.map(ArrowNativeType::as_usize))).collect(),
+        };
+        Values::new(symbols, Type::Text)
     }
 }
 
@@ -236,6 +311,69 @@ pub(super) fn truths(values: &BooleanArray) -> BooleanBuffer {
 }
 
 /// A null buffer, if any value is null.
-pub(super) fn nulls_of(valid: Vec<bool>) -> Option<NullBuffer> {
-    if valid.iter().all(|&valid| valid) { None } else { Some(NullBuffer::from(valid)) }
+pub(super) fn nulls_of(valid: &[bool]) -> Option<NullBuffer> {
+    if valid.iter().all(|&valid| valid) { None } else { Some(NullBuffer::new(packed(valid))) }
+}
+
+#[cfg(test)]
+mod tests {
+    use arrow::array::{Array, BooleanArray, DictionaryArray, Int32Array, StringArray, UInt8Array};
+    use arrow::datatypes::Int32Type;
+    use proptest::collection::vec;
+    use proptest::option;
+    use proptest::prelude::*;
+
+    use super::{Coded, Symbols, Texts, Values};
+    use crate::score::segments::Segments;
+
+    /// The same column in both forms.
+    fn both(symbols: &mut Symbols, known: &[&str], keys: &[Option<u8>]) -> [Values; 2] {
+        let texts = StringArray::from(known.to_vec());
+        let wide: Int32Array = keys.iter().map(|key| key.map(i32::from)).collect();
+        let wide = DictionaryArray::<Int32Type>::new(wide, std::sync::Arc::new(texts.clone()));
+        let narrow = Texts { name: "a".into(), keys: UInt8Array::from(keys.to_vec()), texts };
+        [symbols.of_texts(&narrow), symbols.of_column(&wide)]
+    }
+
+    fn truths(found: &BooleanArray) -> Vec<Option<bool>> {
+        found.iter().collect()
+    }
+
+    proptest! {
+        #[test]
+        fn keys_are_compared_as_their_texts_are(
+            episodes in vec((option::of(0..4_usize), vec(option::of(0..3_u8), 1..12)), 1..9), equal in any::<bool>(),
+        ) {
+            const KNOWN: [&str; 3] = ["red", "blue", "green"];
+            const ASKED: [&str; 4] = ["blue", "red", "nowhere", "green"];
+            let keys: Vec<Option<u8>> = episodes.iter().flat_map(|(_, keys)| keys).copied().collect();
+            let mut offsets = vec![0];
+            offsets.extend(episodes.iter().scan(0, |end, (_, keys)| {
+                *end += keys.len();
+                Some(*end)
+            }));
+            let mut symbols = Symbols::default();
+            let columns = both(&mut symbols, &KNOWN, &keys);
+            let asked = episodes.iter().map(|(asked, _)| asked.map(|asked| symbols.intern(ASKED[asked]))).collect();
+            let text = |key: Option<u8>| key.map(|key| KNOWN[usize::from(key)]);
+            let rows = episodes.iter().flat_map(|(asked, keys)| keys.iter().map(move |key| (asked.map(|at| ASKED[at]), *key)));
+            let expected: Vec<_> = rows.map(|(asked, key)| Some((text(key)? == asked?) == equal)).collect();
+            let blue = symbols.intern("blue");
+            let is_blue: Vec<_> = keys.iter().map(|key| text(*key).map(|text| (text == "blue") == equal)).collect();
+            for column in columns.iter().map(|column| column.coded().unwrap()) {
+                prop_assert_eq!(&truths(&column.compare(Segments::new(&offsets), &asked, equal)), &expected);
+                prop_assert_eq!(&truths(&column.test(|symbol| (symbol == blue) == equal)), &is_blue);
+            }
+        }
+    }
+
+    #[test]
+    fn texts_under_two_keys_are_one_text() {
+        let mut symbols = Symbols::default();
+        for column in both(&mut symbols, &["red", "blue", "red"], &[Some(0), None, Some(1), Some(2)]) {
+            assert!(column.coded().map(Coded::len).is_none());
+            let found = column.symbols();
+            assert!(found.value(0) == found.value(3) && found.value(0) != found.value(2) && found.is_null(1));
+        }
+    }
 }

@@ -3,8 +3,7 @@
 //! Rule: all forms say the same. What asks for single rows may take either; what needs an array asks for one
 //! ([`Column::flat`]), which costs as much as the rows are many.
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, Int32Array, UInt32Array};
-use arrow::buffer::ScalarBuffer;
+use arrow::array::{Array as _, ArrayRef, AsArray as _, StringArray, UInt8Array, UInt32Array};
 use arrow::compute::{cast, concat, take};
 use arrow::datatypes::{DataType, Int32Type, Int64Type};
 use arrow::error::ArrowError;
@@ -18,15 +17,15 @@ pub(super) enum Column {
     Flat(ArrayRef),
     /// A value a run.
     Runs(Runs),
-    /// A key a row: integers of which few are different. No null.
+    /// A byte a row: texts or integers of which few are different.
     Keys(Keys),
 }
 
 /// Rows as keys into values.
 #[derive(Clone, Debug)]
 pub(super) struct Keys {
-    keys: ScalarBuffer<i32>,
-    /// A value for each key.
+    keys: UInt8Array,
+    /// A value for each key, none of them null: integers or texts.
     values: ArrayRef,
 }
 
@@ -67,7 +66,7 @@ impl Column {
         match self {
             Self::Flat(values) => Ok(values.clone()),
             Self::Runs(runs) => runs.at(0..runs.length),
-            Self::Keys(keyed) => take(&keyed.values, &Int32Array::new(keyed.keys.clone(), None), None),
+            Self::Keys(keyed) => keyed.of(&keyed.keys),
         }
     }
 
@@ -80,16 +79,25 @@ impl Column {
             }
             Self::Runs(runs) => runs.at(rows.iter().copied()),
             Self::Keys(keyed) => {
-                let keys: Int32Array = rows.iter().map(|row| keyed.keys[*row]).collect::<Vec<_>>().into();
-                take(&keyed.values, &keys, None)
+                let key = |row: &usize| keyed.keys.is_valid(*row).then(|| keyed.keys.value(*row));
+                keyed.of(&rows.iter().map(key).collect())
             }
         }
     }
 
+    /// The keys and texts of a text column that is held as keys.
+    pub(super) fn byte_texts(&self) -> Option<(&UInt8Array, &StringArray)> {
+        let Self::Keys(Keys { keys, values }) = self else { return None };
+        values.as_string_opt().map(|texts| (keys, texts))
+    }
+
     /// The text at a row of a text column; `None` for null.
     pub(super) fn text(&self, row: usize) -> Option<&str> {
-        let (values, row) = self.place(row);
-        text_at(values, row)
+        match self {
+            Self::Flat(values) => text_at(values, row),
+            Self::Runs(runs) => runs.text(row),
+            Self::Keys(keyed) => Some(keyed.values.as_string::<i32>().value(keyed.key(row)?)),
+        }
     }
 
     /// The texts at some rows, which ascend, of a text column; `None` for null.
@@ -106,17 +114,13 @@ impl Column {
 
     /// The integer at a row of an integer column; `None` for null.
     pub(super) fn int(&self, row: usize) -> Option<i64> {
-        let (values, row) = self.place(row);
-        let values = values.as_primitive::<Int64Type>();
-        values.is_valid(row).then(|| values.value(row))
-    }
-
-    fn place(&self, row: usize) -> (&ArrayRef, usize) {
-        match self {
+        let (values, row) = match self {
             Self::Flat(values) => (values, row),
             Self::Runs(runs) => (&runs.values, runs.run_of(row)),
-            Self::Keys(Keys { keys, values }) => (values, usize::try_from(keys[row]).unwrap_or(usize::MAX)),
-        }
+            Self::Keys(keyed) => (&keyed.values, keyed.key(row)?),
+        };
+        let values = values.as_primitive::<Int64Type>();
+        values.is_valid(row).then(|| values.value(row))
     }
 
     /// The rows of some columns of one kind, one after the other.
@@ -144,24 +148,44 @@ impl From<ArrayRef> for Column {
 }
 
 impl Keys {
-    /// Rows with these keys; `None` where one has no value.
-    pub(super) fn new(keys: Vec<i32>, values: ArrayRef) -> Option<Self> {
-        (all_within(&keys, values.len()) && values.null_count() == 0).then(|| Self { keys: keys.into(), values })
+    /// Rows with these keys, a null's being any; `None` where a key has no value.
+    pub(super) fn new(keys: UInt8Array, values: ArrayRef) -> Option<Self> {
+        // What stands in the place of nulls is within, too, but where there is no value at all.
+        let largest = keys.values().iter().copied().fold(0, u8::max);
+        let within = keys.null_count() == keys.len() || usize::from(largest) < values.len();
+        (within && values.null_count() == 0).then_some(Self { keys, values })
+    }
+
+    /// A key a row.
+    pub(super) fn keys(&self) -> &UInt8Array {
+        &self.keys
+    }
+
+    /// A value for each key.
+    pub(super) fn values(&self) -> &ArrayRef {
+        &self.values
+    }
+
+    fn key(&self, row: usize) -> Option<usize> {
+        self.keys.is_valid(row).then(|| self.keys.value(row).into())
+    }
+
+    /// The values of some keys.
+    fn of(&self, keys: &UInt8Array) -> Result<ArrayRef, ArrowError> {
+        let values = take(&self.values, keys, None)?;
+        if *values.data_type() == DataType::Utf8 { cast(&values, &text_type()) } else { Ok(values) }
     }
 
     /// Whether the integers of each stretch of rows, bounded by `offsets`, are 1, 2, and so on. May say no where they
     /// are, if a value has two keys.
     pub(super) fn count_from_one(&self, offsets: &[usize]) -> bool {
         let stretches = || offsets.windows(2).map(|ends| ends[0]..ends[1]);
-        // The keys of 1, 2, and so on; no key is negative.
-        let mut counting = vec![-1; stretches().map(|rows| rows.len()).max().unwrap_or(0)];
-        for (value, key) in self.values.as_primitive::<Int64Type>().values().iter().zip(0..) {
-            let place = usize::try_from(*value).ok().and_then(|value| value.checked_sub(1));
-            if let Some(counted) = place.and_then(|place| counting.get_mut(place)) {
-                *counted = key;
-            }
-        }
-        stretches().all(|rows| counting[..rows.len()] == self.keys[rows])
+        // The keys of 1, 2, and so on, as far as there are any.
+        let values = self.values.as_primitive::<Int64Type>().values();
+        let key_of = |t: i64| values.iter().position(|value| *value == t).and_then(|key| u8::try_from(key).ok());
+        let counting: Vec<u8> = (1..).map_while(key_of).collect();
+        let keys = self.keys.values();
+        self.keys.null_count() == 0 && stretches().all(|rows| counting.get(..rows.len()) == Some(&keys[rows]))
     }
 }
 
@@ -318,8 +342,8 @@ mod tests {
         ) {
             let mut rows: Vec<i64> = lengths.iter().flat_map(|length| 1..=*length).collect();
             let counted = odd.filter(|row| *row < rows.len()).map(|row| rows[row] = 0).is_none();
-            let keys = rows.iter().map(|row| i32::try_from(values.iter().position(|value| value == row).unwrap()).unwrap());
-            let keys = Keys::new(keys.collect(), Arc::new(Int64Array::from(values))).unwrap();
+            let keys = rows.iter().map(|row| u8::try_from(values.iter().position(|value| value == row).unwrap()).unwrap());
+            let keys = Keys::new(keys.collect::<Vec<_>>().into(), Arc::new(Int64Array::from(values))).unwrap();
             let mut offsets = vec![0];
             for length in &lengths {
                 offsets.push(offsets.last().unwrap() + usize::try_from(*length).unwrap());
@@ -338,7 +362,10 @@ mod tests {
     #[test]
     fn keys_without_a_value_are_refused() {
         let values = || Arc::new(Int64Array::from(vec![1, 2])) as ArrayRef;
-        assert!(Keys::new(vec![0, 1], values()).is_some() && Keys::new(Vec::new(), values()).is_some());
-        assert!(Keys::new(vec![0, 2], values()).is_none() && Keys::new(vec![-1], values()).is_none());
+        let keys = |keys: Vec<Option<u8>>, values: ArrayRef| Keys::new(keys.into(), values);
+        assert!(keys(vec![Some(0), Some(1)], values()).is_some() && keys(Vec::new(), values()).is_some());
+        assert!(keys(vec![Some(0), Some(2)], values()).is_none());
+        let none = || Arc::new(Int64Array::from(Vec::<i64>::new())) as ArrayRef;
+        assert!(keys(vec![None, None], none()).is_some() && keys(vec![None, Some(0)], none()).is_none());
     }
 }

@@ -279,11 +279,7 @@ fn root(file: &TraceFile, layout: &Layout, at: usize) -> Option<usize> {
 
 /// How a column is best held.
 fn form(layout: &Layout, at: usize) -> Form {
-    match at {
-        T => Form::Keys,
-        _ if at == EPISODE_ID || layout.columns[at].constant => Form::Runs,
-        _ => Form::Rows,
-    }
+    if at == EPISODE_ID || layout.columns[at].constant { Form::Runs } else { Form::Rows }
 }
 
 fn cursor(

@@ -6,8 +6,7 @@
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 
-use super::column::text_at;
-use super::column::{Column as Held, Runs};
+use super::column::{Column as Held, Keys, Runs, text_at};
 use super::finding::{Code, Finding};
 use super::layout::{EPISODE_ID, EXPERIMENT, Layout, LayoutColumn, T};
 use super::pass::Episodes;
@@ -48,8 +47,7 @@ impl Rules<'_> {
                 continue;
             }
             if let Held::Keys(keys) = held
-                && at == T
-                && keys.count_from_one(&episodes.offsets)
+                && self.keeps_keyed(at, keys, &episodes.offsets)
             {
                 continue;
             }
@@ -92,13 +90,26 @@ impl Rules<'_> {
         if at == T || values.null_count() > 0 || !runs.start_only_at(offsets) {
             return false;
         }
+        let values = values.as_any_dictionary_opt().map_or(values, |texts| texts.values());
         let harmless = self.layout.columns[at].known.is_none_or(|known| harmless(known, values));
         let experiments = self.experiments.filter(|_| at == EXPERIMENT);
         harmless && experiments.is_none_or(|known| !any_text(values, |text| !known.iter().any(|k| k == text)))
     }
+
+    /// The fast look at a column that is held as keys. May say no where the slow one finds nothing.
+    fn keeps_keyed(&self, at: usize, keys: &Keys, offsets: &[usize]) -> bool {
+        let column = &self.layout.columns[at];
+        let nulls = keys.keys().null_count() > 0;
+        match column.known {
+            _ if column.constant => false,
+            _ if at == T => keys.count_from_one(offsets),
+            Some(known) => (known.nullable || !nulls) && harmless(known, keys.values()),
+            None => true,
+        }
+    }
 }
 
-/// Whether no value breaks a rule of its column.
+/// Whether no value, an integer or a text, breaks a rule of its column.
 fn harmless(known: &Column, values: &ArrayRef) -> bool {
     match known.stored.kind() {
         Kind::Int => {
@@ -123,9 +134,9 @@ fn odd_text(known: &Column) -> Option<(Code, impl Fn(&str) -> bool)> {
     Some((code, move |text: &str| if known.is_empty() { text.is_empty() } else { !known.contains(&text) }))
 }
 
-/// Whether one of the texts that a dictionary knows is `odd`.
-fn any_text(values: &ArrayRef, odd: impl Fn(&str) -> bool) -> bool {
-    values.as_dictionary::<Int32Type>().values().as_string::<i32>().iter().flatten().any(odd)
+/// Whether one of some texts is `odd`.
+fn any_text(texts: &ArrayRef, odd: impl Fn(&str) -> bool) -> bool {
+    texts.as_string::<i32>().iter().flatten().any(odd)
 }
 
 impl Look<'_> {

@@ -6,13 +6,13 @@
 use std::num::NonZeroUsize;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, RecordBatch, RecordBatchOptions};
-use arrow::datatypes::{Field, Schema, SchemaRef};
+use arrow::array::{Array as _, ArrayRef, RecordBatch, RecordBatchOptions, StringArray, UInt8Array};
+use arrow::datatypes::{Field, Schema};
+use arrow::error::ArrowError;
 
-use super::decode::held_as;
 use super::finding::TraceError;
 use super::ids::{Print, Prints};
-use super::layout::{Layout, LayoutColumn};
+use super::layout::Layout;
 use super::open::TraceSet;
 use super::pass::{Episodes, Event, pass};
 use super::rules::{Located, Rules};
@@ -34,18 +34,41 @@ pub const EPISODE_COLUMNS: [&str; 5] = ["episode_id", "model", "experiment", "se
 /// Some whole episodes of one file.
 ///
 /// Columns have one of four types whatever the file stores: bool, `Int64`, `Float64`, and text as
-/// `Dictionary(Int32, Utf8)`. A dictionary may hold values that no row has, and a value under two keys. A column that the
-/// file does not have is null throughout.
+/// `Dictionary(Int32, Utf8)` or, where few texts are different, as [`Texts`]. A dictionary may hold values that no row has, and
+/// a value under two keys. A column that the file does not have is null throughout.
 #[derive(Clone, Debug)]
 pub struct EpisodeBatch {
     /// The rows of episode `i` in `steps` are `offsets[i]..offsets[i + 1]`; its timesteps are 1, 2, ... in that order.
     pub offsets: Vec<usize>,
-    /// A row a step: the columns of [`Projection::steps`].
+    /// A row a step: the columns of [`Projection::steps`], but for those in `texts`.
     pub steps: RecordBatch,
+    /// Columns of [`Projection::steps`].
+    pub texts: Vec<Texts>,
     /// A row an episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
     pub episodes: RecordBatch,
     /// Where the first row is.
     pub origin: Origin,
+}
+
+/// A column of steps with texts of which few are different, a byte a row.
+///
+/// An Arrow dictionary would say the same; to make one is to look at each key once more.
+#[derive(Clone, Debug)]
+pub struct Texts {
+    /// The column.
+    pub name: String,
+    /// A key a row, the position of its text; null for null.
+    pub keys: UInt8Array,
+    /// The texts; none is null.
+    pub texts: StringArray,
+}
+
+impl Texts {
+    /// `length` rows from row `start`; nothing is copied.
+    #[must_use]
+    pub fn slice(&self, start: usize, length: usize) -> Self {
+        Self { keys: self.keys.slice(start, length), ..self.clone() }
+    }
 }
 
 /// A row of a file.
@@ -137,48 +160,58 @@ enum Outcome<T, E> {
 }
 
 /// Which columns of the layout go where in a batch.
-struct Shape {
-    steps: (SchemaRef, Vec<usize>),
-    episodes: (SchemaRef, Vec<usize>),
+struct Shape<'a> {
+    layout: &'a Layout,
+    steps: Vec<usize>,
+    episodes: Vec<usize>,
 }
 
-impl Shape {
-    fn new(layout: &Layout, projection: &Projection) -> Self {
-        let part = |names: Vec<&str>| {
-            let places: Vec<usize> = names.iter().filter_map(|name| layout.position(name)).collect();
-            let fields = places.iter().map(|place| field(&layout.columns[*place]));
-            (Arc::new(Schema::new(fields.collect::<Vec<_>>())), places)
-        };
+impl<'a> Shape<'a> {
+    fn new(layout: &'a Layout, projection: &Projection) -> Self {
         let constants = projection.constants.iter().map(String::as_str);
         Self {
-            steps: part(projection.steps.iter().map(String::as_str).collect()),
-            episodes: part(EPISODE_COLUMNS.into_iter().chain(constants).collect()),
+            layout,
+            steps: projection.steps.iter().filter_map(|name| layout.position(name)).collect(),
+            episodes: EPISODE_COLUMNS.into_iter().chain(constants).filter_map(|name| layout.position(name)).collect(),
         }
     }
 
     fn batch(&self, episodes: Episodes) -> Result<EpisodeBatch, TraceError> {
         let rows = episodes.columns[0].len();
         let firsts = &episodes.offsets[..episodes.len()];
-        let (schema, places) = &self.steps;
-        let steps = places.iter().map(|place| episodes.columns[*place].flat());
-        let steps = steps.collect::<Result<_, _>>().map_err(TraceError::Memory)?;
-        let steps = record_batch(schema, steps, rows)?;
-        let (schema, places) = &self.episodes;
-        let values = places.iter().map(|place| episodes.columns[*place].at(firsts));
-        let values = values.collect::<Result<Vec<_>, _>>().map_err(TraceError::Memory)?;
-        let constants = record_batch(schema, values, episodes.len())?;
+        let (mut texts, mut others) = (Vec::new(), Vec::new());
+        for &place in &self.steps {
+            match episodes.columns[place].byte_texts() {
+                Some((keys, values)) => {
+                    let name = self.layout.columns[place].name.clone();
+                    texts.push(Texts { name, keys: keys.clone(), texts: values.clone() });
+                }
+                None => others.push(place),
+            }
+        }
+        let steps = self.part(&others, rows, |place| episodes.columns[place].flat())?;
+        let constants = self.part(&self.episodes, episodes.len(), |place| episodes.columns[place].at(firsts))?;
         let first = episodes.pieces[0];
         let origin = Origin { file: episodes.file, row_group: first.row_group, row: first.row };
-        Ok(EpisodeBatch { offsets: episodes.offsets, steps, episodes: constants, origin })
+        Ok(EpisodeBatch { offsets: episodes.offsets, steps, texts, episodes: constants, origin })
     }
-}
 
-fn record_batch(schema: &SchemaRef, columns: Vec<ArrayRef>, rows: usize) -> Result<RecordBatch, TraceError> {
-    let options = RecordBatchOptions::new().with_row_count(Some(rows));
-    RecordBatch::try_new_with_options(Arc::clone(schema), columns, &options).map_err(TraceError::Memory)
-}
-
-fn field(column: &LayoutColumn) -> Field {
-    let nullable = column.known.is_none_or(|known| known.nullable);
-    Field::new(&column.name, held_as(column.kind), nullable)
+    /// Some columns of the layout, `rows` values each.
+    fn part(
+        &self,
+        places: &[usize],
+        rows: usize,
+        values: impl Fn(usize) -> Result<ArrayRef, ArrowError>,
+    ) -> Result<RecordBatch, TraceError> {
+        let values = places.iter().map(|place| values(*place)).collect::<Result<Vec<_>, _>>();
+        let values = values.map_err(TraceError::Memory)?;
+        let field = |(place, values): (&usize, &ArrayRef)| {
+            let column = &self.layout.columns[*place];
+            let nullable = column.known.is_none_or(|known| known.nullable);
+            Field::new(&column.name, values.data_type().clone(), nullable)
+        };
+        let schema = Schema::new(places.iter().zip(&values).map(field).collect::<Vec<_>>());
+        let options = RecordBatchOptions::new().with_row_count(Some(rows));
+        RecordBatch::try_new_with_options(Arc::new(schema), values, &options).map_err(TraceError::Memory)
+    }
 }

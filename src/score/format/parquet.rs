@@ -170,7 +170,7 @@ impl Numbers {
 
     fn take(&mut self) -> Int64Array {
         let Self { values, valid } = std::mem::take(self);
-        Int64Array::new(values.into(), nulls_of(valid))
+        Int64Array::new(values.into(), nulls_of(&valid))
     }
 }
 

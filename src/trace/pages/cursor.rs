@@ -6,7 +6,6 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, BooleanArray, BooleanBufferBuilder};
 use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::DataType;
-use arrow::util::bit_chunk_iterator::UnalignedBitChunk;
 use bytes::Bytes;
 use parquet::basic::{Encoding, Type as Physical};
 use parquet::column::page::{Page, PageReader};
@@ -16,17 +15,16 @@ use super::super::column::{Column, Runs};
 use super::Unfit;
 use super::chunk::pages;
 use super::dictionary::Dictionary;
-use super::hybrid::{Hybrid, Span};
+use super::hybrid::{Hybrid, Number, Span};
+use crate::base::bits;
 
 /// How rows are to be held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in super::super) enum Form {
-    /// A value a row.
+    /// A value a row, or a key a row.
     Rows,
     /// A value a run.
     Runs,
-    /// A key a row, if there is no null.
-    Keys,
 }
 
 /// Where the reading of a column is.
@@ -57,13 +55,13 @@ enum Stored {
     Bits(Bytes, usize),
 }
 
-/// Rows in the making.
-struct Rows {
-    nulls: Option<BooleanBufferBuilder>,
+/// Runs in the making.
+#[derive(Default)]
+struct Stretches {
+    /// A key a run.
     keys: Vec<i32>,
-    /// Ends of runs, where rows are held as those; `keys` has a key a run then.
+    /// The row before which each ends.
     ends: Vec<u32>,
-    bits: BooleanBufferBuilder,
 }
 
 impl Cursor {
@@ -103,29 +101,81 @@ impl Cursor {
 
     /// The next rows.
     pub(in super::super) fn read(&mut self, count: usize) -> Result<Column, Unfit> {
-        let mut rows = Rows {
-            nulls: self.optional.then(|| BooleanBufferBuilder::new(count)),
-            keys: Vec::with_capacity(if self.form == Form::Runs || self.physical == Physical::BOOLEAN {
-                0
-            } else {
-                count
-            }),
-            ends: Vec::new(),
-            bits: BooleanBufferBuilder::new(if self.physical == Physical::BOOLEAN { count } else { 0 }),
+        if count > 0 {
+            // The dictionary stands before the first values.
+            self.page()?;
+        }
+        if self.physical == Physical::BOOLEAN {
+            return self.truths(count);
+        }
+        if self.form == Form::Runs {
+            return self.runs(count);
+        }
+        if self.dictionary()?.is_small() {
+            let (keys, nulls) = self.keys(count)?;
+            return self.dictionary()?.keys(keys, nulls).map(Column::Keys);
+        }
+        let (keys, nulls) = self.keys(count)?;
+        self.dictionary()?.values(keys, nulls).map(Column::Flat)
+    }
+
+    fn dictionary(&self) -> Result<&Dictionary, Unfit> {
+        self.dictionary.as_ref().ok_or(Unfit)
+    }
+
+    fn truths(&mut self, count: usize) -> Result<Column, Unfit> {
+        let mut bits = BooleanBufferBuilder::new(count);
+        let nulls = self.rows(count, |stored, _, values| stored.bits(values, &mut bits))?;
+        let bits = bits.finish();
+        let bits = nulls.as_ref().map_or_else(|| bits.clone(), |nulls| spread_bits(&bits, nulls.inner()));
+        Ok(Column::Flat(Arc::new(BooleanArray::new(bits, nulls)) as ArrayRef))
+    }
+
+    fn runs(&mut self, count: usize) -> Result<Column, Unfit> {
+        let mut stretches = Stretches::default();
+        self.rows(count, |stored, rows, values| {
+            // Nulls among rows that are to be runs: rare, and the library's to decode.
+            if rows == values { stored.runs(values, &mut stretches) } else { Err(Unfit) }
+        })?;
+        Ok(Column::Runs(Runs::new(self.dictionary()?.values(stretches.keys, None)?, stretches.ends)))
+    }
+
+    /// The keys of the next rows, 0 where there is none.
+    fn keys<N: Number>(&mut self, count: usize) -> Result<(Vec<N>, Option<NullBuffer>), Unfit> {
+        let mut keys = Vec::with_capacity(count);
+        let nulls = self.rows(count, |stored, _, values| stored.hybrid()?.append(values, &mut keys))?;
+        let keys = match &nulls {
+            Some(nulls) => spread_keys(&keys, nulls.inner()),
+            None => keys,
         };
+        Ok((keys, nulls))
+    }
+
+    /// Goes through the next rows page by page. `take` gets what is stored, the number of rows and that of values;
+    /// the others are null.
+    fn rows(
+        &mut self,
+        count: usize,
+        mut take: impl FnMut(&mut Stored, usize, usize) -> Result<(), Unfit>,
+    ) -> Result<Option<NullBuffer>, Unfit> {
+        let mut nulls = self.optional.then(|| BooleanBufferBuilder::new(count));
         let mut left = count;
         while left > 0 {
             let page = self.page()?;
-            let part = left.min(page.rows);
-            page.rows -= part;
-            left -= part;
-            self.unread -= part;
-            self.rows(part, &mut rows)?;
+            let rows = left.min(page.rows);
+            page.rows -= rows;
+            let values = match (&mut page.levels, &mut nulls) {
+                (Some(levels), Some(nulls)) => validity(levels, rows, nulls)?,
+                _ => rows,
+            };
+            take(&mut page.values, rows, values)?;
+            self.unread -= rows;
+            left -= rows;
         }
         if self.unread == 0 && self.page.as_ref().is_none_or(|page| page.rows == 0) && self.next_page()?.is_some() {
             return Err(Unfit);
         }
-        self.finish(rows, count)
+        Ok(nulls.map(|mut nulls| NullBuffer::new(nulls.finish())).filter(|nulls| nulls.null_count() > 0))
     }
 
     /// The page under way, which has rows left.
@@ -201,46 +251,6 @@ impl Cursor {
         };
         Ok(DataPage { rows, levels, values })
     }
-
-    /// Takes rows out of the page.
-    fn rows(&mut self, count: usize, rows: &mut Rows) -> Result<(), Unfit> {
-        let page = self.page.as_mut().ok_or(Unfit)?;
-        let values = match (&mut page.levels, &mut rows.nulls) {
-            (Some(levels), Some(nulls)) => validity(levels, count, nulls)?,
-            _ => count,
-        };
-        if self.physical == Physical::BOOLEAN {
-            page.values.bits(values, &mut rows.bits)
-        } else if self.form == Form::Runs && values == count {
-            page.values.runs(values, rows)
-        } else if self.form == Form::Runs {
-            // Nulls among rows that are to be runs: rare, and the library's to decode.
-            Err(Unfit)
-        } else {
-            page.values.keys(values, &mut rows.keys)
-        }
-    }
-
-    fn finish(&self, mut rows: Rows, count: usize) -> Result<Column, Unfit> {
-        let nulls = rows.nulls.map(|mut nulls| NullBuffer::new(nulls.finish())).filter(|nulls| nulls.null_count() > 0);
-        if self.physical == Physical::BOOLEAN {
-            let bits = rows.bits.finish();
-            let bits = nulls.as_ref().map_or_else(|| bits.clone(), |nulls| spread_bits(&bits, nulls.inner()));
-            return Ok(Column::Flat(Arc::new(BooleanArray::new(bits, nulls)) as ArrayRef));
-        }
-        let dictionary = self.dictionary.as_ref().ok_or(Unfit)?;
-        if self.form == Form::Runs {
-            return Ok(Column::Runs(Runs::new(dictionary.values(rows.keys, None)?, rows.ends)));
-        }
-        if self.form == Form::Keys && nulls.is_none() && rows.keys.len() == count {
-            return dictionary.keys(rows.keys).map(Column::Keys);
-        }
-        let keys = match &nulls {
-            Some(nulls) => spread_keys(&rows.keys, nulls.inner()),
-            None => rows.keys,
-        };
-        if keys.len() == count { dictionary.values(keys, nulls).map(Column::Flat) } else { Err(Unfit) }
-    }
 }
 
 impl Stored {
@@ -251,33 +261,17 @@ impl Stored {
         }
     }
 
-    fn keys(&mut self, mut count: usize, keys: &mut Vec<i32>) -> Result<(), Unfit> {
+    fn runs(&mut self, mut count: usize, runs: &mut Stretches) -> Result<(), Unfit> {
         while count > 0 {
             match self.hybrid()?.span(count)? {
                 Span::Same { value, count: same } => {
-                    keys.extend(std::iter::repeat_n(value.cast_signed(), same));
-                    count -= same;
-                }
-                Span::Packed(packed) => {
-                    packed.append(keys);
-                    count -= packed.count;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    fn runs(&mut self, mut count: usize, rows: &mut Rows) -> Result<(), Unfit> {
-        while count > 0 {
-            match self.hybrid()?.span(count)? {
-                Span::Same { value, count: same } => {
-                    rows.run(value.cast_signed(), same)?;
+                    runs.add(value.cast_signed(), same)?;
                     count -= same;
                 }
                 Span::Packed(packed) => {
                     let mut outcome = Ok(());
                     packed.each(|value| {
-                        if let Err(unfit) = rows.run(value.cast_signed(), 1) {
+                        if let Err(unfit) = runs.add(value.cast_signed(), 1) {
                             outcome = Err(unfit);
                         }
                     });
@@ -309,9 +303,9 @@ impl Stored {
     }
 }
 
-impl Rows {
+impl Stretches {
     /// Adds rows of one key.
-    fn run(&mut self, key: i32, count: usize) -> Result<(), Unfit> {
+    fn add(&mut self, key: i32, count: usize) -> Result<(), Unfit> {
         let count = u32::try_from(count).map_err(|_| Unfit)?;
         match (self.keys.last(), self.ends.last_mut()) {
             (Some(last), Some(end)) if *last == key => *end += count,
@@ -326,16 +320,16 @@ impl Rows {
 }
 
 /// Adds numbers of one bit: how many, and how many of them are 1.
-fn append(span: Span<'_>, bits: &mut BooleanBufferBuilder) -> (usize, usize) {
+fn append(span: Span<'_>, out: &mut BooleanBufferBuilder) -> (usize, usize) {
     match span {
         Span::Same { value, count } => {
-            bits.append_n(count, value & 1 == 1);
+            out.append_n(count, value & 1 == 1);
             (count, if value & 1 == 1 { count } else { 0 })
         }
         Span::Packed(packed) => {
             let (data, start) = packed.bits();
-            bits.append_packed_range(start..start + packed.count, data);
-            (packed.count, UnalignedBitChunk::new(data, start, packed.count).count_ones())
+            out.append_packed_range(start..start + packed.count, data);
+            (packed.count, bits::count(data, start, packed.count))
         }
     }
 }
@@ -362,8 +356,8 @@ fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unfit> {
 }
 
 /// The keys of rows that have one, at their rows.
-fn spread_keys(keys: &[i32], valid: &BooleanBuffer) -> Vec<i32> {
-    let mut spread = vec![0; valid.len()];
+fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {
+    let mut spread = vec![N::default(); valid.len()];
     let mut keys = keys;
     for (start, end) in valid.set_slices() {
         let (here, rest) = keys.split_at(keys.len().min(end - start));

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, AsArray as _, DictionaryArray, Int32Array, Int64Array, StringBuilder};
+use arrow::array::{
+    Array as _, ArrayRef, AsArray as _, DictionaryArray, Int32Array, Int64Array, StringBuilder, UInt8Array,
+};
 use arrow::buffer::{NullBuffer, ScalarBuffer};
 use arrow::datatypes::{Int32Type, Int64Type};
 
@@ -44,9 +46,16 @@ impl Dictionary {
         Ok(Self::Ints(Arc::new(Int64Array::from(ints.to_vec()))))
     }
 
-    /// Keys and their values.
-    pub(super) fn keys(&self, keys: Vec<i32>) -> Result<Keys, Unfit> {
-        let Self::Ints(values) = self else { return Err(Unfit) };
+    /// Whether a byte is enough for a key.
+    pub(super) fn is_small(&self) -> bool {
+        let (Self::Texts(values) | Self::Ints(values)) = self;
+        values.len() <= 1 << u8::BITS
+    }
+
+    /// Keys of a byte and their values; a null's key is 0.
+    pub(super) fn keys(&self, keys: Vec<u8>, nulls: Option<NullBuffer>) -> Result<Keys, Unfit> {
+        let (Self::Texts(values) | Self::Ints(values)) = self;
+        let keys = UInt8Array::try_new(keys.into(), nulls).map_err(|_| Unfit)?;
         Keys::new(keys, values.clone()).ok_or(Unfit)
     }
 

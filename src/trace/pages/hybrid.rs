@@ -54,6 +54,7 @@ impl Hybrid {
     }
 
     /// The next numbers, `most` of them at most and one at least.
+    #[inline]
     pub(super) fn span(&mut self, most: usize) -> Result<Span<'_>, Unfit> {
         while matches!(self.left, Left::Same { count: 0, .. } | Left::Packed { count: 0, .. }) {
             self.left = self.run()?;
@@ -74,6 +75,30 @@ impl Hybrid {
         })
     }
 
+    /// The next `count` numbers, behind those of `out`.
+    pub(super) fn append<N: Number>(&mut self, count: usize, out: &mut Vec<N>) -> Result<(), Unfit> {
+        if self.width > N::WIDTH {
+            return Err(Unfit);
+        }
+        let start = out.len();
+        out.resize(start + count, N::default());
+        let mut rest = &mut out[start..];
+        while !rest.is_empty() {
+            let taken = match self.span(rest.len())? {
+                Span::Same { value, count } => {
+                    rest[..count].fill(N::of(value));
+                    count
+                }
+                Span::Packed(packed) => {
+                    packed.unpack(&mut rest[..packed.count]);
+                    packed.count
+                }
+            };
+            rest = &mut rest[taken..];
+        }
+        Ok(())
+    }
+
     fn run(&mut self) -> Result<Left, Unfit> {
         let header = self.varint()?;
         let count = usize::try_from(header >> 1).map_err(|_| Unfit)?;
@@ -85,14 +110,21 @@ impl Hybrid {
             return Ok(Left::Same { value, count });
         }
         // Groups of eight. A writer may cut the last one short where the data end.
-        let bytes = count.checked_mul(self.width).ok_or(Unfit)?.min(self.data.len() - self.at);
-        let held = (bytes * 8).checked_div(self.width).unwrap_or(usize::MAX);
-        let left = Left::Packed { bit: self.at * 8, count: held.min(count.saturating_mul(8)) };
+        let stored = count.checked_mul(self.width).ok_or(Unfit)?;
+        let there = self.data.len() - self.at;
+        let (bytes, count) =
+            if stored <= there { (stored, count.saturating_mul(8)) } else { (there, there * 8 / self.width) };
+        let left = Left::Packed { bit: self.at * 8, count };
         self.at += bytes;
-        if held == 0 { Err(Unfit) } else { Ok(left) }
+        if count == 0 { Err(Unfit) } else { Ok(left) }
     }
 
     fn varint(&mut self) -> Result<u64, Unfit> {
+        // Most are one byte.
+        if let Some(byte @ ..0x80) = self.data.get(self.at) {
+            self.at += 1;
+            return Ok(u64::from(*byte));
+        }
         let mut value = 0;
         for shift in (0..35).step_by(7) {
             let byte = *self.data.get(self.at).ok_or(Unfit)?;
@@ -109,22 +141,47 @@ impl Hybrid {
 /// Numbers of which a byte boundary follows.
 const GROUP: usize = 8;
 
+/// What stored numbers are made into.
+pub(super) trait Number: Copy + Default + From<u8> {
+    /// The widest that fit.
+    const WIDTH: usize;
+
+    /// A number that fits.
+    fn of(stored: u32) -> Self;
+}
+
+impl Number for u8 {
+    const WIDTH: usize = 8;
+
+    #[expect(clippy::cast_possible_truncation, reason = "the number fits")]
+    fn of(stored: u32) -> Self {
+        stored as Self
+    }
+}
+
+impl Number for i32 {
+    const WIDTH: usize = 32;
+
+    fn of(stored: u32) -> Self {
+        stored.cast_signed()
+    }
+}
+
 impl Packed<'_> {
-    /// The numbers, behind those of `out`.
-    pub(super) fn append(&self, out: &mut Vec<i32>) {
-        let start = out.len();
-        out.resize(start + self.count, 0);
-        self.unpack(&mut out[start..]);
-    }
-
     /// Gives each number to `take`.
-    pub(super) fn each(&self, take: impl FnMut(u32)) {
-        let mut numbers = vec![0; self.count];
-        self.unpack(&mut numbers);
-        numbers.into_iter().map(i32::cast_unsigned).for_each(take);
+    pub(super) fn each(&self, mut take: impl FnMut(u32)) {
+        let mut numbers = [0_i32; 64];
+        for first in (0..self.count).step_by(numbers.len()) {
+            let count = numbers.len().min(self.count - first);
+            let some = &mut numbers[..count];
+            Self { bit: self.bit + first * self.width, ..*self }.unpack(some);
+            for number in some {
+                take(number.cast_unsigned());
+            }
+        }
     }
 
-    fn unpack(&self, out: &mut [i32]) {
+    fn unpack<N: Number>(&self, out: &mut [N]) {
         // Whole groups begin at bytes; before the first and after the last one numbers are taken singly.
         let to_byte = (0..GROUP).find(|ahead| (self.bit + ahead * self.width).is_multiple_of(8)).unwrap_or(0);
         let (before, rest) = out.split_at_mut(to_byte.min(out.len()));
@@ -132,35 +189,31 @@ impl Packed<'_> {
         let bit = self.bit + before.len() * self.width;
         let (groups, after) = rest.as_chunks_mut::<GROUP>();
         match self.width {
-            1 => self.groups::<1>(bit, groups),
-            2 => self.groups::<2>(bit, groups),
-            3 => self.groups::<3>(bit, groups),
-            4 => self.groups::<4>(bit, groups),
-            5 => self.groups::<5>(bit, groups),
-            6 => self.groups::<6>(bit, groups),
-            7 => self.groups::<7>(bit, groups),
-            8 => self.groups::<8>(bit, groups),
+            1 => self.groups::<1, N>(bit, groups),
+            2 => self.groups::<2, N>(bit, groups),
+            3 => self.groups::<3, N>(bit, groups),
+            4 => self.groups::<4, N>(bit, groups),
+            5 => self.groups::<5, N>(bit, groups),
+            6 => self.groups::<6, N>(bit, groups),
+            7 => self.groups::<7, N>(bit, groups),
+            8 => self.groups::<8, N>(bit, groups),
             _ => self.singly(bit, groups.as_flattened_mut()),
         }
         self.singly(bit + groups.len() * GROUP * self.width, after);
     }
 
     /// Groups of numbers of `WIDTH` bits from the start of a byte: one word each.
-    fn groups<const WIDTH: usize>(&self, bit: usize, groups: &mut [[i32; GROUP]]) {
-        let mask = (1_u32 << WIDTH) - 1;
+    fn groups<const WIDTH: usize, N: Number>(&self, bit: usize, groups: &mut [[N; GROUP]]) {
         for (at, group) in groups.iter_mut().enumerate() {
-            let word = word(self.data, bit / 8 + at * WIDTH);
-            for (place, number) in group.iter_mut().enumerate() {
-                *number = (low(word >> (place * WIDTH)) & mask).cast_signed();
-            }
+            *group = spread::<WIDTH>(word(self.data, bit / 8 + at * WIDTH)).to_le_bytes().map(N::from);
         }
     }
 
-    fn singly(&self, bit: usize, out: &mut [i32]) {
+    fn singly<N: Number>(&self, bit: usize, out: &mut [N]) {
         let mask = low((1_u64 << self.width) - 1);
         for (at, number) in out.iter_mut().enumerate() {
             let bit = bit + at * self.width;
-            *number = (low(word(self.data, bit / 8) >> (bit % 8)) & mask).cast_signed();
+            *number = N::of(low(word(self.data, bit / 8) >> (bit % 8)) & mask);
         }
     }
 
@@ -169,6 +222,17 @@ impl Packed<'_> {
         debug_assert_eq!(self.width, 1, "bits are numbers of one bit");
         (self.data, self.bit)
     }
+}
+
+/// Eight numbers of `WIDTH` bits, each in a byte of its own: halves are moved apart, then quarters, then eighths.
+fn spread<const WIDTH: usize>(packed: u64) -> u64 {
+    let lowest = |count: usize| (1_u64 << (count * WIDTH)) - 1;
+    let half = lowest(4);
+    let halves = packed & half | (packed >> (4 * WIDTH) & half) << 32;
+    let quarter = lowest(2) * 0x0000_0001_0000_0001;
+    let quarters = halves & quarter | (halves >> (2 * WIDTH) & quarter) << 16;
+    let one = lowest(1) * 0x0001_0001_0001_0001;
+    quarters & one | (quarters >> WIDTH & one) << 8
 }
 
 /// The lower half of a word.
@@ -183,23 +247,16 @@ mod tests {
     use proptest::collection::vec;
     use proptest::prelude::*;
 
-    use super::{Hybrid, Span};
+    use super::{Hybrid, Number, Span};
 
     /// What some runs decode to, read `most` at a time.
-    fn read(data: Vec<u8>, width: u8, count: usize, most: usize) -> Vec<u32> {
-        let mut hybrid = Hybrid::new(Bytes::from(data), width).ok().unwrap();
-        let mut found = Vec::new();
+    fn read<N: Number + Into<i64>>(data: &[u8], width: u8, count: usize, most: usize) -> Vec<i64> {
+        let mut hybrid = Hybrid::new(Bytes::copy_from_slice(data), width).ok().unwrap();
+        let mut found: Vec<N> = Vec::new();
         while found.len() < count {
-            match hybrid.span(most.min(count - found.len())).ok().unwrap() {
-                Span::Same { value, count } => found.extend(std::iter::repeat_n(value, count)),
-                Span::Packed(packed) => {
-                    let mut numbers = Vec::new();
-                    packed.append(&mut numbers);
-                    found.extend(numbers.into_iter().map(i32::cast_unsigned));
-                }
-            }
+            hybrid.append(most.min(count - found.len()), &mut found).ok().unwrap();
         }
-        found
+        found.into_iter().map(Into::into).collect()
     }
 
     fn packed(values: &[u32], width: u8) -> Vec<u8> {
@@ -225,7 +282,14 @@ mod tests {
             data.push(7 << 1);
             data.extend(&(same & mask).to_le_bytes()[..usize::from(width.div_ceil(8))]);
             values.extend([same & mask; 7]);
-            prop_assert_eq!(read(data, width, values.len(), most), values);
+            let expected: Vec<i64> = values.iter().map(|value| value.cast_signed().into()).collect();
+            prop_assert_eq!(&read::<i32>(&data, width, values.len(), most), &expected);
+            if width <= 8 {
+                prop_assert_eq!(read::<u8>(&data, width, values.len(), most), expected);
+            } else {
+                let mut narrow: Vec<u8> = Vec::new();
+                prop_assert!(Hybrid::new(data.into(), width).ok().unwrap().append(1, &mut narrow).is_err());
+            }
         }
 
         #[test]

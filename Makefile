@@ -54,7 +54,7 @@ calibrate:
 bench: bench-scores bench-world
 
 ## How fast scoring is beside other engines, and where the time goes: benches/RESULTS.md. BENCH_FEATURES=polars builds
-## `--engine polars` in, which takes minutes more; LARGE=140000000 measures ten times the steps too.
+## a second program, with `--engine polars`, which takes minutes more; LARGE=140000000 measures ten times the steps too.
 STEPS = 14000000
 FILES = 4
 ROUNDS = 5
@@ -62,9 +62,15 @@ LARGE = 0
 BENCH_FEATURES =
 BENCH_PYTHON = target/bench-python
 bench-scores:
-	cargo build --release --no-default-features --features "$(BENCH_FEATURES)" --bin mirrorstats --example generate --example decode
+	mkdir -p target/bench
+	if [ -n "$(BENCH_FEATURES)" ]; then \
+		cargo build --release --no-default-features --features "$(BENCH_FEATURES)" --bin mirrorstats && \
+		cp $${CARGO_TARGET_DIR:-target}/release/mirrorstats target/bench/mirrorstats-polars; \
+	fi
+	cargo build --release --no-default-features --bin mirrorstats --example generate --example decode
 	python3 -m pip install --quiet --upgrade --target $(BENCH_PYTHON) duckdb polars pandas pyarrow
 	PYTHONPATH=$(BENCH_PYTHON) python3 scripts/bench/bench.py --program $${CARGO_TARGET_DIR:-target}/release/mirrorstats \
+		--polars "$(if $(BENCH_FEATURES),target/bench/mirrorstats-polars)" \
 		--steps $(STEPS) --files $(FILES) --rounds $(ROUNDS) --large $(LARGE)
 
 ## How fast the world is: steps a second with and without frames, and where the time goes.

@@ -1,6 +1,6 @@
 //! The kernels alone, on one batch in memory: `cargo bench --bench kernels`.
 //!
-//! A batch of 64 Ki steps is what a scan hands over; each definition here is mostly one kernel.
+//! A scan hands over about half as many steps at a time; each definition here is mostly one kernel.
 
 use std::hint::black_box;
 use std::sync::Arc;

@@ -280,7 +280,7 @@ pub(super) fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
 
 fn narrow(row: usize) -> u32 {
     u32::try_from(row)
-        .expect("rows are decoded 65,536 at a time, and an episode of 2^32 steps does not fit into memory")
+        .expect("rows are decoded some thousands at a time, and an episode of 2^32 steps does not fit into memory")
 }
 
 #[cfg(test)]

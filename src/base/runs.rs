@@ -2,11 +2,12 @@
 //!
 //! Rule: a run that is put away is a temporary file without a name, gone with the process. Memory holds the runs that
 //! are not put away and one record of each other run that is merged. What a record means is the caller's business; one
-//! whose key must decide the order begins with a form of it that no other key continues.
+//! whose key must decide the order begins with a form of it that no other key continues. What many records have in
+//! common may be their title, which is kept once a run; titles come in the order of their bytes, too.
+//!
+//! A run in a file is a sequence of titles and records, each with its length before it; a title stands before its
+//! records and has the highest bit of its length set.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
-use std::collections::binary_heap::PeekMut;
 use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read as _, Seek as _, Write as _};
 use std::ops::Range;
@@ -19,17 +20,47 @@ const FAN_IN: usize = 64;
 /// Bytes of a file that are read or written at a time.
 const BUFFER: usize = 64 * 1024;
 
+/// Marks the length of a title in a file.
+const TITLE: u32 = 1 << 31;
+
 /// Records in order, in memory.
 #[derive(Debug, Default)]
 pub struct Run {
     bytes: Vec<u8>,
-    records: Vec<Range<usize>>,
+    sections: Vec<Section>,
+    records: Vec<Place>,
+}
+
+/// The records of one title.
+#[derive(Clone, Debug)]
+pub struct Section {
+    /// What they have in common.
+    pub title: Vec<u8>,
+    /// The position of the record behind them.
+    pub end: usize,
+}
+
+/// Where a record is among some bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Its first byte.
+    pub start: u32,
+    /// Its number of bytes.
+    pub length: u32,
+}
+
+impl Place {
+    /// The bytes of the record.
+    pub fn range(self) -> Range<usize> {
+        self.start as usize..self.start as usize + self.length as usize
+    }
 }
 
 impl Run {
-    /// The records at these places of some bytes, none before the one ahead of it.
-    pub fn new(bytes: Vec<u8>, records: Vec<Range<usize>>) -> Self {
-        Self { bytes, records }
+    /// The records at these places of some bytes. Titles ascend, each with a record at least, and the records of each
+    /// ascend, too.
+    pub fn new(bytes: Vec<u8>, sections: Vec<Section>, records: Vec<Place>) -> Self {
+        Self { bytes, sections, records }
     }
 
     /// The bytes of its records, and of whatever else lies between them.
@@ -38,7 +69,7 @@ impl Run {
     }
 }
 
-/// Runs that were put away: files of records, each with its length before it.
+/// Runs that were put away.
 #[derive(Debug, Default)]
 pub struct Runs(Vec<File>);
 
@@ -57,13 +88,13 @@ impl Runs {
         self.add(run)
     }
 
-    /// Puts records away, none of which comes before the one ahead of it.
+    /// Puts records without a title away, none of which comes before the one ahead of it.
     ///
     /// # Errors
     /// When there is no place for temporary files, or no more of it.
     pub fn put_away_records<R: AsRef<[u8]>>(&mut self, records: impl IntoIterator<Item = R>) -> io::Result<()> {
         let mut out = Out::new()?;
-        records.into_iter().try_for_each(|record| out.put(record.as_ref()))?;
+        records.into_iter().try_for_each(|record| out.put(record.as_ref(), 0))?;
         self.add(out.finish()?)
     }
 
@@ -88,13 +119,13 @@ impl Runs {
 }
 
 fn heads_in_memory(runs: Vec<Run>) -> Vec<Head> {
-    runs.into_iter().map(|run| Head::Memory { run, next: 0 }).collect()
+    runs.into_iter().map(|run| Head::of(Source::Memory { run, next: 0, section: 0 })).collect()
 }
 
 fn heads_of_files(files: Vec<File>) -> io::Result<Vec<Head>> {
     let head = |mut file: File| {
         file.rewind()?;
-        Ok(Head::File { record: Vec::new(), rest: BufReader::with_capacity(BUFFER, file) })
+        Ok(Head::of(Source::File { record: Vec::new(), rest: BufReader::with_capacity(BUFFER, file) }))
     };
     files.into_iter().map(head).collect()
 }
@@ -102,8 +133,11 @@ fn heads_of_files(files: Vec<File>) -> io::Result<Vec<Head>> {
 fn merged_into_one(heads: Vec<Head>) -> io::Result<File> {
     let mut out = Out::new()?;
     let mut merge = Merge::of(heads)?;
-    while let Some(record) = merge.next()? {
-        out.put(record)?;
+    while let Some(Record { title, bytes }) = merge.next()? {
+        if let Some(title) = title {
+            out.put(title, TITLE)?;
+        }
+        out.put(bytes, 0)?;
     }
     out.finish()
 }
@@ -117,10 +151,11 @@ impl Out {
         Ok(Self(BufWriter::with_capacity(BUFFER, file)))
     }
 
-    fn put(&mut self, record: &[u8]) -> io::Result<()> {
-        let length = u32::try_from(record.len()).expect("a record is a few values of one row");
-        self.0.write_all(&length.to_le_bytes())?;
-        self.0.write_all(record)
+    fn put(&mut self, bytes: &[u8], mark: u32) -> io::Result<()> {
+        let length = u32::try_from(bytes.len()).ok().filter(|length| *length < TITLE);
+        let length = length.expect("a title or record is a few values of one row");
+        self.0.write_all(&(length | mark).to_le_bytes())?;
+        self.0.write_all(bytes)
     }
 
     fn finish(self) -> io::Result<File> {
@@ -130,20 +165,34 @@ impl Out {
 
 /// The records of some runs, merged.
 pub struct Merge {
-    heads: BinaryHeap<Head>,
-    /// Whether the first head has been handed out.
-    taken: bool,
+    /// The runs that are not behind yet.
+    heads: Vec<Head>,
+    /// The title of the records that are handed out.
+    title: Vec<u8>,
+    /// The head that was handed out last.
+    taken: Option<usize>,
+    /// What the first record of every other head under this title begins with, at the least.
+    others: u64,
+}
+
+/// A record, handed out.
+#[derive(Clone, Copy, Debug)]
+pub struct Record<'a> {
+    /// Its title, if it is the first one under it.
+    pub title: Option<&'a [u8]>,
+    /// Its own bytes.
+    pub bytes: &'a [u8],
 }
 
 impl Merge {
     fn of(sources: Vec<Head>) -> io::Result<Self> {
-        let mut heads = BinaryHeap::with_capacity(sources.len());
+        let mut heads = Vec::with_capacity(sources.len());
         for mut head in sources {
-            if head.advance()? {
+            if head.advance()? != Step::End {
                 heads.push(head);
             }
         }
-        Ok(Self { heads, taken: false })
+        Ok(Self { heads, title: Vec::new(), taken: None, others: 0 })
     }
 
     /// The next record.
@@ -151,129 +200,218 @@ impl Merge {
     /// # Errors
     /// When what was put away cannot be read.
     #[expect(clippy::should_implement_trait, reason = "an iterator cannot lend its items")]
-    pub fn next(&mut self) -> io::Result<Option<&[u8]>> {
-        if self.taken
-            && let Some(mut first) = self.heads.peek_mut()
-            && !first.advance()?
-        {
-            PeekMut::pop(first);
+    pub fn next(&mut self) -> io::Result<Option<Record<'_>>> {
+        if let Some(taken) = self.taken {
+            let head = &mut self.heads[taken];
+            match head.advance()? {
+                // Most records come from the run that the one before came from.
+                Step::Record if head.prefix < self.others => {
+                    return Ok(Some(Record { title: None, bytes: self.heads[taken].record() }));
+                }
+                Step::Record => {}
+                Step::Title => head.current = false,
+                Step::End => drop(self.heads.swap_remove(taken)),
+            }
         }
-        self.taken = true;
-        Ok(self.heads.peek().map(Head::record))
+        let mut new = false;
+        (self.taken, self.others) = first(&self.heads);
+        if self.taken.is_none()
+            && let Some(title) = self.heads.iter().map(|head| &head.title).min()
+        {
+            new = true;
+            self.title.clone_from(title);
+            self.heads.iter_mut().for_each(|head| head.current = head.title == self.title);
+            (self.taken, self.others) = first(&self.heads);
+        }
+        let record = |taken: usize| Record { title: new.then_some(&self.title), bytes: self.heads[taken].record() };
+        Ok(self.taken.map(record))
     }
 }
 
-/// The first record of a run that is not behind yet, and those after it.
-enum Head {
+/// The head of those under the current title whose record comes first, and what those of the others begin with, at the
+/// least.
+fn first(heads: &[Head]) -> (Option<usize>, u64) {
+    let (mut first, mut others): (Option<usize>, u64) = (None, u64::MAX);
+    for (at, head) in heads.iter().enumerate().filter(|(_, head)| head.current) {
+        match first {
+            None => first = Some(at),
+            Some(best) if head.comes_before(&heads[best]) => {
+                others = heads[best].prefix;
+                first = Some(at);
+            }
+            Some(_) => others = others.min(head.prefix),
+        }
+    }
+    (first, others)
+}
+
+/// A run, and where the merge is in it.
+struct Head {
+    source: Source,
+    /// The title of its record.
+    title: Vec<u8>,
+    /// Whether that is the one whose records are handed out.
+    current: bool,
+    /// The first eight bytes of its record as a number, which decides most comparisons; zeros where there are fewer.
+    prefix: u64,
+}
+
+enum Source {
     File {
         record: Vec<u8>,
         rest: BufReader<File>,
     },
-    /// `next` is the record after the first one.
+    /// `next` is the record after the present one, which is in `section`.
     Memory {
         run: Run,
         next: usize,
+        section: usize,
     },
 }
 
+/// What follows a record.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// Another one under the same title.
+    Record,
+    /// One under another title, or the first one of all.
+    Title,
+    End,
+}
+
 impl Head {
+    fn of(source: Source) -> Self {
+        Self { source, title: Vec::new(), current: false, prefix: 0 }
+    }
+
     fn record(&self) -> &[u8] {
-        match self {
-            Self::File { record, .. } => record,
-            Self::Memory { run, next } => &run.bytes[run.records[*next - 1].clone()],
+        match &self.source {
+            Source::File { record, .. } => record,
+            Source::Memory { run, next, .. } => &run.bytes[run.records[*next - 1].range()],
         }
     }
 
-    /// Goes on to the next record; whether there is one.
-    fn advance(&mut self) -> io::Result<bool> {
-        match self {
-            Self::File { record, rest } => {
-                let mut length = [0; 4];
-                match rest.read_exact(&mut length) {
-                    Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(false),
-                    result => result?,
-                }
-                record.resize(u32::from_le_bytes(length) as usize, 0);
-                rest.read_exact(record)?;
-                Ok(true)
-            }
-            Self::Memory { run, next } => {
+    fn comes_before(&self, other: &Self) -> bool {
+        self.prefix < other.prefix || self.prefix == other.prefix && self.record() < other.record()
+    }
+
+    /// Goes on to the next record.
+    fn advance(&mut self) -> io::Result<Step> {
+        let step = match &mut self.source {
+            Source::File { record, rest } => read(rest, &mut self.title, record)?,
+            Source::Memory { run, next, section } => {
+                let ended = run.sections.get(*section).is_none_or(|section| section.end == *next);
+                *section += usize::from(ended && *next > 0);
+                let step = match run.sections.get(*section) {
+                    None => Step::End,
+                    Some(_) if !ended && *next > 0 => Step::Record,
+                    Some(section) => {
+                        self.title.clone_from(&section.title);
+                        Step::Title
+                    }
+                };
                 *next += 1;
-                Ok(*next <= run.records.len())
+                step
             }
+        };
+        if step != Step::End {
+            self.prefix = prefix(self.record());
         }
+        Ok(step)
     }
 }
 
-impl Ord for Head {
-    /// The greatest head of a heap is the one whose record comes first.
-    fn cmp(&self, other: &Self) -> Ordering {
-        other.record().cmp(self.record())
+/// Reads the next record, and the title before it if there is one.
+fn read(rest: &mut BufReader<File>, title: &mut Vec<u8>, record: &mut Vec<u8>) -> io::Result<Step> {
+    let mut step = Step::Record;
+    loop {
+        let mut length = [0; 4];
+        match rest.read_exact(&mut length) {
+            Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Ok(Step::End),
+            result => result?,
+        }
+        let length = u32::from_le_bytes(length);
+        let bytes = if length & TITLE == 0 { &mut *record } else { &mut *title };
+        bytes.resize((length & !TITLE) as usize, 0);
+        rest.read_exact(bytes)?;
+        if length & TITLE == 0 {
+            return Ok(step);
+        }
+        step = Step::Title;
     }
 }
 
-impl PartialOrd for Head {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+fn prefix(record: &[u8]) -> u64 {
+    if let Some(bytes) = record.first_chunk() {
+        return u64::from_be_bytes(*bytes);
     }
+    let mut bytes = [0; 8];
+    bytes[..record.len()].copy_from_slice(record);
+    u64::from_be_bytes(bytes)
 }
-
-impl PartialEq for Head {
-    fn eq(&self, other: &Self) -> bool {
-        self.cmp(other).is_eq()
-    }
-}
-
-impl Eq for Head {}
 
 #[cfg(test)]
 mod tests {
     use proptest::collection::vec;
     use proptest::prelude::*;
 
-    use std::ops::Range;
+    use super::{FAN_IN, Place, Record, Run, Runs, Section};
 
-    use super::{FAN_IN, Run, Runs};
+    type Titled = (Vec<u8>, Vec<u8>);
 
-    fn run(records: &[Vec<u8>]) -> Run {
-        let mut places: Vec<Range<usize>> = Vec::new();
-        for record in records {
-            let start = places.last().map_or(0, |last| last.end);
-            places.push(start..start + record.len());
+    fn run(records: &[Titled]) -> Run {
+        let mut records = records.to_vec();
+        records.sort();
+        let (mut bytes, mut sections, mut places): (Vec<u8>, Vec<Section>, Vec<Place>) = Default::default();
+        for (title, record) in records {
+            let narrow = |length: usize| u32::try_from(length).unwrap();
+            places.push(Place { start: narrow(bytes.len()), length: narrow(record.len()) });
+            bytes.extend(record);
+            match sections.last_mut() {
+                Some(section) if section.title == title => section.end += 1,
+                _ => sections.push(Section { title, end: places.len() }),
+            }
         }
-        let bytes = records.concat();
-        places.sort_by_key(|place| bytes[place.clone()].to_vec());
-        Run::new(bytes, places)
+        Run::new(bytes, sections, places)
+    }
+
+    fn handed_out(runs: Runs, last: Vec<Run>) -> Vec<Titled> {
+        let mut merge = runs.merge(last).unwrap();
+        let (mut found, mut present) = (Vec::new(), None::<Vec<u8>>);
+        while let Some(Record { title, bytes }) = merge.next().unwrap() {
+            if let Some(title) = title {
+                assert!(present.as_deref() != Some(title), "a title comes once");
+                present = Some(title.to_vec());
+            }
+            found.push((present.clone().expect("a title comes before its records"), bytes.to_vec()));
+        }
+        found
     }
 
     /// Put away so many runs at a time.
-    fn merged(records: &[Vec<u8>], in_memory: usize, at_a_time: usize) -> Vec<Vec<u8>> {
+    fn merged(records: &[Titled], in_memory: usize, at_a_time: usize) -> Vec<Titled> {
         let mut runs = Runs::default();
         let mut pending = Vec::new();
         for chunk in records.chunks(in_memory) {
             if pending.len() == at_a_time {
                 runs.put_away(std::mem::take(&mut pending)).unwrap();
             }
-            if chunk.len() == 3 {
-                let mut chunk = chunk.to_vec();
-                chunk.sort();
+            if chunk.iter().all(|(title, _)| title.is_empty()) {
+                let mut chunk: Vec<&[u8]> = chunk.iter().map(|(_, record)| record.as_slice()).collect();
+                chunk.sort_unstable();
                 runs.put_away_records(chunk).unwrap();
                 continue;
             }
             pending.push(run(chunk));
         }
-        let mut merge = runs.merge(pending).unwrap();
-        let mut found = Vec::new();
-        while let Some(record) = merge.next().unwrap() {
-            found.push(record.to_vec());
-        }
-        found
+        handed_out(runs, pending)
     }
 
     proptest! {
         #[test]
         fn records_come_in_order_whatever_fits_into_memory(
-            records in vec(vec(any::<u8>(), 0..4), 0..40), in_memory in 1_usize..50, at_a_time in 1_usize..4,
+            records in vec((vec(0..3_u8, 0..3), vec(prop_oneof![Just(0), any::<u8>()], 0..11)), 0..40),
+            in_memory in 1_usize..50, at_a_time in 1_usize..4,
         ) {
             let mut expected = records.clone();
             expected.sort();
@@ -283,7 +421,7 @@ mod tests {
 
     #[test]
     fn more_runs_than_are_merged_at_a_time() {
-        let records: Vec<Vec<u8>> = (0..u8::MAX).rev().map(|byte| vec![byte, 1]).collect();
+        let records: Vec<Titled> = (0..u8::MAX).rev().map(|byte| (vec![byte / 100], vec![byte, 1])).collect();
         assert!(records.len() > 3 * FAN_IN);
         let mut expected = records.clone();
         expected.reverse();

@@ -6,6 +6,7 @@
 //! It deliberately does not know where batches come from, in which order, or on which thread.
 
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
 use arrow::array::{
     Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Datum, Int64Array, PrimitiveArray, RecordBatch,
@@ -87,6 +88,8 @@ pub struct Engine<'p> {
     plan: &'p Plan,
     order: Vec<NodeId>,
     patterns: Vec<Option<Regex>>,
+    /// The constants, but for texts: their symbols are those of a batch.
+    constants: Vec<Option<Values>>,
 }
 
 impl<'p> Engine<'p> {
@@ -105,7 +108,12 @@ impl<'p> Engine<'p> {
                 patterns[id.index()] = Some(Regex::new(pattern).expect("the binder has compiled this pattern"));
             }
         }
-        Self { plan, order, patterns }
+        let constant = |id: NodeId| match &plan.node(id).op {
+            Op::Constant(Constant::Text(_)) => None,
+            Op::Constant(constant) => Some(Values::constant(constant, plan.node(id).ty, &mut Symbols::default())),
+            _ => None,
+        };
+        Self { plan, order, patterns, constants: plan.ids().map(constant).collect() }
     }
 
     /// The step-level and the episode-level columns that a batch must have.
@@ -154,7 +162,7 @@ impl<'p> Engine<'p> {
             symbols: Symbols::default(),
             values: vec![None; self.plan.nodes().len()],
             moments: None,
-            whole: batch.segments.whole(),
+            stretches: Vec::new(),
         };
         for &id in &self.order {
             let value = evaluation.node(id)?;
@@ -198,7 +206,7 @@ fn beside_its_episode(plan: &Plan, op: &Op) -> Option<(NodeId, NodeId)> {
 ///
 /// `first`, `last`, `any` and `count` look for the other part between the ends of the windows, so that no window is
 /// written out. Null where an end is null, a window holds nowhere then, as it is for these aggregates.
-fn windowed(plan: &Plan, condition: NodeId) -> (NodeId, Vec<(Comparison, NodeId)>) {
+fn windowed(plan: &Plan, condition: NodeId) -> (NodeId, Windows) {
     let part =
         |id: NodeId| window(plan, &plan.node(id).op).filter(|(comparison, _)| *comparison != Comparison::NotEqual);
     let (mut rest, mut windows) = (condition, Vec::new());
@@ -310,9 +318,12 @@ struct Evaluation<'e, 'p> {
     /// The timesteps looked up, a value an episode, where a lookup is evaluated: step-level nodes have a value an
     /// episode then, that at its timestep.
     moments: Option<Int64Array>,
-    /// All rows of each episode.
-    whole: Vec<Stretch>,
+    /// The rows of each episode that lie in some windows, for all windows so far. No window: all rows.
+    stretches: Vec<(Windows, Rc<Vec<Stretch>>)>,
 }
+
+/// Conditions on the timestep, each with the node of the moment that it is compared with.
+type Windows = Vec<(Comparison, NodeId)>;
 
 impl Evaluation<'_, '_> {
     fn of(&self, id: NodeId) -> &Values {
@@ -328,7 +339,10 @@ impl Evaluation<'_, '_> {
         let level = if self.moments.is_some() { Level::Episode } else { node.level };
         Ok(match &node.op {
             Op::Column(name) => self.column(name, level)?,
-            Op::Constant(constant) => Values::constant(constant, node.ty, &mut self.symbols),
+            Op::Constant(constant) => match &self.engine.constants[id.index()] {
+                Some(known) => known.clone(),
+                None => Values::constant(constant, node.ty, &mut self.symbols),
+            },
             Op::Time => Values::new(self.moments.clone().unwrap_or_else(|| segments.times()), Type::Int),
             Op::Length => Values::new(segments.lengths(), Type::Int),
             Op::Spread(x) => self.spread(of(*x), level),
@@ -495,7 +509,7 @@ impl Evaluation<'_, '_> {
         Ok(result)
     }
 
-    fn aggregate(&self, aggregate: Aggregate, x: NodeId) -> Result<Values, ArrowError> {
+    fn aggregate(&mut self, aggregate: Aggregate, x: NodeId) -> Result<Values, ArrowError> {
         let (segments, values) = (self.batch.segments, || self.of(x));
         Ok(match (aggregate, self.engine.plan.node(x).ty) {
             (Aggregate::Any | Aggregate::First | Aggregate::Last | Aggregate::Count, _) => self.search(aggregate, x),
@@ -513,20 +527,24 @@ impl Evaluation<'_, '_> {
     }
 
     /// The steps at which a condition holds, between the ends of its windows.
-    fn search(&self, aggregate: Aggregate, condition: NodeId) -> Values {
+    fn search(&mut self, aggregate: Aggregate, condition: NodeId) -> Values {
         let (rest, windows) = windowed(self.engine.plan, condition);
-        let moments = |moment: NodeId| self.full(moment, Level::Episode).ints().clone();
-        let windows: Vec<_> = windows.into_iter().map(|(comparison, moment)| (comparison, moments(moment))).collect();
-        let inside;
-        let stretches = if windows.is_empty() {
-            &self.whole
-        } else {
-            inside = self.batch.segments.within(&windows);
-            &inside
-        };
+        let stretches = self.within(windows);
         let ty = if aggregate == Aggregate::Any { Type::Bool } else { Type::Int };
         let predicate = self.full_bools(rest, Level::Step);
-        Values::shared(Segments::aggregate(aggregate, &predicate, stretches), ty)
+        Values::shared(Segments::aggregate(aggregate, &predicate, &stretches), ty)
+    }
+
+    /// The rows of each episode that lie in all these windows. Many aggregates have the same ones.
+    fn within(&mut self, windows: Windows) -> Rc<Vec<Stretch>> {
+        if let Some((_, known)) = self.stretches.iter().find(|(known, _)| *known == windows) {
+            return Rc::clone(known);
+        }
+        let moments = |moment: NodeId| self.full(moment, Level::Episode).ints().clone();
+        let bounds: Vec<_> = windows.iter().map(|(comparison, moment)| (*comparison, moments(*moment))).collect();
+        let found = Rc::new(self.batch.segments.within(&bounds));
+        self.stretches.push((windows, Rc::clone(&found)));
+        found
     }
 
     /// A value at a timestep of each episode, computed from what its columns hold there.
@@ -539,7 +557,7 @@ impl Evaluation<'_, '_> {
             symbols: std::mem::take(&mut self.symbols),
             values: vec![None; plan.nodes().len()],
             moments: Some(moments.clone()),
-            whole: Vec::new(),
+            stretches: Vec::new(),
         };
         for leaf in inner.iter().flat_map(|id| plan.node(*id).op.operands()).filter(|id| is_leaf(plan, *id)) {
             let values = self.of(leaf);

@@ -4,14 +4,15 @@
 //! memory are put away as sorted runs ([`crate::base::runs`]); how many there are changes nothing but the time.
 //!
 //! ```text
-//! experiment 00 00  model 00 00  seed  run  episode_id 00 00  labels  metrics
+//! title    experiment 00 00  model 00 00
+//! record   seed  run  episode_id 00 00  labels  metrics
 //! ```
 //!
 //! Zero bytes within a text are followed by FF, integers are big-endian with the sign bit turned over.
 
 use std::borrow::Cow;
+use std::collections::{BTreeMap, HashMap};
 use std::io;
-use std::ops::Range;
 
 use arrow::array::{
     Array, ArrayAccessor as _, ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray, TypedDictionaryArray,
@@ -21,42 +22,32 @@ use memchr::memchr;
 
 use super::engine::Scores;
 use super::table::{EpisodeKey, EpisodeRow, Header};
-use crate::base::runs::{Merge, Run, Runs};
+use crate::base::runs::{self, Merge, Place, Run, Runs, Section};
 use crate::trace::scan::EPISODE_COLUMNS;
 
 /// Bytes of rows that are held in memory before they are put away.
-const MEMORY: usize = 8 << 20;
+const MEMORY: usize = 12 << 20;
 
 /// Bytes of rows that are sorted at a time.
 const SORTED: usize = 1 << 20;
 
 /// What a row takes, about.
-const USUAL_BYTES: usize = 96;
+const USUAL_BYTES: usize = 64;
 
 /// Some rows as bytes.
 #[derive(Debug, Default)]
 pub struct Rows {
     bytes: Vec<u8>,
-    records: Vec<Record>,
+    /// The rows of each title, in the order of their coming.
+    titled: Vec<(Vec<u8>, Vec<Record>)>,
 }
 
-/// Where a row is among the bytes.
+/// A row among the bytes.
 #[derive(Clone, Copy, Debug)]
 struct Record {
-    start: usize,
-    length: u32,
-    /// How far its experiment and model go.
-    names: u32,
-}
-
-impl Record {
-    fn range(self) -> Range<usize> {
-        self.start..self.start + self.length as usize
-    }
-
-    fn names(self) -> Range<usize> {
-        self.start..self.start + self.names as usize
-    }
+    place: Place,
+    /// The bytes of its seed and run, which decide most comparisons.
+    numbers: u64,
 }
 
 impl Rows {
@@ -65,84 +56,46 @@ impl Rows {
         let keys = KeyColumns::of(episodes);
         let column = |name: &String| episodes.column_by_name(name).expect("the projection asks for this column");
         let labels: Vec<&ArrayRef> = labels.iter().map(column).collect();
-        let mut rows = Self {
-            bytes: Vec::with_capacity(scores.kept.len() * USUAL_BYTES),
-            records: Vec::with_capacity(scores.kept.len()),
-        };
+        let metrics = Metrics::of(&scores.metrics, scores.kept.len());
+        let mut bytes = Vec::with_capacity(scores.kept.len() * USUAL_BYTES);
+        let mut titled: Vec<(Vec<u8>, Vec<Record>)> = Vec::new();
+        let mut known: HashMap<[Option<i32>; 2], usize> = HashMap::new();
+        let mut rows = scores.kept.iter().copied().enumerate().peekable();
         // Experiment and model seldom change from row to row.
-        let mut before: Option<([Option<i32>; 2], Range<usize>)> = None;
-        for (at, &row) in scores.kept.iter().enumerate() {
-            let start = rows.bytes.len();
-            match &before {
-                Some((same, names)) if *same == keys.names(row) => rows.bytes.extend_from_within(names.clone()),
-                _ => keys.put_names(&mut rows.bytes, row),
+        while let Some(&(_, first)) = rows.peek() {
+            let names = keys.names(first);
+            let title = *known.entry(names).or_insert_with(|| {
+                titled.push((keys.title(first), Vec::new()));
+                titled.len() - 1
+            });
+            let records = &mut titled[title].1;
+            while let Some((at, row)) = rows.next_if(|(_, row)| keys.names(*row) == names) {
+                let start = bytes.len();
+                let numbers = keys.numbers(row);
+                bytes.extend_from_slice(&numbers.to_be_bytes());
+                put_text(&mut bytes, text(keys.episode_id, row).unwrap_or_default());
+                for label in &labels {
+                    put_label(&mut bytes, shown(label, row).as_deref());
+                }
+                metrics.put(&mut bytes, at);
+                let place = Place { start: narrow(start), length: narrow(bytes.len() - start) };
+                records.push(Record { place, numbers });
             }
-            let names = rows.bytes.len();
-            before = Some((keys.names(row), start..names));
-            keys.put_rest(&mut rows.bytes, row);
-            for label in &labels {
-                put_label(&mut rows.bytes, shown(label, row).as_deref());
-            }
-            for metric in &scores.metrics {
-                put_metric(&mut rows.bytes, metric.is_valid(at).then(|| metric.value(at)));
-            }
-            let length = |end: usize| u32::try_from(end - start).expect("a row is a few names and numbers");
-            rows.records.push(Record { start, length: length(rows.bytes.len()), names: length(names) });
         }
-        rows
+        Self { bytes, titled }
     }
-
-    fn append(&mut self, other: &Self) {
-        let offset = self.bytes.len();
-        self.bytes.extend_from_slice(&other.bytes);
-        self.records.extend(other.records.iter().map(|record| Record { start: record.start + offset, ..*record }));
-    }
-
-    /// No rows yet, and room for some bytes of them: the same room each time, so that memory that was given back fits.
-    fn with_room(bytes: usize) -> Self {
-        Self { bytes: Vec::with_capacity(bytes), records: Vec::with_capacity(bytes / USUAL_BYTES) }
-    }
-
-    /// A sorted run of all rows.
-    fn sorted(self) -> Run {
-        let Self { bytes, records } = self;
-        let mut places = Vec::with_capacity(records.capacity());
-        places.extend(order(&bytes, &records).into_iter().map(|at| records[at as usize].range()));
-        Run::new(bytes, places)
-    }
-}
-
-/// The positions of rows in the order of their bytes.
-///
-/// Few experiments and models have many rows: their names are compared once, then numbers.
-fn order(bytes: &[u8], records: &[Record]) -> Vec<u32> {
-    let names = |record: &Record| &bytes[record.names()];
-    let alike = || records.chunk_by(|a, b| names(a) == names(b));
-    let mut known: Vec<&[u8]> = alike().map(|rows| names(&rows[0])).collect();
-    known.sort_unstable();
-    known.dedup();
-    let mut order: Vec<(u32, u32, u64)> = Vec::with_capacity(records.len());
-    for rows in alike() {
-        let rank = narrow(known.partition_point(|name| *name < names(&rows[0])));
-        for record in rows {
-            let numbers = bytes[record.names().end..].first_chunk().expect("seed and run stand behind the names");
-            order.push((rank, narrow(order.len()), u64::from_be_bytes(*numbers)));
-        }
-    }
-    let rest = |at: u32| &bytes[records[at as usize].range()];
-    // Rows of one file mostly come in order, which this sort makes use of.
-    order.sort_by(|a, b| (a.0, a.2).cmp(&(b.0, b.2)).then_with(|| rest(a.1).cmp(rest(b.1))));
-    order.into_iter().map(|(_, at, _)| at).collect()
 }
 
 fn narrow(count: usize) -> u32 {
-    u32::try_from(count).expect("fewer than 2^32 rows are held in memory")
+    u32::try_from(count).expect("rows are sorted some thousands at a time, and each is a few names and numbers")
 }
 
 /// Sorts rows as they come, in bounded memory.
 pub struct RowSorter {
     header: Header,
-    pending: Rows,
+    /// The bytes of rows that are not sorted yet, and where those of each title are.
+    bytes: Vec<u8>,
+    titled: BTreeMap<Vec<u8>, Vec<Record>>,
     sorted: Vec<Run>,
     runs: Runs,
     at_a_time: usize,
@@ -152,8 +105,15 @@ pub struct RowSorter {
 impl RowSorter {
     /// A sorter without rows.
     pub fn new(header: Header) -> Self {
-        let (pending, sorted, runs) = (Rows::default(), Vec::new(), Runs::default());
-        Self { header, pending, sorted, runs, at_a_time: SORTED, memory: MEMORY }
+        Self {
+            header,
+            bytes: Vec::new(),
+            titled: BTreeMap::new(),
+            sorted: Vec::new(),
+            runs: Runs::default(),
+            at_a_time: SORTED,
+            memory: MEMORY,
+        }
     }
 
     /// Adds rows.
@@ -161,15 +121,41 @@ impl RowSorter {
     /// # Errors
     /// When rows cannot be put away.
     pub fn add(&mut self, rows: &Rows) -> io::Result<()> {
-        if self.pending.bytes.len() + rows.bytes.len() > self.at_a_time {
-            let pending = std::mem::replace(&mut self.pending, Rows::with_room(self.at_a_time));
-            self.sorted.push(pending.sorted());
+        if self.bytes.len() + rows.bytes.len() > self.at_a_time {
+            self.sort();
+            if self.sorted.iter().map(Run::size).sum::<usize>() >= self.memory {
+                self.runs.put_away(std::mem::take(&mut self.sorted))?;
+            }
+            self.bytes.reserve(self.at_a_time);
         }
-        self.pending.append(rows);
-        if self.sorted.iter().map(Run::size).sum::<usize>() >= self.memory {
-            self.runs.put_away(std::mem::take(&mut self.sorted))?;
+        let offset = narrow(self.bytes.len());
+        self.bytes.extend_from_slice(&rows.bytes);
+        for (title, records) in &rows.titled {
+            if !self.titled.contains_key(title) {
+                self.titled.insert(title.clone(), Vec::new());
+            }
+            let Some(all) = self.titled.get_mut(title) else { continue };
+            all.extend(records.iter().map(|record| {
+                let place = Place { start: record.place.start + offset, ..record.place };
+                Record { place, ..*record }
+            }));
         }
         Ok(())
+    }
+
+    /// Makes a sorted run of the rows that have come since the last one.
+    fn sort(&mut self) {
+        let bytes = std::mem::take(&mut self.bytes);
+        let (mut sections, mut places): (Vec<Section>, Vec<Place>) = (Vec::new(), Vec::new());
+        places.reserve_exact(self.titled.values().map(Vec::len).sum());
+        for (title, mut records) in std::mem::take(&mut self.titled) {
+            let rest = |record: &Record| &bytes[record.place.range()];
+            // Rows of one file mostly come in order, which this sort makes use of.
+            records.sort_by(|a, b| a.numbers.cmp(&b.numbers).then_with(|| rest(a).cmp(rest(b))));
+            places.extend(records.iter().map(|record| record.place));
+            sections.push(Section { title, end: places.len() });
+        }
+        self.sorted.push(Run::new(bytes, sections, places));
     }
 
     /// All rows in order.
@@ -177,9 +163,9 @@ impl RowSorter {
     /// # Errors
     /// When rows that were put away cannot be read.
     pub fn finish(mut self) -> io::Result<SortedRows> {
-        self.sorted.push(self.pending.sorted());
+        self.sort();
         let merge = self.runs.merge(self.sorted)?;
-        Ok(SortedRows { header: self.header, merge, row: EpisodeRow::default(), names: Vec::new() })
+        Ok(SortedRows { header: self.header, merge, row: EpisodeRow::default() })
     }
 }
 
@@ -188,8 +174,6 @@ pub struct SortedRows {
     header: Header,
     merge: Merge,
     row: EpisodeRow,
-    /// The bytes of its experiment and model.
-    names: Vec<u8>,
 }
 
 impl SortedRows {
@@ -203,28 +187,21 @@ impl SortedRows {
     /// # Errors
     /// When rows that were put away cannot be read.
     pub fn next_row(&mut self) -> io::Result<Option<&EpisodeRow>> {
-        let Some(record) = self.merge.next()? else { return Ok(None) };
+        let Some(runs::Record { title, bytes }) = self.merge.next()? else { return Ok(None) };
         let EpisodeRow { key, labels, metrics } = &mut self.row;
         let EpisodeKey { experiment, model, seed, run, episode_id } = key;
-        let mut rest = Bytes(record);
-        if !self.names.is_empty() && record.starts_with(&self.names) {
-            rest.take(self.names.len())?;
-        } else {
-            rest.text(experiment)?;
-            rest.text(model)?;
-            self.names.clear();
-            self.names.extend_from_slice(&record[..record.len() - rest.0.len()]);
+        if let Some(title) = title {
+            let mut title = Bytes(title);
+            title.text(experiment)?;
+            title.text(model)?;
         }
-        let mut record = rest;
+        let mut record = Bytes(bytes);
         *seed = record.int()?;
         *run = record.int()?;
         record.text(episode_id)?;
         labels.resize(self.header.labels.len(), None);
         labels.iter_mut().try_for_each(|label| record.label(label))?;
-        metrics.clear();
-        for _ in &self.header.metrics {
-            metrics.push(record.metric()?);
-        }
+        record.metrics(self.header.metrics.len(), metrics)?;
         Ok(Some(&self.row))
     }
 }
@@ -281,16 +258,18 @@ impl<'a> KeyColumns<'a> {
         [self.experiment, self.model].map(|column| column.keys().is_valid(row).then(|| column.keys().value(row)))
     }
 
-    fn put_names(&self, bytes: &mut Vec<u8>, row: usize) {
-        put_text(bytes, text(self.experiment, row).unwrap_or_default());
-        put_text(bytes, text(self.model, row).unwrap_or_default());
+    fn title(&self, row: usize) -> Vec<u8> {
+        let mut title = Vec::new();
+        put_text(&mut title, text(self.experiment, row).unwrap_or_default());
+        put_text(&mut title, text(self.model, row).unwrap_or_default());
+        title
     }
 
-    fn put_rest(&self, bytes: &mut Vec<u8>, row: usize) {
+    /// Seed and run, as a number that compares as they do.
+    fn numbers(&self, row: usize) -> u64 {
         // The scan has checked that seed and run fit.
-        put_int(bytes, self.seed(row));
-        put_int(bytes, self.run(row));
-        put_text(bytes, text(self.episode_id, row).unwrap_or_default());
+        let ordered = |value: i32| u64::from((value ^ i32::MIN).cast_unsigned());
+        ordered(self.seed(row)) << 32 | ordered(self.run(row))
     }
 }
 
@@ -332,10 +311,6 @@ fn put_text(bytes: &mut Vec<u8>, text: &str) {
     bytes.extend_from_slice(&END);
 }
 
-fn put_int(bytes: &mut Vec<u8>, value: i32) {
-    bytes.extend_from_slice(&(value ^ i32::MIN).to_be_bytes());
-}
-
 const NO_LABEL: u8 = 0;
 const LABEL: u8 = 1;
 
@@ -351,18 +326,43 @@ fn put_label(bytes: &mut Vec<u8>, label: Option<&str>) {
 
 /// An undefined metric.
 const UNDEFINED: u8 = 0xFF;
-/// A metric whose value takes eight bytes; any other byte is the value.
+/// A metric whose value follows in eight bytes behind the codes of all; any other code is the value.
 const LARGE: u8 = 0xFE;
 
-fn put_metric(bytes: &mut Vec<u8>, metric: Option<i64>) {
-    match metric.map(|value| (value, u8::try_from(value))) {
-        None => bytes.push(UNDEFINED),
-        Some((_, Ok(small))) if small < LARGE => bytes.push(small),
-        Some((value, _)) => {
-            bytes.push(LARGE);
-            bytes.extend_from_slice(&value.to_le_bytes());
+/// The metrics of some rows, to be written as bytes: a code each, then the values that no code stands for.
+struct Metrics<'a> {
+    metrics: &'a [Int64Array],
+    /// The codes of all rows, row by row.
+    codes: Vec<u8>,
+}
+
+impl<'a> Metrics<'a> {
+    fn of(metrics: &'a [Int64Array], rows: usize) -> Self {
+        let mut codes = vec![UNDEFINED; rows * metrics.len()];
+        for (first, metric) in metrics.iter().enumerate() {
+            let codes = codes.iter_mut().skip(first).step_by(metrics.len());
+            match metric.nulls() {
+                None => codes.zip(metric.values()).for_each(|(place, value)| *place = code(*value)),
+                Some(nulls) => codes
+                    .zip(metric.values().iter().zip(nulls))
+                    .for_each(|(place, (value, defined))| *place = if defined { code(*value) } else { UNDEFINED }),
+            }
+        }
+        Self { metrics, codes }
+    }
+
+    fn put(&self, bytes: &mut Vec<u8>, row: usize) {
+        let count = self.metrics.len();
+        let codes = &self.codes[row * count..(row + 1) * count];
+        bytes.extend_from_slice(codes);
+        for (metric, _) in self.metrics.iter().zip(codes).filter(|(_, code)| **code == LARGE) {
+            bytes.extend_from_slice(&metric.value(row).to_le_bytes());
         }
     }
+}
+
+fn code(value: i64) -> u8 {
+    u8::try_from(value).map_or(LARGE, |small| small.min(LARGE))
 }
 
 /// What is left of a row's bytes.
@@ -406,12 +406,19 @@ impl Bytes<'_> {
         }
     }
 
-    fn metric(&mut self) -> io::Result<Option<i64>> {
-        Ok(match self.array()? {
-            [UNDEFINED] => None,
-            [LARGE] => Some(i64::from_le_bytes(self.array()?)),
-            [small] => Some(small.into()),
-        })
+    /// Reads so many metrics, the last ones of a row.
+    fn metrics(mut self, count: usize, metrics: &mut Vec<Option<i64>>) -> io::Result<()> {
+        let (codes, rest) = self.0.split_at_checked(count).ok_or_else(damaged)?;
+        self.0 = rest;
+        metrics.clear();
+        for code in codes {
+            metrics.push(match *code {
+                UNDEFINED => None,
+                LARGE => Some(i64::from_le_bytes(self.array()?)),
+                small => Some(small.into()),
+            });
+        }
+        Ok(())
     }
 }
 

@@ -6,15 +6,13 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use arrow::array::{
-    Array, ArrayRef, ArrowPrimitiveType, BooleanArray, BooleanBufferBuilder, Int64Array, PrimitiveArray, UInt32Array,
-};
+use arrow::array::{Array, ArrayRef, ArrowPrimitiveType, BooleanArray, Int64Array, PrimitiveArray, UInt32Array};
 use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::Int64Type;
 use arrow::error::ArrowError;
 
 use super::values::{nulls_of, truths};
-use crate::base::bits;
+use crate::base::bits::{self, Bits};
 use crate::metric::plan::{Aggregate, Comparison};
 
 /// Where episodes begin and end among the rows of a batch.
@@ -77,9 +75,9 @@ impl<'a> Segments<'a> {
     }
 
     fn spread_bits(self, bits: &BooleanBuffer) -> BooleanBuffer {
-        let mut rows = BooleanBufferBuilder::new(self.rows());
+        let mut rows = Bits::with_capacity(self.rows());
         for ((_, length), bit) in self.each().zip(bits.iter()) {
-            rows.append_n(length, bit);
+            rows.fill(length, bit);
         }
         rows.finish()
     }
@@ -92,13 +90,13 @@ impl<'a> Segments<'a> {
     ///
     /// The timesteps are never written out: a window is a run of set bits.
     pub(super) fn window(self, comparison: Comparison, moments: &Int64Array) -> BooleanArray {
-        let mut rows = BooleanBufferBuilder::new(self.rows());
+        let mut rows = Bits::with_capacity(self.rows());
         for ((_, length), &moment) in self.each().zip(moments.values()) {
             let window = inside(comparison, moment, length);
             let (from, to, inside) = (window.start, window.end, comparison != Comparison::NotEqual);
-            rows.append_n(from, !inside);
-            rows.append_n(to - from, inside);
-            rows.append_n(length - to, !inside);
+            rows.fill(from, !inside);
+            rows.fill(to - from, inside);
+            rows.fill(length - to, !inside);
         }
         BooleanArray::new(rows.finish(), self.spread_nulls(moments.nulls()))
     }
@@ -113,11 +111,13 @@ impl<'a> Segments<'a> {
     pub(super) fn within(self, windows: &[(Comparison, Int64Array)]) -> Vec<Stretch> {
         let mut stretches = self.whole();
         for (comparison, moments) in windows {
-            for (episode, (_, rows)) in stretches.iter_mut().enumerate() {
-                let length = self.offsets[episode + 1] - self.offsets[episode];
-                let window = inside(*comparison, moments.value(episode), length);
+            let nulls = moments.nulls();
+            let each = stretches.iter_mut().zip(self.offsets.windows(2)).zip(moments.values()).enumerate();
+            for (episode, (((_, rows), ends), moment)) in each {
+                let window = inside(*comparison, *moment, ends[1] - ends[0]);
                 let (from, to) = (rows.start.max(window.start), rows.end.min(window.end));
-                *rows = if moments.is_null(episode) || from > to { 0..0 } else { from..to };
+                let none = from > to || nulls.is_some_and(|nulls| nulls.is_null(episode));
+                *rows = if none { 0..0 } else { from..to };
             }
         }
         stretches

@@ -3,9 +3,9 @@
 //! Rule: all forms say the same. What asks for single rows may take either; what needs an array asks for one
 //! ([`Column::flat`]), which costs as much as the rows are many.
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, StringArray, UInt8Array, UInt32Array};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, Int32Array, StringArray, UInt8Array, UInt32Array};
 use arrow::compute::{cast, concat, take};
-use arrow::datatypes::{DataType, Int32Type, Int64Type};
+use arrow::datatypes::{ArrowNativeType as _, DataType, Int32Type, Int64Type};
 use arrow::error::ArrowError;
 
 use super::open::text_type;
@@ -102,13 +102,14 @@ impl Column {
 
     /// The texts at some rows, which ascend, of a text column; `None` for null.
     pub(super) fn texts<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = Option<&'a str>> {
-        let mut run = if let Self::Runs(runs) = self { runs.run_of(0) } else { 0 };
-        rows.iter().map(move |row| match self {
-            Self::Runs(runs) => {
+        let runs = if let Self::Runs(runs) = self { Some((runs, DictionaryTexts::of(&runs.values))) } else { None };
+        let mut run = runs.map_or(0, |(runs, _)| runs.run_of(0));
+        rows.iter().map(move |row| match runs {
+            Some((runs, texts)) => {
                 runs.advance(&mut run, *row);
-                text_at(&runs.values, run)
+                texts.at(run)
             }
-            _ => self.text(*row),
+            None => self.text(*row),
         })
     }
 
@@ -215,7 +216,8 @@ impl Runs {
 
     /// The rows at which the text is another one than in the row before; row 0 is none of them.
     pub(super) fn text_changes(&self) -> impl Iterator<Item = usize> + '_ {
-        let differs = |(_, run): &(usize, usize)| text_at(&self.values, *run) != text_at(&self.values, run - 1);
+        let texts = DictionaryTexts::of(&self.values);
+        let differs = move |(_, run): &(usize, usize)| !texts.same(*run, run - 1);
         self.starts().skip(1).filter(differs).map(|(start, _)| start)
     }
 
@@ -274,8 +276,37 @@ pub(super) fn all_within(keys: &[i32], count: usize) -> bool {
 
 /// The text at a row of a dictionary; `None` for null.
 pub(super) fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
-    let column = column.as_dictionary::<Int32Type>();
-    Some(column.values().as_string::<i32>().value(column.key(row)?))
+    DictionaryTexts::of(column).at(row)
+}
+
+/// A dictionary of texts: a key a row, a text a key.
+#[derive(Clone, Copy)]
+struct DictionaryTexts<'a> {
+    keys: &'a Int32Array,
+    texts: &'a StringArray,
+}
+
+impl<'a> DictionaryTexts<'a> {
+    fn of(column: &'a ArrayRef) -> Self {
+        let column = column.as_dictionary::<Int32Type>();
+        Self { keys: column.keys(), texts: column.values().as_string() }
+    }
+
+    fn key(self, row: usize) -> Option<usize> {
+        self.keys.is_valid(row).then(|| self.keys.value(row).as_usize())
+    }
+
+    /// The text at a row; `None` for null.
+    fn at(self, row: usize) -> Option<&'a str> {
+        self.key(row).map(|key| self.texts.value(key))
+    }
+
+    /// Whether two rows have the same text, or both none. A text may have two keys.
+    fn same(self, a: usize, b: usize) -> bool {
+        let (a, b) = (self.key(a), self.key(b));
+        let text = |key: Option<usize>| key.map(|key| self.texts.value(key));
+        a == b || text(a) == text(b)
+    }
 }
 
 fn narrow(row: usize) -> u32 {

@@ -1,135 +1,108 @@
 //! Whether each episode has an id of its own, in bounded memory.
 //!
-//! Rule: exact. Of each episode its id's hash and its place are kept, beyond a fixed number of them in temporary files
-//! ([`crate::base::runs`]). Where two hashes are equal, the ids themselves are read again and compared.
+//! Rule: exact. Of each episode its id's hash is kept, beyond a fixed number of them in temporary files
+//! ([`crate::base::runs`]). Where two hashes are equal, the traces are read again and the ids themselves compared.
 
 use std::collections::{HashMap, HashSet};
-use std::hash::{BuildHasherDefault, DefaultHasher, Hasher};
+use std::hash::{DefaultHasher, Hasher};
 use std::io;
+use std::num::NonZeroUsize;
 
-use super::decode::RowGroup;
 use super::finding::{Code, Finding, TraceError};
 use super::layout::Layout;
 use super::open::TraceFile;
-use super::pass::Episodes;
+use super::pass::{Episodes, Event, pass};
 use super::rules::Located;
-use crate::base::runs::Runs;
+use crate::base::runs::{Record, Runs};
 
-/// Episodes that are held in memory before they are put away.
+/// Hashes that are held in memory before they are put away.
 const MEMORY: usize = 256 * 1024;
 
-/// Where an episode begins. The order is that of files and rows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct Place {
-    file: u32,
-    row_group: u32,
-    row: u64,
+/// The hashes of the ids of the episodes that begin at a row up to `last`; an episode without an id has none.
+pub(super) fn hashes(episodes: &Episodes, last: usize) -> Vec<u64> {
+    let firsts = &episodes.offsets[..episodes.len()];
+    let begins = &firsts[..firsts.partition_point(|row| *row <= last)];
+    episodes.ids(begins).flatten().map(hash).collect()
 }
 
-impl Place {
-    fn new(file: usize, row_group: usize, row: usize) -> Self {
-        let narrow = |index: usize| u32::try_from(index).expect("files and row groups are far fewer than 2^32");
-        Self { file: narrow(file), row_group: narrow(row_group), row: row as u64 }
-    }
-}
-
-/// An episode: its id as a number that two ids nearly never share, and where it begins.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Print {
-    hash: u64,
-    place: Place,
-}
-
-impl Print {
-    const BYTES: usize = 24;
-
-    /// The prints of the episodes that begin at a row up to `last`; an episode without an id has none.
-    pub(super) fn of(episodes: &Episodes, last: usize) -> Vec<Self> {
-        let firsts = &episodes.offsets[..episodes.len()];
-        let begins = &firsts[..firsts.partition_point(|row| *row <= last)];
-        let print = |(id, row): (Option<&str>, &usize)| {
-            let (row_group, row) = episodes.place(*row);
-            Some(Self { hash: hash(id?), place: Place::new(episodes.file, row_group, row) })
-        };
-        episodes.ids(begins).zip(begins).filter_map(print).collect()
-    }
-
-    /// Bytes that compare as prints do.
-    fn to_bytes(self) -> [u8; Self::BYTES] {
-        let mut bytes = [0; Self::BYTES];
-        bytes[..8].copy_from_slice(&self.hash.to_be_bytes());
-        bytes[8..12].copy_from_slice(&self.place.file.to_be_bytes());
-        bytes[12..16].copy_from_slice(&self.place.row_group.to_be_bytes());
-        bytes[16..].copy_from_slice(&self.place.row.to_be_bytes());
-        bytes
-    }
-
-    fn from_bytes(bytes: [u8; Self::BYTES]) -> Self {
-        let mut words =
-            bytes.chunks_exact(4).map(|word| word.iter().fold(0, |value, &byte| value << 8 | u32::from(byte)));
-        let mut word = || words.next().unwrap_or_default();
-        let wide = |high: u32, low: u32| u64::from(high) << 32 | u64::from(low);
-        let hash = wide(word(), word());
-        let place = Place { file: word(), row_group: word(), row: wide(word(), word()) };
-        Self { hash, place }
-    }
-}
-
-/// The hash of a hash.
-#[derive(Default)]
-struct Itself(u64);
-
-impl Hasher for Itself {
-    fn write(&mut self, bytes: &[u8]) {
-        for byte in bytes {
-            self.0 = self.0 << 8 | u64::from(*byte);
-        }
-    }
-
-    fn write_u64(&mut self, hash: u64) {
-        self.0 = hash;
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
-    }
-}
-
-/// The same number for the same id at every run.
+/// A number that two ids nearly never share, the same one at every run.
 fn hash(id: &str) -> u64 {
     let mut hasher = DefaultHasher::new();
     hasher.write(id.as_bytes());
     hasher.finish()
 }
 
-/// The episodes met so far.
+/// The ids of the episodes met so far, as their hashes.
 pub(super) struct Prints {
-    pending: Vec<Print>,
-    /// The hashes of those.
-    met: HashSet<u64, BuildHasherDefault<Itself>>,
-    /// Whether one of them was met twice.
-    again: bool,
+    pending: Vec<u64>,
+    /// What the pending ones begin with.
+    once: Beginnings,
+    /// What two of them begin with: only those can be equal.
+    twice: Beginnings,
+    /// How many there are altogether.
+    count: u64,
     runs: Runs,
     memory: usize,
 }
 
+/// What some hashes begin with, as a set of bits.
+struct Beginnings(Vec<u64>);
+
+impl Beginnings {
+    /// Highest bits of a hash that are looked at: eight times as many values as hashes are pending.
+    const BITS: u32 = 21;
+
+    fn none() -> Self {
+        Self(vec![0; 1 << (Self::BITS - u64::BITS.ilog2())])
+    }
+
+    fn place(hash: u64) -> (usize, u64) {
+        let beginning = hash >> (u64::BITS - Self::BITS);
+        let word = usize::try_from(beginning / 64).expect("a few bits fit");
+        (word, 1 << (beginning % 64))
+    }
+
+    fn contains(&self, hash: u64) -> bool {
+        let (word, bit) = Self::place(hash);
+        self.0[word] & bit != 0
+    }
+
+    fn insert(&mut self, hash: u64) {
+        let (word, bit) = Self::place(hash);
+        self.0[word] |= bit;
+    }
+}
+
+/// What ends the search for the first repeated id.
+enum End {
+    Found(Box<Finding>),
+    /// All episodes have been looked at.
+    Searched,
+    Failed(TraceError),
+}
+
+impl From<TraceError> for End {
+    fn from(error: TraceError) -> Self {
+        Self::Failed(error)
+    }
+}
+
 impl Prints {
     pub(super) fn new() -> Self {
-        Self {
-            pending: Vec::new(),
-            met: HashSet::with_capacity_and_hasher(MEMORY, BuildHasherDefault::default()),
-            again: false,
-            runs: Runs::default(),
-            memory: MEMORY,
-        }
+        let (once, twice) = (Beginnings::none(), Beginnings::none());
+        Self { pending: Vec::new(), once, twice, count: 0, runs: Runs::default(), memory: MEMORY }
     }
 
     /// Takes note of episodes.
-    pub(super) fn add(&mut self, prints: &[Print]) -> Result<(), TraceError> {
-        self.pending.extend_from_slice(prints);
-        for print in prints {
-            self.again |= !self.met.insert(print.hash);
+    pub(super) fn add(&mut self, hashes: &[u64]) -> Result<(), TraceError> {
+        self.pending.extend_from_slice(hashes);
+        for hash in hashes {
+            if self.once.contains(*hash) {
+                self.twice.insert(*hash);
+            }
+            self.once.insert(*hash);
         }
+        self.count += hashes.len() as u64;
         if self.pending.len() >= self.memory {
             self.put_away().map_err(TraceError::Spill)?;
         }
@@ -138,97 +111,74 @@ impl Prints {
 
     fn put_away(&mut self) -> io::Result<()> {
         self.pending.sort_unstable();
-        self.met.clear();
-        self.runs.put_away_records(self.pending.drain(..).map(Print::to_bytes))
+        self.runs.put_away_records(self.pending.drain(..).map(u64::to_be_bytes))
     }
 
-    /// The first episode by file and row whose id an episode before it has, if there is one.
+    /// The first episode by file and row whose id an episode before it has, if there is one among those met.
     pub(super) fn first_repeated(
-        mut self,
+        self,
         files: &[TraceFile],
         layout: &Layout,
     ) -> Result<Option<Box<Finding>>, TraceError> {
-        if self.runs.is_empty() && !self.again {
-            return Ok(None);
+        let count = self.count;
+        let alike = self.alike().map_err(TraceError::Spill)?;
+        // Equal hashes nearly always are equal ids.
+        if alike.is_empty() { Ok(None) } else { first_equal(files, layout, &alike, count) }
+    }
+
+    /// The hashes that are there more than once.
+    fn alike(mut self) -> io::Result<HashSet<u64>> {
+        if self.runs.is_empty() {
+            self.pending.retain(|hash| self.twice.contains(*hash));
+            self.pending.sort_unstable();
+            return Ok(self.pending.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect());
         }
-        self.put_away().map_err(TraceError::Spill)?;
-        let mut alike = alike(self.runs).map_err(TraceError::Spill)?;
-        // Equal hashes nearly always are equal ids, so that hardly more than the first two are read again.
-        alike.sort_unstable_by_key(|places| places[1]);
-        let mut first: Option<Repeated> = None;
-        for places in alike {
-            if first.as_ref().is_some_and(|first| places[1] > first.again) {
-                break;
+        self.put_away()?;
+        let mut merge = self.runs.merge(Vec::new())?;
+        let (mut found, mut before) = (HashSet::new(), None);
+        while let Some(Record { bytes, .. }) = merge.next()? {
+            let bytes = bytes.try_into().map_err(|_| io::Error::from(io::ErrorKind::InvalidData))?;
+            let hash = u64::from_be_bytes(bytes);
+            if before.replace(hash) == Some(hash) {
+                found.insert(hash);
             }
-            let earlier = |found: &Repeated| first.as_ref().is_none_or(|first| found.again < first.again);
-            if let Some(found) = first_equal(&places, |place| id_at(files, layout, place))?.filter(earlier) {
-                first = Some(found);
+        }
+        Ok(found)
+    }
+}
+
+/// Reads the first `count` episodes again, in the order of the files, and compares the ids whose hash is one of these.
+fn first_equal(
+    files: &[TraceFile],
+    layout: &Layout,
+    alike: &HashSet<u64>,
+    count: u64,
+) -> Result<Option<Box<Finding>>, TraceError> {
+    let (mut ids, mut left) = (Ids::default(), count);
+    let name = |file: usize| files[file].name().to_owned();
+    let search = pass(files, layout, NonZeroUsize::MIN, &|episodes| starts(&episodes), |file, event| {
+        let starts = match event {
+            Event::Whole(starts) => starts,
+            Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
+        };
+        for start in starts {
+            if left == 0 {
+                return Err(End::Searched);
+            }
+            left -= 1;
+            if alike.contains(&hash(&start.id))
+                && let Some(Located { finding, .. }) = ids.admit(start, file, name)
+            {
+                return Err(End::Found(Box::new(finding)));
             }
         }
-        Ok(first.map(|Repeated { before, again, id }| {
-            let name = |place: Place| files[place.file as usize].name();
-            let other = (before.file != again.file).then(|| name(before));
-            let groups = (before.row_group as usize, again.row_group as usize);
-            Box::new(repeated(name(again), &id, other, groups))
-        }))
+        Ok(())
+    });
+    match search {
+        Err(End::Found(finding)) => Ok(Some(finding)),
+        Err(End::Failed(error)) => Err(error),
+        Err(End::Searched) | Ok(()) => Ok(None),
     }
-}
-
-/// An id, and the first two episodes that have it.
-struct Repeated {
-    before: Place,
-    again: Place,
-    id: String,
-}
-
-/// The first episode of these places whose id one before it has.
-fn first_equal<E>(places: &[Place], id_at: impl Fn(Place) -> Result<String, E>) -> Result<Option<Repeated>, E> {
-    let mut met: HashMap<String, Place> = HashMap::new();
-    for &again in places {
-        let id = id_at(again)?;
-        if let Some(&before) = met.get(&id) {
-            return Ok(Some(Repeated { before, again, id }));
-        }
-        met.insert(id, again);
-    }
-    Ok(None)
-}
-
-/// The places of episodes whose hashes are equal, ascending, two or more for each such hash.
-fn alike(runs: Runs) -> io::Result<Vec<Vec<Place>>> {
-    let mut merge = runs.merge(Vec::new())?;
-    let mut found: Vec<Vec<Place>> = Vec::new();
-    let (mut hash, mut places) = (0, Vec::new());
-    while let Some(record) = merge.next()? {
-        let record = record.try_into().map_err(|_| io::Error::from(io::ErrorKind::InvalidData))?;
-        let print = Print::from_bytes(record);
-        if print.hash != hash {
-            hash = print.hash;
-            if places.len() > 1 {
-                found.push(std::mem::take(&mut places));
-            }
-            places.clear();
-        }
-        places.push(print.place);
-    }
-    if places.len() > 1 {
-        found.push(places);
-    }
-    Ok(found)
-}
-
-/// Reads the id of an episode again.
-fn id_at(files: &[TraceFile], layout: &Layout, place: Place) -> Result<String, TraceError> {
-    let file = &files[place.file as usize];
-    for rows in RowGroup::open(file, layout, place.row_group as usize).map_err(|finding| TraceError::from(*finding))? {
-        let rows = rows.map_err(|finding| TraceError::from(*finding))?;
-        let row = usize::try_from(place.row).unwrap_or(usize::MAX) - rows.first;
-        if row < rows.len() {
-            return Ok(rows.episode(row).unwrap_or_default().to_owned());
-        }
-    }
-    let finding = Finding::new(Code::CorruptData, file.name(), "the same rows as before", "fewer");
-    Err(finding.in_row_group(place.row_group as usize).into())
 }
 
 /// That an id was there before: in another file if `other` names it; `groups` are the row groups, before and again.
@@ -284,40 +234,56 @@ pub(super) fn starts(episodes: &Episodes) -> Vec<Start> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::HashSet;
+    use std::collections::BTreeMap;
 
     use proptest::collection::vec;
     use proptest::prelude::*;
 
     use super::*;
+    use crate::trace::inputs::resolve;
+    use crate::trace::open::TraceSet;
 
     proptest! {
         #[test]
-        fn alike_are_those_of_one_hash_and_only_they(hashes in vec(0..12_u64, 0..30), memory in 1_usize..8) {
+        fn alike_are_the_hashes_that_come_twice_and_only_they(hashes in vec((0..3_u64, 0..4_u64).prop_map(|(high, low)| high << 60 | low), 0..30), memory in 1_usize..40) {
             let mut prints = Prints { memory, ..Prints::new() };
-            let mut expected: HashMap<u64, Vec<Place>> = HashMap::new();
-            for (row, &hash) in hashes.iter().enumerate() {
-                let place = Place::new(row % 2, row % 3, row);
-                expected.entry(hash).or_default().push(place);
-                prints.add(&[Print { hash, place }]).unwrap();
+            let mut expected: BTreeMap<u64, usize> = BTreeMap::new();
+            for some in hashes.chunks(3) {
+                prints.add(some).unwrap();
+                some.iter().for_each(|hash| *expected.entry(*hash).or_default() += 1);
             }
-            for places in expected.values_mut() {
-                places.sort();
-            }
-            let expected: HashSet<_> = expected.into_values().filter(|places| places.len() > 1).collect();
-            prints.put_away().unwrap();
-            let found = alike(prints.runs).unwrap();
-            prop_assert_eq!(found.into_iter().collect::<HashSet<_>>(), expected);
+            prop_assert_eq!(prints.count, hashes.len() as u64);
+            let expected: HashSet<u64> = expected.into_iter().filter(|(_, times)| *times > 1).map(|(hash, _)| hash).collect();
+            prop_assert_eq!(prints.alike().unwrap(), expected);
         }
     }
 
     #[test]
     fn equal_hashes_of_different_ids_are_no_repetition() {
-        let ids = ["a", "b", "c", "b", "a"];
-        let places: Vec<Place> = (0..ids.len()).map(|row| Place::new(0, 0, row)).collect();
-        let id_at = |place: Place| Ok::<_, ()>(ids[usize::try_from(place.row).unwrap()].to_owned());
-        let found = first_equal(&places, id_at).unwrap().unwrap();
-        assert_eq!((found.before, found.again, found.id.as_str()), (places[1], places[3], "b"));
-        assert!(first_equal(&places[..3], id_at).unwrap().is_none());
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper").to_owned();
+        let inputs = resolve(&[folder], std::io::empty()).unwrap();
+        let set = TraceSet::open(&inputs).unwrap();
+        let layout = Layout::new(&set, [], []).unwrap();
+        let mut all = HashSet::new();
+        pass::<_, TraceError>(
+            set.files(),
+            &layout,
+            NonZeroUsize::MIN,
+            &|episodes| hashes(&episodes, usize::MAX),
+            |_, event| {
+                let Event::Whole(hashes) = event else { panic!("a fault in a fixture") };
+                all.extend(hashes);
+                Ok(())
+            },
+        )
+        .unwrap();
+        assert_eq!(all.len(), 840);
+        // As if they were alike: the ids themselves are compared, those of the first file twice.
+        assert!(first_equal(set.files(), &layout, &all, 840).unwrap().is_none());
+        let twice = TraceSet::open(&[&inputs[..1], &inputs].concat()).unwrap();
+        let found = first_equal(twice.files(), &layout, &all, 861).unwrap().unwrap();
+        assert_eq!(found.code, Code::EpisodeInTwoFiles);
+        // Only episodes that were met the first time count.
+        assert!(first_equal(twice.files(), &layout, &all, 21).unwrap().is_none());
     }
 }

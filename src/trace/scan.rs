@@ -11,7 +11,7 @@ use arrow::datatypes::{Field, Schema};
 use arrow::error::ArrowError;
 
 use super::finding::TraceError;
-use super::ids::{Print, Prints};
+use super::ids::{Prints, hashes};
 use super::layout::Layout;
 use super::open::TraceSet;
 use super::pass::{Episodes, Event, pass};
@@ -116,20 +116,20 @@ impl TraceSet {
         let checked = |episodes: Episodes| {
             let fault = rules.check(self.files()[episodes.file].name(), &episodes).into_iter().next();
             let last = fault.as_ref().map_or(usize::MAX, |fault| fault.row);
-            let prints = Print::of(&episodes, last);
+            let ids = hashes(&episodes, last);
             let (count, steps) = (episodes.len(), episodes.columns[0].len());
             let outcome = match fault {
                 Some(fault) => Outcome::Fault(fault),
                 None => Outcome::Done(shape.batch(episodes).map_err(E::from).and_then(&work)),
             };
-            Checked { prints, count, steps, outcome }
+            Checked { ids, count, steps, outcome }
         };
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
                 Event::Whole(checked) => checked,
                 Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
             };
-            prints.add(&checked.prints)?;
+            prints.add(&checked.ids)?;
             summary.episodes += checked.count as u64;
             summary.steps += checked.steps as u64;
             match checked.outcome {
@@ -147,8 +147,8 @@ impl TraceSet {
 
 /// What a worker found out about some episodes.
 struct Checked<T, E> {
-    /// The episodes up to the fault, if there is one.
-    prints: Vec<Print>,
+    /// The hashes of the ids of the episodes up to the fault, if there is one.
+    ids: Vec<u64>,
     count: usize,
     steps: usize,
     outcome: Outcome<T, E>,

@@ -1,8 +1,10 @@
 //! The episode table as Parquet, the definitions in its footer.
 
 use std::io::Write;
+use std::iter;
+use std::ops::Range;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::{self, Receiver, SyncSender};
 
 use arrow::array::{
     Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Array, RecordBatch, StringBuilder,
@@ -11,11 +13,13 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::ChunkReader;
+use parquet::file::writer::SerializedFileWriter;
 
 use super::FormatError;
 use super::csv::{KEYS, check_unique};
@@ -39,8 +43,13 @@ pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 ///
 /// `folders` are columns that stand in the names of the file's folders.
 pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
-    let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
-    let Ok(Ok(metadata)) = footer else { return false };
+    // Its key-value metadata and schema are enough.
+    let options = ParquetMetaDataOptions::new()
+        .with_column_stats_policy(ParquetStatisticsPolicy::SkipAll)
+        .with_encoding_stats_policy(ParquetStatisticsPolicy::SkipAll)
+        .with_size_stats_policy(ParquetStatisticsPolicy::SkipAll);
+    let reader = ParquetMetaDataReader::new().with_metadata_options(Some(options));
+    let Ok(Ok(metadata)) = contained(|| reader.parse_and_finish(file)) else { return false };
     if footer::value(metadata.file_metadata(), KIND_KEY).is_some() {
         return footer::value(metadata.file_metadata(), KIND_KEY).as_deref() == Some(SCORES_KIND);
     }
@@ -61,10 +70,13 @@ const ROW_GROUP_ROWS: usize = 64 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 8 * 1024;
 
-/// Batches that wait for the encoder.
+/// Batches that wait for an encoder.
 const WAITING: usize = 4;
 
-/// Writes a table as Parquet: rows are gathered here and encoded on a thread of its own.
+/// The columns that one encoder takes; another one takes those behind them. Each has about half of the work.
+const TEXTS: Range<usize> = 0..3;
+
+/// Writes a table as Parquet: rows are gathered here and encoded on threads of their own.
 ///
 /// `rows` gives each row to the function that it is called with.
 pub(super) fn write<E: From<FormatError>>(
@@ -94,7 +106,7 @@ pub(super) fn write<E: From<FormatError>>(
         send(&mut gathered).map(drop).map_err(E::from)
     };
     let (given, written) =
-        beside("parquet", WAITING, |batches| encode(parquet, batches), feed).map_err(FormatError::Thread)?;
+        beside("parquet", WAITING, |batches| encode(parquet, &batches), feed).map_err(FormatError::Thread)?;
     given?;
     written?.close().map_err(FormatError::from)?;
     Ok(())
@@ -102,13 +114,66 @@ pub(super) fn write<E: From<FormatError>>(
 
 /// Encodes batches until there are no more; what comes back is to be closed, unless a row was lost.
 fn encode<W: Write + Send>(
-    mut parquet: ArrowWriter<W>,
-    batches: Receiver<RecordBatch>,
-) -> Result<ArrowWriter<W>, FormatError> {
-    for batch in batches {
-        parquet.write(&batch)?;
+    parquet: ArrowWriter<W>,
+    batches: &Receiver<RecordBatch>,
+) -> Result<SerializedFileWriter<W>, FormatError> {
+    let (mut file, factory) = parquet.into_serialized_writer()?;
+    let others = TEXTS.end..file.schema_descr().num_columns();
+    let (give, numbers) = mpsc::channel();
+    let factory = &factory;
+    let encode_numbers = move |batches: Receiver<RecordBatch>| {
+        let gone = |_| ParquetError::General("nobody takes the encoded columns".into());
+        encode_columns(factory, &others, batches, |chunks| give.send(chunks).map_err(gone))
+    };
+    let encode_texts = |pass_on: SyncSender<RecordBatch>| {
+        let mut pass_on = Some(pass_on);
+        // The other encoder is told at once when there are no more: its last columns are waited for here.
+        let batches = iter::from_fn(|| {
+            let batch = batches.recv().ok();
+            pass_on = pass_on.take().filter(|next| batch.clone().is_some_and(|batch| next.send(batch).is_ok()));
+            batch
+        });
+        encode_columns(factory, &TEXTS, batches, |texts| {
+            // Why there are none, the other encoder knows.
+            let Ok(numbers) = numbers.recv() else { return Ok(()) };
+            let mut group = file.next_row_group()?;
+            texts.into_iter().chain(numbers).try_for_each(|chunk| chunk.append_to_row_group(&mut group))?;
+            group.close().map(drop)
+        })
+    };
+    let (texts, numbers) = beside("parquet", WAITING, encode_numbers, encode_texts).map_err(FormatError::Thread)?;
+    texts?;
+    numbers?;
+    Ok(file)
+}
+
+/// Encodes some columns of batches and gives `done` their chunks, row group by row group.
+fn encode_columns(
+    factory: &ArrowRowGroupWriterFactory,
+    columns: &Range<usize>,
+    batches: impl IntoIterator<Item = RecordBatch>,
+    mut done: impl FnMut(Vec<ArrowColumnChunk>) -> Result<(), ParquetError>,
+) -> Result<(), ParquetError> {
+    let mut batches = batches.into_iter().filter(|batch| batch.num_rows() > 0).peekable();
+    for group in 0.. {
+        if batches.peek().is_none() {
+            break;
+        }
+        let mut writers: Vec<_> = factory.create_column_writers(group)?.drain(columns.clone()).collect();
+        let mut rows = 0;
+        while rows < ROW_GROUP_ROWS
+            && let Some(batch) = batches.next()
+        {
+            for (writer, at) in writers.iter_mut().zip(columns.clone()) {
+                for leaf in compute_leaves(batch.schema_ref().field(at), batch.column(at))? {
+                    writer.write(&leaf)?;
+                }
+            }
+            rows += batch.num_rows();
+        }
+        done(writers.into_iter().map(ArrowColumnWriter::close).collect::<Result<_, _>>()?)?;
     }
-    Ok(parquet)
+    Ok(())
 }
 
 fn properties(header: &Header) -> Result<WriterProperties, FormatError> {
@@ -123,17 +188,15 @@ fn properties(header: &Header) -> Result<WriterProperties, FormatError> {
     ];
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
-        // No two episodes have the same id.
-        .set_column_dictionary_enabled(KEYS[0].into(), false)
-        .set_column_statistics_enabled(KEYS[0].into(), EnabledStatistics::None)
-        .set_statistics_enabled(EnabledStatistics::Chunk)
+        // Who reads scores reads all of them.
+        .set_statistics_enabled(EnabledStatistics::None)
+        // No two episodes have the same id, names stand in order, and small numbers take few bits anyway.
+        .set_dictionary_enabled(false)
+        .set_write_batch_size(GATHERED_ROWS)
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_key_value_metadata(Some(metadata));
-    // Small numbers take few bits without a dictionary, too.
     for name in header.metrics.iter().map(String::as_str).chain([KEYS[3], KEYS[4]]) {
-        properties = properties
-            .set_column_dictionary_enabled(name.into(), false)
-            .set_column_encoding(name.into(), Encoding::DELTA_BINARY_PACKED);
+        properties = properties.set_column_encoding(name.into(), Encoding::DELTA_BINARY_PACKED);
     }
     Ok(properties.build())
 }
@@ -168,9 +231,13 @@ impl Numbers {
         self.valid.push(number.is_some());
     }
 
+    /// All of them; room is made for as many.
     fn take(&mut self) -> Int64Array {
-        let Self { values, valid } = std::mem::take(self);
-        Int64Array::new(values.into(), nulls_of(&valid))
+        let count = self.values.len();
+        let values = std::mem::replace(&mut self.values, Vec::with_capacity(count));
+        let numbers = Int64Array::new(values.into(), nulls_of(&self.valid));
+        self.valid.clear();
+        numbers
     }
 }
 
@@ -203,12 +270,19 @@ impl Gathered {
     /// The columns in the order of the schema; none is left behind.
     fn take(&mut self) -> Vec<ArrayRef> {
         let mut columns: Vec<ArrayRef> = Vec::new();
-        columns.extend(self.texts.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef));
+        columns.extend(self.texts.iter_mut().map(taken));
         columns.extend([&mut self.seed, &mut self.run].map(|column| Arc::new(column.finish()) as ArrayRef));
-        columns.extend(self.labels.iter_mut().map(|column| Arc::new(column.finish()) as ArrayRef));
+        columns.extend(self.labels.iter_mut().map(taken));
         columns.extend(self.metrics.iter_mut().map(|column| Arc::new(column.take()) as ArrayRef));
         columns
     }
+}
+
+/// All texts of a column; room is made for as many.
+fn taken(column: &mut StringBuilder) -> ArrayRef {
+    let texts = column.finish();
+    *column = StringBuilder::with_capacity(texts.len(), texts.value_data().len());
+    Arc::new(texts)
 }
 
 pub(super) fn read(

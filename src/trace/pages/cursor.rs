@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::sync::Arc;
 
-use arrow::array::{ArrayRef, BooleanArray, BooleanBufferBuilder};
+use arrow::array::{ArrayRef, BooleanArray};
 use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::DataType;
 use bytes::Bytes;
@@ -16,7 +16,7 @@ use super::Unfit;
 use super::chunk::pages;
 use super::dictionary::Dictionary;
 use super::hybrid::{Hybrid, Number, Span};
-use crate::base::bits;
+use crate::base::bits::Bits;
 
 /// How rows are to be held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,7 +124,7 @@ impl Cursor {
     }
 
     fn truths(&mut self, count: usize) -> Result<Column, Unfit> {
-        let mut bits = BooleanBufferBuilder::new(count);
+        let mut bits = Bits::with_capacity(count);
         let nulls = self.rows(count, |stored, _, values| stored.bits(values, &mut bits))?;
         let bits = bits.finish();
         let bits = nulls.as_ref().map_or_else(|| bits.clone(), |nulls| spread_bits(&bits, nulls.inner()));
@@ -158,7 +158,7 @@ impl Cursor {
         count: usize,
         mut take: impl FnMut(&mut Stored, usize, usize) -> Result<(), Unfit>,
     ) -> Result<Option<NullBuffer>, Unfit> {
-        let mut nulls = self.optional.then(|| BooleanBufferBuilder::new(count));
+        let mut nulls = self.optional.then(|| Bits::with_capacity(count));
         let mut left = count;
         while left > 0 {
             let page = self.page()?;
@@ -175,7 +175,7 @@ impl Cursor {
         if self.unread == 0 && self.page.as_ref().is_none_or(|page| page.rows == 0) && self.next_page()?.is_some() {
             return Err(Unfit);
         }
-        Ok(nulls.map(|mut nulls| NullBuffer::new(nulls.finish())).filter(|nulls| nulls.null_count() > 0))
+        Ok(nulls.map(|nulls| NullBuffer::new(nulls.finish())).filter(|nulls| nulls.null_count() > 0))
     }
 
     /// The page under way, which has rows left.
@@ -283,14 +283,14 @@ impl Stored {
         Ok(())
     }
 
-    fn bits(&mut self, mut count: usize, bits: &mut BooleanBufferBuilder) -> Result<(), Unfit> {
+    fn bits(&mut self, mut count: usize, bits: &mut Bits) -> Result<(), Unfit> {
         match self {
             Self::Bits(data, at) => {
                 let end = *at + count;
                 if end > data.len() * 8 {
                     return Err(Unfit);
                 }
-                bits.append_packed_range(*at..end, data);
+                bits.append(data, *at, count);
                 *at = end;
             }
             Self::Hybrid(hybrid) => {
@@ -320,22 +320,21 @@ impl Stretches {
 }
 
 /// Adds numbers of one bit: how many, and how many of them are 1.
-fn append(span: Span<'_>, out: &mut BooleanBufferBuilder) -> (usize, usize) {
+fn append(span: Span<'_>, out: &mut Bits) -> (usize, usize) {
     match span {
         Span::Same { value, count } => {
-            out.append_n(count, value & 1 == 1);
+            out.fill(count, value & 1 == 1);
             (count, if value & 1 == 1 { count } else { 0 })
         }
         Span::Packed(packed) => {
             let (data, start) = packed.bits();
-            out.append_packed_range(start..start + packed.count, data);
-            (packed.count, bits::count(data, start, packed.count))
+            (packed.count, out.append(data, start, packed.count))
         }
     }
 }
 
 /// Which of the next rows have a value, and how many do.
-fn validity(levels: &mut Hybrid, count: usize, nulls: &mut BooleanBufferBuilder) -> Result<usize, Unfit> {
+fn validity(levels: &mut Hybrid, count: usize, nulls: &mut Bits) -> Result<usize, Unfit> {
     let (mut left, mut valid) = (count, 0);
     while left > 0 {
         let (rows, ones) = append(levels.span(left)?, nulls);
@@ -369,13 +368,13 @@ fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {
 
 /// The bits of rows that have one, at their rows.
 fn spread_bits(bits: &BooleanBuffer, valid: &BooleanBuffer) -> BooleanBuffer {
-    let mut spread = BooleanBufferBuilder::new(valid.len());
-    let mut taken = 0;
+    let mut spread = Bits::with_capacity(valid.len());
+    let mut taken = bits.offset();
     for (start, end) in valid.set_slices() {
-        spread.append_n(start - spread.len(), false);
-        spread.append_buffer(&bits.slice(taken, end - start));
+        spread.fill(start - spread.count(), false);
+        spread.append(bits.values(), taken, end - start);
         taken += end - start;
     }
-    spread.append_n(valid.len() - spread.len(), false);
+    spread.fill(valid.len() - spread.count(), false);
     spread.finish()
 }

@@ -12,21 +12,16 @@ pub(super) struct Hybrid {
     data: Bytes,
     at: usize,
     width: usize,
-    left: Left,
+    run: Run,
+    /// What is left of the run.
+    count: usize,
 }
 
-/// What is left of the run under way.
 #[derive(Clone, Copy)]
-enum Left {
-    Same {
-        value: u32,
-        count: usize,
-    },
-    /// `count` numbers from this bit of the data.
-    Packed {
-        bit: usize,
-        count: usize,
-    },
+enum Run {
+    Same(u32),
+    /// Packed numbers from this bit of the data.
+    Packed(usize),
 }
 
 /// Some numbers, one after the other.
@@ -50,25 +45,21 @@ impl Hybrid {
         if width > 32 {
             return Err(Unfit);
         }
-        Ok(Self { data, at: 0, width, left: Left::Same { value: 0, count: 0 } })
+        Ok(Self { data, at: 0, width, run: Run::Same(0), count: 0 })
     }
 
     /// The next numbers, `most` of them at most and one at least.
     #[inline]
     pub(super) fn span(&mut self, most: usize) -> Result<Span<'_>, Unfit> {
-        while matches!(self.left, Left::Same { count: 0, .. } | Left::Packed { count: 0, .. }) {
-            self.left = self.run()?;
+        while self.count == 0 {
+            self.next_run()?;
         }
-        Ok(match &mut self.left {
-            Left::Same { value, count: left } => {
-                let count = most.min(*left);
-                *left -= count;
-                Span::Same { value: *value, count }
-            }
-            Left::Packed { bit, count: left } => {
-                let count = most.min(*left);
+        let count = most.min(self.count);
+        self.count -= count;
+        Ok(match &mut self.run {
+            Run::Same(value) => Span::Same { value: *value, count },
+            Run::Packed(bit) => {
                 let packed = Packed { data: &self.data, bit: *bit, width: self.width, count };
-                *left -= count;
                 *bit += count * self.width;
                 Span::Packed(packed)
             }
@@ -99,43 +90,39 @@ impl Hybrid {
         Ok(())
     }
 
-    fn run(&mut self) -> Result<Left, Unfit> {
-        let header = self.varint()?;
+    fn next_run(&mut self) -> Result<(), Unfit> {
+        let data: &[u8] = &self.data;
+        let (header, from) = varint(data, self.at)?;
         let count = usize::try_from(header >> 1).map_err(|_| Unfit)?;
         if header & 1 == 0 {
-            let bytes = self.width.div_ceil(8);
-            let stored = self.data.get(self.at..self.at + bytes).ok_or(Unfit)?;
-            let value = stored.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte));
-            self.at += bytes;
-            return Ok(Left::Same { value, count });
+            let stored = data.get(from..from + self.width.div_ceil(8)).ok_or(Unfit)?;
+            self.run = Run::Same(stored.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte)));
+            (self.at, self.count) = (from + stored.len(), count);
+            return Ok(());
         }
         // Groups of eight. A writer may cut the last one short where the data end.
         let stored = count.checked_mul(self.width).ok_or(Unfit)?;
-        let there = self.data.len() - self.at;
+        let there = data.len() - from;
         let (bytes, count) =
             if stored <= there { (stored, count.saturating_mul(8)) } else { (there, there * 8 / self.width) };
-        let left = Left::Packed { bit: self.at * 8, count };
-        self.at += bytes;
-        if count == 0 { Err(Unfit) } else { Ok(left) }
+        self.run = Run::Packed(from * 8);
+        (self.at, self.count) = (from + bytes, count);
+        if count == 0 { Err(Unfit) } else { Ok(()) }
     }
+}
 
-    fn varint(&mut self) -> Result<u64, Unfit> {
-        // Most are one byte.
-        if let Some(byte @ ..0x80) = self.data.get(self.at) {
-            self.at += 1;
-            return Ok(u64::from(*byte));
+/// The number of variable length at a place, and the place behind it.
+fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unfit> {
+    let mut value = 0;
+    for shift in (0..35).step_by(7) {
+        let byte = *data.get(at).ok_or(Unfit)?;
+        at += 1;
+        value |= u64::from(byte & 0x7f) << shift;
+        if byte & 0x80 == 0 {
+            return Ok((value, at));
         }
-        let mut value = 0;
-        for shift in (0..35).step_by(7) {
-            let byte = *self.data.get(self.at).ok_or(Unfit)?;
-            self.at += 1;
-            value |= u64::from(byte & 0x7f) << shift;
-            if byte & 0x80 == 0 {
-                return Ok(value);
-            }
-        }
-        Err(Unfit)
     }
+    Err(Unfit)
 }
 
 /// Numbers of which a byte boundary follows.

@@ -90,6 +90,8 @@ class Bench:
                 if name in notes or (name == "pandas" and turn > 1):
                     continue
                 out = self.data / f"out-{re.sub('[^a-z]', '', name.lower())}.parquet"
+                # Some file systems take longer where there is a file to replace.
+                out.unlink(missing_ok=True)
                 try:
                     run = contenders[name](folder, out)
                 except RuntimeError as error:

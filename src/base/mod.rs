@@ -1,4 +1,4 @@
-//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs, bits.
+//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs, repeats, bits.
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
@@ -11,6 +11,7 @@ pub mod near;
 pub mod number;
 pub mod palette;
 pub mod ratio;
+pub mod repeats;
 pub mod runs;
 pub mod temporary;
 pub mod visible;

@@ -74,11 +74,6 @@ impl Run {
 pub struct Runs(Vec<File>);
 
 impl Runs {
-    /// Whether nothing was put away.
-    pub fn is_empty(&self) -> bool {
-        self.0.is_empty()
-    }
-
     /// Puts runs away, as one.
     ///
     /// # Errors
@@ -86,16 +81,6 @@ impl Runs {
     pub fn put_away(&mut self, runs: Vec<Run>) -> io::Result<()> {
         let run = merged_into_one(heads_in_memory(runs))?;
         self.add(run)
-    }
-
-    /// Puts records without a title away, none of which comes before the one ahead of it.
-    ///
-    /// # Errors
-    /// When there is no place for temporary files, or no more of it.
-    pub fn put_away_records<R: AsRef<[u8]>>(&mut self, records: impl IntoIterator<Item = R>) -> io::Result<()> {
-        let mut out = Out::new()?;
-        records.into_iter().try_for_each(|record| out.put(record.as_ref(), 0))?;
-        self.add(out.finish()?)
     }
 
     fn add(&mut self, run: File) -> io::Result<()> {
@@ -165,14 +150,24 @@ impl Out {
 
 /// The records of some runs, merged.
 pub struct Merge {
-    /// The runs that are not behind yet.
+    /// The runs; one that is behind stays where it is.
     heads: Vec<Head>,
     /// The title of the records that are handed out.
     title: Vec<u8>,
-    /// The head that was handed out last.
+    /// Those of the heads that stand at that title.
+    front: Vec<Front>,
+    /// The place in front of the head that was handed out last.
     taken: Option<usize>,
-    /// What the first record of every other head under this title begins with, at the least.
+    /// What the records of all others in front begin with, at the least.
     others: u64,
+}
+
+/// A head whose record may be the next one.
+#[derive(Clone, Copy)]
+struct Front {
+    head: usize,
+    /// The first eight bytes of its record as a number, which decides most comparisons; zeros where there are fewer.
+    prefix: u64,
 }
 
 /// A record, handed out.
@@ -185,14 +180,11 @@ pub struct Record<'a> {
 }
 
 impl Merge {
-    fn of(sources: Vec<Head>) -> io::Result<Self> {
-        let mut heads = Vec::with_capacity(sources.len());
-        for mut head in sources {
-            if head.advance()? != Step::End {
-                heads.push(head);
-            }
+    fn of(mut heads: Vec<Head>) -> io::Result<Self> {
+        for head in &mut heads {
+            head.advance()?;
         }
-        Ok(Self { heads, title: Vec::new(), taken: None, others: 0 })
+        Ok(Self { heads, title: Vec::new(), front: Vec::new(), taken: None, others: 0 })
     }
 
     /// The next record.
@@ -202,47 +194,50 @@ impl Merge {
     #[expect(clippy::should_implement_trait, reason = "an iterator cannot lend its items")]
     pub fn next(&mut self) -> io::Result<Option<Record<'_>>> {
         if let Some(taken) = self.taken {
-            let head = &mut self.heads[taken];
-            match head.advance()? {
+            let Front { head, prefix } = &mut self.front[taken];
+            let at = *head;
+            if self.heads[at].advance()? == Step::Record {
+                *prefix = self.heads[at].prefix();
                 // Most records come from the run that the one before came from.
-                Step::Record if head.prefix < self.others => {
-                    return Ok(Some(Record { title: None, bytes: self.heads[taken].record() }));
+                if *prefix < self.others {
+                    return Ok(Some(Record { title: None, bytes: self.heads[at].record() }));
                 }
-                Step::Record => {}
-                Step::Title => head.current = false,
-                Step::End => drop(self.heads.swap_remove(taken)),
+            } else {
+                self.front.swap_remove(taken);
             }
         }
-        let mut new = false;
-        (self.taken, self.others) = first(&self.heads);
-        if self.taken.is_none()
-            && let Some(title) = self.heads.iter().map(|head| &head.title).min()
-        {
-            new = true;
+        let new = self.front.is_empty();
+        if new {
+            let left = || self.heads.iter().enumerate().filter(|(_, head)| !head.over);
+            let Some(title) = left().map(|(_, head)| &head.title).min() else {
+                self.taken = None;
+                return Ok(None);
+            };
             self.title.clone_from(title);
-            self.heads.iter_mut().for_each(|head| head.current = head.title == self.title);
-            (self.taken, self.others) = first(&self.heads);
+            let front = left().filter(|(_, head)| head.title == self.title);
+            self.front.extend(front.map(|(at, head)| Front { head: at, prefix: head.prefix() }));
         }
-        let record = |taken: usize| Record { title: new.then_some(&self.title), bytes: self.heads[taken].record() };
-        Ok(self.taken.map(record))
+        let (first, others) = self.first();
+        (self.taken, self.others) = (Some(first), others);
+        let bytes = self.heads[self.front[first].head].record();
+        Ok(Some(Record { title: new.then_some(&self.title), bytes }))
     }
-}
 
-/// The head of those under the current title whose record comes first, and what those of the others begin with, at the
-/// least.
-fn first(heads: &[Head]) -> (Option<usize>, u64) {
-    let (mut first, mut others): (Option<usize>, u64) = (None, u64::MAX);
-    for (at, head) in heads.iter().enumerate().filter(|(_, head)| head.current) {
-        match first {
-            None => first = Some(at),
-            Some(best) if head.comes_before(&heads[best]) => {
-                others = heads[best].prefix;
-                first = Some(at);
+    /// The place in front whose record comes first, and what those of the others begin with, at the least.
+    fn first(&self) -> (usize, u64) {
+        let record = |front: &Front| self.heads[front.head].record();
+        let (mut first, mut others) = (0, u64::MAX);
+        for (at, front) in self.front.iter().enumerate().skip(1) {
+            let best = &self.front[first];
+            if front.prefix < best.prefix || front.prefix == best.prefix && record(front) < record(best) {
+                others = best.prefix;
+                first = at;
+            } else {
+                others = others.min(front.prefix);
             }
-            Some(_) => others = others.min(head.prefix),
         }
+        (first, others)
     }
-    (first, others)
 }
 
 /// A run, and where the merge is in it.
@@ -250,10 +245,8 @@ struct Head {
     source: Source,
     /// The title of its record.
     title: Vec<u8>,
-    /// Whether that is the one whose records are handed out.
-    current: bool,
-    /// The first eight bytes of its record as a number, which decides most comparisons; zeros where there are fewer.
-    prefix: u64,
+    /// Whether there is no record left.
+    over: bool,
 }
 
 enum Source {
@@ -281,7 +274,7 @@ enum Step {
 
 impl Head {
     fn of(source: Source) -> Self {
-        Self { source, title: Vec::new(), current: false, prefix: 0 }
+        Self { source, title: Vec::new(), over: false }
     }
 
     fn record(&self) -> &[u8] {
@@ -291,8 +284,14 @@ impl Head {
         }
     }
 
-    fn comes_before(&self, other: &Self) -> bool {
-        self.prefix < other.prefix || self.prefix == other.prefix && self.record() < other.record()
+    fn prefix(&self) -> u64 {
+        let record = self.record();
+        if let Some(bytes) = record.first_chunk() {
+            return u64::from_be_bytes(*bytes);
+        }
+        let mut bytes = [0; 8];
+        bytes[..record.len()].copy_from_slice(record);
+        u64::from_be_bytes(bytes)
     }
 
     /// Goes on to the next record.
@@ -314,9 +313,7 @@ impl Head {
                 step
             }
         };
-        if step != Step::End {
-            self.prefix = prefix(self.record());
-        }
+        self.over = step == Step::End;
         Ok(step)
     }
 }
@@ -339,15 +336,6 @@ fn read(rest: &mut BufReader<File>, title: &mut Vec<u8>, record: &mut Vec<u8>) -
         }
         step = Step::Title;
     }
-}
-
-fn prefix(record: &[u8]) -> u64 {
-    if let Some(bytes) = record.first_chunk() {
-        return u64::from_be_bytes(*bytes);
-    }
-    let mut bytes = [0; 8];
-    bytes[..record.len()].copy_from_slice(record);
-    u64::from_be_bytes(bytes)
 }
 
 #[cfg(test)]
@@ -395,12 +383,6 @@ mod tests {
         for chunk in records.chunks(in_memory) {
             if pending.len() == at_a_time {
                 runs.put_away(std::mem::take(&mut pending)).unwrap();
-            }
-            if chunk.iter().all(|(title, _)| title.is_empty()) {
-                let mut chunk: Vec<&[u8]> = chunk.iter().map(|(_, record)| record.as_slice()).collect();
-                chunk.sort_unstable();
-                runs.put_away_records(chunk).unwrap();
-                continue;
             }
             pending.push(run(chunk));
         }

@@ -1,11 +1,10 @@
 //! Whether each episode has an id of its own, in bounded memory.
 //!
-//! Rule: exact. Of each episode its id's hash is kept, beyond a fixed number of them in temporary files
-//! ([`crate::base::runs`]). Where two hashes are equal, the traces are read again and the ids themselves compared.
+//! Rule: exact. Of each episode its id's hash is kept, beyond a fixed number of them in a temporary file
+//! ([`crate::base::repeats`]). Where two hashes are equal, the traces are read again and the ids themselves compared.
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hasher};
-use std::io;
 use std::num::NonZeroUsize;
 
 use super::finding::{Code, Finding, TraceError};
@@ -13,10 +12,7 @@ use super::layout::Layout;
 use super::open::TraceFile;
 use super::pass::{Episodes, Event, pass};
 use super::rules::Located;
-use crate::base::runs::{Record, Runs};
-
-/// Hashes that are held in memory before they are put away.
-const MEMORY: usize = 256 * 1024;
+use crate::base::repeats::Repeats;
 
 /// The hashes of the ids of the episodes that begin at a row up to `last`; an episode without an id has none.
 pub(super) fn hashes(episodes: &Episodes, last: usize) -> Vec<u64> {
@@ -33,44 +29,11 @@ fn hash(id: &str) -> u64 {
 }
 
 /// The ids of the episodes met so far, as their hashes.
+#[derive(Default)]
 pub(super) struct Prints {
-    pending: Vec<u64>,
-    /// What the pending ones begin with.
-    once: Beginnings,
-    /// What two of them begin with: only those can be equal.
-    twice: Beginnings,
-    /// How many there are altogether.
+    hashes: Repeats,
+    /// How many there are.
     count: u64,
-    runs: Runs,
-    memory: usize,
-}
-
-/// What some hashes begin with, as a set of bits.
-struct Beginnings(Vec<u64>);
-
-impl Beginnings {
-    /// Highest bits of a hash that are looked at: eight times as many values as hashes are pending.
-    const BITS: u32 = 21;
-
-    fn none() -> Self {
-        Self(vec![0; 1 << (Self::BITS - u64::BITS.ilog2())])
-    }
-
-    fn place(hash: u64) -> (usize, u64) {
-        let beginning = hash >> (u64::BITS - Self::BITS);
-        let word = usize::try_from(beginning / 64).expect("a few bits fit");
-        (word, 1 << (beginning % 64))
-    }
-
-    fn contains(&self, hash: u64) -> bool {
-        let (word, bit) = Self::place(hash);
-        self.0[word] & bit != 0
-    }
-
-    fn insert(&mut self, hash: u64) {
-        let (word, bit) = Self::place(hash);
-        self.0[word] |= bit;
-    }
 }
 
 /// What ends the search for the first repeated id.
@@ -88,30 +51,10 @@ impl From<TraceError> for End {
 }
 
 impl Prints {
-    pub(super) fn new() -> Self {
-        let (once, twice) = (Beginnings::none(), Beginnings::none());
-        Self { pending: Vec::new(), once, twice, count: 0, runs: Runs::default(), memory: MEMORY }
-    }
-
     /// Takes note of episodes.
     pub(super) fn add(&mut self, hashes: &[u64]) -> Result<(), TraceError> {
-        self.pending.extend_from_slice(hashes);
-        for hash in hashes {
-            if self.once.contains(*hash) {
-                self.twice.insert(*hash);
-            }
-            self.once.insert(*hash);
-        }
         self.count += hashes.len() as u64;
-        if self.pending.len() >= self.memory {
-            self.put_away().map_err(TraceError::Spill)?;
-        }
-        Ok(())
-    }
-
-    fn put_away(&mut self) -> io::Result<()> {
-        self.pending.sort_unstable();
-        self.runs.put_away_records(self.pending.drain(..).map(u64::to_be_bytes))
+        self.hashes.add(hashes).map_err(TraceError::Spill)
     }
 
     /// The first episode by file and row whose id an episode before it has, if there is one among those met.
@@ -120,30 +63,9 @@ impl Prints {
         files: &[TraceFile],
         layout: &Layout,
     ) -> Result<Option<Box<Finding>>, TraceError> {
-        let count = self.count;
-        let alike = self.alike().map_err(TraceError::Spill)?;
+        let alike = self.hashes.finish().map_err(TraceError::Spill)?;
         // Equal hashes nearly always are equal ids.
-        if alike.is_empty() { Ok(None) } else { first_equal(files, layout, &alike, count) }
-    }
-
-    /// The hashes that are there more than once.
-    fn alike(mut self) -> io::Result<HashSet<u64>> {
-        if self.runs.is_empty() {
-            self.pending.retain(|hash| self.twice.contains(*hash));
-            self.pending.sort_unstable();
-            return Ok(self.pending.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect());
-        }
-        self.put_away()?;
-        let mut merge = self.runs.merge(Vec::new())?;
-        let (mut found, mut before) = (HashSet::new(), None);
-        while let Some(Record { bytes, .. }) = merge.next()? {
-            let bytes = bytes.try_into().map_err(|_| io::Error::from(io::ErrorKind::InvalidData))?;
-            let hash = u64::from_be_bytes(bytes);
-            if before.replace(hash) == Some(hash) {
-                found.insert(hash);
-            }
-        }
-        Ok(found)
+        if alike.is_empty() { Ok(None) } else { first_equal(files, layout, &alike, self.count) }
     }
 }
 
@@ -234,29 +156,9 @@ pub(super) fn starts(episodes: &Episodes) -> Vec<Start> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
-    use proptest::collection::vec;
-    use proptest::prelude::*;
-
     use super::*;
     use crate::trace::inputs::resolve;
     use crate::trace::open::TraceSet;
-
-    proptest! {
-        #[test]
-        fn alike_are_the_hashes_that_come_twice_and_only_they(hashes in vec((0..3_u64, 0..4_u64).prop_map(|(high, low)| high << 60 | low), 0..30), memory in 1_usize..40) {
-            let mut prints = Prints { memory, ..Prints::new() };
-            let mut expected: BTreeMap<u64, usize> = BTreeMap::new();
-            for some in hashes.chunks(3) {
-                prints.add(some).unwrap();
-                some.iter().for_each(|hash| *expected.entry(*hash).or_default() += 1);
-            }
-            prop_assert_eq!(prints.count, hashes.len() as u64);
-            let expected: HashSet<u64> = expected.into_iter().filter(|(_, times)| *times > 1).map(|(hash, _)| hash).collect();
-            prop_assert_eq!(prints.alike().unwrap(), expected);
-        }
-    }
 
     #[test]
     fn equal_hashes_of_different_ids_are_no_repetition() {

@@ -111,7 +111,7 @@ impl TraceSet {
         )?;
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
         let shape = Shape::new(&layout, projection);
-        let mut prints = Prints::new();
+        let mut prints = Prints::default();
         let mut summary = ScanSummary::default();
         let checked = |episodes: Episodes| {
             let fault = rules.check(self.files()[episodes.file].name(), &episodes).into_iter().next();

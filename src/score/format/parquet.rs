@@ -385,3 +385,80 @@ fn ints(batch: &RecordBatch, name: &str) -> Result<Vec<Option<i64>>, FormatError
     let column = column(batch, name, &DataType::Int64, "integers")?;
     Ok(column.as_primitive::<Int64Type>().iter().collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io;
+
+    use bytes::Bytes;
+
+    use super::*;
+    use crate::metric::definitions::Definitions;
+    use crate::score::format::{self, Format};
+    use crate::score::run::schema_columns;
+
+    /// More rows than a row group has.
+    fn table() -> EpisodeTable {
+        let rows = 0..ROW_GROUP_ROWS + GATHERED_ROWS + 5;
+        let metric = |name: &str, of: &dyn Fn(usize) -> Option<i64>| MetricColumn {
+            name: name.to_owned(),
+            values: rows.clone().map(of).collect(),
+        };
+        let small = |row: usize| i64::try_from(row % 7).unwrap();
+        EpisodeTable {
+            catalog: Definitions::load("paper", &schema_columns()).unwrap().catalog,
+            keys: rows
+                .clone()
+                .map(|row| EpisodeKey {
+                    experiment: format!("E{}", 1 + row / 20_000),
+                    model: "é, \"quoted\"".to_owned(),
+                    seed: i32::try_from(row).unwrap(),
+                    run: -1,
+                    episode_id: format!("episode {row:06}"),
+                })
+                .collect(),
+            labels: Vec::new(),
+            metrics: vec![
+                metric("TSA", &|row| Some(small(row) % 2)),
+                metric("TTD", &|row| (row % 3 > 0).then(|| small(row) << 40)),
+            ],
+        }
+    }
+
+    #[test]
+    fn row_groups_come_back_whole() {
+        let mut bytes = Vec::new();
+        format::write(&table(), Format::Parquet, &mut bytes).unwrap();
+        let bytes = Bytes::from(bytes);
+        let groups = ParquetMetaDataReader::new().parse_and_finish(&bytes).unwrap();
+        let rows: Vec<i64> = groups.row_groups().iter().map(|group| group.num_rows()).collect();
+        assert_eq!(rows, [ROW_GROUP_ROWS, GATHERED_ROWS + 5].map(|rows| i64::try_from(rows).unwrap()));
+        let surroundings = Surroundings { folders: &[], definitions: None };
+        assert_eq!(read(bytes, &surroundings).unwrap(), table());
+    }
+
+    /// Takes so many bytes.
+    struct Full(usize);
+
+    impl Write for Full {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.0 = self.0.checked_sub(bytes.len()).ok_or(io::ErrorKind::StorageFull)?;
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_full_disk_is_told_wherever_it_is_full() {
+        let table = table();
+        let mut bytes = Vec::new();
+        format::write(&table, Format::Parquet, &mut bytes).unwrap();
+        for room in [0, 4, bytes.len() / 3, bytes.len() - 1] {
+            let error = format::write(&table, Format::Parquet, Full(room)).unwrap_err();
+            assert_eq!(error.into_io().unwrap().kind(), io::ErrorKind::StorageFull, "room for {room} bytes");
+        }
+    }
+}

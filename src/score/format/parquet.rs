@@ -68,10 +68,10 @@ pub fn holds_definitions(file: &impl ChunkReader) -> bool {
 /// Rows after which a row group is closed: what is encoded and not yet written stays small.
 const ROW_GROUP_ROWS: usize = 64 * 1024;
 /// Rows that are gathered before they are encoded.
-const GATHERED_ROWS: usize = 8 * 1024;
+const GATHERED_ROWS: usize = 4 * 1024;
 
 /// Batches that wait for an encoder.
-const WAITING: usize = 4;
+const WAITING: usize = 2;
 
 /// The columns that one encoder takes; another one takes those behind them. Each has about half of the work.
 const TEXTS: Range<usize> = 0..3;

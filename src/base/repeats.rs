@@ -84,8 +84,8 @@ impl Repeats {
                 let (from, to) = (share[byte], share[byte + 1]);
                 let Some(file) = &mut self.away else { continue };
                 file.seek(SeekFrom::Start(from * WIDTH as u64))?;
-                bytes.clear();
-                file.take((to - from) * WIDTH as u64).read_to_end(&mut bytes)?;
+                bytes.resize(usize::try_from(to - from).map_err(io::Error::other)? * WIDTH, 0);
+                file.read_exact(&mut bytes)?;
                 self.pending.extend(bytes.as_chunks().0.iter().map(|number| u64::from_le_bytes(*number)));
             }
             find(&mut self.pending, &mut found);
@@ -151,7 +151,9 @@ mod tests {
             let mut expected: BTreeMap<u64, usize> = BTreeMap::new();
             for some in numbers.chunks(3) {
                 repeats.add(some).unwrap();
-                some.iter().for_each(|number| *expected.entry(*number).or_default() += 1);
+                for number in some {
+                    *expected.entry(*number).or_default() += 1;
+                }
             }
             expected.retain(|_, times| *times > 1);
             prop_assert_eq!(repeats.finish().unwrap(), expected.into_keys().collect::<HashSet<u64>>());

@@ -63,9 +63,11 @@ impl Run {
         Self { bytes, sections, records }
     }
 
-    /// The bytes of its records, and of whatever else lies between them.
+    /// The bytes that it takes.
     pub fn size(&self) -> usize {
-        self.bytes.len()
+        let title = |section: &Section| size_of::<Section>() + section.title.len();
+        let titles: usize = self.sections.iter().map(title).sum();
+        self.bytes.len() + self.records.len() * size_of::<Place>() + titles
     }
 }
 

@@ -391,6 +391,7 @@ mod tests {
     use std::io;
 
     use bytes::Bytes;
+    use parquet::file::metadata::RowGroupMetaData;
 
     use super::*;
     use crate::metric::definitions::Definitions;
@@ -431,7 +432,7 @@ mod tests {
         format::write(&table(), Format::Parquet, &mut bytes).unwrap();
         let bytes = Bytes::from(bytes);
         let groups = ParquetMetaDataReader::new().parse_and_finish(&bytes).unwrap();
-        let rows: Vec<i64> = groups.row_groups().iter().map(|group| group.num_rows()).collect();
+        let rows: Vec<i64> = groups.row_groups().iter().map(RowGroupMetaData::num_rows).collect();
         assert_eq!(rows, [ROW_GROUP_ROWS, GATHERED_ROWS + 5].map(|rows| i64::try_from(rows).unwrap()));
         let surroundings = Surroundings { folders: &[], definitions: None };
         assert_eq!(read(bytes, &surroundings).unwrap(), table());

@@ -241,7 +241,7 @@ def main():
         "",
         "`native` and `bare decode` are whole processes, from start to exit: `mirrorstats score TRACES -o out.parquet`, and",
         "`examples/decode` over the same eleven columns on all cores. Engines in Python are timed inside, without imports;",
-        "they run `mirrorstats sql` and write the same table. pandas runs once. "
+        "they run `mirrorstats sql` and write the same table, which is not there before. pandas runs once. "
         "All of them gave the same number of episodes and, metric by metric, the same count and sum.",
         "",
         *table_of(runs, notes, names, reference),

@@ -1,6 +1,7 @@
 //! A real master with two workers: the scores are those of the native engine, to the last byte of the file, also when a
 //! worker is killed in the middle; what the traces break is refused; and nothing runs on when the program is gone.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 use std::process::{Command as Process, Stdio};
@@ -44,10 +45,10 @@ const SMALL: [&str; 6] = [
     "spark.sql.codegen.wholeStage=false",
 ];
 
-fn on(cluster: &Cluster, folder: &Path, arguments: &[&str]) -> assert_cmd::Command {
+fn on(cluster: &Cluster, folder: &Path, name: &str, arguments: &[&str]) -> assert_cmd::Command {
     let mut command = program(folder);
     command.env("PYTHONPATH", &cluster.packages).env("SPARK_LOCAL_IP", "127.0.0.1");
-    command.args(["score", "--engine", "spark", "--master", &cluster.master]).args(arguments);
+    command.args([name, "--engine", "spark", "--master", &cluster.master]).args(arguments);
     for setting in SMALL {
         command.args(["--spark-conf", setting]);
     }
@@ -55,7 +56,7 @@ fn on(cluster: &Cluster, folder: &Path, arguments: &[&str]) -> assert_cmd::Comma
 }
 
 fn spark(cluster: &Cluster, folder: &Path, arguments: &[&str]) -> Answer {
-    answer(&mut on(cluster, folder, arguments))
+    answer(&mut on(cluster, folder, "score", arguments))
 }
 
 fn native(folder: &Path, arguments: &[&str]) -> String {
@@ -68,6 +69,7 @@ fn a_cluster_gives_the_scores_of_the_native_engine() {
     let mut cluster = Cluster::start(packages);
     texts_and_patterns_from_a_uri_into_a_folder(&cluster);
     what_the_traces_break_is_refused(&cluster);
+    a_report_is_the_native_one(&cluster);
     nothing_runs_on_when_the_program_is_gone(&cluster);
     a_worker_may_be_killed(&mut cluster);
 }
@@ -113,10 +115,36 @@ fn what_the_traces_break_is_refused(cluster: &Cluster) {
     assert!(!at.join("out.csv").exists());
 }
 
+fn a_report_is_the_native_one(cluster: &Cluster) {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let traces = fixtures();
+    let arguments = |out| [traces.to_str().unwrap(), "--by", "experiment,body_color", "--no-figures", "--out", out];
+    answer(&mut on(cluster, at, "report", &arguments("spark"))).done();
+    answer(program(at).arg("report").args(arguments("native"))).done();
+    let files = |report: &str| {
+        let (mut found, mut open) = (BTreeMap::new(), vec![at.join(report)]);
+        while let Some(path) = open.pop() {
+            if path.is_dir() {
+                open.extend(fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+            } else {
+                found.insert(path.strip_prefix(at.join(report)).unwrap().to_owned(), fs::read(&path).unwrap());
+            }
+        }
+        found
+    };
+    let (native, spark) = (files("native"), files("spark"));
+    assert!(native.keys().any(|path| path.ends_with("cells.csv")) && native.len() > 4);
+    assert!(native.keys().eq(spark.keys()));
+    let other: Vec<_> = native.iter().filter(|(path, bytes)| spark[*path] != **bytes).map(|(path, _)| path).collect();
+    assert!(other.is_empty(), "{other:?} differ");
+}
+
 fn nothing_runs_on_when_the_program_is_gone(cluster: &Cluster) {
     let folder = tempfile::tempdir().unwrap();
     let arguments = ["--spark-log", "log", "--spark-conf", "spark.sql.shuffle.partitions=2000"];
-    let mut child = started(&on(cluster, folder.path(), &[&[fixtures().to_str().unwrap()], &arguments[..]].concat()));
+    let mut child =
+        started(&on(cluster, folder.path(), "score", &[&[fixtures().to_str().unwrap()], &arguments[..]].concat()));
     let running = || cluster.state()["activeapps"].as_array().is_some_and(|apps| !apps.is_empty());
     wait_for("the application", || running().then_some(()));
     let driver = || word_after(&folder.path().join("log"), "Successfully started service 'SparkUI' on port ");
@@ -145,7 +173,7 @@ fn a_worker_may_be_killed(cluster: &mut Cluster) {
     ] {
         arguments.extend(["--spark-conf", setting]);
     }
-    let mut command = on(cluster, at, &arguments);
+    let mut command = on(cluster, at, "score", &arguments);
     command.args(["--spark-conf", "spark.sql.shuffle.partitions=30"]);
     let mut child = started(&command);
     let page = wait_for("the driver's page", || {

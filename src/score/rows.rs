@@ -26,7 +26,7 @@ use crate::base::runs::{self, Merge, Place, Run, Runs, Section};
 use crate::trace::scan::EPISODE_COLUMNS;
 
 /// Bytes of rows that are held in memory before they are put away.
-const MEMORY: usize = 16 << 20;
+const MEMORY: usize = 17 << 20;
 
 /// Bytes of rows that are sorted at a time.
 const SORTED: usize = 1 << 20;

@@ -5,6 +5,9 @@ use arrow::buffer::BooleanBuffer;
 /// Bits that are looked at in one step, wherever they start: what [`wide`] gives for certain.
 const STEP: usize = 120;
 
+/// The same of what [`word`] gives.
+const WORD: usize = 56;
+
 /// Eight bytes from a byte on, zeros beyond the end.
 #[inline]
 pub fn word(data: &[u8], at: usize) -> u64 {
@@ -72,8 +75,8 @@ impl Bits {
     #[inline]
     pub fn append(&mut self, data: &[u8], start: usize, length: usize) -> usize {
         let mut set = 0;
-        for at in (0..length).step_by(56) {
-            let count = (length - at).min(56);
+        for at in (0..length).step_by(WORD) {
+            let count = (length - at).min(WORD);
             let bits = word(data, (start + at) / 8) >> ((start + at) % 8) & ((1 << count) - 1);
             set += bits.count_ones() as usize;
             self.push(bits, count);

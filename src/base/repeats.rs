@@ -72,17 +72,18 @@ impl Repeats {
     /// When what was put away cannot be read.
     pub fn finish(mut self) -> io::Result<HashSet<u64>> {
         let mut found = HashSet::new();
-        if self.away.is_none() {
+        if self.away.is_some() {
+            self.put_away()?;
+        }
+        let Some(mut file) = self.away else {
             self.pending.retain(|number| self.twice.contains(*number));
             find(&mut self.pending, &mut found);
             return Ok(found);
-        }
-        self.put_away()?;
+        };
         let mut bytes = Vec::new();
         for byte in 0..256 {
             for share in &self.shares {
                 let (from, to) = (share[byte], share[byte + 1]);
-                let Some(file) = &mut self.away else { continue };
                 file.seek(SeekFrom::Start(from * WIDTH as u64))?;
                 bytes.resize(usize::try_from(to - from).map_err(io::Error::other)? * WIDTH, 0);
                 file.read_exact(&mut bytes)?;

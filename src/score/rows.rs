@@ -131,11 +131,7 @@ impl RowSorter {
         let offset = narrow(self.bytes.len());
         self.bytes.extend_from_slice(&rows.bytes);
         for (title, records) in &rows.titled {
-            if !self.titled.contains_key(title) {
-                self.titled.insert(title.clone(), Vec::new());
-            }
-            let Some(all) = self.titled.get_mut(title) else { continue };
-            all.extend(records.iter().map(|record| {
+            self.titled.entry(title.clone()).or_default().extend(records.iter().map(|record| {
                 let place = Place { start: record.place.start + offset, ..record.place };
                 Record { place, ..*record }
             }));

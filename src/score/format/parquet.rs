@@ -16,7 +16,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderB
 use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy};
+use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::ChunkReader;
 use parquet::file::writer::SerializedFileWriter;
@@ -43,13 +43,8 @@ pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 ///
 /// `folders` are columns that stand in the names of the file's folders.
 pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
-    // Its key-value metadata and schema are enough.
-    let options = ParquetMetaDataOptions::new()
-        .with_column_stats_policy(ParquetStatisticsPolicy::SkipAll)
-        .with_encoding_stats_policy(ParquetStatisticsPolicy::SkipAll)
-        .with_size_stats_policy(ParquetStatisticsPolicy::SkipAll);
-    let reader = ParquetMetaDataReader::new().with_metadata_options(Some(options));
-    let Ok(Ok(metadata)) = contained(|| reader.parse_and_finish(file)) else { return false };
+    let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
+    let Ok(Ok(metadata)) = footer else { return false };
     if footer::value(metadata.file_metadata(), KIND_KEY).is_some() {
         return footer::value(metadata.file_metadata(), KIND_KEY).as_deref() == Some(SCORES_KIND);
     }

@@ -1,6 +1,9 @@
 //! The program at the process boundary: exit codes, what is said where, and that nothing is left half done.
 
 mod extended;
+mod generated;
+#[path = "../../examples/generate/generation/mod.rs"]
+mod generation;
 mod help;
 mod hostile;
 mod options;

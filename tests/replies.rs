@@ -47,6 +47,28 @@ fn the_exploration_family_has_no_cube() {
 }
 
 #[test]
+fn a_cube_is_read_in_any_letter_case_and_white_space() {
+    for (text, cube) in [
+        ("Red", "red"),
+        ("RED", "red"),
+        (" red ", "red"),
+        ("red\u{a0}", "red"),
+        ("\\nred\\t", "red"),
+        ("None", "none"),
+        (" NONE", "none"),
+    ] {
+        let reading = read(&GOOD.replace("\"selected_cube\": \"none\"", &format!("\"selected_cube\": \"{text}\"")));
+        // As for an attribution, that is no repair: the raw reply keeps what was written.
+        assert_eq!((reading.status, reading.repairs), (Status::Ok, Vec::new()), "{text:?}");
+        assert_eq!(reading.selected_cube.as_deref(), Some(cube), "{text:?}");
+    }
+    for text in ["unknown", "Mauve", "", "red cube", "r ed"] {
+        let reading = read(&GOOD.replace("\"selected_cube\": \"none\"", &format!("\"selected_cube\": \"{text}\"")));
+        assert_eq!((reading.status, reading.selected_cube), (Status::SchemaInvalid, None), "{text:?}");
+    }
+}
+
+#[test]
 fn repairs_are_named_and_change_no_word() {
     use Repair::{CodeFence, SingleQuotes, SurroundingText, TrailingComma};
     let comma = GOOD.replace("\"unknown\"}", "\"unknown\" ,\n }");

@@ -9,8 +9,9 @@ pub fn visible(text: &str) -> String {
     shown
 }
 
-/// Control characters, zero-width and bidirectional marks, line and paragraph separators, the byte order mark.
-fn acts(c: char) -> bool {
+/// Whether a character acts: control characters, zero-width and bidirectional marks, line and paragraph separators, the
+/// byte order mark.
+pub fn acts(c: char) -> bool {
     let is_mark = matches!(c, '\u{ad}' | '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}');
     c.is_control() || is_mark || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{e0000}'..='\u{e007f}')
 }

@@ -15,6 +15,7 @@ use parquet::basic::ConvertedType;
 use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 
+use super::colors::palette::{Declared, Palette};
 use super::contain::contained;
 use super::finding::{Code, Finding, TraceError};
 use super::footer::{Extent, footer, plain, readable, rows_of};
@@ -38,6 +39,7 @@ pub struct TraceFile {
     /// The rows of each row group.
     rows: Vec<usize>,
     pairs: Vec<KeyValue>,
+    colors: Declared,
     /// What a reader needs, while somebody reads: footers of many row groups are large.
     footer: Mutex<Weak<ArrowReaderMetadata>>,
 }
@@ -144,10 +146,11 @@ impl TraceFile {
         }
         let rows = metadata.row_groups().iter().map(rows_of).collect();
         let pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        let colors = Declared::of(&input.name, value(&pairs, schema::RECORDING_KEY)).map_err(|f| vec![*f])?;
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
         let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
-        Ok(Self { name, path, bytes, columns, rows, pairs, footer })
+        Ok(Self { name, path, bytes, columns, rows, pairs, colors, footer })
     }
 
     /// The name in messages and outputs.
@@ -204,6 +207,16 @@ impl TraceFile {
     /// The footer's key-value metadata.
     pub(super) fn pairs(&self) -> &[KeyValue] {
         &self.pairs
+    }
+
+    /// The palette that the footer declares, if it declares one.
+    pub(crate) fn palette(&self) -> Option<&Palette> {
+        self.colors.palette.as_ref()
+    }
+
+    /// The colours that the footer declares.
+    pub(super) fn colors(&self) -> &Declared {
+        &self.colors
     }
 
     /// A value of the footer's key-value metadata.

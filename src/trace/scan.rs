@@ -10,6 +10,7 @@ use arrow::array::{Array as _, ArrayRef, RecordBatch, RecordBatchOptions, String
 use arrow::datatypes::{Field, Schema};
 use arrow::error::ArrowError;
 
+use super::colors::set::{Spellings, other_names};
 use super::finding::TraceError;
 use super::ids::{Prints, hashes};
 use super::layout::Layout;
@@ -112,17 +113,19 @@ impl TraceSet {
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
         let shape = Shape::new(&layout, projection);
         let mut prints = Prints::default();
+        let mut spellings = Spellings::new(self.files());
         let mut summary = ScanSummary::default();
         let checked = |episodes: Episodes| {
-            let fault = rules.check(self.files()[episodes.file].name(), &episodes).into_iter().next();
+            let fault = rules.check(&self.files()[episodes.file], &episodes).into_iter().next();
             let last = fault.as_ref().map_or(usize::MAX, |fault| fault.row);
             let ids = hashes(&episodes, last);
             let (count, steps) = (episodes.len(), episodes.columns[0].len());
+            let colors = other_names(&layout, &episodes);
             let outcome = match fault {
                 Some(fault) => Outcome::Fault(fault),
                 None => Outcome::Done(shape.batch(episodes).map_err(E::from).and_then(&work)),
             };
-            Checked { ids, count, steps, outcome }
+            Checked { ids, count, steps, colors, outcome }
         };
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
@@ -130,6 +133,7 @@ impl TraceSet {
                 Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
             };
             prints.add(&checked.ids)?;
+            spellings.add(checked.colors);
             summary.episodes += checked.count as u64;
             summary.steps += checked.steps as u64;
             match checked.outcome {
@@ -138,9 +142,14 @@ impl TraceSet {
             }
         });
         // An id that was there before is found at the end, though it comes before whatever ended the pass.
-        match prints.first_repeated(self.files(), &layout)? {
-            Some(finding) => Err(TraceError::from(*finding).into()),
-            None => passed.map(|()| summary),
+        if let Some(finding) = prints.first_repeated(self.files(), &layout)? {
+            return Err(TraceError::from(*finding).into());
+        }
+        passed?;
+        // That two names are spellings of one colour shows when all are known.
+        match spellings.first_conflict(self.files(), &layout, threads)? {
+            Some(finding) => Err(TraceError::from(finding).into()),
+            None => Ok(summary),
         }
     }
 }
@@ -151,6 +160,8 @@ struct Checked<T, E> {
     ids: Vec<u64>,
     count: usize,
     steps: usize,
+    /// Names of colours beyond those of the study.
+    colors: Vec<String>,
     outcome: Outcome<T, E>,
 }
 

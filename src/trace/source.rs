@@ -7,6 +7,7 @@ use arrow::array::{
 };
 use arrow::datatypes::{DataType, Field};
 
+use super::colors;
 use super::episode::{Action, Episode};
 use super::schema::{Column, Stored};
 
@@ -117,7 +118,8 @@ fn text_fault(column: &Column, text: &str) -> Option<(String, String)> {
     } else if text.is_empty() && column.names() {
         format!("`{}` not to be empty", column.name)
     } else {
-        return None;
+        let color = colors::column(column.name).filter(|color| !color.may_hold(text, None))?;
+        format!("`{}` to be {}", column.name, color.expected(None))
     };
     Some((expected, format!("`{}`", text.escape_debug())))
 }

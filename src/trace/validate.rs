@@ -7,6 +7,7 @@ use std::num::NonZeroUsize;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::colors::set::{Tally, sightings};
 use super::finding::{Code, Finding, Severity, TraceError};
 use super::ids::{Ids, Start, starts};
 use super::inputs::Input;
@@ -21,7 +22,7 @@ use super::schema::COLUMNS;
 pub struct Validation {
     /// The files, in their order.
     pub files: Vec<CheckedFile>,
-    /// All findings, by file, row group and row.
+    /// All findings, by file, row group and row; what only all inputs together show comes last of its file.
     pub findings: Vec<Finding>,
 }
 
@@ -135,21 +136,27 @@ fn check_rows(
     let rules = Rules { layout: &layout, experiments };
     let name = |file: usize| set.files()[file].name().to_owned();
     let work = |episodes: Episodes| {
-        let mut found = rules.check(&name(episodes.file), &episodes);
+        let mut found = rules.check(&set.files()[episodes.file], &episodes);
         found.extend(split(&name(episodes.file), &episodes));
-        (found, starts(&episodes), episodes.len() as u64, episodes.columns[0].len() as u64)
+        let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
+        (found, colors, starts(&episodes), episodes.len() as u64, episodes.columns[0].len() as u64)
     };
-    let mut ids = Ids::default();
+    let (mut ids, mut tally) = (Ids::default(), Tally::new(set.files()));
     pass(set.files(), &layout, threads, &work, |file, event| {
         let event = match event {
             Event::Fault(finding) => Event::Fault(finding),
-            Event::Whole((found, starts, episodes, steps)) => {
+            Event::Whole((found, colors, starts, episodes, steps)) => {
+                tally.add(set.files(), file, colors);
                 Event::Whole((with_repeated(found, starts, &mut ids, file, name), episodes, steps))
             }
         };
         receive(file, event);
-        Ok(())
-    })
+        Ok::<_, TraceError>(())
+    })?;
+    for (file, finding) in tally.findings(set.files()) {
+        receive(file, Event::Whole((vec![finding], 0, 0)));
+    }
+    Ok(())
 }
 
 /// The findings of some episodes and those about their ids, by row.

@@ -1,5 +1,6 @@
 //! The program at the process boundary: exit codes, what is said where, and that nothing is left half done.
 
+mod colors;
 mod extended;
 mod generated;
 #[path = "../../examples/generate/generation/mod.rs"]

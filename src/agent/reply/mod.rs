@@ -5,7 +5,8 @@
 //! ```
 //!
 //! Rule: nothing is made up. A reply is taken as it is, or after a repair that has a name, or it is no decision: then
-//! action, cube and attribution are absent, and the raw text is all there is.
+//! action, cube and attribution are absent, and the raw text is all there is. The raw text keeps how `selected_cube` and
+//! `identification` were written: letter case and white space mean nothing in either, and are no repair.
 //!
 //! A `selected_cube` other than `none` beside another action than `done` breaks a rule of the prompt, but not the
 //! shape of the object: it is kept as replied, and the metrics look at the cube of the `done` step alone.
@@ -19,6 +20,7 @@ pub use repair::Repair;
 
 use super::{Family, Reply, Status, Usage, Words, identification, prompt};
 use crate::base::palette::Color;
+use crate::trace::colors::spelling;
 use crate::trace::episode::Action;
 
 /// How a provider says that a reply ended.
@@ -126,7 +128,7 @@ fn decision(object: &object::Object, family: Family) -> Result<Reading, String> 
     let action = prompt::action(&action)
         .ok_or_else(|| format!("\"action\" is \"{action}\", expected one of w, s, a, d, done"))?;
     let selected_cube = match family {
-        Family::CubeSelection => Some(cube(text("selected_cube")?)?),
+        Family::CubeSelection => Some(cube(&text("selected_cube")?)?),
         Family::Exploration => None,
     };
     let identification = text("identification")?;
@@ -146,9 +148,11 @@ fn decision(object: &object::Object, family: Family) -> Result<Reading, String> 
     })
 }
 
-fn cube(name: String) -> Result<String, String> {
-    if name == "none" || Color::named(&name).is_some() {
-        return Ok(name);
+/// The cube that a reply names. Letter case and white space do not matter, as in an identification.
+fn cube(name: &str) -> Result<String, String> {
+    let cube = spelling::normal(name);
+    if cube == "none" || Color::named(&cube).is_some() {
+        return Ok(cube);
     }
     Err(format!("\"selected_cube\" is \"{name}\", expected a colour of the palette or none"))
 }

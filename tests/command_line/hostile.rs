@@ -31,7 +31,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let episodes: Vec<_> =
-        NAMES.iter().flat_map(|name| [episode(name, "E1", 0, "red"), episode(name, "E1", 1, name)]).collect();
+        NAMES.iter().flat_map(|name| [episode(name, "E1", 0, "red"), episode(name, "E1", 1, "blue")]).collect();
     write_episodes(&at.join("a.parquet"), None, &episodes).unwrap();
     for arguments in [
         ["report", "a.parquet"].as_slice(),

@@ -9,6 +9,7 @@ use arrow::datatypes::{DataType, Field};
 
 use super::episode::{Action, Episode};
 use super::schema::{Column, Stored};
+use crate::base::visible::visible;
 
 /// How to get a column's value in an episode at the step of an index (0-based).
 #[derive(Clone, Copy)]
@@ -119,7 +120,7 @@ fn text_fault(column: &Column, text: &str) -> Option<(String, String)> {
     } else {
         return None;
     };
-    Some((expected, format!("`{}`", text.escape_debug())))
+    Some((expected, format!("`{}`", visible(text))))
 }
 
 /// The values of one column, gathered episode by episode.

@@ -8,6 +8,7 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use super::{CellRow, Intervals, Role, Statistics, Verdict};
 use crate::base::estimate::{bounds, fixed, p_value};
+use crate::base::visible::visible;
 use crate::cells::interval::Interval;
 use crate::metric::catalog::Kind;
 
@@ -247,28 +248,9 @@ fn percent(confidence: f64) -> String {
     format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// The text with control characters escaped, those that reverse or hide text included.
-fn visible(text: &str) -> String {
-    let hides =
-        |c: char| matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}');
-    text.chars().fold(String::with_capacity(text.len()), |mut shown, c| {
-        if c.is_control() || hides(c) {
-            shown.extend(c.escape_default());
-        } else {
-            shown.push(c);
-        }
-        shown
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{percent, visible};
-
-    #[test]
-    fn control_characters_are_shown() {
-        assert_eq!(visible("a\u{1b}[31mb\n\u{202e}é"), "a\\u{1b}[31mb\\n\\u{202e}é");
-    }
+    use super::percent;
 
     #[test]
     fn a_confidence_is_a_percentage() {

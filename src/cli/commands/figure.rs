@@ -96,7 +96,7 @@ impl FigureArgs {
         let inputs = scoring::resolve(&self.traces)?;
         let threads = self.traces.threads.count();
         let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        let sources = Sources::of(&inputs, &self.scoring, &episodes, &style, threads)?;
+        let sources = Sources::of(&inputs, &self.scoring, &episodes, &style, &[self.name], threads)?;
         self.write(&sources.input())
     }
 

@@ -22,6 +22,7 @@ pub mod recording;
 pub mod scoring;
 pub mod sides;
 pub mod spark;
+mod terminal;
 #[cfg(feature = "sim")]
 pub mod vlm;
 

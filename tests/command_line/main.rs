@@ -9,6 +9,7 @@ mod hostile;
 mod options;
 mod refusals;
 mod scores;
+mod widths;
 
 use std::path::{Path, PathBuf};
 

@@ -6,6 +6,7 @@
 pub mod args;
 pub mod commands;
 pub mod drawing;
+mod empty_filter;
 #[cfg(feature = "sim")]
 pub mod exec;
 #[cfg(feature = "sim")]

@@ -9,7 +9,7 @@ use polars::prelude::LazyFrame;
 use super::commands::query::{AnswerFormat, QueryArgs};
 use super::listing::listing;
 use super::outcome::{Failure, Outcome};
-use super::{output, scoring, terminal};
+use super::{empty_filter, output, scoring, terminal};
 use crate::base::visible::visible;
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::engine::polars::answer::{self, Excerpt, Format, QueryError};
@@ -96,6 +96,7 @@ fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Fa
     }
     if query.tables.contains(&Table::Episodes) || query.tables.contains(&Table::Cells) {
         let scores = scoring::table(&inputs, &args.scoring, &[], args.traces.threads.count())?;
+        empty_filter::note(scores.len(), &inputs, &args.scoring, args.traces.threads.count())?;
         loaded.push((Table::Episodes, tables::episodes(&scores).map_err(failed)?));
         if query.tables.contains(&Table::Cells) {
             let by = DEFAULT_BY.map(str::to_owned);

@@ -4,6 +4,7 @@ mod extended;
 mod generated;
 #[path = "../../examples/generate/generation/mod.rs"]
 mod generation;
+mod filters;
 mod help;
 mod hostile;
 mod options;

@@ -62,6 +62,9 @@ impl DiffArgs {
         let traces = if inputs.is_empty() { None } else { Some(scoring::open_steps(&inputs)?) };
         let asked = self.asked();
         let sides = sides::pair(&old, &new, traces.as_ref(), &asked)?;
+        if sides.before.table.is_empty() && sides.after.table.is_empty() {
+            new.check_filter(&inputs, &asked)?;
+        }
         let mut changes = sides::changes(&sides, &self.by)?;
         TableOrder { catalog: &sides.after.table.catalog, style: &style }.sort(&mut changes);
         if let Some(traces) = &traces {

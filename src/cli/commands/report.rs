@@ -10,7 +10,7 @@ use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
 use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
-use super::super::{output, scoring};
+use super::super::{empty_filter, output, scoring};
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::report::bundle::{self, Bundle, Manifest};
 use crate::report::layout;
@@ -89,6 +89,7 @@ impl ReportArgs {
         let labels = scoring::labels(&self.by);
         let threads = self.traces.threads.count();
         let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &labels, threads)?;
+        empty_filter::check(episodes.len(), &inputs, &self.scoring, threads)?;
         let cells = group(&episodes, &self.by).map_err(Failure::input)?;
         let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
         let condition = self.scoring.condition.clone();

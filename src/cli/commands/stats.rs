@@ -8,7 +8,7 @@ use crate::cells::cell::Cells;
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{scoring, terminal};
+use crate::cli::{empty_filter, scoring, terminal};
 use crate::report::statistics::{Options, Statistics, text};
 use crate::score::table::EpisodeTable;
 
@@ -64,6 +64,7 @@ impl StatsArgs {
         let asked =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let table = scoring::table(&inputs, &asked, &scoring::labels(&self.by), threads)?;
+        empty_filter::check(table.len(), &inputs, &asked, threads)?;
         let cells = group(&table, &self.by).map_err(Failure::input)?;
         let lost = scoring::lost(&inputs, threads)?;
         self.print(&table, &cells, lost)

@@ -10,6 +10,7 @@ use tempfile::NamedTempFile;
 
 use super::outcome::{Failure, Outcome};
 use crate::base::temporary;
+use crate::base::visible::visible_lines;
 
 /// Prints an answer, as text for people or as JSON for programs.
 ///
@@ -19,7 +20,7 @@ pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, 
     if json {
         return print_json(answer);
     }
-    writeln!(io::stdout().lock(), "{}", answer.to_string().trim_end())?;
+    writeln!(io::stdout().lock(), "{}", visible_lines(answer.to_string().trim_end()))?;
     Ok(Outcome::Done)
 }
 
@@ -32,6 +33,16 @@ pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
     serde_json::to_writer_pretty(&mut out, answer).map_err(io::Error::from)?;
     writeln!(out)?;
     Ok(Outcome::Done)
+}
+
+/// Says something on standard error that is neither an answer nor a fault.
+pub fn note(words: &str) {
+    say(&format!("note: {words}"));
+}
+
+/// Says how a command went on standard error. With standard error closed there is nobody to tell, and the work goes on.
+pub fn say(words: &str) {
+    let _ = writeln!(io::stderr(), "{}", visible_lines(words));
 }
 
 /// Writes a file, whole or not at all.

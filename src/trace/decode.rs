@@ -13,6 +13,7 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowSelection, RowSelector,
 };
+use parquet::basic::Type as Physical;
 
 use super::ahead::Ids;
 use super::column::{Column, all_within};
@@ -26,6 +27,9 @@ use super::schema::Kind;
 
 /// Rows that are decoded at a time: the columns of so many stay in a core's cache.
 const BATCH_ROWS: usize = 32 * 1024;
+
+/// Bytes of one column's texts that are decoded at a time, about: an array holds 2 GiB, and texts are not all as long.
+const BATCH_TEXT: u64 = 256 << 20;
 
 /// Some rows of one row group: a column for each of the layout, in its order.
 #[derive(Clone, Debug)]
@@ -68,6 +72,8 @@ pub(super) struct RowGroup<'a> {
     sources: Vec<Source>,
     /// Where the next rows start in the row group.
     first: usize,
+    /// Rows that are decoded at a time.
+    at_a_time: usize,
     /// Nothing more comes: the end, or a fault.
     over: bool,
 }
@@ -124,7 +130,11 @@ impl<'a> RowGroup<'a> {
     ) -> Result<Self, Box<Finding>> {
         let handle = handle(file)?;
         let footer = file.footer()?;
-        let mut rows = Self { file, layout, footer, index: row_group, ids, sources: Vec::new(), first: 0, over: false };
+        let roots = (0..layout.columns.len()).filter_map(|at| root(file, layout, at));
+        let text = roots.filter_map(|root| text_bytes(&footer, root, row_group)).max().unwrap_or(0);
+        let at_a_time = rows_at_a_time(file.row_group_rows(row_group), text);
+        let sources = Vec::new();
+        let mut rows = Self { file, layout, footer, index: row_group, ids, sources, first: 0, at_a_time, over: false };
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {
                 None => Source::Absent,
@@ -143,7 +153,7 @@ impl<'a> RowGroup<'a> {
     fn library(&self, root: usize) -> Result<Source, Box<Finding>> {
         let corrupt = |error: String| corrupt(self.file, self.index, &error);
         let handle = handle(self.file)?;
-        let reader = contained(|| reader(&self.footer, handle, root, self.index, self.first)).map_err(corrupt)?;
+        let reader = contained(|| self.reader(handle, root, self.first)).map_err(corrupt)?;
         let reader = reader.map_err(|error| corrupt(plain(&error)))?;
         Ok(Source::Library(Box::new(Library { reader, held: Vec::new() })))
     }
@@ -151,7 +161,7 @@ impl<'a> RowGroup<'a> {
     fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
         let left = self.file.row_group_rows(self.index) - self.first;
         // Whole episodes where it is known where they end.
-        let most = BATCH_ROWS.min(left);
+        let most = self.at_a_time.min(left);
         let count = self.ids.as_ref().filter(|_| left > 0).map_or(most, |ids| ids.runs.until(self.first, most));
         let columns = (0..self.sources.len()).map(|at| self.column(at, count));
         let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
@@ -240,8 +250,23 @@ impl<'a> RowGroup<'a> {
     fn anew(&self, at: usize, first: usize) -> Option<Column> {
         let root = root(self.file, self.layout, at)?;
         let handle = self.file.reader().ok()?;
-        let decoded = contained(|| reader(&self.footer, handle, root, self.index, first).ok()?.next()?.ok()).ok()?;
+        let decoded = contained(|| self.reader(handle, root, first).ok()?.next()?.ok()).ok()?;
         normal_column(decoded?.column(0), self.layout.columns[at].kind).ok().map(Column::Flat)
+    }
+
+    /// A reader of one column, from a row on.
+    fn reader(&self, handle: File, root: usize, first: usize) -> parquet::errors::Result<ParquetRecordBatchReader> {
+        let rows = rows_of(self.footer.metadata().row_group(self.index));
+        let reader =
+            ParquetRecordBatchReaderBuilder::new_with_metadata(handle, ArrowReaderMetadata::clone(&self.footer))
+                .with_row_groups(vec![self.index])
+                .with_projection(ProjectionMask::roots(self.footer.parquet_schema(), [root]))
+                .with_batch_size(rows.clamp(1, self.at_a_time));
+        if first == 0 {
+            return reader.build();
+        }
+        let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
+        reader.with_row_selection(RowSelection::from(rest)).build()
     }
 }
 
@@ -289,31 +314,30 @@ fn cursor(
     row_group: usize,
     form: Form,
 ) -> Result<Cursor, Unfit> {
-    let schema = footer.parquet_schema();
-    let leaf = (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root).ok_or(Unfit)?;
+    let leaf = leaf(footer, root).ok_or(Unfit)?;
     let row_group = footer.metadata().row_group(row_group);
     let stored = footer.schema().field(root).data_type();
     Cursor::open(handle, row_group.column(leaf), stored, rows_of(row_group), form)
 }
 
-/// A reader of one column, from a row on.
-fn reader(
-    footer: &ArrowReaderMetadata,
-    handle: File,
-    root: usize,
-    row_group: usize,
-    first: usize,
-) -> parquet::errors::Result<ParquetRecordBatchReader> {
-    let rows = rows_of(footer.metadata().row_group(row_group));
-    let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(handle, footer.clone())
-        .with_row_groups(vec![row_group])
-        .with_projection(ProjectionMask::roots(footer.parquet_schema(), [root]))
-        .with_batch_size(rows.clamp(1, BATCH_ROWS));
-    if first == 0 {
-        return reader.build();
-    }
-    let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
-    reader.with_row_selection(RowSelection::from(rest)).build()
+fn leaf(footer: &ArrowReaderMetadata, root: usize) -> Option<usize> {
+    let schema = footer.parquet_schema();
+    (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root)
+}
+
+/// The bytes of a column's texts in a row group, written out if the file says so; `None` for other columns.
+fn text_bytes(footer: &ArrowReaderMetadata, root: usize, row_group: usize) -> Option<u64> {
+    let column = footer.metadata().row_group(row_group).columns().get(leaf(footer, root)?)?;
+    let written_out = column.unencoded_byte_array_data_bytes().unwrap_or_default();
+    let bytes = u64::try_from(column.uncompressed_size().max(written_out)).unwrap_or_default();
+    (column.column_type() == Physical::BYTE_ARRAY).then_some(bytes)
+}
+
+/// Rows to decode at a time of a row group whose largest column has so many bytes of text.
+fn rows_at_a_time(rows: usize, text: u64) -> usize {
+    let fitting = u64::try_from(rows).unwrap_or(u64::MAX).saturating_mul(BATCH_TEXT).checked_div(text);
+    let fitting = fitting.and_then(|rows| usize::try_from(rows).ok()).unwrap_or(usize::MAX);
+    fitting.clamp(1, BATCH_ROWS)
 }
 
 fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {
@@ -370,4 +394,23 @@ fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
     let good = column.values().null_count() == 0
         && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
     if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BATCH_ROWS, BATCH_TEXT, rows_at_a_time};
+
+    #[test]
+    fn long_texts_are_decoded_some_rows_at_a_time() {
+        for (rows, text, expected) in [
+            (0, 0, BATCH_ROWS),
+            (100_000, 0, BATCH_ROWS),
+            (100_000, 100_000 * 100, BATCH_ROWS),
+            (100_000, 100_000 << 16, 4096),
+            (10, 10 * BATCH_TEXT, 1),
+            (10, u64::MAX, 1),
+        ] {
+            assert_eq!(rows_at_a_time(rows, text), expected, "{rows} rows, {text} bytes");
+        }
+    }
 }

@@ -348,15 +348,15 @@ impl fmt::Display for Finding {
             write!(f, ", row group {row_group}")?;
         }
         if let Some(episode) = &self.episode {
-            write!(f, ", episode `{}`", episode.escape_debug())?;
+            write!(f, ", episode `{}`", visible(episode))?;
         }
         if let Some(t) = self.t {
             write!(f, ", t = {t}")?;
         }
         if let Some(column) = &self.column {
-            write!(f, ", column `{}`", column.escape_debug())?;
+            write!(f, ", column `{}`", visible(column))?;
         }
-        write!(f, "\n  expected {}\n  found {}\n  help: {}", self.expected, self.found, self.help)
+        write!(f, "\n  expected {}\n  found {}\n  help: {}", visible(&self.expected), visible(&self.found), self.help)
     }
 }
 

@@ -22,6 +22,7 @@ use super::footer::{Extent, footer, plain, readable, rows_of};
 use super::inputs::Input;
 use super::schema::{self, COLUMNS, Kind};
 use crate::base::near::nearest;
+use crate::base::visible::visible;
 
 /// Traces that are open: every footer is read and good, no row is read yet.
 #[derive(Debug)]
@@ -267,7 +268,7 @@ fn check_version(file: &str, metadata: &ParquetMetaData) -> Result<(), Box<Findi
         Ok(version) if version > 0 => Ok(()),
         _ => {
             let expected = format!("`{}` to be a whole number from 1", schema::VERSION_KEY);
-            Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", text.escape_debug()))))
+            Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", visible(text)))))
         }
     }
 }

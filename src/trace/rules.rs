@@ -14,6 +14,7 @@ use super::open::TraceFile;
 use super::pass::Episodes;
 use super::schema::{Column, Kind};
 use crate::base::near::nearest;
+use crate::base::visible::visible;
 
 /// A finding and its row among the episodes'.
 pub(super) struct Located {
@@ -387,7 +388,7 @@ fn shown(values: &ArrayRef, row: usize) -> String {
         return "null".into();
     }
     if values.as_dictionary_opt::<Int32Type>().is_some() {
-        return format!("`{}`", text_at(values, row).unwrap_or_default().escape_debug());
+        return format!("`{}`", visible(text_at(values, row).unwrap_or_default()));
     }
     let any = values.as_any();
     let number = any.downcast_ref::<Int64Array>().map(|ints| ints.value(row).to_string());

@@ -5,11 +5,13 @@ mod extended;
 mod generated;
 #[path = "../../examples/generate/generation/mod.rs"]
 mod generation;
+mod filters;
 mod help;
 mod hostile;
 mod options;
 mod refusals;
 mod scores;
+mod widths;
 
 use std::path::{Path, PathBuf};
 

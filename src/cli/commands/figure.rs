@@ -8,6 +8,7 @@ use clap::ValueEnum;
 
 use crate::cli::args::{EngineArgs, ScoringArgs, TraceArgs};
 use crate::cli::drawing::Sources;
+use crate::cli::empty_filter;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::scoring;
@@ -96,7 +97,8 @@ impl FigureArgs {
         let inputs = scoring::resolve(&self.traces)?;
         let threads = self.traces.threads.count();
         let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        let sources = Sources::of(&inputs, &self.scoring, &episodes, &style, threads)?;
+        empty_filter::check(episodes.len(), &inputs, &self.scoring, threads)?;
+        let sources = Sources::of(&inputs, &self.scoring, &episodes, &style, &[self.name], threads)?;
         self.write(&sources.input())
     }
 

@@ -15,7 +15,8 @@ use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, scoring};
+use crate::cli::{output, scoring, terminal};
+use crate::report::tables::fit::fitted;
 use crate::trace::finding::{Severity, TraceError};
 use crate::trace::inputs::Input;
 use crate::trace::validate::validate;
@@ -210,7 +211,7 @@ impl fmt::Display for RenormalizeAnswer {
                     shortened(&flip.identification),
                 ]);
             }
-            writeln!(f, "{}\n", aligned_right(table, [1]).trim_fmt())?;
+            writeln!(f, "{}\n", fitted(&aligned_right(table, [1]), 2, terminal::width()))?;
         }
         let sum = |of: fn(&RenormalizedFile) -> u64| self.files.iter().map(of).sum::<u64>();
         let (flips, texts) = (counted(self.flips.len() as u64, "attribution"), sum(|file| file.texts));

@@ -1,12 +1,12 @@
 //! `score`: the episode table of traces, or the evidence for one episode.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
-use super::super::{output, scoring, spark};
+use super::super::{empty_filter, output, scoring, spark};
 use crate::score::evidence;
 use crate::score::format::Format;
 
@@ -62,10 +62,18 @@ impl ScoreArgs {
             return output::print(&found, self.json);
         }
         if self.engine.engine == Engine::Native {
-            return self.deliver(format, |format, out| scoring::write(&inputs, &self.scoring, threads, format, out));
+            let mut rows = 0;
+            self.deliver(format, |format, out| {
+                rows = scoring::write(&inputs, &self.scoring, threads, format, out)?;
+                Ok(())
+            })?;
+            empty_filter::note(rows, &inputs, &self.scoring, threads)?;
+            return Ok(Outcome::Done);
         }
         let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out))?;
+        empty_filter::note(table.len(), &inputs, &self.scoring, threads)?;
+        Ok(Outcome::Done)
     }
 
     fn run_on_spark(&self) -> Result<Outcome, Failure> {
@@ -79,12 +87,13 @@ impl ScoreArgs {
             let name = folder.to_string_lossy();
             let written = asked()?.write(&name)?;
             let episodes = counted(written.episodes, "episode");
-            writeln!(io::stderr(), "{episodes}; `mirrorstats report {name}` goes on from here")?;
+            output::say(&format!("{episodes}; `mirrorstats report {name}` goes on from here"));
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;
         let table = asked()?.score(&[])?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out))?;
+        Ok(Outcome::Done)
     }
 
     /// Writes the table to where it was asked for.
@@ -92,13 +101,13 @@ impl ScoreArgs {
         &self,
         format: Option<Format>,
         write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<(), Failure>,
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<(), Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
         match &self.output {
             Some(path) => output::write_file_with(path, |file| write(format, &mut BufWriter::new(file)))?,
             None => write(format, &mut BufWriter::new(io::stdout()))?,
         }
-        Ok(Outcome::Done)
+        Ok(())
     }
 }
 

@@ -7,6 +7,7 @@
 //! complete content is copied into it.
 
 mod error;
+mod folder;
 mod leftover;
 mod same_file;
 
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 use tempfile::NamedTempFile;
 
 pub use error::without_name;
+pub use folder::{FolderError, FolderFiles, replace_folder};
 pub use same_file::{TargetIsInput, check_target, is_same_file};
 
 /// Every temporary name begins with this; those who look for data pass over names that begin with a dot.

@@ -14,5 +14,4 @@ pub mod ratio;
 pub mod repeats;
 pub mod replace;
 pub mod runs;
-pub mod temporary;
 pub mod visible;

@@ -4,7 +4,11 @@ mod extended;
 mod help;
 mod hostile;
 mod options;
+#[cfg(target_os = "linux")]
+mod outputs;
 mod refusals;
+#[cfg(unix)]
+mod reports;
 mod scores;
 
 use std::path::{Path, PathBuf};

@@ -21,6 +21,7 @@ use crate::report::style::Style;
 use crate::report::table::Table;
 use crate::report::tables::{csv, latex, markdown};
 use crate::report::value::interval;
+use old::MANIFEST;
 
 /// What goes into the folder.
 #[derive(Clone, Copy, Debug)]
@@ -66,7 +67,7 @@ pub struct Manifest {
     pub filter: Option<String>,
     /// What was read, ordered by path, then hash.
     pub inputs: Vec<Input>,
-    /// What was written beside this manifest, ordered by path. Not there in reports of versions before, and in the copy
+    /// What was written beside this manifest, ordered by path. Absent in reports of earlier versions, and in the copy
     /// inside `report.html`, whose own hash would have to be in it.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub outputs: Vec<Output>,
@@ -187,9 +188,6 @@ impl Output {
         }
     }
 }
-
-/// The name of the manifest, which is the last file to be there.
-const MANIFEST: &str = "manifest.json";
 
 /// A report that was written.
 #[derive(Clone, Debug, PartialEq)]

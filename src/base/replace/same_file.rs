@@ -3,6 +3,8 @@
 use std::fs;
 use std::path::Path;
 
+use super::place::is_stream;
+
 /// A target that is one of the files which the command reads.
 #[derive(Debug, thiserror::Error)]
 #[error("`{target}`: expected another file to write, found {what}\n  help: give the output another name")]
@@ -25,7 +27,7 @@ pub fn check_target<P: AsRef<Path>>(
     inputs: impl IntoIterator<Item = P>,
     what: &str,
 ) -> Result<(), TargetIsInput> {
-    if !target.is_file() || super::is_stream(target) {
+    if !target.is_file() || is_stream(target) {
         return Ok(());
     }
     match inputs.into_iter().find(|input| is_same_file(target, input.as_ref())) {

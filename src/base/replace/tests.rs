@@ -2,7 +2,8 @@ use std::fs::{self, File};
 use std::io::Write as _;
 use std::path::Path;
 
-use super::{NewFile, check_target, is_same_file, prefix_for, replace};
+use super::place::prefix_for;
+use super::{NewFile, check_target, is_same_file, replace};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> =

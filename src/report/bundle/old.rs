@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::MANIFEST;
 use crate::report::figures::FigureName;
+
+/// The name of the manifest, which is the last file to be there.
+pub(super) const MANIFEST: &str = "manifest.json";
 
 /// As much of a manifest as is needed; a manifest of other versions may have more.
 #[derive(Deserialize)]

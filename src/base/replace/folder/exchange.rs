@@ -9,8 +9,9 @@ use std::fs::{self, File, Metadata};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::super::{folder_of, sync_folder};
-use super::{FolderFiles, Stage, old_files, platform, step};
+use super::super::place::{folder_of, sync_folder};
+use super::platform;
+use super::stage::{FolderFiles, Stage, old_files, step};
 
 /// Replaces the files of the existing folder `out`.
 ///

@@ -5,11 +5,9 @@ use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::super::{replace as replace_bytes, sync_folder};
-use super::{FolderError, FolderFiles, Stage, old_files, step, sync_folders};
-
-/// A file in the folder that lists, while it has no index, what the next attempt replaces or removes.
-pub(super) const NOTE: &str = ".mirrorstats-unfinished";
+use super::super::new_file::replace as replace_bytes;
+use super::super::place::{folder_of, sync_folder};
+use super::stage::{FolderError, FolderFiles, NOTE, Stage, old_files, step, sync_folders};
 
 /// Replaces the files of the existing folder `out`.
 ///
@@ -43,14 +41,14 @@ pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
 fn note(out: &Path, old: &BTreeSet<PathBuf>, files: &FolderFiles<'_>) -> io::Result<()> {
     let new = files.new.iter().map(|(path, _)| *path);
     let paths: BTreeSet<&Path> = old.iter().map(PathBuf::as_path).chain(new).collect();
-    let text: String = paths.iter().map(|path| format!("{}\0", path.display())).collect();
+    let names: Vec<_> = paths.iter().map(|path| path.to_string_lossy()).collect();
     step();
-    replace_bytes(&out.join(NOTE), text.as_bytes())
+    replace_bytes(&out.join(NOTE), names.join("\0").as_bytes())
 }
 
 fn put(stage: &Stage, out: &Path, path: &Path) -> Result<(), FolderError> {
     let target = out.join(path);
-    let folder = super::folder_of(&target);
+    let folder = folder_of(&target);
     step();
     fs::create_dir_all(folder)
         .and_then(|()| fs::rename(stage.path().join(path), &target))

@@ -89,6 +89,9 @@ fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
 /// The tables that the query names; the others are not computed.
 fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Failure> {
     let inputs = scoring::resolve(&args.traces)?;
+    if let Some(path) = &args.output {
+        output::check_target(path, output::files_read(&inputs, &[args.scoring.definitions.as_deref()]))?;
+    }
     let mut loaded = Vec::new();
     if query.tables.contains(&Table::Steps) {
         let traces = scoring::open_steps(&inputs)?;
@@ -107,12 +110,12 @@ fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Fa
     Ok(loaded)
 }
 
-/// Writes a file that appears whole or not at all.
+/// Replaces a file by one of these rows.
 fn write_file(frame: LazyFrame, format: Format, path: &Path) -> Result<(), Failure> {
-    let temporary = output::beside(path)?;
-    let file: File = temporary.reopen().map_err(Failure::Output)?;
-    answer::write(frame, format, BufWriter::new(file)).map_err(failed)?;
-    output::persist(temporary, path)
+    let file = output::create(path)?;
+    let out: File = file.as_file().try_clone().map_err(Failure::Output)?;
+    answer::write(frame, format, BufWriter::new(out)).map_err(failed)?;
+    output::commit_unsynced(file, path)
 }
 
 /// The rows for people: names, types, rows, how many there are.

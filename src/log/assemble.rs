@@ -12,7 +12,7 @@ use serde_json::Value;
 
 use super::message::{EpisodeMessage, Head};
 use super::{LogError, METADATA, METADATA_KEY, topic};
-use crate::base::temporary;
+use crate::base::replace::NewFile;
 
 /// What orders the episodes of a log: seed and run.
 pub type Place = (i32, i32);
@@ -35,6 +35,15 @@ pub(super) fn write_recording<W: Write + Seek>(out: &mut Writer<W>, recording: &
     out.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })
 }
 
+/// Writes one log of these logs of one episode each, which replaces the one at `out` in one step.
+///
+/// # Errors
+/// When a log cannot be read or is damaged, and whatever writing gives; the log at `out` is as it was then.
+pub fn write(out: &Path, parts: &[(Place, PathBuf)], recording: &Value) -> Result<(), LogError> {
+    let file = NewFile::create(out).map_err(LogError::io("write", out))?;
+    join(file, None, out, parts, recording)
+}
+
 /// Puts the episodes of the log at `out`, if there is one, and of these logs of one episode each into one log, which
 /// replaces the one at `out` in one step; it is written in `scratch`, a folder of the same disk. Of an episode that is
 /// there twice the one in the log counts.
@@ -42,16 +51,40 @@ pub(super) fn write_recording<W: Write + Seek>(out: &mut Writer<W>, recording: &
 /// # Errors
 /// When a log cannot be read or is damaged, and whatever writing gives; the log at `out` is as it was then.
 pub fn assemble(out: &Path, parts: &[(Place, PathBuf)], recording: &Value, scratch: &Path) -> Result<(), LogError> {
-    let file = temporary::file_in(scratch).map_err(LogError::io("write", out))?;
+    let file = NewFile::create_in(scratch, out).map_err(LogError::io("write", out))?;
+    let before = if out.exists() { Some(Source::open(out)?) } else { None };
+    join(file, before, out, parts, recording)
+}
+
+/// Writes a log and gives it its name.
+fn join(
+    file: NewFile,
+    before: Option<Source>,
+    out: &Path,
+    parts: &[(Place, PathBuf)],
+    recording: &Value,
+) -> Result<(), LogError> {
     let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(out))?;
     write_recording(&mut log, recording).map_err(LogError::writing(out))?;
-    let mut before = if out.exists() { Some(Source::open(out)?) } else { None };
+    copy_all(&mut log, before, out, parts)?;
+    log.finish().map_err(LogError::writing(out))?;
+    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", out)(error.into_error()))?;
+    file.commit().map_err(LogError::io("write", out))
+}
+
+/// Copies the episodes of both, by seed and run.
+fn copy_all<W: Write + Seek>(
+    log: &mut Writer<W>,
+    mut before: Option<Source>,
+    out: &Path,
+    parts: &[(Place, PathBuf)],
+) -> Result<(), LogError> {
     let mut parts = parts.to_vec();
     parts.sort();
     for (place, part) in &parts {
         while let Some(earlier) = before.as_ref().and_then(Source::place).filter(|earlier| earlier <= place) {
             if let Some(source) = &mut before {
-                source.copy_episode(&mut log, out)?;
+                source.copy_episode(log, out)?;
             }
             if earlier == *place {
                 break;
@@ -59,16 +92,13 @@ pub fn assemble(out: &Path, parts: &[(Place, PathBuf)], recording: &Value, scrat
         }
         if !is_written(before.as_ref(), *place) {
             let mut source = Source::open(part)?;
-            source.copy_episode(&mut log, out)?;
+            source.copy_episode(log, out)?;
         }
     }
     while let Some(source) = before.as_mut().filter(|source| source.place().is_some()) {
-        source.copy_episode(&mut log, out)?;
+        source.copy_episode(log, out)?;
     }
-    log.finish().map_err(LogError::writing(out))?;
-    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", out)(error.into_error()))?;
-    file.as_file().sync_all().map_err(LogError::io("write", out))?;
-    file.persist(out).map(drop).map_err(|error| LogError::io("write", out)(error.error))
+    Ok(())
 }
 
 fn is_written(before: Option<&Source>, place: Place) -> bool {

@@ -85,7 +85,7 @@ pub enum LogError {
 impl LogError {
     fn io(doing: &'static str, path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
         let file = path.display().to_string();
-        move |source| Self::Io { doing, file, source: crate::base::temporary::without_name(source) }
+        move |source| Self::Io { doing, file, source: crate::base::replace::without_name(source) }
     }
 
     /// An error of the MCAP library while writing.

@@ -53,6 +53,21 @@ impl LogReader<BufReader<File>> {
     }
 }
 
+/// An episode of a log that is not the one of this id; `None` if there is none.
+///
+/// # Errors
+/// When the log cannot be read to its end.
+pub fn other_episode(path: &Path, id: &str) -> Result<Option<String>, LogError> {
+    for message in LogReader::open(path)? {
+        if let Event::Episode(EpisodeMessage::Begin(head)) = message?.event
+            && head.episode_id != id
+        {
+            return Ok(Some(head.episode_id));
+        }
+    }
+    Ok(None)
+}
+
 impl<R: Read> LogReader<R> {
     /// The messages in these bytes; `path` is for messages of errors.
     pub fn new(path: &Path, bytes: R) -> Self {

@@ -18,6 +18,7 @@ use serde::Serialize;
 use super::assemble::writer;
 use super::message::{Decision, EpisodeMessage, Head};
 use super::{LogError, topic};
+use crate::base::replace;
 
 /// Something that moves, in the frame of the room.
 #[derive(Clone, Debug, PartialEq)]
@@ -162,8 +163,7 @@ impl EpisodeLog {
         let failed = |error| LogError::io("write", &self.path)(error);
         let mut file = self.out.into_inner();
         file.flush().map_err(failed)?;
-        file.get_ref().sync_all().map_err(failed)?;
-        fs::rename(&self.unfinished.0, &self.path).map_err(failed)
+        replace::commit_named(file.get_ref(), &self.unfinished.0, &self.path).map_err(failed)
     }
 
     fn json(&mut self, channel: u16, time: u64, message: &impl Serialize) -> Result<(), LogError> {

@@ -12,7 +12,7 @@
 //! step; so any number of processes may record into one folder, and each leaves the same trace.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -28,9 +28,6 @@ use crate::trace::episode::Episode;
 use crate::trace::finding::TraceError;
 use crate::trace::merge;
 use crate::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
-
-/// A trace that is being put together; by its name it is cleared away if that is not brought to an end.
-const UNFINISHED_TRACE: &str = ".mirrorstats-assembled";
 
 /// The folder of a recording, for one model.
 #[derive(Debug)]
@@ -79,7 +76,7 @@ pub enum StoreError {
 
 impl StoreError {
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
-        move |source| Self::Io { doing, path: path.to_owned(), source: crate::base::temporary::without_name(source) }
+        move |source| Self::Io { doing, path: path.to_owned(), source: crate::base::replace::without_name(source) }
     }
 }
 
@@ -150,8 +147,7 @@ impl Store {
         let metadata = TraceMetadata { recording: Some(self.shelf.recording().clone()), columns: self.columns.clone() };
         let mut writer = TraceWriter::create(&path, &metadata)?;
         writer.write(episode)?;
-        writer.finish_durably()?;
-        synchronise(&self.parts())
+        Ok(writer.finish()?)
     }
 
     /// Puts the trace and the log of an experiment together from what is there; nothing if there are no parts.
@@ -179,10 +175,7 @@ impl Store {
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
         self.assemble_log(experiment, &parts, &recording)?;
-        let whole = self.parts().join(UNFINISHED_TRACE);
-        merge::write(&whole, Some(&recording), &episodes)?;
-        fs::rename(&whole, &trace).map_err(StoreError::io("write", &trace))?;
-        synchronise(self.claim.folder())?;
+        merge::write_in(&self.parts(), &trace, Some(&recording), &episodes)?;
         for part in parts.iter().chain(log_parts.iter().filter(|part| part.exists())) {
             fs::remove_file(part).map_err(StoreError::io("remove", part))?;
         }
@@ -204,8 +197,4 @@ impl Store {
         }
         Ok(assemble::assemble(&self.log(experiment), &logs, recording, &self.parts())?)
     }
-}
-
-fn synchronise(path: &Path) -> Result<(), StoreError> {
-    File::open(path).and_then(|file| file.sync_all()).map_err(StoreError::io("write", path))
 }

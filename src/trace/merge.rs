@@ -13,14 +13,13 @@ use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::file::reader::ChunkReader;
-use tempfile::NamedTempFile;
 
 use super::contain::contained;
 use super::episode::Episode;
 use super::finding::TraceError;
 use super::restore::{self, NotAnEpisode};
 use super::write::{self, OptionalColumns, ROW_GROUP_ROWS, TraceEncoder, TraceMetadata};
-use crate::base::temporary;
+use crate::base::replace::{self, NewFile};
 
 /// The rows of one episode, with what it is ordered and found by.
 #[derive(Clone, Debug)]
@@ -138,11 +137,24 @@ pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows,
     rows.pop().ok_or_else(|| TraceError::Part { file: "memory".to_owned(), source: "no episode came back".into() })
 }
 
-/// Writes these episodes, in this order, as the trace at `path`, which appears whole or not at all.
+/// Replaces the trace at `path` by one of these episodes, in this order.
 ///
 /// # Errors
-/// When the episodes do not have the same columns, or whatever writing gives.
+/// When the episodes do not have the same columns, or whatever writing gives; the trace at `path` is as it was then.
 pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
+    write_in(replace::folder_of(path), path, recording, episodes)
+}
+
+/// As [`write()`], with the temporary file in `scratch`, a folder of the same file system.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_in(
+    scratch: &Path,
+    path: &Path,
+    recording: Option<&serde_json::Value>,
+    episodes: &[EpisodeRows],
+) -> Result<(), TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write {
         file: path.display().to_string(),
         source,
@@ -152,11 +164,9 @@ pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[Epi
     if let Some(other) = episodes.iter().find(|episode| !same_columns(&schema, &episode.rows.schema())) {
         return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
+    let file = NewFile::create_in(scratch, path).map_err(|error| failed(error.into()))?;
     let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
-    file.as_file().sync_all().map_err(|error| failed(error.into()))?;
-    file.persist(path).map(drop).map_err(|error| failed(error.error.into()))
+    file.commit().map_err(|error| failed(error.into()))
 }
 
 fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
@@ -167,11 +177,11 @@ fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
 }
 
 fn encode(
-    file: NamedTempFile,
+    file: NewFile,
     schema: &SchemaRef,
     recording: Option<&serde_json::Value>,
     episodes: &[EpisodeRows],
-) -> parquet::errors::Result<NamedTempFile> {
+) -> parquet::errors::Result<NewFile> {
     let options =
         ArrowWriterOptions::new().with_properties(write::properties(recording)).with_skip_arrow_metadata(true);
     let mut parquet = ArrowWriter::try_new_with_options(file, Arc::clone(schema), options)?;

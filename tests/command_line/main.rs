@@ -9,7 +9,11 @@ mod filters;
 mod help;
 mod hostile;
 mod options;
+#[cfg(target_os = "linux")]
+mod outputs;
 mod refusals;
+#[cfg(unix)]
+mod reports;
 mod scores;
 mod widths;
 

@@ -294,7 +294,7 @@ impl Frames {
     fn new(scratch: &Path) -> Result<Self, Lost> {
         let made =
             std::path::absolute(scratch).and_then(|folder| tempfile::Builder::new().prefix(FRAMES).tempdir_in(folder));
-        made.map(Self).map_err(|fault| unusable(crate::base::temporary::without_name(fault)))
+        made.map(Self).map_err(|fault| unusable(crate::base::replace::without_name(fault)))
     }
 
     /// Writes a frame and says where it is.

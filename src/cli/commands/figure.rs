@@ -95,6 +95,10 @@ impl FigureArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let inputs = scoring::resolve(&self.traces)?;
+        if let Some(path) = &self.output {
+            let named = [self.scoring.definitions.as_deref(), Some(self.style.as_str())];
+            output::check_target(path, output::files_read(&inputs, &named))?;
+        }
         let threads = self.traces.threads.count();
         let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
         empty_filter::check(episodes.len(), &inputs, &self.scoring, threads)?;

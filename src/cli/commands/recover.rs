@@ -53,6 +53,7 @@ impl RecoverArgs {
     /// # Errors
     /// When the log cannot be read or is none, the trace cannot be written, or what was written breaks a rule.
     pub fn run(&self) -> Result<Outcome, Failure> {
+        output::check_target(&self.out, [&self.log])?;
         let recovered = recover(&self.log).map_err(Failure::input)?;
         let columns = recovered.recording.as_ref().map_or_else(OptionalColumns::all, OptionalColumns::recorded);
         let rows = recovered.episodes.iter().map(|episode| merge::rows(episode, &columns));

@@ -12,7 +12,7 @@ use super::super::outcome::{Failure, Outcome};
 use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
 use super::super::{empty_filter, output, scoring};
 use crate::cells::group::{DEFAULT_BY, group};
-use crate::report::bundle::{self, Bundle, Manifest};
+use crate::report::bundle::{self, Bundle, Manifest, Written};
 use crate::report::layout;
 use crate::report::style::{MAIN_TABLE, Style};
 use crate::report::table::Table;
@@ -84,6 +84,8 @@ impl ReportArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions, the style or the folder.
     pub fn make(&self, inputs: Vec<Input>) -> Result<(Made, Vec<String>), Failure> {
+        let read = output::files_read(&inputs, &[self.scoring.definitions.as_deref(), Some(&self.style)]);
+        bundle::check_old(&self.out, &read).map_err(Failure::input)?;
         // Small files first: a slip in the style should not cost a pass over the traces.
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let labels = scoring::labels(&self.by);
@@ -94,12 +96,14 @@ impl ReportArgs {
         let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
         let condition = self.scoring.condition.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, condition, scoring::provenance(&inputs)?);
-        let made = Made { inputs, episodes, cells, tables, manifest, style };
-        let files = self.write(&made)?;
-        Ok((made, files))
+        let mut made = Made { inputs, episodes, cells, tables, manifest, style };
+        let written = self.write(&made, &read)?;
+        made.manifest = written.manifest;
+        let inside = |path: &PathBuf| path.strip_prefix(&self.out).unwrap_or(path).display().to_string();
+        Ok((made, written.files.iter().map(inside).collect()))
     }
 
-    fn write(&self, made: &Made) -> Result<Vec<String>, Failure> {
+    fn write(&self, made: &Made, read: &[PathBuf]) -> Result<Written, Failure> {
         let mut others = Vec::new();
         if !self.no_figures {
             let asked = Asked { scoring: &self.scoring, threads: self.traces.threads.count() };
@@ -116,10 +120,8 @@ impl ReportArgs {
         let mut bytes = Vec::new();
         format::write(&made.episodes, format::Format::Parquet, &mut bytes).map_err(Failure::input)?;
         let Made { cells, tables, manifest, .. } = made;
-        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, others: &others };
-        let written = bundle::write(&self.out, &bundle).map_err(Failure::input)?;
-        let inside = |path: &PathBuf| path.strip_prefix(&self.out).unwrap_or(path).display().to_string();
-        Ok(written.iter().map(inside).collect())
+        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, read, others: &others };
+        bundle::write(&self.out, &bundle).map_err(Failure::input)
     }
 
     fn print(&self, tables: &[Table], episodes: usize) -> Result<Outcome, Failure> {

@@ -9,6 +9,7 @@ use super::super::outcome::{Failure, Outcome};
 use super::super::{empty_filter, output, scoring, spark};
 use crate::score::evidence;
 use crate::score::format::Format;
+use crate::trace::inputs::Input;
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -51,6 +52,7 @@ impl ScoreArgs {
         // An output name of no known format should not cost a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
         let inputs = scoring::resolve(&self.traces)?;
+        self.check_target(&inputs)?;
         let threads = self.traces.threads.count();
         if let Some(episode) = &self.explain {
             let traces = scoring::open_steps(&inputs)?;
@@ -91,9 +93,19 @@ impl ScoreArgs {
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let table = asked()?.score(&[])?;
+        let asked = asked()?;
+        if let Some(path) = &self.output {
+            output::check_target(path, asked.read())?;
+        }
+        let table = asked.score(&[])?;
         self.deliver(format, |format, out| scoring::write_table(&table, format, out))?;
         Ok(Outcome::Done)
+    }
+
+    /// That the output is no input.
+    fn check_target(&self, inputs: &[Input]) -> Result<(), Failure> {
+        let Some(path) = &self.output else { return Ok(()) };
+        output::check_target(path, output::files_read(inputs, &[self.scoring.definitions.as_deref()]))
     }
 
     /// Writes the table to where it was asked for.

@@ -202,7 +202,9 @@ impl Store {
         if logs.is_empty() {
             return Ok(());
         }
-        Ok(assemble::assemble(&self.log(experiment), &logs, recording, &self.parts())?)
+        let log = self.log(experiment);
+        let before = log.exists().then_some(log.as_path());
+        Ok(assemble::assemble(&log, before, &logs, recording, &self.parts())?)
     }
 }
 

@@ -173,7 +173,8 @@ impl ReplayArgs {
         if let Some(path) = &self.mcap {
             let recording = trace.recording.clone().unwrap_or(Value::Null);
             let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            assemble::assemble(&absent(path)?, &logs, &recording, folder).map_err(Failure::input)?;
+            // Whatever log was there is replaced by one of this replay alone.
+            assemble::assemble(path, None, &logs, &recording, folder).map_err(Failure::input)?;
         }
         if let (true, Some(path)) = (self.recompute_visibility, &self.out) {
             if fs::canonicalize(path).is_ok_and(|out| fs::canonicalize(&trace.path).is_ok_and(|own| own == out)) {
@@ -268,16 +269,6 @@ impl Counts {
 fn key(episode: &Episode) -> Result<Key, Failure> {
     let experiment = Experiment::parse(&episode.experiment).map_err(Failure::input)?;
     Ok(Key { experiment, seed: episode.seed, run: episode.run })
-}
-
-/// A log that is not put together with one that is there.
-fn absent(path: &Path) -> Result<PathBuf, Failure> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(Failure::input(format!("cannot replace `{}`: {error}", path.display())))
-        }
-        _ => Ok(path.to_owned()),
-    }
 }
 
 /// The metadata of a trace whose visibility was decided anew. The world stays: it is what a replay builds.

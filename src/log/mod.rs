@@ -21,6 +21,7 @@
 pub mod assemble;
 pub mod message;
 mod messages;
+mod parse;
 pub mod read;
 mod records;
 pub mod recover;

@@ -6,9 +6,10 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 use mcap::MAGIC;
-use mcap::read::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use super::parse::parsed;
 
 /// No record of a log is longer, chunks included; a longer one is damage.
 pub(super) const LONGEST: usize = 1 << 30;
@@ -229,23 +230,20 @@ impl<R: Read + Seek> Records<R> {
 fn decode(at: u64, opcode: u8, whole: &[u8]) -> Result<Piece, String> {
     let body = whole.get(FRAME..).unwrap_or_default();
     match opcode {
-        op::CHUNK => match parse_record(op::CHUNK, body) {
+        op::CHUNK => match parsed(op::CHUNK, body) {
             Ok(Record::Chunk { header, data })
                 if CHUNK_HEADER + header.compression.len() + data.len() == body.len() && !data.is_empty() =>
             {
                 Ok(Piece::Chunk(at, whole.to_vec()))
             }
             Ok(_) => Err("a chunk of another length than it says".to_owned()),
-            Err(fault) => Err(fault.to_string()),
+            Err(fault) => Err(fault),
         },
         // An end is believed at its exact length alone: nothing behind it is looked at for episodes.
         op::DATA_END if body.len() != 4 => Err("an end record of another length".to_owned()),
         // No log of ours has any, and the library expects that they are sound.
         op::ATTACHMENT => Ok(Piece::Record(Record::Unknown { opcode, data: Vec::new().into() })),
-        _ => {
-            let record = parse_record(opcode, body).map_err(|fault| fault.to_string())?;
-            Ok(Piece::Record(record.into_owned()))
-        }
+        _ => Ok(Piece::Record(parsed(opcode, body)?.into_owned())),
     }
 }
 
@@ -287,7 +285,7 @@ fn unpacked(chunk: &[u8], options: LinearReaderOptions, mut give: impl FnMut(Rec
                 rest = later;
             }
             LinearReadEvent::Record { data, opcode: opcode @ (op::SCHEMA | op::CHANNEL | op::MESSAGE) } => {
-                give(parse_record(opcode, data).map_err(|fault| fault.to_string())?.into_owned());
+                give(parsed(opcode, data)?.into_owned());
             }
             LinearReadEvent::Record { .. } => {}
         }

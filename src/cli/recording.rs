@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,8 @@ use crate::agent::vlm::limits::Spend;
 use crate::base::number::Decimal;
 use crate::base::visible::visible;
 use crate::record::lost::LostEpisode;
-use crate::record::run::{Progress, Spent, Tally};
+use crate::record::queue::Held;
+use crate::record::run::{Progress, Spent};
 
 /// The answer of `record --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -31,6 +32,8 @@ pub struct RecordAnswer {
     pub recorded: usize,
     /// Their steps.
     pub steps: u64,
+    /// Episodes that other processes recorded into the same folder meanwhile.
+    pub elsewhere: usize,
     /// Episodes that were lost to failures which are not the agent's: in no trace, listed in `lost.jsonl` of the folder.
     pub lost: Vec<LostEpisode>,
     /// What was spent over all starts of the recording; null for agents that cost nothing.
@@ -41,15 +44,6 @@ pub struct RecordAnswer {
     pub traces: Vec<String>,
     /// Their logs.
     pub logs: Vec<String>,
-}
-
-impl RecordAnswer {
-    /// What became of the episodes of a player.
-    pub fn of(tally: Tally, player: &dyn Player, asked: usize, found: usize, [traces, logs]: [Vec<String>; 2]) -> Self {
-        let Tally { recorded, steps, lost, stopped } = tally;
-        let (model, recorded, spend) = (player.model().to_owned(), recorded.len(), player.spend());
-        Self { model, asked, found, recorded, steps, lost, spend, stopped, traces, logs }
-    }
 }
 
 /// How often progress is told where no terminal shows it.
@@ -65,6 +59,8 @@ pub(super) struct Bar<'a> {
     is_shown: bool,
     /// When a line was last written.
     told: Mutex<Instant>,
+    /// Whether it was said that other processes are waited for.
+    is_waiting: AtomicBool,
 }
 
 impl<'a> Bar<'a> {
@@ -77,7 +73,8 @@ impl<'a> Bar<'a> {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
         line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let told = Mutex::new(Instant::now());
-        let bar = Self { line, player, episodes, ended: AtomicUsize::new(0), budget, is_shown, told };
+        let (ended, is_waiting) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let bar = Self { line, player, episodes, ended, budget, is_shown, told, is_waiting };
         bar.line.set_message(bar.message());
         bar
     }
@@ -130,6 +127,23 @@ impl Progress for Bar<'_> {
             let _ = writeln!(io::stderr(), "lost {}: {}", visible(id), visible(reason));
         });
     }
+
+    fn waiting(&self, id: &str, held: Held) {
+        if !self.is_waiting.swap(true, Ordering::Relaxed) {
+            // With standard error closed there is nobody left to tell.
+            self.line.suspend(|| drop(writeln!(io::stderr(), "{}", waiting(id, held))));
+        }
+    }
+}
+
+/// Which episodes are waited for, and who has them.
+fn waiting(id: &str, held: Held) -> String {
+    let others = match held.count - 1 {
+        0 => String::new(),
+        more => format!(" and {}", counted(more as u64, "other episode")),
+    };
+    let process = held.process.map_or_else(|| "another process".to_owned(), |process| format!("process {process}"));
+    format!("waiting for {}{others}: {process} records it into the same folder; Ctrl-C ends the waiting", visible(id))
 }
 
 /// What was spent, in words.
@@ -165,6 +179,10 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
         0 => writeln!(out)?,
         found => writeln!(out, "; {found} of {} were there before", answer.asked)?,
     }
+    if answer.elsewhere > 0 {
+        let episodes = counted(answer.elsewhere as u64, "episode");
+        writeln!(out, "another process recorded {episodes} into the same folder meanwhile")?;
+    }
     if let Some(shares) = shares(times) {
         writeln!(out, "time: {shares}")?;
     }
@@ -180,7 +198,7 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
         )?;
     }
     if answer.stopped {
-        let left = answer.asked - answer.found - answer.recorded - answer.lost.len();
+        let left = answer.asked - answer.found - answer.recorded - answer.elsewhere - answer.lost.len();
         writeln!(out, "stopped, {} to go: the same command continues", counted(left as u64, "episode"))?;
     }
     Ok(())
@@ -203,9 +221,22 @@ fn shares(times: Spent) -> Option<String> {
 mod tests {
     use std::time::Duration;
 
-    use super::{dollars, shares, spent};
+    use super::{dollars, shares, spent, waiting};
     use crate::agent::vlm::limits::Spend;
+    use crate::record::plan::Key;
+    use crate::record::queue::Held;
     use crate::record::run::Spent;
+    use crate::sim::Experiment;
+
+    #[test]
+    fn who_is_waited_for_is_said() {
+        let key = Key { experiment: Experiment::E1, seed: 1, run: 3 };
+        let one = Held { key, process: Some(4711), count: 1 };
+        let expected = "waiting for E1/a/s1/r3: process 4711 records it into the same folder; Ctrl-C ends the waiting";
+        assert_eq!(waiting("E1/a/s1/r3", one), expected);
+        let more = waiting("E1/a/s1/r3", Held { process: None, count: 3, ..one });
+        assert!(more.starts_with("waiting for E1/a/s1/r3 and 2 other episodes: another process records it"), "{more}");
+    }
 
     #[test]
     fn what_is_not_known_of_a_cost_is_said() {

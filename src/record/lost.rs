@@ -11,8 +11,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::fault::StoreError;
 use super::plan::Key;
-use super::store::StoreError;
 use crate::agent::Lost;
 use crate::base::replace::NewFile;
 

@@ -16,6 +16,7 @@
 //! | [`store`] | the folder: how an episode commits, how the final files are made |
 //! | [`claim`] | who else records into the folder |
 //! | [`lost`] | the list of episodes that failures kept from being recorded |
+//! | [`replies`] | how many replies gave no decision |
 //! | [`run`] | threads, episodes under way, stopping, what took the time |
 //!
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
@@ -27,6 +28,7 @@ pub mod lost;
 pub mod metadata;
 pub mod plan;
 pub mod play;
+pub mod replies;
 pub mod run;
 pub mod shelf;
 pub mod store;

@@ -54,6 +54,10 @@ fn print(out: &mut impl Write, info: &Info) -> io::Result<()> {
     if !own.is_empty() {
         list(out, "own columns", &own)?;
     }
+    if let Some(replies) = info.replies.as_ref().filter(|replies| replies.all_unreadable() > 0) {
+        let (bad, all) = (replies.all_unreadable(), replies.replies);
+        writeln!(out, "\n{bad} of {all} replies could not be read: {replies} (`reply_status`)")?;
+    }
     writeln!(out, "\nepisodes by experiment and model\n{}", coverage(info).trim_fmt())?;
     gaps(out, info)?;
     writeln!(out, "\nfiles\n{}", files(info).trim_fmt())

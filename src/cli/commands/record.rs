@@ -135,6 +135,9 @@ impl RecordArgs {
     ) -> Result<Outcome, Failure> {
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| store.recorded(experiment))?;
+        if todo.len() < planned.len() {
+            player.resumes();
+        }
         let bar = Bar::new(player, todo.len(), config.episode.steps);
         let shares = Shares::default();
         let start = Instant::now();
@@ -149,7 +152,8 @@ impl RecordArgs {
         let missing: BTreeSet<Key> = todo.iter().copied().collect();
         let found = planned.iter().filter(|key| !missing.contains(key));
         store.note_lost(found.chain(&tally.recorded).copied(), &tally.lost).map_err(Failure::input)?;
-        let answer = RecordAnswer::of(tally, player, planned.len(), planned.len() - todo.len(), files(plan, store));
+        let (asked, found) = (planned.len(), planned.len() - todo.len());
+        let answer = RecordAnswer::of(tally, player, bar.replies(), asked, found, files(plan, store));
         recording::say(&answer, &store.lost_list(), start.elapsed(), shares.spent())?;
         if self.json {
             output::print_json(&answer)?;

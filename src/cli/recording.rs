@@ -16,8 +16,12 @@ use crate::agent::vlm::limits::Spend;
 use crate::base::number::Decimal;
 use crate::base::visible::visible;
 use crate::record::lost::LostEpisode;
+use crate::record::plan::Key;
 use crate::record::queue::Held;
+use crate::record::replies::{Replies, RepliesAnswer, UnreadableReply};
 use crate::record::run::{Progress, Spent};
+use crate::trace::episode::Step;
+use crate::trace::replies::ReplyCounts;
 
 /// The answer of `record --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -34,6 +38,8 @@ pub struct RecordAnswer {
     pub steps: u64,
     /// Episodes that other processes recorded into the same folder meanwhile.
     pub elsewhere: usize,
+    /// The replies of this start.
+    pub replies: RepliesAnswer,
     /// Episodes that were lost to failures which are not the agent's: in no trace, listed in `lost.jsonl` of the folder.
     pub lost: Vec<LostEpisode>,
     /// What was spent over all starts of the recording; null for agents that cost nothing.
@@ -49,12 +55,14 @@ pub struct RecordAnswer {
 /// How often progress is told where no terminal shows it.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
-/// The progress: a bar where a terminal shows it, else a line now and then for agents that cost something.
+/// The progress: a bar where a terminal shows it, else a line now and then for agents that cost something or whose
+/// replies cannot be read.
 pub(super) struct Bar<'a> {
     line: ProgressBar,
     player: &'a dyn Player,
     episodes: usize,
     ended: AtomicUsize,
+    replies: Replies,
     budget: u64,
     is_shown: bool,
     /// When a line was last written.
@@ -73,8 +81,8 @@ impl<'a> Bar<'a> {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
         line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let told = Mutex::new(Instant::now());
-        let (ended, is_waiting) = (AtomicUsize::new(0), AtomicBool::new(false));
-        let bar = Self { line, player, episodes, ended, budget, is_shown, told, is_waiting };
+        let (ended, is_waiting, replies) = (AtomicUsize::new(0), AtomicBool::new(false), Replies::default());
+        let bar = Self { line, player, episodes, ended, replies, budget, is_shown, told, is_waiting };
         bar.line.set_message(bar.message());
         bar
     }
@@ -84,16 +92,35 @@ impl<'a> Bar<'a> {
         self.line.finish_and_clear();
     }
 
-    /// How many episodes have ended, and what was spent.
+    /// The replies so far.
+    pub(super) fn replies(&self) -> RepliesAnswer {
+        self.replies.answer()
+    }
+
+    /// How many episodes have ended, how many replies could not be read, and what was spent.
     fn message(&self) -> String {
+        let unreadable = unreadable(&self.replies.counts()).map_or_else(String::new, |words| format!(", {words}"));
         let spent = self.player.spend().map_or_else(String::new, |spend| format!(", {}", spent(&spend)));
-        format!("{} of {} episodes{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
+        format!("{} of {} episodes{unreadable}{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
+    }
+
+    /// A line above the bar, or in a log.
+    fn say(&self, line: &str) {
+        self.line.suspend(|| {
+            // With standard error closed there is nobody left to tell.
+            let _ = writeln!(io::stderr(), "{line}");
+        });
+    }
+
+    /// Whether a line in a log says more than that steps are played.
+    fn has_news(&self) -> bool {
+        self.player.spend().is_some() || self.replies.counts().all_unreadable() > 0
     }
 
     /// A line for a log, now and then.
     fn write_line(&self) {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.is_shown || self.player.spend().is_none() || told.elapsed() < BETWEEN_LINES {
+        if self.is_shown || told.elapsed() < BETWEEN_LINES || !self.has_news() {
             return;
         }
         *told = Instant::now();
@@ -104,8 +131,11 @@ impl<'a> Bar<'a> {
 }
 
 impl Progress for Bar<'_> {
-    fn step(&self) {
+    fn step(&self, episode: Key, t: i32, row: &Step) {
         self.line.inc(1);
+        if let Some(first) = self.replies.add(self.player.model(), episode, t, row) {
+            self.say(&format!("a reply could not be read: {}: {}", first.status, quoted(&first)));
+        }
         if self.is_shown {
             self.line.set_message(self.message());
         } else {
@@ -122,16 +152,12 @@ impl Progress for Bar<'_> {
     }
 
     fn lost(&self, id: &str, reason: &str) {
-        self.line.suspend(|| {
-            // With standard error closed there is nobody left to tell.
-            let _ = writeln!(io::stderr(), "lost {}: {}", visible(id), visible(reason));
-        });
+        self.say(&format!("lost {}: {}", visible(id), visible(reason)));
     }
 
     fn waiting(&self, id: &str, held: Held) {
         if !self.is_waiting.swap(true, Ordering::Relaxed) {
-            // With standard error closed there is nobody left to tell.
-            self.line.suspend(|| drop(writeln!(io::stderr(), "{}", waiting(id, held))));
+            self.say(&waiting(id, held));
         }
     }
 }
@@ -144,6 +170,19 @@ fn waiting(id: &str, held: Held) -> String {
     };
     let process = held.process.map_or_else(|| "another process".to_owned(), |process| format!("process {process}"));
     format!("waiting for {}{others}: {process} records it into the same folder; Ctrl-C ends the waiting", visible(id))
+}
+
+/// How many replies could not be read, and why, in words; `None` if all could.
+fn unreadable(counts: &ReplyCounts) -> Option<String> {
+    let (bad, all) = (counts.all_unreadable(), counts.replies);
+    let noun = if all == 1 { "reply" } else { "replies" };
+    (bad > 0).then(|| format!("{bad} of {all} {noun} could not be read: {counts}"))
+}
+
+/// What an unreadable reply says, and where it is.
+fn quoted(reply: &UnreadableReply) -> String {
+    let words = reply.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
+    format!("{words} ({}, step {})", visible(&reply.episode_id), reply.step)
 }
 
 /// What was spent, in words.
@@ -183,6 +222,10 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
         let episodes = counted(answer.elsewhere as u64, "episode");
         writeln!(out, "another process recorded {episodes} into the same folder meanwhile")?;
     }
+    if let Some(words) = unreadable(&answer.replies.counts) {
+        let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, quoted);
+        writeln!(out, "{words}; first: {first}")?;
+    }
     if let Some(shares) = shares(times) {
         writeln!(out, "time: {shares}")?;
     }
@@ -221,12 +264,14 @@ fn shares(times: Spent) -> Option<String> {
 mod tests {
     use std::time::Duration;
 
-    use super::{dollars, shares, spent, waiting};
+    use super::{Bar, dollars, shares, spent, waiting};
+    use crate::agent::scripted::Scripted;
     use crate::agent::vlm::limits::Spend;
     use crate::record::plan::Key;
     use crate::record::queue::Held;
-    use crate::record::run::Spent;
+    use crate::record::run::{Progress as _, Spent};
     use crate::sim::Experiment;
+    use crate::trace::episode::{Extra, Step};
 
     #[test]
     fn who_is_waited_for_is_said() {
@@ -236,6 +281,24 @@ mod tests {
         assert_eq!(waiting("E1/a/s1/r3", one), expected);
         let more = waiting("E1/a/s1/r3", Held { process: None, count: 3, ..one });
         assert!(more.starts_with("waiting for E1/a/s1/r3 and 2 other episodes: another process records it"), "{more}");
+    }
+
+    #[test]
+    fn the_progress_tells_of_replies_that_cannot_be_read() {
+        let player = Scripted::named("frozen").unwrap();
+        let bar = Bar::new(&player, 2, 10);
+        let row = |status: &str| {
+            let extra = Extra { reply_status: Some(status.to_owned()), ..Extra::default() };
+            Step { action: None, self_color: None, selected_cube: None, mirror_visible: false, extra }
+        };
+        let key = Key { experiment: Experiment::E1, seed: 1, run: 1 };
+        bar.step(key, 1, &row("ok"));
+        assert_eq!((bar.message().as_str(), bar.has_news()), ("0 of 2 episodes", false));
+        for (t, status) in [(2, "refusal"), (3, "parse_failed"), (4, "refusal")] {
+            bar.step(key, t, &row(status));
+        }
+        let expected = "0 of 2 episodes, 3 of 4 replies could not be read: parse_failed 1, refusal 2";
+        assert_eq!((bar.message().as_str(), bar.has_news()), (expected, true));
     }
 
     #[test]

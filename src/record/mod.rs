@@ -20,6 +20,7 @@
 //! | `continued` | whether the log that is there belongs to the recording |
 //! | [`fault`] | why a folder cannot be used |
 //! | [`lost`] | the list of episodes that failures kept from being recorded |
+//! | [`replies`] | how many replies gave no decision |
 //! | [`run`] | threads, episodes under way, stopping, what took the time |
 //!
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
@@ -35,6 +36,7 @@ pub mod metadata;
 pub mod plan;
 pub mod play;
 pub mod queue;
+pub mod replies;
 pub mod run;
 pub mod shelf;
 pub mod store;

@@ -81,8 +81,8 @@ fn add(share: &AtomicU64, start: Instant) {
 
 /// What happens while a recording runs; called from its threads.
 pub trait Progress: Sync {
-    /// A step was played.
-    fn step(&self);
+    /// A step of an episode was played: its number, from 1, and its row.
+    fn step(&self, episode: Key, t: i32, row: &Step);
     /// An episode is committed.
     fn episode(&self, id: &str, steps: usize);
     /// An episode is lost, for this reason.
@@ -249,7 +249,7 @@ impl Recording<'_> {
         let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
         let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
         let frames = self.settings.frames;
-        let mut onlooker = Onlookers { progress: self.progress, shares: self.shares, frames, log };
+        let mut onlooker = Onlookers { key, progress: self.progress, shares: self.shares, frames, log };
         let played = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await;
         let committed = match &played {
             Ok(episode) => self.commit(key, episode, onlooker.log),
@@ -313,6 +313,7 @@ fn panicked() -> Broken {
 
 /// Counts steps, and writes the log if there is one.
 struct Onlookers<'a> {
+    key: Key,
     progress: &'a dyn Progress,
     shares: &'a Shares,
     /// Whether the log has frames.
@@ -331,7 +332,7 @@ impl Onlooker for Onlookers<'_> {
     }
 
     fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken> {
-        self.progress.step();
+        self.progress.step(self.key, t, row);
         let start = Instant::now();
         if let Some(log) = &mut self.log {
             log.done(t, row)?;

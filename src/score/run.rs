@@ -298,7 +298,7 @@ pub(super) fn projection(
     });
     let known = &definitions.catalog;
     let experiments = (!known.open).then(|| known.experiment.keys().cloned().collect());
-    Ok(Projection { steps, constants, experiments })
+    Ok(Projection { steps, constants, experiments, ..Projection::default() })
 }
 
 /// Refuses a column to group by that is not constant in an episode, or not in every trace.

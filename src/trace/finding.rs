@@ -108,11 +108,13 @@ pub enum Code {
     UnseenColor,
     /// An episode's rows lie in more than one row group.
     SplitEpisode,
+    /// Replies of the file gave no decision.
+    UnreadableReplies,
 }
 
 impl Code {
     /// All codes, in the order of the documentation.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 30] = [
         Self::Unreadable,
         Self::EmptyFile,
         Self::NotParquet,
@@ -142,6 +144,7 @@ impl Code {
         Self::InvalidColor,
         Self::UnseenColor,
         Self::SplitEpisode,
+        Self::UnreadableReplies,
     ];
 
     /// The stable name, `t-gap`.
@@ -162,7 +165,7 @@ impl Code {
     /// How much it matters.
     pub const fn severity(self) -> Severity {
         match self {
-            Self::UnseenColor | Self::SplitEpisode => Severity::Note,
+            Self::UnseenColor | Self::SplitEpisode | Self::UnreadableReplies => Severity::Note,
             _ => Severity::Error,
         }
     }
@@ -276,6 +279,11 @@ impl Code {
                 "split-episode",
                 "an episode's rows are in one row group",
                 "nothing to do: the episode is read whole; mirrorstats' own writer keeps it together",
+            ),
+            Self::UnreadableReplies => (
+                "unreadable-replies",
+                "every reply could be read: its status is `ok` or `repaired`",
+                "the column `reply` holds what was replied; to the metrics these are steps without a decision",
             ),
         }
     }

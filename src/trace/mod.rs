@@ -20,6 +20,7 @@ pub mod merge;
 pub mod open;
 mod pages;
 mod pass;
+pub mod replies;
 pub mod restore;
 pub mod rewrite;
 mod rules;

@@ -23,10 +23,19 @@ use super::rules::{Located, Rules};
 pub struct Projection {
     /// Columns with a value a step.
     pub steps: Vec<String>,
+    /// Columns with a value a step that are taken as they are: the schema's rules about values do not count.
+    pub unchecked: Vec<String>,
     /// Columns with a value an episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
     pub constants: Vec<String>,
     /// The experiments that are known; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
+}
+
+impl Projection {
+    /// The columns with a value a step.
+    fn step_columns(&self) -> impl Iterator<Item = &str> {
+        self.steps.iter().chain(&self.unchecked).map(String::as_str)
+    }
 }
 
 /// The first columns of [`EpisodeBatch::episodes`].
@@ -41,9 +50,9 @@ pub const EPISODE_COLUMNS: [&str; 5] = ["episode_id", "model", "experiment", "se
 pub struct EpisodeBatch {
     /// The rows of episode `i` in `steps` are `offsets[i]..offsets[i + 1]`; its timesteps are 1, 2, ... in that order.
     pub offsets: Vec<usize>,
-    /// A row a step: the columns of [`Projection::steps`], but for those in `texts`.
+    /// A row a step: the columns of [`Projection::steps`] and [`Projection::unchecked`], but for those in `texts`.
     pub steps: RecordBatch,
-    /// Columns of [`Projection::steps`].
+    /// Columns of [`Projection::steps`] and [`Projection::unchecked`].
     pub texts: Vec<Texts>,
     /// A row an episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
     pub episodes: RecordBatch,
@@ -105,11 +114,14 @@ impl TraceSet {
         work: impl Fn(EpisodeBatch) -> Result<T, E> + Sync,
         mut sink: impl FnMut(T) -> Result<(), E>,
     ) -> Result<ScanSummary, E> {
-        let layout = Layout::new(
+        let mut layout = Layout::new(
             self,
-            projection.steps.iter().map(String::as_str),
+            projection.step_columns(),
             EPISODE_COLUMNS.into_iter().chain(projection.constants.iter().map(String::as_str)),
         )?;
+        for column in &projection.unchecked {
+            layout.without_rules(column);
+        }
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
         let shape = Shape::new(&layout, projection);
         let mut prints = Prints::default();
@@ -182,7 +194,7 @@ impl<'a> Shape<'a> {
         let constants = projection.constants.iter().map(String::as_str);
         Self {
             layout,
-            steps: projection.steps.iter().filter_map(|name| layout.position(name)).collect(),
+            steps: projection.step_columns().filter_map(|name| layout.position(name)).collect(),
             episodes: EPISODE_COLUMNS.into_iter().chain(constants).filter_map(|name| layout.position(name)).collect(),
         }
     }

@@ -56,6 +56,10 @@ fn print(out: &mut impl Write, info: &Info, width: Option<usize>) -> io::Result<
     if !own.is_empty() {
         list(out, "own columns", &own, width)?;
     }
+    if let Some(replies) = info.replies.as_ref().filter(|replies| replies.all_unreadable() > 0) {
+        let (bad, all) = (replies.all_unreadable(), replies.replies);
+        writeln!(out, "\n{bad} of {all} replies could not be read: {replies} (`reply_status`)")?;
+    }
     writeln!(out, "\nepisodes by experiment and model\n{}", fitted(&coverage(info), 1, width))?;
     gaps(out, info)?;
     writeln!(out, "\nfiles\n{}", fitted(&files(info), 1, width))

@@ -136,6 +136,9 @@ impl RecordArgs {
     ) -> Result<Outcome, Failure> {
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| store.recorded(experiment))?;
+        if todo.len() < planned.len() {
+            player.resumes();
+        }
         let bar = Bar::new(player, todo.len(), config.episode.steps);
         let shares = Shares::default();
         let start = Instant::now();
@@ -160,6 +163,7 @@ impl RecordArgs {
             recorded: recorded.len(),
             elsewhere: elsewhere.len() + lost_here - lost.len(),
             steps,
+            replies: bar.replies(),
             lost,
             spend: player.spend(),
             stopped,

@@ -43,7 +43,8 @@ impl SchemaDocument {
             title: "mirrorstats trace",
             description: "A Parquet file of whole episodes: the rows of an episode are together, and t runs 1..T. \
                           Readers take plain and dictionary strings, and integers of any width. \
-                          Columns that are not listed are kept and can be used in definitions.",
+                          Columns that are not listed are kept and can be used in definitions. \
+                          All columns are flat: no lists, structs or maps.",
             version: SCHEMA_VERSION,
             columns: COLUMNS,
             metadata: METADATA,

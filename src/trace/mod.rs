@@ -3,6 +3,7 @@
 //! Rule: only this room opens traces. It knows no metric.
 
 mod ahead;
+mod bounds;
 mod column;
 pub(crate) mod contain;
 mod decode;
@@ -10,6 +11,7 @@ pub mod describe;
 pub mod episode;
 pub mod finding;
 mod footer;
+mod footer_shape;
 mod ids;
 pub mod import;
 pub mod info;
@@ -25,5 +27,7 @@ mod rules;
 pub mod scan;
 pub mod schema;
 mod source;
+mod thrift;
 pub mod validate;
+pub mod verify;
 pub mod write;

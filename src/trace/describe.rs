@@ -43,8 +43,7 @@ impl SchemaDocument {
             title: "mirrorstats trace",
             description: "A Parquet file of whole episodes: the rows of an episode are together, and t runs 1..T. \
                           Readers take plain and dictionary strings, and integers of any width. \
-                          Columns that are not listed are kept and can be used in definitions. \
-                          All columns are flat: no lists, structs or maps.",
+                          Columns that are not listed are kept and can be used in definitions.",
             version: SCHEMA_VERSION,
             columns: COLUMNS,
             metadata: METADATA,

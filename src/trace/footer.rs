@@ -18,7 +18,6 @@ use super::footer_shape;
 use super::inputs::Input;
 use super::open::{FileColumn, text_type};
 use super::schema::Kind;
-use super::thrift::Fault;
 
 const MAGIC: [u8; 4] = *b"PAR1";
 const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
@@ -72,31 +71,13 @@ pub(super) fn footer(input: &Input, extent: Extent) -> Result<(u64, ParquetMetaD
         let found = format!("{bytes} bytes that end without it");
         return Err(finding(Code::Truncated, "a footer at the end, closed with `PAR1`", found));
     }
-    check_shape(&mut file, bytes, &finding)?;
+    footer_shape::check_file(&file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
     let reader = || ParquetMetaDataReader::new().with_metadata_options(Some(extent.options()));
     match contained(|| reader().parse_and_finish(&file)) {
         Ok(Ok(metadata)) => Ok((bytes, metadata)),
         Ok(Err(error)) => Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
         Err(panic) => Err(finding(Code::CorruptFooter, "a readable footer", panic)),
     }
-}
-
-/// The footer's structure, before the Parquet library follows it. One whose length is wrong is left to the library.
-fn check_shape(
-    file: &mut File,
-    bytes: u64,
-    finding: impl Fn(Code, &str, String) -> Box<Finding>,
-) -> Result<(), Box<Finding>> {
-    let mut length = [0; 4];
-    let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
-    file.seek(SeekFrom::End(-8)).and_then(|_| file.read_exact(&mut length)).map_err(unreadable)?;
-    let length = u64::from(u32::from_le_bytes(length));
-    let Some(start) = bytes.checked_sub(8 + length) else { return Ok(()) };
-    let mut footer = Vec::new();
-    file.seek(SeekFrom::Start(start)).map_err(unreadable)?;
-    file.take(length).read_to_end(&mut footer).map_err(unreadable)?;
-    let corrupt = |fault: Fault| finding(Code::CorruptFooter, "a readable footer", fault.to_string());
-    footer_shape::check(&footer).map_err(corrupt)
 }
 
 fn magic(file: &mut File, at: SeekFrom) -> io::Result<Option<[u8; 4]>> {

@@ -5,6 +5,8 @@
 //!
 //! Source: the Parquet format's `parquet.thrift`.
 
+use parquet::file::reader::ChunkReader;
+
 use super::thrift::{Compact, Fault, Wire};
 
 /// The fields of a structure.
@@ -127,8 +129,19 @@ const BOX: Shape = &[
 ];
 const KEY_VALUE: Shape = &[(1, One(Binary)), (2, One(Binary))];
 
+/// Whether the footer of a file keeps within its bytes, before the Parquet library follows it; else what it is. Where there
+/// is none, the library has the better words.
+pub(crate) fn check_file(file: &impl ChunkReader) -> Result<(), String> {
+    let footer = || {
+        let end = file.len().checked_sub(8)?;
+        let length = u32::from_le_bytes(*file.get_bytes(end, 4).ok()?.first_chunk()?);
+        file.get_bytes(end.checked_sub(length.into())?, usize::try_from(length).ok()?).ok()
+    };
+    footer().map_or(Ok(()), |footer| check(&footer).map_err(|fault| fault.to_string()))
+}
+
 /// Whether some bytes are the structure of a footer, within their bounds.
-pub(super) fn check(footer: &[u8]) -> Result<(), Fault> {
+fn check(footer: &[u8]) -> Result<(), Fault> {
     walk(&mut Compact::new(footer), FILE)
 }
 

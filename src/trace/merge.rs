@@ -96,6 +96,13 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
 
 fn decode(name: &str, store: Store, metadata: ParquetMetaData) -> Result<Vec<EpisodeRows>, TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
+    let columns = metadata.file_metadata().schema_descr().columns();
+    if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
+        let column = nested.path().parts()[0].escape_debug();
+        return Err(failed(
+            format!("the column `{column}` is nested; leave it out, or write its parts as columns").into(),
+        ));
+    }
     contained(|| {
         let row_groups = (0..metadata.num_row_groups()).collect();
         let slot = FaultSlot::default();

@@ -11,7 +11,7 @@ pub mod describe;
 pub mod episode;
 pub mod finding;
 mod footer;
-mod footer_shape;
+pub(crate) mod footer_shape;
 mod ids;
 pub mod import;
 pub mod info;

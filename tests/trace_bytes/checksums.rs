@@ -135,6 +135,11 @@ fn every_page_with_a_wrong_checksum_is_found_on_every_way_to_read_it() {
             assert_eq!(finding.column.as_ref(), Some(&page.column));
             let merged = merge::read(&path).unwrap_err().to_string();
             assert!(merged.contains("CRC-32") && merged.contains(&page.column), "{merged}");
+            if mirrorstats::trace::schema::column(&page.column).is_none() {
+                // A column of their own, which `validate` does not read.
+                assert_eq!(page.column, "description");
+                continue;
+            }
             let output = Command::cargo_bin("mirrorstats").unwrap().arg("validate").arg(&path).output().unwrap();
             let told = told(&output);
             assert_eq!(output.status.code(), Some(1), "{name}, {page:?}: {told}");

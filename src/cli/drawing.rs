@@ -7,15 +7,15 @@ use super::outcome::Failure;
 use super::scoring;
 use crate::cells::cell::Cells;
 use crate::cells::group::{DEFAULT_BY, group};
+use crate::metric::definitions::Definitions;
 use crate::report::figures::e5_outcomes::Outcomes;
-use crate::report::figures::{self, Figure, FigureError, FigureName, Input};
+use crate::report::figures::{self, Figure, FigureError, FigureName, Input, gaze};
 use crate::report::style::Style;
+use crate::score::run::ScoreError;
 use crate::score::table::EpisodeTable;
 use crate::score::timeline::{self, Timeline};
 use crate::trace::inputs;
-
-/// The most episodes that are drawn one by one.
-const MOST_EPISODES: usize = 2_000;
+use crate::trace::open::TraceSet;
 
 /// Everything that figures may need.
 #[derive(Debug)]
@@ -37,7 +37,7 @@ pub struct Drawings {
 }
 
 impl<'a> Sources<'a> {
-    /// Groups the episodes as figures show them, and reads their timelines if they come from traces.
+    /// Groups the episodes as figures show them, and reads what `names` need of the steps if they come from traces.
     ///
     /// # Errors
     /// What is wrong with the traces or the definitions.
@@ -46,11 +46,18 @@ impl<'a> Sources<'a> {
         asked: &ScoringArgs,
         episodes: &'a EpisodeTable,
         style: &'a Style,
+        names: &[FigureName],
         threads: NonZeroUsize,
     ) -> Result<Self, Failure> {
         let cells = group(episodes, &DEFAULT_BY.map(str::to_owned)).map_err(Failure::input)?;
-        let timelines = timelines(inputs, asked, episodes, threads)?;
-        let outcomes = timelines.as_deref().and_then(|timelines| Outcomes::of(episodes, timelines));
+        let (timelines, outcomes) = if scoring::are_scores(inputs) {
+            (None, None)
+        } else {
+            let traces = scoring::open(inputs)?;
+            // Neither needs a metric, and so no column that only a metric left out would read.
+            let definitions = scoring::definitions(&traces, asked)?;
+            steps_of(&traces, &definitions, episodes, names, threads).map_err(scoring::score_failure)?
+        };
         Ok(Self { cells, order: &style.sheet.row_order, episodes, timelines, outcomes })
     }
 
@@ -78,18 +85,25 @@ impl<'a> Sources<'a> {
     }
 }
 
-/// `None` for scores, for definitions that do not name the moments, and for more episodes than a raster can show.
-fn timelines(
-    inputs: &[inputs::Input],
-    asked: &ScoringArgs,
+/// What figures of these names need of the steps: timelines of as many episodes as a raster shows, and how open
+/// questions ended.
+///
+/// `None` for what the definitions do not name, and for what no figure would show.
+fn steps_of(
+    traces: &TraceSet,
+    definitions: &Definitions,
     episodes: &EpisodeTable,
+    names: &[FigureName],
     threads: NonZeroUsize,
-) -> Result<Option<Vec<Timeline>>, Failure> {
-    if episodes.len() > MOST_EPISODES || scoring::are_scores(inputs) {
-        return Ok(None);
-    }
-    let traces = scoring::open(inputs)?;
-    // Timelines need no metric, and so no column that only a metric left out would read.
-    let definitions = scoring::definitions(&traces, asked)?;
-    timeline::timelines(&traces, &definitions, threads).map_err(scoring::score_failure)
+) -> Result<(Option<Vec<Timeline>>, Option<Outcomes>), ScoreError> {
+    let shows_each = names.contains(&FigureName::Gaze) && episodes.len() <= gaze::MOST_EPISODES;
+    let shows_ends = names.contains(&FigureName::E5Outcomes) && Outcomes::are_there(episodes);
+    let timelines = if shows_each { timeline::timelines(traces, definitions, threads)? } else { None };
+    let answered = match &timelines {
+        Some(timelines) => Some(timelines.iter().map(|timeline| timeline.answered).collect()),
+        None if shows_ends => timeline::answered(traces, definitions, &episodes.keys, threads)?,
+        None => None,
+    };
+    let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(episodes, &answered));
+    Ok((timelines, outcomes))
 }

@@ -54,7 +54,9 @@ impl Asked<'_> {
     /// # Errors
     /// What is wrong with the traces or the definitions.
     pub fn drawings(self, made: &Made) -> Result<Drawings, Failure> {
-        Ok(Sources::of(&made.inputs, self.scoring, &made.episodes, &made.style, self.threads)?.draw_all())
+        let sources =
+            Sources::of(&made.inputs, self.scoring, &made.episodes, &made.style, &FigureName::ALL, self.threads)?;
+        Ok(sources.draw_all())
     }
 
     /// `report.html`; `None` for more than [`MOST_EPISODES`].

@@ -58,7 +58,7 @@ pub fn table(
     }
 }
 
-/// Writes the episode table; memory does not grow with the traces.
+/// Writes the episode table and returns its number of rows; memory does not grow with the traces.
 ///
 /// # Errors
 /// Whatever is wrong with the files, the definitions, the condition or the output.
@@ -68,20 +68,24 @@ pub fn write(
     threads: NonZeroUsize,
     format: Format,
     out: impl io::Write + Send,
-) -> Result<(), Failure> {
+) -> Result<usize, Failure> {
     if are_scores(inputs) {
-        return write_table(&table(inputs, scoring, &[], threads)?, format, out);
+        let table = table(inputs, scoring, &[], threads)?;
+        return write_table(&table, format, out).map(|()| table.len());
     }
     let traces = open(inputs)?;
     let definitions = definitions(&traces, scoring)?;
     let mut rows = run::rows(&traces, &definitions, &[], threads).map_err(score_failure)?;
     let header = rows.header().clone();
+    let mut count = 0;
     format::write_rows(header, format, out, |write| {
         while let Some(row) = rows.next_row().map_err(ScoreError::Spill).map_err(Unwritten::Score)? {
             write(row)?;
+            count += 1;
         }
         Ok(())
     })
+    .map(|()| count)
     .map_err(|error| match error {
         Unwritten::Score(error) => score_failure(error),
         Unwritten::Format(error) => unwritten(error),
@@ -216,6 +220,15 @@ pub fn definitions(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Definitio
         condition: scoring.condition.clone(),
     };
     run::definitions(traces, &request).map_err(score_failure)
+}
+
+/// The names of all metrics of the definitions asked for.
+///
+/// # Errors
+/// Every fault of the definitions.
+pub fn metric_names(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Vec<String>, Failure> {
+    let definitions = Definitions::load(scoring.definitions_name(), &run::trace_columns(traces));
+    Ok(definitions.map_err(definition_failure)?.catalog.metric.into_keys().collect())
 }
 
 /// The definitions over the columns of the schema, for traces that are not opened here.

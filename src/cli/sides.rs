@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::args::ScoringArgs;
 use super::outcome::Failure;
-use super::scoring;
+use super::{empty_filter, scoring};
 use crate::base::near::nearest;
 use crate::cells::changes::{Changes, Flip, Overlap};
 use crate::metric::definitions::{Definitions, UnknownMetric};
@@ -96,6 +96,26 @@ impl Side {
         }
     }
 
+    /// How it is scored, or how its scores are read.
+    fn scoring(&self, asked: &Asked) -> ScoringArgs {
+        let definitions = match self {
+            Self::Definitions(name) => Some(name.as_str()),
+            Self::Scores(inputs) if inputs.iter().any(scoring::carries_definitions) => None,
+            Self::Scores(_) => asked.text_definitions,
+        };
+        let condition = asked.condition.map(str::to_owned);
+        ScoringArgs { definitions: definitions.map(str::to_owned), metrics: None, condition }
+    }
+
+    /// Refuses no episodes where the filter is why there are none.
+    ///
+    /// # Errors
+    /// Such a filter; what is wrong with the traces or scores without it.
+    pub fn check_filter(&self, traces: &[Input], asked: &Asked) -> Result<(), Failure> {
+        let inputs = if let Self::Scores(inputs) = self { inputs } else { traces };
+        empty_filter::check(0, inputs, &self.scoring(asked), asked.threads)
+    }
+
     /// Its metrics, and its scores if it is scores.
     fn read(&self, traces: Option<&TraceSet>, asked: &Asked) -> Result<(Vec<String>, Option<EpisodeTable>), Failure> {
         match self {
@@ -105,13 +125,7 @@ impl Side {
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
             Self::Scores(inputs) => {
-                let carry = inputs.iter().any(scoring::carries_definitions);
-                let scoring = ScoringArgs {
-                    definitions: asked.text_definitions.filter(|_| !carry).map(str::to_owned),
-                    metrics: None,
-                    condition: asked.condition.map(str::to_owned),
-                };
-                let table = scoring::table(inputs, &scoring, &[], asked.threads)?;
+                let table = scoring::table(inputs, &self.scoring(asked), &[], asked.threads)?;
                 Ok((table.metrics.iter().map(|metric| metric.name.clone()).collect(), Some(table)))
             }
         }
@@ -126,12 +140,8 @@ impl Side {
         asked: &Asked,
     ) -> Result<(EpisodeTable, Option<Definitions>), Failure> {
         match (self, read, traces) {
-            (Self::Definitions(name), _, Some(traces)) => {
-                let scoring = ScoringArgs {
-                    definitions: Some(name.clone()),
-                    metrics: Some(common.to_vec()),
-                    condition: asked.condition.map(str::to_owned),
-                };
+            (Self::Definitions(_), _, Some(traces)) => {
+                let scoring = ScoringArgs { metrics: Some(common.to_vec()), ..self.scoring(asked) };
                 let definitions = scoring::definitions(traces, &scoring)?;
                 let labels = scoring::labels(asked.by);
                 let table = run::score(traces, &definitions, &labels, asked.threads).map_err(scoring::score_failure)?;

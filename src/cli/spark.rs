@@ -1,10 +1,10 @@
 //! `--engine spark`: from what was typed to a job for the user's own Spark.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::args::{Engine, EngineArgs, ScoringArgs, SparkArgs, TraceArgs};
 use super::outcome::Failure;
-use super::scoring;
+use super::{output, scoring};
 use crate::engine::spark::source::{Sources, is_uri};
 use crate::engine::spark::{self, Cluster, Job, SparkError, Written};
 use crate::metric::definitions::Definitions;
@@ -41,6 +41,8 @@ pub struct Asked {
     sources: Sources,
     definitions: Definitions,
     cluster: Cluster,
+    /// The files of this machine that are read.
+    read: Vec<PathBuf>,
 }
 
 impl Asked {
@@ -55,6 +57,7 @@ impl Asked {
                 sources: Sources::Uris(traces.traces.clone()),
                 definitions: scoring::definitions_unopened(scoring_args)?,
                 cluster: engine.cluster(),
+                read: Vec::new(),
             }),
             _ => Err(Failure::Rendered(
                 "error: expected files of this machine or URIs for Spark, found both\n  help: name the files as file:// URIs, or score the two apart"
@@ -79,7 +82,16 @@ impl Asked {
         let sources = Sources::files(inputs, &opened)
             .map_err(|source| SparkError::System { what: "name the traces for Spark".to_owned(), source })
             .map_err(Failure::input)?;
-        Ok(Self { sources, definitions, cluster: engine.cluster() })
+        let read = output::files_read(inputs, &[scoring_args.definitions.as_deref()]);
+        if let Some(log) = &engine.spark.spark_log {
+            output::check_target(log, &read)?;
+        }
+        Ok(Self { sources, definitions, cluster: engine.cluster(), read })
+    }
+
+    /// The files of this machine that are read.
+    pub fn read(&self) -> &[PathBuf] {
+        &self.read
     }
 
     /// The scores, brought here.

@@ -13,7 +13,6 @@ use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::arrow::{ArrowWriter, ProjectionMask};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
-use tempfile::NamedTempFile;
 
 use super::bounds;
 use super::contain::contained;
@@ -21,10 +20,11 @@ use super::episode::Episode;
 use super::finding::{Code, Finding, TraceError};
 use super::footer::{Extent, footer, plain};
 use super::inputs::Input;
+use super::open::is_nested;
 use super::pages::{FaultSlot, Library, Store, damaged};
 use super::restore::{self, NotAnEpisode};
 use super::write::{self, OptionalColumns, ROW_GROUP_ROWS, TraceEncoder, TraceMetadata};
-use crate::base::temporary;
+use crate::base::replace::{self, NewFile};
 
 /// Rows that are decoded at a time.
 const BATCH_ROWS: usize = 8 << 10;
@@ -98,10 +98,7 @@ fn decode(name: &str, store: Store, metadata: ParquetMetaData) -> Result<Vec<Epi
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
     let columns = metadata.file_metadata().schema_descr().columns();
     if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
-        let column = nested.path().parts()[0].escape_debug();
-        return Err(failed(
-            format!("the column `{column}` is nested; leave it out, or write its parts as columns").into(),
-        ));
+        return Err(failed(is_nested(name, &nested.path().parts()[0]).to_string().into()));
     }
     contained(|| {
         let row_groups = (0..metadata.num_row_groups()).collect();
@@ -162,11 +159,24 @@ pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows,
     rows.pop().ok_or_else(|| TraceError::Part { file: "memory".to_owned(), source: "no episode came back".into() })
 }
 
-/// Writes these episodes, in this order, as the trace at `path`, which appears whole or not at all.
+/// Replaces the trace at `path` by one of these episodes, in this order.
 ///
 /// # Errors
-/// When the episodes do not have the same columns, or whatever writing gives.
+/// When the episodes do not have the same columns, or whatever writing gives; the trace at `path` is as it was then.
 pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
+    write_in(replace::folder_of(path), path, recording, episodes)
+}
+
+/// As [`write()`], with the temporary file in `scratch`, a folder of the same file system.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_in(
+    scratch: &Path,
+    path: &Path,
+    recording: Option<&serde_json::Value>,
+    episodes: &[EpisodeRows],
+) -> Result<(), TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write {
         file: path.display().to_string(),
         source,
@@ -176,11 +186,9 @@ pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[Epi
     if let Some(other) = episodes.iter().find(|episode| !same_columns(&schema, &episode.rows.schema())) {
         return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
+    let file = NewFile::create_in(scratch, path).map_err(|error| failed(error.into()))?;
     let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
-    file.as_file().sync_all().map_err(|error| failed(error.into()))?;
-    file.persist(path).map(drop).map_err(|error| failed(error.error.into()))
+    file.commit().map_err(|error| failed(error.into()))
 }
 
 fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
@@ -191,11 +199,11 @@ fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
 }
 
 fn encode(
-    file: NamedTempFile,
+    file: NewFile,
     schema: &SchemaRef,
     recording: Option<&serde_json::Value>,
     episodes: &[EpisodeRows],
-) -> parquet::errors::Result<NamedTempFile> {
+) -> parquet::errors::Result<NewFile> {
     let options =
         ArrowWriterOptions::new().with_properties(write::properties(recording)).with_skip_arrow_metadata(true);
     let mut parquet = ArrowWriter::try_new_with_options(file, Arc::clone(schema), options)?;

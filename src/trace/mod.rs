@@ -4,6 +4,7 @@
 
 mod ahead;
 mod bounds;
+pub mod colors;
 mod column;
 pub(crate) mod contain;
 mod decode;
@@ -21,6 +22,7 @@ pub mod merge;
 pub mod open;
 mod pages;
 mod pass;
+pub mod replies;
 pub mod restore;
 pub mod rewrite;
 mod rules;

@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use super::super::args::{ThreadArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::sides::{self, Asked, Side};
-use super::super::{output, scoring};
+use super::super::{output, scoring, terminal};
 use crate::cells::changes::Changes;
 use crate::cells::group::DEFAULT_BY;
 use crate::report::changes::{self, Limit};
@@ -62,11 +62,14 @@ impl DiffArgs {
         let traces = if inputs.is_empty() { None } else { Some(scoring::open_steps(&inputs)?) };
         let asked = self.asked();
         let sides = sides::pair(&old, &new, traces.as_ref(), &asked)?;
+        if sides.before.table.is_empty() && sides.after.table.is_empty() {
+            new.check_filter(&inputs, &asked)?;
+        }
         let mut changes = sides::changes(&sides, &self.by)?;
         TableOrder { catalog: &sides.after.table.catalog, style: &style }.sort(&mut changes);
         if let Some(traces) = &traces {
             for note in sides::explain(&mut changes, traces, &sides, asked.threads)? {
-                writeln!(io::stderr(), "note: {note}")?;
+                output::note(&note);
             }
         }
         self.print(&changes)
@@ -86,7 +89,7 @@ impl DiffArgs {
         if self.json {
             output::print_json(changes)?;
         } else {
-            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit)).as_bytes())?;
+            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit), terminal::width()).as_bytes())?;
         }
         let failed = self.fail_on_change && !changes.is_empty();
         Ok(if failed { Outcome::CheckFailed } else { Outcome::Done })

@@ -8,6 +8,7 @@ use clap::ValueEnum;
 
 use crate::cli::args::{EngineArgs, ScoringArgs, TraceArgs};
 use crate::cli::drawing::Sources;
+use crate::cli::empty_filter;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::scoring;
@@ -94,9 +95,14 @@ impl FigureArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let inputs = scoring::resolve(&self.traces)?;
+        if let Some(path) = &self.output {
+            let named = [self.scoring.definitions.as_deref(), Some(self.style.as_str())];
+            output::check_target(path, output::files_read(&inputs, &named))?;
+        }
         let threads = self.traces.threads.count();
         let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        let sources = Sources::of(&inputs, &self.scoring, &episodes, &style, threads)?;
+        empty_filter::check(episodes.len(), &inputs, &self.scoring, threads)?;
+        let sources = Sources::of(&inputs, &self.scoring, &episodes, &style, &[self.name], threads)?;
         self.write(&sources.input())
     }
 

@@ -1,6 +1,6 @@
 //! `report`: every table of the study from traces, on the terminal and as a folder.
 
-use std::io::{self, IsTerminal as _, Write as _};
+use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
@@ -10,13 +10,13 @@ use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
 use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
-use super::super::{output, scoring};
+use super::super::{empty_filter, output, scoring};
 use crate::cells::group::{DEFAULT_BY, group};
-use crate::report::bundle::{self, Bundle, Manifest};
+use crate::report::bundle::{self, Bundle, Manifest, Written};
 use crate::report::layout;
 use crate::report::style::{MAIN_TABLE, Style};
 use crate::report::table::Table;
-use crate::report::tables::terminal::{self, Marks, Terminal};
+use crate::report::tables::terminal;
 use crate::score::format;
 use crate::trace::inputs::Input;
 use crate::trace::schema::SCHEMA_VERSION;
@@ -84,61 +84,54 @@ impl ReportArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions, the style or the folder.
     pub fn make(&self, inputs: Vec<Input>) -> Result<(Made, Vec<String>), Failure> {
+        let read = output::files_read(&inputs, &[self.scoring.definitions.as_deref(), Some(&self.style)]);
+        bundle::check_old(&self.out, &read).map_err(Failure::input)?;
         // Small files first: a slip in the style should not cost a pass over the traces.
         let style = Style::load(&self.style).map_err(Failure::input)?;
         let labels = scoring::labels(&self.by);
-        let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &labels, self.traces.threads.count())?;
+        let threads = self.traces.threads.count();
+        let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &labels, threads)?;
+        empty_filter::check(episodes.len(), &inputs, &self.scoring, threads)?;
         let cells = group(&episodes, &self.by).map_err(Failure::input)?;
         let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
         let condition = self.scoring.condition.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, condition, scoring::provenance(&inputs)?);
-        let made = Made { inputs, episodes, cells, tables, manifest, style };
-        let files = self.write(&made)?;
-        Ok((made, files))
+        let mut made = Made { inputs, episodes, cells, tables, manifest, style };
+        let written = self.write(&made, &read)?;
+        made.manifest = written.manifest;
+        let inside = |path: &PathBuf| path.strip_prefix(&self.out).unwrap_or(path).display().to_string();
+        Ok((made, written.files.iter().map(inside).collect()))
     }
 
-    fn write(&self, made: &Made) -> Result<Vec<String>, Failure> {
+    fn write(&self, made: &Made, read: &[PathBuf]) -> Result<Written, Failure> {
         let mut others = Vec::new();
         if !self.no_figures {
             let asked = Asked { scoring: &self.scoring, threads: self.traces.threads.count() };
             let drawings = asked.drawings(made)?;
             for (name, reason) in &drawings.left_out {
-                writeln!(io::stderr(), "note: no figure `{name}`: {reason}")?;
+                output::note(&format!("no figure `{name}`: {reason}"));
             }
             others.extend(figure_files(&drawings)?);
             match asked.page(made, &drawings)? {
                 Some(page) => others.push(page),
-                None => writeln!(io::stderr(), "note: no report.html: it lists at most {MOST_EPISODES} episodes")?,
+                None => output::note(&format!("no report.html: it lists at most {MOST_EPISODES} episodes")),
             }
         }
         let mut bytes = Vec::new();
         format::write(&made.episodes, format::Format::Parquet, &mut bytes).map_err(Failure::input)?;
         let Made { cells, tables, manifest, .. } = made;
-        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, others: &others };
-        let written = bundle::write(&self.out, &bundle).map_err(Failure::input)?;
-        let inside = |path: &PathBuf| path.strip_prefix(&self.out).unwrap_or(path).display().to_string();
-        Ok(written.iter().map(inside).collect())
+        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, read, others: &others };
+        bundle::write(&self.out, &bundle).map_err(Failure::input)
     }
 
     fn print(&self, tables: &[Table], episodes: usize) -> Result<Outcome, Failure> {
         let main = tables.iter().find(|table| table.name == MAIN_TABLE).or(tables.first());
         let mut out = io::stdout().lock();
         if let Some(table) = main {
-            out.write_all(terminal::render(table, terminal_now()).as_bytes())?;
+            out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
         }
         let episodes = counted(episodes as u64, "episode");
-        writeln!(io::stderr(), "{episodes}; the report is in {}", self.out.display())?;
+        output::say(&format!("{episodes}; the report is in {}", self.out.display()));
         Ok(Outcome::Done)
-    }
-}
-
-/// What standard output is.
-fn terminal_now() -> Terminal {
-    let is_terminal = io::stdout().is_terminal();
-    let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-    let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
-    Terminal {
-        width: if is_terminal { width } else { None },
-        emphasis: if is_terminal && !plain { Marks::Ansi } else { Marks::Signs },
     }
 }

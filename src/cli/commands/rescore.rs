@@ -13,7 +13,7 @@ use super::super::outcome::{Failure, Outcome};
 use super::super::page::Made;
 use super::super::provenance;
 use super::super::sides::{self, Scored, Sides};
-use super::super::{output, scoring};
+use super::super::{output, scoring, terminal};
 use super::report::ReportArgs;
 use crate::cells::changes::Changes;
 use crate::report::bundle::Manifest;
@@ -93,7 +93,7 @@ impl RescoreArgs {
         let changes = match before {
             Ok(before) => Some(self.changes(before, &made, &traces, &report)?),
             Err(reason) => {
-                writeln!(io::stderr(), "note: no comparison with the old report: {reason}")?;
+                output::note(&format!("no comparison with the old report: {reason}"));
                 None
             }
         };
@@ -178,7 +178,7 @@ impl RescoreArgs {
         let mut changes = sides::changes(&sides, &report.by)?;
         TableOrder { catalog: &made.cells.catalog, style: &made.style }.sort(&mut changes);
         for note in sides::explain(&mut changes, traces, &sides, self.threads.count())? {
-            writeln!(io::stderr(), "note: {note}")?;
+            output::note(&note);
         }
         Ok(changes)
     }
@@ -190,9 +190,9 @@ impl RescoreArgs {
             return output::print_json(&RescoreAnswer { out, files, episodes, manifest, changes });
         }
         if let Some(changes) = &changes {
-            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit)).as_bytes())?;
+            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit), terminal::width()).as_bytes())?;
         }
-        writeln!(io::stderr(), "{}; the report is in {out}", counted(episodes as u64, "episode"))?;
+        output::say(&format!("{}; the report is in {out}", counted(episodes as u64, "episode")));
         Ok(Outcome::Done)
     }
 }

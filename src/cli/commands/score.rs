@@ -1,14 +1,15 @@
 //! `score`: the episode table of traces, or the evidence for one episode.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
-use super::super::{output, scoring, spark};
+use super::super::{empty_filter, output, scoring, spark};
 use crate::score::evidence;
 use crate::score::format::Format;
+use crate::trace::inputs::Input;
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -51,6 +52,7 @@ impl ScoreArgs {
         // An output name of no known format should not cost a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
         let inputs = scoring::resolve(&self.traces)?;
+        self.check_target(&inputs)?;
         let threads = self.traces.threads.count();
         if let Some(episode) = &self.explain {
             let traces = scoring::open_steps(&inputs)?;
@@ -62,10 +64,18 @@ impl ScoreArgs {
             return output::print(&found, self.json);
         }
         if self.engine.engine == Engine::Native {
-            return self.deliver(format, |format, out| scoring::write(&inputs, &self.scoring, threads, format, out));
+            let mut rows = 0;
+            self.deliver(format, |format, out| {
+                rows = scoring::write(&inputs, &self.scoring, threads, format, out)?;
+                Ok(())
+            })?;
+            empty_filter::note(rows, &inputs, &self.scoring, threads)?;
+            return Ok(Outcome::Done);
         }
         let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out))?;
+        empty_filter::note(table.len(), &inputs, &self.scoring, threads)?;
+        Ok(Outcome::Done)
     }
 
     fn run_on_spark(&self) -> Result<Outcome, Failure> {
@@ -79,12 +89,23 @@ impl ScoreArgs {
             let name = folder.to_string_lossy();
             let written = asked()?.write(&name)?;
             let episodes = counted(written.episodes, "episode");
-            writeln!(io::stderr(), "{episodes}; `mirrorstats report {name}` goes on from here")?;
+            output::say(&format!("{episodes}; `mirrorstats report {name}` goes on from here"));
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let table = asked()?.score(&[])?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
+        let asked = asked()?;
+        if let Some(path) = &self.output {
+            output::check_target(path, asked.read())?;
+        }
+        let table = asked.score(&[])?;
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out))?;
+        Ok(Outcome::Done)
+    }
+
+    /// That the output is no input.
+    fn check_target(&self, inputs: &[Input]) -> Result<(), Failure> {
+        let Some(path) = &self.output else { return Ok(()) };
+        output::check_target(path, output::files_read(inputs, &[self.scoring.definitions.as_deref()]))
     }
 
     /// Writes the table to where it was asked for.
@@ -92,13 +113,13 @@ impl ScoreArgs {
         &self,
         format: Option<Format>,
         write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<(), Failure>,
-    ) -> Result<Outcome, Failure> {
+    ) -> Result<(), Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
         match &self.output {
             Some(path) => output::write_file_with(path, |file| write(format, &mut BufWriter::new(file)))?,
             None => write(format, &mut BufWriter::new(io::stdout()))?,
         }
-        Ok(Outcome::Done)
+        Ok(())
     }
 }
 

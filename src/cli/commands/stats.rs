@@ -8,7 +8,7 @@ use crate::cells::cell::Cells;
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::scoring;
+use crate::cli::{empty_filter, scoring, terminal};
 use crate::report::statistics::{Options, Statistics, text};
 use crate::score::table::EpisodeTable;
 
@@ -64,6 +64,7 @@ impl StatsArgs {
         let asked =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let table = scoring::table(&inputs, &asked, &scoring::labels(&self.by), threads)?;
+        empty_filter::check(table.len(), &inputs, &asked, threads)?;
         let cells = group(&table, &self.by).map_err(Failure::input)?;
         let lost = scoring::lost(&inputs, threads)?;
         self.print(&table, &cells, lost)
@@ -85,7 +86,7 @@ impl StatsArgs {
         let text = if self.json {
             serde_json::to_string_pretty(&statistics).map_err(Failure::input)? + "\n"
         } else {
-            text::render(&statistics, &self.chosen(table, &statistics)?)
+            text::render(&statistics, &self.chosen(table, &statistics)?, terminal::width())
         };
         std::io::stdout().lock().write_all(text.as_bytes())?;
         Ok(Outcome::Done)

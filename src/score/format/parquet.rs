@@ -69,6 +69,8 @@ fn metadata(file: &impl ChunkReader) -> Option<ParquetMetaData> {
 const ROW_GROUP_ROWS: usize = 64 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 4 * 1024;
+/// Bytes of texts that are gathered at most, one row more or less: a column holds 2 GiB.
+const GATHERED_TEXT: usize = 256 << 20;
 
 /// Batches that wait for an encoder.
 const WAITING: usize = 2;
@@ -99,7 +101,7 @@ pub(super) fn write<E: From<FormatError>>(
         rows(&mut |row| {
             if !over {
                 gathered.add(row);
-                over = gathered.seed.len() == GATHERED_ROWS && !send(&mut gathered)?;
+                over = gathered.is_full() && !send(&mut gathered)?;
             }
             Ok(())
         })?;
@@ -216,6 +218,7 @@ struct Gathered {
     run: Int32Builder,
     labels: Vec<StringBuilder>,
     metrics: Vec<Numbers>,
+    text_bytes: usize,
 }
 
 /// Integers of which some are not there.
@@ -249,18 +252,25 @@ impl Gathered {
             run: Int32Builder::new(),
             labels: header.labels.iter().map(|_| StringBuilder::new()).collect(),
             metrics: header.metrics.iter().map(|_| Numbers::default()).collect(),
+            text_bytes: 0,
         }
+    }
+
+    fn is_full(&self) -> bool {
+        self.seed.len() == GATHERED_ROWS || self.text_bytes >= GATHERED_TEXT
     }
 
     fn add(&mut self, row: &EpisodeRow) {
         let EpisodeKey { experiment, model, seed, run, episode_id } = &row.key;
         for (column, text) in self.texts.iter_mut().zip([episode_id, model, experiment]) {
             column.append_value(text);
+            self.text_bytes += text.len();
         }
         self.seed.append_value(*seed);
         self.run.append_value(*run);
         for (column, label) in self.labels.iter_mut().zip(&row.labels) {
             column.append_option(label.as_deref());
+            self.text_bytes += label.as_ref().map_or(0, String::len);
         }
         for (column, metric) in self.metrics.iter_mut().zip(&row.metrics) {
             column.add(*metric);
@@ -269,6 +279,7 @@ impl Gathered {
 
     /// The columns in the order of the schema; none is left behind.
     fn take(&mut self) -> Vec<ArrayRef> {
+        self.text_bytes = 0;
         let mut columns: Vec<ArrayRef> = Vec::new();
         columns.extend(self.texts.iter_mut().map(taken));
         columns.extend([&mut self.seed, &mut self.run].map(|column| Arc::new(column.finish()) as ArrayRef));

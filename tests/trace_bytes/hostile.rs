@@ -5,7 +5,12 @@
 
 use std::path::Path;
 use std::process::Command;
+use std::sync::Arc;
 
+use arrow::array::{ArrayRef, ListArray, RecordBatch, StructArray};
+use arrow::datatypes::Float64Type;
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::{WriterProperties, WriterVersion};
 
@@ -204,4 +209,25 @@ fn columns_of_the_same_bytes_are_refused() {
         },
     );
     refused("two columns", &bytes, "corrupt-footer");
+}
+
+#[test]
+fn a_trace_with_a_nested_column_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = bytes::Bytes::from(file(folder.path(), Compression::UNCOMPRESSED));
+    let rows = ParquetRecordBatchReaderBuilder::try_new(whole).unwrap().build().unwrap().next().unwrap().unwrap();
+    let numbers = ListArray::from_iter_primitive::<Float64Type, _, _>((0..rows.num_rows()).map(|_| Some([Some(0.5)])));
+    let parts = StructArray::from(rows.slice(0, rows.num_rows()));
+    for nested in [Arc::new(numbers) as ArrayRef, Arc::new(parts)] {
+        let named = rows.schema().fields().iter().map(|field| field.name().clone()).collect::<Vec<_>>();
+        let mut columns: Vec<_> = named.into_iter().zip(rows.columns().iter().cloned()).collect();
+        columns.push(("extra".to_owned(), nested));
+        let rows = RecordBatch::try_from_iter_with_nullable(columns.into_iter().map(|(name, column)| (name, column, true)));
+        let rows = rows.unwrap();
+        let mut writer = ArrowWriter::try_new(Vec::new(), rows.schema(), None).unwrap();
+        writer.write(&rows).unwrap();
+        let bytes = writer.into_inner().unwrap();
+        refused("nested", &bytes, "column `extra`");
+        refused("nested", &bytes, "found a list, a struct or a map");
+    }
 }

@@ -2,7 +2,6 @@
 //!
 //! Rule: whatever bytes a file holds, decoding gives rows or a finding, never a panic.
 
-use std::fs::File;
 use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray as _, new_null_array};
@@ -10,9 +9,7 @@ use arrow::compute::{cast, concat};
 use arrow::datatypes::{DataType, Int32Type, UInt64Type};
 use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowSelection, RowSelector,
-};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader, RowSelection, RowSelector};
 use parquet::basic::Type as Physical;
 
 use super::ahead::Ids;
@@ -22,7 +19,7 @@ use super::finding::{Code, Finding};
 use super::footer::{plain, rows_of};
 use super::layout::{EPISODE_ID, Layout, T};
 use super::open::{TraceFile, text_type};
-use super::pages::{Cursor, Form, Unfit};
+use super::pages::{self, Cursor, FaultSlot, Form, Place, Store, Unfit};
 use super::schema::Kind;
 
 /// Rows that are decoded at a time: the columns of so many stay in a core's cache.
@@ -95,6 +92,8 @@ struct Library {
     reader: ParquetRecordBatchReader,
     /// Decoded rows that are still to be given.
     held: Vec<ArrayRef>,
+    /// Where the first fault of a page is found.
+    slot: FaultSlot,
 }
 
 impl Library {
@@ -128,7 +127,7 @@ impl<'a> RowGroup<'a> {
         row_group: usize,
         ids: Option<Ids>,
     ) -> Result<Self, Box<Finding>> {
-        let handle = handle(file)?;
+        let store = store(file)?;
         let footer = file.footer()?;
         let roots = (0..layout.columns.len()).filter_map(|at| root(file, layout, at));
         let text = roots.filter_map(|root| text_bytes(&footer, root, row_group)).max().unwrap_or(0);
@@ -139,9 +138,9 @@ impl<'a> RowGroup<'a> {
             let source = match root(file, layout, at) {
                 None => Source::Absent,
                 Some(_) if at == EPISODE_ID && rows.ids.is_some() => Source::Ahead,
-                Some(root) => match contained(|| cursor(&rows.footer, &handle, root, row_group, form(layout, at))) {
+                Some(root) => match contained(|| cursor(&rows.footer, &store, root, row_group, form(layout, at))) {
                     Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
-                    Ok(Err(Unfit)) | Err(_) => rows.library(root)?,
+                    Ok(Err(Unfit)) | Err(_) => rows.library(at, root)?,
                 },
             };
             rows.sources.push(source);
@@ -150,12 +149,19 @@ impl<'a> RowGroup<'a> {
     }
 
     /// A column as the library decodes it, from the next row on.
-    fn library(&self, root: usize) -> Result<Source, Box<Finding>> {
-        let corrupt = |error: String| corrupt(self.file, self.index, &error);
-        let handle = handle(self.file)?;
-        let reader = contained(|| self.reader(handle, root, self.first)).map_err(corrupt)?;
-        let reader = reader.map_err(|error| corrupt(plain(&error)))?;
-        Ok(Source::Library(Box::new(Library { reader, held: Vec::new() })))
+    fn library(&self, at: usize, root: usize) -> Result<Source, Box<Finding>> {
+        let (store, slot) = (store(self.file)?, FaultSlot::default());
+        let made = contained(|| self.reader(store, root, self.first, &slot));
+        match made.and_then(|reader| reader.map_err(|error| plain(&error))) {
+            Ok(reader) => Ok(Source::Library(Box::new(Library { reader, held: Vec::new(), slot }))),
+            Err(error) => Err(self.damaged(at, &slot, &error)),
+        }
+    }
+
+    /// A column that the library cannot decode, or that it is not given because of a page.
+    fn damaged(&self, at: usize, slot: &FaultSlot, error: &str) -> Box<Finding> {
+        let finding = pages::damaged(self.file.name(), slot, error).in_row_group(self.index);
+        Box::new(finding.in_column(&self.layout.columns[at].name))
     }
 
     fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
@@ -185,7 +191,7 @@ impl<'a> RowGroup<'a> {
                 return Ok(column);
             }
             let root = *root;
-            self.sources[at] = self.library(root)?;
+            self.sources[at] = self.library(at, root)?;
         }
         if let (Source::Ahead, Some(ids)) = (&self.sources[at], &self.ids) {
             return Ok(Column::Runs(ids.runs.slice(self.first, count)));
@@ -203,8 +209,14 @@ impl<'a> RowGroup<'a> {
                 return column.map(Column::Flat).map_err(|error| corrupt(self.file, self.index, &error.to_string()));
             }
             let batch = contained(|| library.reader.next())
-                .and_then(|next| next.transpose().map_err(|error| error.to_string()))
-                .map_err(|error| corrupt(self.file, self.index, &error))?;
+                .and_then(|next| next.transpose().map_err(|error| error.to_string()));
+            let batch = match batch {
+                Ok(batch) => batch,
+                Err(error) => {
+                    let slot = Arc::clone(&library.slot);
+                    return Err(self.damaged(at, &slot, &error));
+                }
+            };
             let Some(batch) = batch else {
                 if count == 0 {
                     return Ok(new_null_array(&held_as(kind), 0).into());
@@ -249,24 +261,27 @@ impl<'a> RowGroup<'a> {
     /// A column from a row on, read once more.
     fn anew(&self, at: usize, first: usize) -> Option<Column> {
         let root = root(self.file, self.layout, at)?;
-        let handle = self.file.reader().ok()?;
-        let decoded = contained(|| self.reader(handle, root, first).ok()?.next()?.ok()).ok()?;
+        let (store, slot) = (store(self.file).ok()?, FaultSlot::default());
+        let read = || self.reader(store, root, first, &slot).ok()?.next()?.ok();
+        let decoded = contained(read).ok()?;
         normal_column(decoded?.column(0), self.layout.columns[at].kind).ok().map(Column::Flat)
     }
 
     /// A reader of one column, from a row on.
-    fn reader(&self, handle: File, root: usize, first: usize) -> parquet::errors::Result<ParquetRecordBatchReader> {
+    fn reader(
+        &self,
+        store: Store,
+        root: usize,
+        first: usize,
+        slot: &FaultSlot,
+    ) -> parquet::errors::Result<ParquetRecordBatchReader> {
         let rows = rows_of(self.footer.metadata().row_group(self.index));
-        let reader =
-            ParquetRecordBatchReaderBuilder::new_with_metadata(handle, ArrowReaderMetadata::clone(&self.footer))
-                .with_row_groups(vec![self.index])
-                .with_projection(ProjectionMask::roots(self.footer.parquet_schema(), [root]))
-                .with_batch_size(rows.clamp(1, self.at_a_time));
-        if first == 0 {
-            return reader.build();
-        }
+        let (metadata, slot) = (Arc::clone(self.footer.metadata()), Arc::clone(slot));
+        let library = pages::Library { store, metadata, row_groups: vec![self.index], slot };
         let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
-        reader.with_row_selection(RowSelection::from(rest)).build()
+        let selection = (first > 0).then(|| RowSelection::from(rest));
+        let column = ProjectionMask::roots(self.footer.parquet_schema(), [root]);
+        library.reader(column, Some(self.footer.schema().fields()), rows.clamp(1, self.at_a_time), selection)
     }
 }
 
@@ -286,13 +301,13 @@ impl Iterator for RowGroup<'_> {
 /// The ids of the episodes of a row group, if its pages are such that they can be had without the other columns.
 pub(super) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
     let root = root(file, layout, EPISODE_ID)?;
-    let (handle, footer) = (file.reader().ok()?, file.footer().ok()?);
-    let read = || cursor(&footer, &handle, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
+    let (store, footer) = (store(file).ok()?, file.footer().ok()?);
+    let read = || cursor(&footer, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
     contained(read).ok()?.ok()
 }
 
-fn handle(file: &TraceFile) -> Result<File, Box<Finding>> {
-    file.reader().map_err(|error| {
+fn store(file: &TraceFile) -> Result<Store, Box<Finding>> {
+    file.reader().map(Store::File).map_err(|error| {
         Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
     })
 }
@@ -309,15 +324,14 @@ fn form(layout: &Layout, at: usize) -> Form {
 
 fn cursor(
     footer: &ArrowReaderMetadata,
-    handle: &File,
+    store: &Store,
     root: usize,
     row_group: usize,
     form: Form,
 ) -> Result<Cursor, Unfit> {
     let leaf = leaf(footer, root).ok_or(Unfit)?;
-    let row_group = footer.metadata().row_group(row_group);
-    let stored = footer.schema().field(root).data_type();
-    Cursor::open(handle, row_group.column(leaf), stored, rows_of(row_group), form)
+    let place = Place { metadata: footer.metadata(), row_group, column: leaf };
+    Cursor::open(store, place, footer.schema().field(root).data_type(), form)
 }
 
 fn leaf(footer: &ArrowReaderMetadata, root: usize) -> Option<usize> {
@@ -341,8 +355,7 @@ fn rows_at_a_time(rows: usize, text: u64) -> usize {
 }
 
 fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {
-    let found = found.split_whitespace().collect::<Vec<_>>().join(" ");
-    Box::new(Finding::new(Code::CorruptData, file.name(), "data that decodes", found).in_row_group(row_group))
+    Box::new(pages::damaged(file.name(), &FaultSlot::default(), found).in_row_group(row_group))
 }
 
 /// How a column of this kind is held in memory.

@@ -3,6 +3,7 @@
 //! Rule: only this room opens traces. It knows no metric.
 
 mod ahead;
+mod bounds;
 pub mod colors;
 mod column;
 pub(crate) mod contain;
@@ -11,6 +12,7 @@ pub mod describe;
 pub mod episode;
 pub mod finding;
 mod footer;
+pub(crate) mod footer_shape;
 mod ids;
 pub mod import;
 pub mod info;
@@ -27,5 +29,7 @@ mod rules;
 pub mod scan;
 pub mod schema;
 mod source;
+mod thrift;
 pub mod validate;
+pub mod verify;
 pub mod write;

@@ -16,7 +16,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderB
 use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::ChunkReader;
 use parquet::file::writer::SerializedFileWriter;
@@ -29,6 +29,7 @@ use crate::base::beside::beside;
 use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
 use crate::score::values::nulls_of;
 use crate::trace::contain::contained;
+use crate::trace::footer_shape;
 
 /// The footer key that tells scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -43,8 +44,7 @@ pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 ///
 /// `folders` are columns that stand in the names of the file's folders.
 pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
-    let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
-    let Ok(Ok(metadata)) = footer else { return false };
+    let Some(metadata) = metadata(file) else { return false };
     if footer::value(metadata.file_metadata(), KIND_KEY).is_some() {
         return footer::value(metadata.file_metadata(), KIND_KEY).as_deref() == Some(SCORES_KIND);
     }
@@ -56,8 +56,13 @@ pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)
 
 /// Whether a file of scores carries the definitions that gave them.
 pub fn holds_definitions(file: &impl ChunkReader) -> bool {
-    let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
-    matches!(footer, Ok(Ok(metadata)) if footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
+    metadata(file).is_some_and(|metadata| footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
+}
+
+/// The footer of a file, if it has one that can be read.
+fn metadata(file: &impl ChunkReader) -> Option<ParquetMetaData> {
+    footer_shape::check_file(file).ok()?;
+    contained(|| ParquetMetaDataReader::new().parse_and_finish(file)).ok()?.ok()
 }
 
 /// Rows after which a row group is closed: what is encoded and not yet written stays small.
@@ -300,6 +305,7 @@ pub(super) fn read(
 }
 
 fn decode(input: impl ChunkReader + 'static, surroundings: &Surroundings<'_>) -> Result<EpisodeTable, FormatError> {
+    footer_shape::check_file(&input).map_err(ParquetError::General)?;
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
     let catalog = match (footer::value(builder.metadata().file_metadata(), DEFINITIONS_KEY), surroundings.definitions) {

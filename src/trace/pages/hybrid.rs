@@ -285,7 +285,7 @@ mod tests {
 
     /// What some runs decode to, read `most` at a time.
     fn read<N: Number + Into<i64>>(data: &[u8], width: u8, count: usize, most: usize) -> Vec<i64> {
-        let mut hybrid = Hybrid::new(Bytes::copy_from_slice(data), width).ok().unwrap();
+        let mut hybrid = Hybrid::new(Bytes::copy_from_slice(data), width, count).ok().unwrap();
         let mut found: Vec<N> = Vec::new();
         while found.len() < count {
             hybrid.append(most.min(count - found.len()), &mut found).ok().unwrap();
@@ -322,13 +322,13 @@ mod tests {
                 prop_assert_eq!(read::<u8>(&data, width, values.len(), most), expected);
             } else {
                 let mut narrow: Vec<u8> = Vec::new();
-                prop_assert!(Hybrid::new(data.into(), width).ok().unwrap().append(1, &mut narrow).is_err());
+                prop_assert!(Hybrid::new(data.into(), width, usize::MAX).ok().unwrap().append(1, &mut narrow).is_err());
             }
         }
 
         #[test]
         fn any_bytes_give_numbers_or_an_error(data in vec(any::<u8>(), 0..40), width in 0..=40_u8) {
-            let Ok(mut hybrid) = Hybrid::new(Bytes::from(data), width) else { return Ok(()) };
+            let Ok(mut hybrid) = Hybrid::new(Bytes::from(data), width, usize::MAX) else { return Ok(()) };
             for _ in 0..50 {
                 let Ok(span) = hybrid.span(1000) else { break };
                 if let Span::Packed(packed) = span {

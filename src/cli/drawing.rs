@@ -11,7 +11,7 @@ use crate::metric::definitions::Definitions;
 use crate::report::figures::e5_outcomes::Outcomes;
 use crate::report::figures::{self, Figure, FigureError, FigureName, Input, gaze};
 use crate::report::style::Style;
-use crate::score::run::ScoreError;
+use crate::score::score_traces::ScoreError;
 use crate::score::table::EpisodeTable;
 use crate::score::timeline::{self, Timeline};
 use crate::trace::inputs;

@@ -15,7 +15,7 @@ use crate::base::visible::visible;
 use crate::cells::cell::KeyValue;
 use crate::cells::group::{KEY_COLUMNS, column_values};
 use crate::metric::names::mentioned;
-use crate::score::run;
+use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
 use crate::trace::inputs::Input;
 
@@ -78,7 +78,8 @@ fn unfiltered(
         return scoring::table(inputs, &whole, &[], threads);
     }
     let traces = scoring::open(inputs)?;
-    let is_label = |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && run::check_label(&traces, name).is_ok();
+    let is_label =
+        |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && score_traces::check_label(&traces, name).is_ok();
     let labels: Vec<String> = names.iter().filter(is_label).cloned().collect();
     let known = scoring::metric_names(&traces, &whole)?;
     let metrics = names.iter().filter(|name| known.contains(name)).cloned().collect();

@@ -17,10 +17,11 @@ use crate::engine::spark::source::is_uri;
 use crate::metric::definitions::Definitions;
 use crate::metric::file::FileError;
 use crate::report::bundle;
-use crate::score::format::{self, Format, FormatError, Surroundings};
-use crate::score::run::{self, Request, ScoreError};
+use crate::score::format::{self, Format, FormatError, Partition};
+use crate::score::score_traces::{self, Request, ScoreError};
 use crate::score::select;
 use crate::score::table::EpisodeTable;
+use crate::trace::in_order::in_order;
 use crate::trace::inputs::{self, Input};
 use crate::trace::open::TraceSet;
 
@@ -58,58 +59,23 @@ pub fn table(
     }
 }
 
-/// Writes the episode table and returns its number of rows; memory does not grow with the traces.
-///
-/// # Errors
-/// Whatever is wrong with the files, the definitions, the condition or the output.
-pub fn write(
-    inputs: &[Input],
-    scoring: &ScoringArgs,
-    threads: NonZeroUsize,
-    format: Format,
-    out: impl io::Write + Send,
-) -> Result<usize, Failure> {
-    if are_scores(inputs) {
-        let table = table(inputs, scoring, &[], threads)?;
-        return write_table(&table, format, out).map(|()| table.len());
-    }
-    let traces = open(inputs)?;
-    let definitions = definitions(&traces, scoring)?;
-    let mut rows = run::rows(&traces, &definitions, &[], threads).map_err(score_failure)?;
-    let header = rows.header().clone();
-    let mut count = 0;
-    format::write_rows(header, format, out, |write| {
-        while let Some(row) = rows.next_row().map_err(ScoreError::Spill).map_err(Unwritten::Score)? {
-            write(row)?;
-            count += 1;
-        }
-        Ok(())
-    })
-    .map(|()| count)
-    .map_err(|error| match error {
-        Unwritten::Score(error) => score_failure(error),
-        Unwritten::Format(error) => unwritten(error),
-    })
-}
-
-/// What ends the writing of scores as they are computed.
-enum Unwritten {
-    Score(ScoreError),
-    Format(FormatError),
-}
-
-impl From<FormatError> for Unwritten {
-    fn from(error: FormatError) -> Self {
-        Self::Format(error)
-    }
-}
-
-/// Writes a table.
+/// Writes a table; Parquet is encoded by `threads` threads.
 ///
 /// # Errors
 /// Whatever writing gives.
-pub fn write_table(table: &EpisodeTable, format: Format, out: impl io::Write + Send) -> Result<(), Failure> {
-    format::write(table, format, out).map_err(unwritten)
+pub fn write_table(
+    table: &EpisodeTable,
+    format: Format,
+    out: impl io::Write + Send,
+    threads: NonZeroUsize,
+) -> Result<(), Failure> {
+    if format != Format::Parquet {
+        return format::write(table, format, out).map_err(unwritten);
+    }
+    let (encoder, mut writer) = format::parquet::encoder(table, out).map_err(unwritten)?;
+    let jobs: Vec<_> = encoder.jobs().collect();
+    in_order(threads, &jobs, |job| encoder.encode(*job), |column| writer.append(column?)).map_err(unwritten)?;
+    writer.finish().map_err(unwritten)
 }
 
 fn unwritten(error: FormatError) -> Failure {
@@ -184,7 +150,7 @@ fn score_traces(
 ) -> Result<EpisodeTable, Failure> {
     let traces = open(inputs)?;
     let definitions = definitions(&traces, scoring)?;
-    run::score(&traces, &definitions, labels, threads).map_err(score_failure)
+    score_traces::score(&traces, &definitions, labels, threads).map_err(score_failure)
 }
 
 /// Opens traces.
@@ -219,7 +185,7 @@ pub fn definitions(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Definitio
         metrics: scoring.metrics.clone(),
         condition: scoring.condition.clone(),
     };
-    run::definitions(traces, &request).map_err(score_failure)
+    score_traces::definitions(traces, &request).map_err(score_failure)
 }
 
 /// The names of all metrics of the definitions asked for.
@@ -227,7 +193,7 @@ pub fn definitions(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Definitio
 /// # Errors
 /// Every fault of the definitions.
 pub fn metric_names(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Vec<String>, Failure> {
-    let definitions = Definitions::load(scoring.definitions_name(), &run::trace_columns(traces));
+    let definitions = Definitions::load(scoring.definitions_name(), &score_traces::trace_columns(traces));
     Ok(definitions.map_err(definition_failure)?.catalog.metric.into_keys().collect())
 }
 
@@ -236,7 +202,7 @@ pub fn metric_names(traces: &TraceSet, scoring: &ScoringArgs) -> Result<Vec<Stri
 /// # Errors
 /// Every fault of the definitions and the condition; an unknown metric.
 pub fn definitions_unopened(scoring: &ScoringArgs) -> Result<Definitions, Failure> {
-    let columns = run::schema_columns();
+    let columns = score_traces::schema_columns();
     let name = scoring.definitions_name();
     let mut definitions = Definitions::load(name, &columns).map_err(definition_failure)?;
     if let Some(condition) = &scoring.condition {
@@ -299,7 +265,7 @@ fn read_scores(inputs: &[&Input], scoring: &ScoringArgs) -> Result<EpisodeTable,
         let table = read_one(input, scoring)?;
         whole = Some(match whole {
             None => table,
-            Some(whole) => whole.joined(table).map_err(|error| at(input, error))?,
+            Some(whole) => whole.joined(&table).map_err(|error| at(input, error))?,
         });
     }
     let table = whole.unwrap_or_else(|| unreachable!("the caller has found a file of scores"));
@@ -311,7 +277,8 @@ fn read_scores(inputs: &[&Input], scoring: &ScoringArgs) -> Result<EpisodeTable,
 
 fn read_one(input: &Input, scoring: &ScoringArgs) -> Result<EpisodeTable, Failure> {
     let file = File::open(&input.path).map_err(|error| at(input, error))?;
-    let named = || Definitions::load(scoring.definitions_name(), &run::schema_columns()).map_err(definition_failure);
+    let named =
+        || Definitions::load(scoring.definitions_name(), &score_traces::schema_columns()).map_err(definition_failure);
     match Format::of_name(&input.name) {
         Ok(text @ (Format::Csv | Format::JsonLines)) => {
             format::read_text(text, &named()?.catalog, file).map_err(|error| at(input, error))
@@ -319,8 +286,8 @@ fn read_one(input: &Input, scoring: &ScoringArgs) -> Result<EpisodeTable, Failur
         Ok(Format::Parquet) | Err(_) => {
             let named = if format::holds_definitions(&file) { None } else { Some(named()?.catalog) };
             let folders = inputs::folder_values(&input.path);
-            let surroundings = Surroundings { folders: &folders, definitions: named.as_ref() };
-            let table = format::read_parquet(file, &surroundings).map_err(|error| at(input, error))?;
+            let partition = Partition { folders: &folders, definitions: named.as_ref() };
+            let table = format::read_parquet(file, &partition).map_err(|error| at(input, error))?;
             match &scoring.definitions {
                 Some(name) => check_hash(name, input, table),
                 None => Ok(table),
@@ -331,7 +298,7 @@ fn read_one(input: &Input, scoring: &ScoringArgs) -> Result<EpisodeTable, Failur
 
 /// Scores keep the definitions that they were computed with.
 fn check_hash(name: &str, input: &Input, table: EpisodeTable) -> Result<EpisodeTable, Failure> {
-    let definitions = Definitions::load(name, &run::schema_columns()).map_err(definition_failure)?;
+    let definitions = Definitions::load(name, &score_traces::schema_columns()).map_err(definition_failure)?;
     if definitions.catalog.hash == table.catalog.hash {
         return Ok(table);
     }
@@ -373,13 +340,13 @@ pub fn lost(inputs: &[Input], threads: NonZeroUsize) -> Result<Option<BTreeSet<S
     if traces.column("reply_status").is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some()) {
         return Ok(None);
     }
-    let columns = run::trace_columns(&traces);
+    let columns = score_traces::trace_columns(&traces);
     let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
     let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
     let nothing = Definitions::from_toml("losses", "", &columns).map_err(definition_failure)?;
     let definitions = nothing.filtered("losses", &ended, &columns).map_err(Failure::input)?;
-    let table = run::score(&traces, &definitions, &[], threads).map_err(score_failure)?;
-    Ok(Some(table.keys.into_iter().map(|key| key.episode_id).collect()))
+    let table = score_traces::score(&traces, &definitions, &[], threads).map_err(score_failure)?;
+    Ok(Some(table.keys.iter().map(|key| key.episode_id.to_owned()).collect()))
 }
 
 /// The experiments that the definitions know; any if `None`.
@@ -387,7 +354,7 @@ pub fn lost(inputs: &[Input], threads: NonZeroUsize) -> Result<Option<BTreeSet<S
 /// # Errors
 /// Every fault of the definitions.
 pub fn known_experiments(definitions: &str) -> Result<Option<Vec<String>>, Failure> {
-    let catalog = Definitions::load(definitions, &run::schema_columns()).map_err(definition_failure)?.catalog;
+    let catalog = Definitions::load(definitions, &score_traces::schema_columns()).map_err(definition_failure)?.catalog;
     Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
 }
 

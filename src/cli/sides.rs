@@ -15,7 +15,7 @@ use crate::base::near::nearest;
 use crate::cells::changes::{Changes, Flip, Overlap};
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::score::evidence;
-use crate::score::run::{self, ScoreError};
+use crate::score::score_traces::{self, ScoreError};
 use crate::score::table::EpisodeTable;
 use crate::trace::inputs::{self, Input};
 use crate::trace::open::TraceSet;
@@ -120,7 +120,7 @@ impl Side {
     fn read(&self, traces: Option<&TraceSet>, asked: &Asked) -> Result<(Vec<String>, Option<EpisodeTable>), Failure> {
         match self {
             Self::Definitions(name) => {
-                let columns = traces.map_or_else(run::schema_columns, run::trace_columns);
+                let columns = traces.map_or_else(score_traces::schema_columns, score_traces::trace_columns);
                 let definitions = Definitions::load(name, &columns).map_err(scoring::definition_failure)?;
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
@@ -144,7 +144,8 @@ impl Side {
                 let scoring = ScoringArgs { metrics: Some(common.to_vec()), ..self.scoring(asked) };
                 let definitions = scoring::definitions(traces, &scoring)?;
                 let labels = scoring::labels(asked.by);
-                let table = run::score(traces, &definitions, &labels, asked.threads).map_err(scoring::score_failure)?;
+                let table = score_traces::score(traces, &definitions, &labels, asked.threads)
+                    .map_err(scoring::score_failure)?;
                 Ok((table, Some(definitions)))
             }
             (_, Some(mut table), _) => {
@@ -259,7 +260,7 @@ impl Scored {
     /// These metrics of what scored it, read back from what its scores carry if they were not computed now.
     fn definitions(&self, traces: &TraceSet, metrics: &[String]) -> Result<Definitions, ScoreError> {
         match &self.definitions {
-            None => run::restored(traces, &self.table.catalog, metrics),
+            None => score_traces::restored(traces, &self.table.catalog, metrics),
             Some(definitions) => {
                 let mut definitions = definitions.clone();
                 definitions.select(metrics)?;

@@ -9,7 +9,7 @@ use crate::engine::spark::source::{Sources, is_uri};
 use crate::engine::spark::{self, Cluster, Job, SparkError, Written};
 use crate::metric::definitions::Definitions;
 use crate::score::format::Format;
-use crate::score::run;
+use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
 use crate::trace::inputs::Input;
 
@@ -77,7 +77,10 @@ impl Asked {
         engine: &EngineArgs,
     ) -> Result<Self, Failure> {
         let opened = scoring::open_steps(inputs)?;
-        labels.iter().try_for_each(|label| run::check_label(&opened, label)).map_err(scoring::score_failure)?;
+        labels
+            .iter()
+            .try_for_each(|label| score_traces::check_label(&opened, label))
+            .map_err(scoring::score_failure)?;
         let definitions = scoring::definitions(&opened, scoring_args)?;
         let sources = Sources::files(inputs, &opened)
             .map_err(|source| SparkError::System { what: "name the traces for Spark".to_owned(), source })

@@ -11,7 +11,7 @@ use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::DataType;
 use assert_cmd::Command;
 use mirrorstats::score::format::{self, Format};
-use mirrorstats::score::run::{self, Request};
+use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::trace::episode::Episode;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -112,9 +112,9 @@ fn write_as(layout: Layout, rows: &RecordBatch, path: &Path) {
 fn scores(paths: &[PathBuf], threads: usize) -> Vec<Vec<u8>> {
     let traces = open(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>());
     let request = Request { condition: Some("seed <> 2 or TSA = 0".into()), ..Request::of("paper") };
-    let definitions = run::definitions(&traces, &request).unwrap();
+    let definitions = score_traces::definitions(&traces, &request).unwrap();
     let labels = ["body_color".to_owned(), "distractors".to_owned()];
-    let table = run::score(&traces, &definitions, &labels, NonZeroUsize::new(threads).unwrap()).unwrap();
+    let table = score_traces::score(&traces, &definitions, &labels, NonZeroUsize::new(threads).unwrap()).unwrap();
     let bytes = |format| {
         let mut bytes = Vec::new();
         format::write(&table, format, &mut bytes).unwrap();

@@ -12,7 +12,7 @@ use crate::base::visible::visible;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::FaultRecord;
 use crate::metric::file::{FileError, built_in, built_in_names};
-use crate::score::run;
+use crate::score::score_traces;
 use crate::trace::inputs;
 
 /// Check, explain and show metric definitions
@@ -87,10 +87,10 @@ impl DefinitionsArgs {
 
 fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> {
     let columns = if traces.is_empty() {
-        run::schema_columns()
+        score_traces::schema_columns()
     } else {
         let inputs = inputs::resolve(traces, io::stdin().lock()).map_err(Failure::input)?;
-        run::trace_columns(&scoring::open(&inputs)?)
+        score_traces::trace_columns(&scoring::open(&inputs)?)
     };
     match Definitions::load(file, &columns) {
         Ok(definitions) if json => {
@@ -122,7 +122,8 @@ fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> 
 }
 
 fn explain(metric: &str, definitions: &str, json: bool) -> Result<Outcome, Failure> {
-    let definitions = Definitions::load(definitions, &run::schema_columns()).map_err(scoring::definition_failure)?;
+    let definitions =
+        Definitions::load(definitions, &score_traces::schema_columns()).map_err(scoring::definition_failure)?;
     if let Some(explanation) = definitions.explain(metric) {
         return output::print(&explanation, json);
     }

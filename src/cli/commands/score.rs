@@ -63,17 +63,8 @@ impl ScoreArgs {
             })?;
             return output::print(&found, self.json);
         }
-        if self.engine.engine == Engine::Native {
-            let mut rows = 0;
-            self.deliver(format, |format, out| {
-                rows = scoring::write(&inputs, &self.scoring, threads, format, out)?;
-                Ok(())
-            })?;
-            empty_filter::note(rows, &inputs, &self.scoring, threads)?;
-            return Ok(Outcome::Done);
-        }
         let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out))?;
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out, threads))?;
         empty_filter::note(table.len(), &inputs, &self.scoring, threads)?;
         Ok(Outcome::Done)
     }
@@ -97,8 +88,8 @@ impl ScoreArgs {
         if let Some(path) = &self.output {
             output::check_target(path, asked.read())?;
         }
-        let table = asked.score(&[])?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out))?;
+        let (table, threads) = (asked.score(&[])?, self.traces.threads.count());
+        self.deliver(format, |format, out| scoring::write_table(&table, format, out, threads))?;
         Ok(Outcome::Done)
     }
 

@@ -2,6 +2,8 @@
 //!
 //! Source: the Parquet format's "Run Length Encoding / Bit-Packing Hybrid (RLE = 3)".
 
+use std::convert::Infallible;
+
 use bytes::Bytes;
 
 use super::Unfit;
@@ -195,15 +197,22 @@ impl Number for i32 {
 impl Packed<'_> {
     /// Gives each number to `take`.
     pub(super) fn each(&self, mut take: impl FnMut(u32)) {
+        let Ok(()) = self.blocks(|some| {
+            some.iter().for_each(|number| take(number.cast_unsigned()));
+            Ok::<_, Infallible>(())
+        });
+    }
+
+    /// Gives all numbers to `take`, some at a time.
+    pub(super) fn blocks<E>(&self, mut take: impl FnMut(&[i32]) -> Result<(), E>) -> Result<(), E> {
         let mut numbers = [0_i32; 64];
         for first in (0..self.count).step_by(numbers.len()) {
             let count = numbers.len().min(self.count - first);
             let some = &mut numbers[..count];
             Self { bit: self.bit + first * self.width, ..*self }.unpack(some);
-            for number in some {
-                take(number.cast_unsigned());
-            }
+            take(some)?;
         }
+        Ok(())
     }
 
     fn unpack<N: Number>(&self, out: &mut [N]) {

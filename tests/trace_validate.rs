@@ -102,6 +102,7 @@ fn everything_wrong_is_reported_by_row() {
         (Code::TGap, a, Some(4), Some("t")),
         (Code::InconsistentConstant, a, Some(6), Some("run")),
         (Code::UnknownExperiment, b, Some(0), Some("experiment")),
+        (Code::InvalidColor, b, Some(0), Some("body_color")),
         (Code::TStart, b, Some(0), Some("t")),
         (Code::TDuplicate, b, Some(1), Some("t")),
         (Code::TGap, b, Some(3), Some("t")),

@@ -135,7 +135,7 @@ fn every_page_with_a_wrong_checksum_is_found_on_every_way_to_read_it() {
             let finding = verified(&path).unwrap_err();
             assert_eq!(finding.column.as_ref(), Some(&page.column));
             let merged = merge::read(&path).unwrap_err().to_string();
-            assert!(merged.contains("CRC-32") && merged.contains(&page.column), "{merged}");
+            assert!(merged.contains("CRC-32") && merged.contains(&page.column), "{name}, {page:?}: {merged}");
             if mirrorstats::trace::schema::column(&page.column).is_none() {
                 // A column of their own, which `validate` does not read.
                 assert_eq!(page.column, "description");

@@ -86,7 +86,9 @@ impl Contents {
         encoding: Encoding,
     ) -> Result<(), Fault> {
         let count = match stored {
-            Some(stored) => ones(stored, declared.rows).map_err(|Unfit| levels("others"))?,
+            Some(stored) => {
+                ones(stored, declared.rows).map_err(|Unfit| levels("runs of another length, or levels above 1"))?
+            }
             None => declared.rows,
         };
         if let Some(nulls) = declared.nulls
@@ -99,7 +101,7 @@ impl Contents {
             (Encoding::PLAIN, _) => self.plain(values, count),
             (Encoding::RLE, Physical::BOOLEAN) => {
                 let sound = prefixed(values).and_then(|(truths, _)| ones(truths, count));
-                sound.map(drop).map_err(|Unfit| ("a truth value for each row", "others".into()))
+                sound.map(drop).map_err(|Unfit| ("a truth value for each row", "runs of another length".into()))
             }
             (Encoding::BYTE_STREAM_SPLIT, _) => fixed(values, count, self.width),
             (Encoding::DELTA_BINARY_PACKED | Encoding::DELTA_LENGTH_BYTE_ARRAY | Encoding::DELTA_BYTE_ARRAY, _) => {
@@ -132,7 +134,8 @@ impl Contents {
         match self.physical {
             Physical::BOOLEAN if values.len() == count.div_ceil(8) => Ok(()),
             Physical::BOOLEAN => Err(("a bit for each value", format!("{} bytes for {count}", values.len()))),
-            Physical::BYTE_ARRAY => texts(values, count).map_err(|Unfit| ("texts that fill it", "others".into())),
+            Physical::BYTE_ARRAY => texts(values, count)
+                .map_err(|Unfit| ("texts as long as their lengths say", "texts that end before or beyond it".into())),
             _ => fixed(values, count, self.width),
         }
     }
@@ -143,7 +146,8 @@ fn no_levels(stored: Bytes, rows: usize) -> Result<(), Fault> {
     if stored.is_empty() {
         return Ok(());
     }
-    let mut hybrid = Hybrid::new(stored, 0, rows).map_err(|Unfit| levels("others"))?;
+    let mut hybrid =
+        Hybrid::new(stored, 0, rows).map_err(|Unfit| levels("runs of another length, or levels above 1"))?;
     each_span(&mut hybrid, rows, |_| ()).map_err(|Unfit| levels("some above 0"))
 }
 

@@ -9,17 +9,11 @@ use serde::Serialize;
 use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
-use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
-use super::super::{output, scoring};
-use crate::cells::group::{DEFAULT_BY, group};
-use crate::report::bundle::{self, Bundle, Manifest};
-use crate::report::layout;
-use crate::report::style::{MAIN_TABLE, Style};
-use crate::report::table::Table;
+use super::super::output;
+use crate::cells::group::DEFAULT_BY;
+use crate::report::bundle::Manifest;
 use crate::report::tables::terminal::{self, Marks, Terminal};
-use crate::score::format;
-use crate::trace::inputs::Input;
-use crate::trace::schema::SCHEMA_VERSION;
+use crate::study::{Report, ReportOptions};
 
 /// Compute the tables and figures of traces, print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
@@ -69,67 +63,34 @@ impl ReportArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions, the style or the folder.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let inputs = scoring::resolve(&self.traces)?;
-        let (made, files) = self.make(inputs)?;
+        let study = self.traces.study_on(&self.engine, &self.scoring, &self.by)?;
+        let report = study.report(&ReportOptions { style: self.style.clone(), figures: !self.no_figures })?;
+        tell_notes(&report.notes)?;
+        let files = report.write(&self.out)?;
         if self.json {
             let out = self.out.display().to_string();
-            let Made { episodes, manifest, .. } = made;
-            return output::print_json(&ReportAnswer { out, files, episodes: episodes.len(), manifest });
+            let Report { results, manifest, .. } = report;
+            return output::print_json(&ReportAnswer { out, files, episodes: results.episodes.len(), manifest });
         }
-        self.print(&made.tables, made.episodes.len())
+        self.print(&report)
     }
 
-    /// Makes the report of these files and writes its folder; returns what was made and the files written.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the traces, the definitions, the style or the folder.
-    pub fn make(&self, inputs: Vec<Input>) -> Result<(Made, Vec<String>), Failure> {
-        // Small files first: a slip in the style should not cost a pass over the traces.
-        let style = Style::load(&self.style).map_err(Failure::input)?;
-        let labels = scoring::labels(&self.by);
-        let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &labels, self.traces.threads.count())?;
-        let cells = group(&episodes, &self.by).map_err(Failure::input)?;
-        let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
-        let condition = self.scoring.condition.clone();
-        let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, condition, scoring::provenance(&inputs)?);
-        let made = Made { inputs, episodes, cells, tables, manifest, style };
-        let files = self.write(&made)?;
-        Ok((made, files))
-    }
-
-    fn write(&self, made: &Made) -> Result<Vec<String>, Failure> {
-        let mut others = Vec::new();
-        if !self.no_figures {
-            let asked = Asked { scoring: &self.scoring, threads: self.traces.threads.count() };
-            let drawings = asked.drawings(made)?;
-            for (name, reason) in &drawings.left_out {
-                writeln!(io::stderr(), "note: no figure `{name}`: {reason}")?;
-            }
-            others.extend(figure_files(&drawings)?);
-            match asked.page(made, &drawings)? {
-                Some(page) => others.push(page),
-                None => writeln!(io::stderr(), "note: no report.html: it lists at most {MOST_EPISODES} episodes")?,
-            }
+    fn print(&self, report: &Report) -> Result<Outcome, Failure> {
+        if let Some(table) = report.main_table() {
+            io::stdout().lock().write_all(terminal::render(table, terminal_now()).as_bytes())?;
         }
-        let mut bytes = Vec::new();
-        format::write(&made.episodes, format::Format::Parquet, &mut bytes).map_err(Failure::input)?;
-        let Made { cells, tables, manifest, .. } = made;
-        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, others: &others };
-        let written = bundle::write(&self.out, &bundle).map_err(Failure::input)?;
-        let inside = |path: &PathBuf| path.strip_prefix(&self.out).unwrap_or(path).display().to_string();
-        Ok(written.iter().map(inside).collect())
-    }
-
-    fn print(&self, tables: &[Table], episodes: usize) -> Result<Outcome, Failure> {
-        let main = tables.iter().find(|table| table.name == MAIN_TABLE).or(tables.first());
-        let mut out = io::stdout().lock();
-        if let Some(table) = main {
-            out.write_all(terminal::render(table, terminal_now()).as_bytes())?;
-        }
-        let episodes = counted(episodes as u64, "episode");
+        let episodes = counted(report.results.episodes.len() as u64, "episode");
         writeln!(io::stderr(), "{episodes}; the report is in {}", self.out.display())?;
         Ok(Outcome::Done)
     }
+}
+
+/// Says on standard error what a report lacks or leaves open.
+///
+/// # Errors
+/// When standard error cannot be written.
+pub fn tell_notes(notes: &[String]) -> io::Result<()> {
+    notes.iter().try_for_each(|note| writeln!(io::stderr(), "note: {note}"))
 }
 
 /// What standard output is.

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
-use super::super::{output, scoring, spark};
-use crate::score::evidence;
-use crate::score::format::Format;
+use super::super::{output, spark};
+use crate::score::format::{self, Format};
+use crate::study::{SparkJob, StudyError, are_uris};
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -40,7 +40,6 @@ impl ScoreArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions or the output.
     pub fn run(self) -> Result<Outcome, Failure> {
-        self.engine.check()?;
         if self.engine.engine == Engine::Spark {
             return self.run_on_spark();
         }
@@ -50,22 +49,11 @@ impl ScoreArgs {
         }
         // An output name of no known format should not cost a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let inputs = scoring::resolve(&self.traces)?;
-        let threads = self.traces.threads.count();
-        if let Some(episode) = &self.explain {
-            let traces = scoring::open_steps(&inputs)?;
-            let definitions = scoring::definitions(&traces, &self.scoring)?;
-            let found = evidence::explain(&traces, &definitions, episode, threads).map_err(|error| match error {
-                evidence::EvidenceError::Score(error) => scoring::score_failure(error),
-                other @ evidence::EvidenceError::NoSuchEpisode { .. } => Failure::input(other),
-            })?;
-            return output::print(&found, self.json);
+        let study = self.traces.study_on(&self.engine, &self.scoring, &[])?;
+        match &self.explain {
+            Some(episode) => output::print(&study.explain(episode)?, self.json),
+            None => self.deliver(format, |format, out| study.write_scores(format, out)),
         }
-        if self.engine.engine == Engine::Native {
-            return self.deliver(format, |format, out| scoring::write(&inputs, &self.scoring, threads, format, out));
-        }
-        let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
     }
 
     fn run_on_spark(&self) -> Result<Outcome, Failure> {
@@ -74,28 +62,36 @@ impl ScoreArgs {
                 "error: --explain looks into the steps, which Spark keeps to itself\n  help: leave --engine out";
             return Err(Failure::Rendered(words.to_owned()));
         }
-        let asked = || spark::Asked::of(&self.traces, &self.scoring, &self.engine);
         if let Some(folder) = self.output.as_deref().filter(|output| spark::is_folder(output)) {
             let name = folder.to_string_lossy();
-            let written = asked()?.write(&name)?;
+            let written = self.spark_job()?.write(&name)?;
             let episodes = counted(written.episodes, "episode");
             writeln!(io::stderr(), "{episodes}; `mirrorstats report {name}` goes on from here")?;
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let table = asked()?.score(&[])?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out))
+        let table = self.spark_job()?.score()?;
+        self.deliver(format, |format, out| Ok(format::write(&table, format, out)?))
+    }
+
+    /// What Spark is to compute, of files of this machine or of URIs that it alone can read.
+    fn spark_job(&self) -> Result<SparkJob, Failure> {
+        let cluster = self.engine.cluster();
+        if are_uris(&self.traces.traces)? {
+            return Ok(SparkJob::of_uris(self.traces.traces.clone(), &self.scoring.question(&[]), cluster)?);
+        }
+        Ok(SparkJob::of_study(&self.traces.study(&self.scoring, &[])?, cluster)?)
     }
 
     /// Writes the table to where it was asked for.
     fn deliver(
         &self,
         format: Option<Format>,
-        write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<(), Failure>,
+        write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<(), StudyError>,
     ) -> Result<Outcome, Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
         match &self.output {
-            Some(path) => output::write_file_with(path, |file| write(format, &mut BufWriter::new(file)))?,
+            Some(path) => output::write_file_with(path, |file| Ok(write(format, &mut BufWriter::new(file))?))?,
             None => write(format, &mut BufWriter::new(io::stdout()))?,
         }
         Ok(Outcome::Done)

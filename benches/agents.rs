@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Account;
-use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model};
+use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
 use mirrorstats::agent::vlm::provider::{Patience, Provider};
 use mirrorstats::agent::vlm::{OnOutage, Vlm};
 use mirrorstats::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
@@ -29,7 +29,7 @@ use mirrorstats::record::run::{Progress, Recording, Settings, Shares, Spent};
 use mirrorstats::record::store::Store;
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::trace::episode::Action;
+use mirrorstats::trace::episode::{Action, Step};
 use tokio::runtime::Runtime;
 
 const IN_FLIGHT: usize = 64;
@@ -86,7 +86,7 @@ impl Behind {
             vendor: None,
             backend: "loopback".into(),
             id: "model".into(),
-            prices: None,
+            prices: Prices::default(),
             contract: Contract::Schema,
         };
         let backend = Backend { dialect, base_url: Some(address), key: "UNUSED".into() };
@@ -158,7 +158,7 @@ fn answer(stream: &TcpStream) -> Option<()> {
 struct Quiet;
 
 impl Progress for Quiet {
-    fn step(&self) {}
+    fn step(&self, _: Key, _: i32, _: &Step) {}
 
     fn episode(&self, _: &str, _: usize) {}
 

@@ -118,10 +118,11 @@ fn rows(criterion: &mut Criterion) {
     let sample = Sample::new();
     let definitions = Definitions::load("paper", &schema_columns()).unwrap();
     let scores = Engine::new(&definitions.plan).score(&sample.batch()).unwrap();
+    let rows = |scores| Rows::of(&sample.episodes, scores, &[], 0, usize::MAX).unwrap().0;
     let mut group = criterion.benchmark_group("rows");
     group.throughput(Throughput::Elements(scores.kept.len() as u64));
-    group.bench_function("as bytes", |bencher| bencher.iter(|| Rows::of(&sample.episodes, black_box(&scores), &[])));
-    let rows = Rows::of(&sample.episodes, &scores, &[]);
+    group.bench_function("as bytes", |bencher| bencher.iter(|| rows(black_box(&scores))));
+    let rows = rows(&scores);
     let metrics = definitions.plan.outputs.iter().map(|output| output.name.clone()).collect();
     let header = Header { catalog: definitions.catalog.clone(), labels: Vec::new(), metrics };
     group.bench_function("sorted and read back", |bencher| {

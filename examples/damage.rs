@@ -137,6 +137,7 @@ fn broken_values() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     Ok(vec![
         text("null-in-required.parquet", "null-in-required", "`body_color` is null", "body_color", None)?,
         text("empty-string.parquet", "empty-string", "`self_color` is empty", "self_color", Some(""))?,
+        text("invalid-color.parquet", "invalid-color", "`self_color` is `Red`", "self_color", Some("Red"))?,
         text("unknown-action.parquet", "unknown-action", "the action is `jump`", "action", Some("jump"))?,
         text("inconsistent-constant.parquet", "inconsistent-constant", "another `model`", "model", Some("other"))?,
         whole("seed-out-of-range.parquet", "out-of-range", "the seed is 3000000000", "seed", Arc::new(seeds))?,

@@ -30,7 +30,7 @@
 //! | [`score`] | the plan evaluated over Arrow batches; the episode table |
 //! | [`metric`] | definition files: TOML, SQL expressions, types, plans |
 //! | [`trace`] | what an episode is: schema, writer, reader, validation |
-//! | [`base`] | exact numbers to text, hashes, near names |
+//! | [`base`] | exact numbers to text, hashes, near names, files that are replaced |
 //!
 //! # Invariants
 //!

@@ -47,6 +47,28 @@ fn the_exploration_family_has_no_cube() {
 }
 
 #[test]
+fn a_cube_is_read_in_any_letter_case_and_white_space() {
+    for (text, cube) in [
+        ("Red", "red"),
+        ("RED", "red"),
+        (" red ", "red"),
+        ("red\u{a0}", "red"),
+        ("\\nred\\t", "red"),
+        ("None", "none"),
+        (" NONE", "none"),
+    ] {
+        let reading = read(&GOOD.replace("\"selected_cube\": \"none\"", &format!("\"selected_cube\": \"{text}\"")));
+        // As for an attribution, that is no repair: the raw reply keeps what was written.
+        assert_eq!((reading.status, reading.repairs), (Status::Ok, Vec::new()), "{text:?}");
+        assert_eq!(reading.selected_cube.as_deref(), Some(cube), "{text:?}");
+    }
+    for text in ["unknown", "Mauve", "", "red cube", "r ed"] {
+        let reading = read(&GOOD.replace("\"selected_cube\": \"none\"", &format!("\"selected_cube\": \"{text}\"")));
+        assert_eq!((reading.status, reading.selected_cube), (Status::SchemaInvalid, None), "{text:?}");
+    }
+}
+
+#[test]
 fn repairs_are_named_and_change_no_word() {
     use Repair::{CodeFence, SingleQuotes, SurroundingText, TrailingComma};
     let comma = GOOD.replace("\"unknown\"}", "\"unknown\" ,\n }");
@@ -71,6 +93,61 @@ fn repairs_are_named_and_change_no_word() {
         assert_eq!((reading.status, &reading.repairs), (Status::Repaired, &repairs), "{raw}");
         assert_eq!(reading.words, words, "{raw}");
         assert_eq!(reading.action, Some(Action::TurnLeft), "{raw}");
+    }
+}
+
+/// A whole reply that decides otherwise than [`GOOD`].
+fn draft() -> String {
+    GOOD.replace("\"action\": \"a\"", "\"action\": \"w\"")
+}
+
+#[test]
+fn thoughts_before_the_object_are_a_repair_and_no_object_of_theirs_is_taken() {
+    use Repair::{CodeFence, SurroundingText, Thoughts, TrailingComma};
+    let (draft, comma) = (draft(), GOOD.replace("\"unknown\"}", "\"unknown\",}"));
+    let cases: Vec<(String, Vec<Repair>)> = vec![
+        (format!("<think>A wall.</think>{GOOD}"), vec![Thoughts]),
+        (format!("<think>\nA wall: {draft}\n</think>\n\n{GOOD}"), vec![Thoughts]),
+        (format!("<think></think>\n{GOOD}"), vec![Thoughts]),
+        // Servers whose prompt ends with the opening tag send the closing one alone.
+        (format!("A wall: {draft}\n</think>\n{GOOD}"), vec![Thoughts]),
+        (format!("{{ an open brace </think>{GOOD}"), vec![Thoughts]),
+        (format!("<think>a</think><think>{draft}</think>{GOOD}"), vec![Thoughts]),
+        (format!("<think>hm</think>```json\n{GOOD}\n```"), vec![Thoughts, CodeFence]),
+        (format!("```json\n<think>hm</think>{GOOD}\n```"), vec![CodeFence, Thoughts]),
+        (format!("<think>{draft}</think>Here it is: {GOOD}"), vec![Thoughts, SurroundingText]),
+        (format!("<think>hm</think>{comma}"), vec![Thoughts, TrailingComma]),
+        // Tags within a string are words like any other.
+        (format!("```\n{}\n```", GOOD.replace("a wall", "a <think> or a </think>")), vec![CodeFence]),
+    ];
+    for (raw, repairs) in cases {
+        let reading = read(&raw);
+        assert_eq!((reading.status, reading.repairs), (Status::Repaired, repairs), "{raw}");
+        assert_eq!((reading.action, reading.fault), (Some(Action::TurnLeft), None), "{raw}");
+    }
+    assert_eq!(Repair::joined(&[Thoughts, CodeFence]).as_deref(), Some("thoughts+code_fence"));
+    let tags = GOOD.replace("a wall", "a <think> or a </think>");
+    assert_eq!((read(&tags).status, read(&tags).action), (Status::Ok, Some(Action::TurnLeft)));
+}
+
+#[test]
+fn thoughts_without_an_answer_are_no_decision() {
+    let draft = draft();
+    let cases = [
+        (format!("<think>A wall: {draft}"), Status::Truncated),
+        ("<think>".to_owned(), Status::Truncated),
+        (format!("Well. <think>{draft}"), Status::Truncated),
+        (format!("<think>a</think><think>{draft}"), Status::Truncated),
+        (format!("<think>{draft}</think>"), Status::Empty),
+        (format!("{draft}</think> \n"), Status::Empty),
+        (format!("<think>{draft}</think>I turn left."), Status::ParseFailed),
+        (format!("<think>{draft}</think>[]"), Status::ParseFailed),
+        (format!("<think>{draft}</think>{{}}"), Status::SchemaInvalid),
+        (format!("<think>hm</think>{GOOD}{GOOD}"), Status::ParseFailed),
+    ];
+    for (raw, status) in cases {
+        let reading = read(&raw);
+        assert_eq!((reading.status, reading.action, reading.self_color), (status, None, None), "{raw}");
     }
 }
 

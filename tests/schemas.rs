@@ -86,12 +86,25 @@ fn the_files_are_what_the_types_say() {
     }
 }
 
-/// What the model providers and other harnesses are given is these files.
+/// A reply's schema without what is there for people alone.
+fn keys_and_types(schema: &Value) -> Value {
+    let mut schema = schema.clone();
+    let object = schema.as_object_mut().unwrap();
+    object.retain(|keyword, _| keyword != "$schema" && keyword != "title");
+    for property in object["properties"].as_object_mut().unwrap().values_mut() {
+        property.as_object_mut().unwrap().retain(|keyword, _| keyword != "description" && keyword != "enum");
+    }
+    schema
+}
+
+/// People and other harnesses are given these files; agents get the structure alone.
 #[test]
-fn replies_are_asked_for_as_the_files_say() {
+fn replies_are_described_as_the_files_say() {
     for (family, name) in [(Family::CubeSelection, "reply-cubes"), (Family::Exploration, "reply-exploration")] {
         let text = fs::read_to_string(folder().join(format!("{name}.schema.json"))).unwrap();
         assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), reply::schema(family));
+        let without_words = [reply::schema(family), reply::structure(family)].map(|schema| keys_and_types(&schema));
+        assert_eq!(without_words[0], without_words[1], "{name}");
     }
 }
 

@@ -282,7 +282,7 @@ fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
 fn nothing_at_all_is_no_fault() {
     let found = statistics(&[]);
     assert_eq!((found.episodes, found.cells.len(), found.models.len()), (0, 0, 0));
-    assert!(text::render(&found, &found.headline).starts_with("0 episodes"));
+    assert!(text::render(&found, &found.headline, None).starts_with("0 episodes"));
 }
 
 #[test]
@@ -298,7 +298,7 @@ fn json_reads_back_to_the_same_rows() {
 
 #[test]
 fn a_rate_without_failure_is_never_certain() {
-    let text = text::render(&statistics(&block("E1", "a", 21, 9)), &["TSA".into()]);
+    let text = text::render(&statistics(&block("E1", "a", 21, 9)), &["TSA".into()], None);
     assert!(text.contains("[0.845, 1.000]") && !text.contains("[1.000, 1.000]") && !text.contains(" 0.000"), "{text}");
 }
 
@@ -317,12 +317,12 @@ fn values_too_large_to_square_are_refused() {
 #[test]
 fn the_text_begins_with_what_can_be_concluded() {
     let found = statistics(&study());
-    insta::assert_snapshot!(text::render(&found, &found.headline));
+    insta::assert_snapshot!(text::render(&found, &found.headline, None));
 }
 
 #[test]
 fn names_from_traces_cannot_write_to_the_terminal() {
     let found = statistics(&[block("E1", "evil\u{1b}[2J", 21, 9), block("E1", "b\nc", 0, 9)].concat());
-    let text = text::render(&found, &found.headline);
+    let text = text::render(&found, &found.headline, None);
     assert!(!text.contains('\u{1b}') && text.contains("evil\\u{1b}[2J") && text.contains("b\\nc"));
 }

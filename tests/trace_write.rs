@@ -75,6 +75,8 @@ fn what_the_schema_forbids_is_refused() {
     let status = with_extra(episode("a", 1), Extra { reply_status: Some("fine".into()), ..Extra::default() });
     let mut blank = episode("a", 1);
     blank.steps[0].self_color = Some(String::new());
+    let mut capital = episode("a", 1);
+    capital.steps[0].self_color = Some("Red".into());
     for (refused, why) in [
         (episode("a", 0), "expected 1 to 2147483647 steps, found 0"),
         (nameless, "expected `model` not to be empty, found ``"),
@@ -82,6 +84,7 @@ fn what_the_schema_forbids_is_refused() {
         (costless, "expected `cost_usd` not to be below zero, found NaN"),
         (status, "expected `reply_status` to be one of ok, repaired"),
         (blank, "expected `self_color` not to be empty"),
+        (capital, "expected `self_color` to be the lower-case name of a colour, `unknown`, or null, found `Red`"),
     ] {
         let metadata = TraceMetadata { columns: OptionalColumns::all(), ..TraceMetadata::default() };
         let mut encoder = TraceEncoder::new(Vec::new(), &metadata).unwrap();

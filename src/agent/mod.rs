@@ -250,6 +250,9 @@ pub trait Player: Send + Sync {
         1
     }
 
+    /// Hears that episodes of this recording are there from an earlier start.
+    fn resumes(&self) {}
+
     /// What was spent so far, over all starts of the recording; `None` for agents that cost nothing.
     #[cfg(feature = "sim")]
     fn spend(&self) -> Option<vlm::limits::Spend> {

@@ -1,4 +1,4 @@
-//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs, repeats, bits.
+//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs, repeats, bits, files replaced.
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
@@ -12,6 +12,6 @@ pub mod number;
 pub mod palette;
 pub mod ratio;
 pub mod repeats;
+pub mod replace;
 pub mod runs;
-pub mod temporary;
 pub mod visible;

@@ -8,7 +8,7 @@ use std::collections::HashSet;
 use std::fs::File;
 use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write as _};
 
-use super::temporary;
+use super::replace;
 
 /// Numbers that are held in memory before they are put away.
 const MEMORY: usize = 256 * 1024;
@@ -56,7 +56,7 @@ impl Repeats {
         self.pending.sort_unstable();
         let file = match &mut self.away {
             Some(file) => file,
-            none => none.insert(tempfile::tempfile().map_err(temporary::without_name)?),
+            none => none.insert(tempfile::tempfile().map_err(replace::without_name)?),
         };
         let start = self.shares.last().and_then(|share| share.last()).copied().unwrap_or(0);
         let place = |byte: u64| self.pending.partition_point(|number| first_byte(*number) < byte) as u64;

@@ -12,7 +12,7 @@ use std::fs::File;
 use std::io::{self, BufReader, BufWriter, Read as _, Seek as _, Write as _};
 use std::ops::Range;
 
-use super::temporary;
+use super::replace;
 
 /// Runs that are merged at a time, each an open file; more of them are first made into one.
 const FAN_IN: usize = 64;
@@ -134,7 +134,7 @@ struct Out(BufWriter<File>);
 
 impl Out {
     fn new() -> io::Result<Self> {
-        let file = tempfile::tempfile().map_err(temporary::without_name)?;
+        let file = tempfile::tempfile().map_err(replace::without_name)?;
         Ok(Self(BufWriter::with_capacity(BUFFER, file)))
     }
 

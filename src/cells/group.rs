@@ -88,6 +88,15 @@ pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
     })
 }
 
+/// The different values of a key column, a label or a metric; `None` for any other name.
+pub fn column_values(table: &EpisodeTable, name: &str) -> Option<BTreeSet<KeyValue>> {
+    if let Some(column) = column(table, name) {
+        return Some((0..table.len()).map(|row| column.value(table, row)).collect());
+    }
+    let metric = table.metrics.iter().find(|metric| metric.name == name)?;
+    Some(metric.values.iter().map(|value| value.map_or(KeyValue::Missing, KeyValue::Int)).collect())
+}
+
 /// For each episode of `table` the position of its group among those of [`group`].
 ///
 /// # Errors

@@ -97,11 +97,9 @@ impl RequestForecast {
             forecast.prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), family, view)?;
         }
         forecast.completion_tokens_at_most = forecast.at_most * u64::from(vlm.max_output_tokens());
-        if let Some(prices) = vlm.choice().model.prices {
-            forecast.prompt_cost_usd = Some(prices.cost_of(forecast.prompt_tokens, 0));
-            forecast.cost_usd_at_most =
-                Some(prices.cost_of(forecast.prompt_tokens, forecast.completion_tokens_at_most));
-        }
+        let prices = vlm.choice().model.prices;
+        forecast.prompt_cost_usd = prices.cost_of_requests(forecast.prompt_tokens);
+        forecast.cost_usd_at_most = prices.cost_of(forecast.prompt_tokens, forecast.completion_tokens_at_most);
         Ok(forecast)
     }
 }
@@ -131,6 +129,11 @@ pub(super) fn print(answer: &ForecastAnswer) -> io::Result<()> {
             dollars(prompt),
             dollars(most)
         ),
-        _ => writeln!(out, "cost: unknown, the model has no prices; --models FILE gives them"),
+        (Some(prompt), None) => writeln!(
+            out,
+            "cost: about {} for the requests, unknown for the replies: the model has no output price; --models FILE gives it",
+            dollars(prompt)
+        ),
+        _ => writeln!(out, "cost: unknown, the model has no price for requests; --models FILE gives prices"),
     }
 }

@@ -18,10 +18,12 @@ pub mod querying;
 pub mod recording;
 pub mod scoring;
 pub mod spark;
+mod terminal;
 #[cfg(feature = "sim")]
 pub mod vlm;
 
 use std::ffi::OsString;
+use std::io::{self, Write as _};
 use std::process::ExitCode;
 
 use clap::Parser;
@@ -40,14 +42,21 @@ struct Cli {
 /// Runs the program with these arguments, the program's name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match Cli::try_parse_from(arguments) {
-        Ok(cli) => outcome::exit_code(cli.command.run()),
+        Ok(cli) => outcome::exit_code(cli.command.run().and_then(flushed)),
         Err(usage) => {
             // Help and version arrive here too; clap knows which stream and code each one takes.
             outcome::exit_code(match usage.print() {
                 Err(error) => Err(Failure::Output(error)),
-                Ok(()) if usage.exit_code() == 0 => Ok(Outcome::Done),
+                Ok(()) if usage.exit_code() == 0 => flushed(Outcome::Done),
                 Ok(()) => Err(Failure::Usage),
             })
         }
     }
+}
+
+/// The outcome, once all of standard output is out: what is left in its buffer at the end is written without a word
+/// about a full disk.
+fn flushed(outcome: Outcome) -> Result<Outcome, Failure> {
+    io::stdout().flush()?;
+    Ok(outcome)
 }

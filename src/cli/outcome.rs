@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use crate::base::visible::visible;
+use crate::base::visible::visible_lines;
 
 /// A command that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,12 +75,12 @@ pub fn exit_code(result: Result<Outcome, Failure>) -> ExitCode {
 fn say(failure: &Failure) {
     let mut text = match failure {
         Failure::Faults(text) => text.clone(),
-        Failure::Rendered(text) => tame(text),
-        other => tame(&format!("error: {other}")),
+        Failure::Rendered(text) => visible_lines(text),
+        other => visible_lines(&format!("error: {other}")),
     };
     let mut cause = failure.source();
     while let Some(error) = cause {
-        let words = tame(&error.to_string());
+        let words = visible_lines(&error.to_string());
         // Some messages tell their cause themselves.
         if !text.contains(&words) {
             let _ = write!(text, "\n  caused by: {words}");
@@ -89,9 +89,4 @@ fn say(failure: &Failure) {
     }
     // With standard error closed there is nobody left to tell.
     let _ = writeln!(io::stderr(), "{}", text.trim_end());
-}
-
-/// The text with nothing that acts on a terminal; names in it may come from a file.
-fn tame(text: &str) -> String {
-    text.lines().map(visible).collect::<Vec<_>>().join("\n")
 }

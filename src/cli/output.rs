@@ -1,4 +1,8 @@
 //! Answers on standard output, and files that appear whole or not at all.
+//!
+//! Recordings, traces, logs and reports are on the disk when a command ends. What a command computes from them in no time
+//! (scores, rows of a query, pictures) is renamed without waiting for the disk: that wait was 10 to 40 ms a file on an
+//! ext4 disk, where `score` takes 0.2 s for 14 million steps.
 
 use std::fmt::Display;
 use std::fs::File;
@@ -6,10 +10,10 @@ use std::io::{self, Write as _};
 use std::path::Path;
 
 use serde::Serialize;
-use tempfile::NamedTempFile;
 
 use super::outcome::{Failure, Outcome};
-use crate::base::temporary;
+use crate::base::replace::{self, NewFile};
+use crate::base::visible::visible_lines;
 
 /// Prints an answer, as text for people or as JSON for programs.
 ///
@@ -19,7 +23,7 @@ pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, 
     if json {
         return print_json(answer);
     }
-    writeln!(io::stdout().lock(), "{}", answer.to_string().trim_end())?;
+    writeln!(io::stdout().lock(), "{}", visible_lines(answer.to_string().trim_end()))?;
     Ok(Outcome::Done)
 }
 
@@ -34,7 +38,22 @@ pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Writes a file, whole or not at all.
+/// Says something on standard error that is neither an answer nor a fault.
+pub fn note(words: &str) {
+    say(&format!("note: {words}"));
+}
+
+/// Says what an answer lacks or leaves open.
+pub fn notes(notes: &[String]) {
+    notes.iter().for_each(|words| note(words));
+}
+
+/// Says how a command went on standard error. With standard error closed there is nobody to tell, and the work goes on.
+pub fn say(words: &str) {
+    let _ = writeln!(io::stderr(), "{}", visible_lines(words));
+}
+
+/// Replaces a file by one of these bytes.
 ///
 /// # Errors
 /// When the folder is not there or not writable, or the disk is full; the error names the file.
@@ -42,40 +61,59 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write_file_with(path, |file| Ok(file.write_all(bytes)?))
 }
 
-/// Writes a file as `write` does, whole or not at all.
+/// Replaces a file by one with what `write` writes.
 ///
 /// # Errors
 /// When the folder is not there or not writable, or the disk is full; the error names the file. What `write` gives.
-pub fn write_file_with(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
-    let mut file = beside(path)?;
-    write(file.as_file_mut()).map_err(|failure| match failure {
+pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T, Failure>) -> Result<T, Failure> {
+    let mut file = create(path)?;
+    let written = write(file.as_file_mut()).map_err(|failure| match failure {
         Failure::Output(error) => unwritable(path, error),
         other => other,
     })?;
-    persist(file, path)
+    commit_unsynced(file, path)?;
+    Ok(written)
 }
 
-/// A temporary file in the folder of `path`.
+/// Begins the new content of a file.
 ///
 /// # Errors
-/// When the folder is not there or not writable.
-pub fn beside(path: &Path) -> Result<NamedTempFile, Failure> {
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    temporary::file_in(folder).map_err(|error| unwritable(path, error))
+/// When the folder is not there or not writable; the error names the file.
+pub fn create(path: &Path) -> Result<NewFile, Failure> {
+    NewFile::create(path).map_err(|error| unwritable(path, error))
 }
 
-/// Gives a temporary file its name.
+/// Replaces the file at `path` without waiting for the disk.
 ///
 /// # Errors
-/// When the name cannot be taken.
-pub fn persist(file: NamedTempFile, path: &Path) -> Result<(), Failure> {
-    file.persist(path).map(|_| ()).map_err(|error| unwritable(path, error.error))
+/// When the disk is full or the name cannot be taken; the error names the file.
+pub fn commit_unsynced(file: NewFile, path: &Path) -> Result<(), Failure> {
+    file.commit_unsynced().map_err(|error| unwritable(path, error))
+}
+
+/// Replaces the file at `path`; the new one is on the disk when this returns.
+///
+/// # Errors
+/// When the disk is full or the name cannot be taken; the error names the file.
+pub fn commit(file: NewFile, path: &Path) -> Result<(), Failure> {
+    file.commit().map_err(|error| unwritable(path, error))
+}
+
+/// Refuses an output that is one of the files which the command reads.
+///
+/// # Errors
+/// When it is one.
+pub fn check_target<P: AsRef<Path>>(target: &Path, read: impl IntoIterator<Item = P>) -> Result<(), Failure> {
+    replace::check_target(target, read, "one that is read").map_err(Failure::input)
 }
 
 fn unwritable(path: &Path, error: io::Error) -> Failure {
+    // The reader of a pipe has seen enough, also where the pipe has a name.
+    if error.kind() == io::ErrorKind::BrokenPipe {
+        return Failure::Output(error);
+    }
     Failure::Rendered(format!(
-        "error: cannot write `{}`: {}\n  help: is the folder there and writable, and the disk not full?",
+        "error: cannot write `{}`: {error}\n  help: is the folder there and writable, and the disk not full?",
         path.display(),
-        temporary::without_name(error)
     ))
 }

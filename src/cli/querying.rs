@@ -9,7 +9,7 @@ use polars::prelude::LazyFrame;
 use super::commands::query::{AnswerFormat, QueryArgs};
 use super::listing::listing;
 use super::outcome::{Failure, Outcome};
-use super::output;
+use super::{output, terminal};
 use crate::base::visible::visible;
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::engine::polars::answer::{self, Excerpt, Format, QueryError};
@@ -17,6 +17,7 @@ use crate::engine::polars::run::PolarsError;
 use crate::engine::polars::statement::{self, Checked, Table};
 use crate::engine::polars::tables;
 use crate::metric::fault::Faults;
+use crate::report::tables::fit::fitted;
 use crate::study::StudyError;
 
 /// What stands for null in a table.
@@ -37,10 +38,9 @@ pub fn run(args: &QueryArgs) -> Result<Outcome, Failure> {
     let Some(format) = format else {
         let most = (args.rows > 0).then_some(args.rows);
         let excerpt = answer::excerpt(frame, most).map_err(failed)?;
-        let text = render(&excerpt);
         match &args.output {
-            Some(path) => output::write_file(path, text.as_bytes())?,
-            None => io::stdout().lock().write_all(text.as_bytes())?,
+            Some(path) => output::write_file(path, render(&excerpt, None).as_bytes())?,
+            None => io::stdout().lock().write_all(render(&excerpt, terminal::width()).as_bytes())?,
         }
         return Ok(Outcome::Done);
     };
@@ -90,12 +90,18 @@ fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
 /// The tables that the query names; the others are not computed.
 fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Failure> {
     let study = args.traces.study(&args.scoring, &DEFAULT_BY.map(str::to_owned))?;
+    if let Some(path) = &args.output {
+        output::check_target(path, study.files_read(None))?;
+    }
     let mut loaded = Vec::new();
     if query.tables.contains(&Table::Steps) {
         loaded.push((Table::Steps, tables::steps(study.traces()?).map_err(failed)?));
     }
     if query.tables.contains(&Table::Episodes) || query.tables.contains(&Table::Cells) {
         let scores = study.score()?.episodes;
+        if let Some(words) = study.empty_filter(scores.len())? {
+            output::note(&words);
+        }
         loaded.push((Table::Episodes, tables::episodes(&scores).map_err(failed)?));
         if query.tables.contains(&Table::Cells) {
             let by = DEFAULT_BY.map(str::to_owned);
@@ -106,16 +112,16 @@ fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Fa
     Ok(loaded)
 }
 
-/// Writes a file that appears whole or not at all.
+/// Replaces a file by one of these rows.
 fn write_file(frame: LazyFrame, format: Format, path: &Path) -> Result<(), Failure> {
-    let temporary = output::beside(path)?;
-    let file: File = temporary.reopen().map_err(Failure::Output)?;
-    answer::write(frame, format, BufWriter::new(file)).map_err(failed)?;
-    output::persist(temporary, path)
+    let file = output::create(path)?;
+    let out: File = file.as_file().try_clone().map_err(Failure::Output)?;
+    answer::write(frame, format, BufWriter::new(out)).map_err(failed)?;
+    output::commit_unsynced(file, path)
 }
 
 /// The rows for people: names, types, rows, how many there are.
-fn render(excerpt: &Excerpt) -> String {
+fn render(excerpt: &Excerpt, width: Option<usize>) -> String {
     let mut table = listing(excerpt.columns.iter().map(|(name, _)| visible(name)));
     table.add_row(excerpt.columns.iter().map(|(_, ty)| ty.clone()).collect::<Vec<_>>());
     let shown = |row: &Vec<Option<String>>| -> Vec<String> {
@@ -133,5 +139,5 @@ fn render(excerpt: &Excerpt) -> String {
     }
     let count = if excerpt.rows == 1 { "1 row".to_owned() } else { format!("{} rows", excerpt.rows) };
     let note = if left_out > 0 { format!(" ({} shown)", excerpt.rows - left_out) } else { String::new() };
-    format!("{}\n{count}{note}\n", table.trim_fmt())
+    format!("{}\n{count}{note}\n", fitted(&table, 1, width))
 }

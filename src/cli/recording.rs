@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -16,7 +16,12 @@ use crate::agent::vlm::limits::Spend;
 use crate::base::number::Decimal;
 use crate::base::visible::visible;
 use crate::record::lost::LostEpisode;
-use crate::record::run::{Progress, Spent, Tally};
+use crate::record::plan::Key;
+use crate::record::queue::Held;
+use crate::record::replies::{Replies, RepliesAnswer, UnreadableReply};
+use crate::record::run::{Progress, Spent};
+use crate::trace::episode::Step;
+use crate::trace::replies::ReplyCounts;
 
 /// The answer of `record --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -31,6 +36,10 @@ pub struct RecordAnswer {
     pub recorded: usize,
     /// Their steps.
     pub steps: u64,
+    /// Episodes that other processes recorded into the same folder meanwhile.
+    pub elsewhere: usize,
+    /// The replies of this start.
+    pub replies: RepliesAnswer,
     /// Episodes that were lost to failures which are not the agent's: in no trace, listed in `lost.jsonl` of the folder.
     pub lost: Vec<LostEpisode>,
     /// What was spent over all starts of the recording; null for agents that cost nothing.
@@ -43,28 +52,23 @@ pub struct RecordAnswer {
     pub logs: Vec<String>,
 }
 
-impl RecordAnswer {
-    /// What became of the episodes of a player.
-    pub fn of(tally: Tally, player: &dyn Player, asked: usize, found: usize, [traces, logs]: [Vec<String>; 2]) -> Self {
-        let Tally { recorded, steps, lost, stopped } = tally;
-        let (model, recorded, spend) = (player.model().to_owned(), recorded.len(), player.spend());
-        Self { model, asked, found, recorded, steps, lost, spend, stopped, traces, logs }
-    }
-}
-
 /// How often progress is told where no terminal shows it.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
-/// The progress: a bar where a terminal shows it, else a line now and then for agents that cost something.
+/// The progress: a bar where a terminal shows it, else a line now and then for agents that cost something or whose
+/// replies cannot be read.
 pub(super) struct Bar<'a> {
     line: ProgressBar,
     player: &'a dyn Player,
     episodes: usize,
     ended: AtomicUsize,
+    replies: Replies,
     budget: u64,
     is_shown: bool,
     /// When a line was last written.
     told: Mutex<Instant>,
+    /// Whether it was said that other processes are waited for.
+    is_waiting: AtomicBool,
 }
 
 impl<'a> Bar<'a> {
@@ -77,7 +81,8 @@ impl<'a> Bar<'a> {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
         line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let told = Mutex::new(Instant::now());
-        let bar = Self { line, player, episodes, ended: AtomicUsize::new(0), budget, is_shown, told };
+        let (ended, is_waiting, replies) = (AtomicUsize::new(0), AtomicBool::new(false), Replies::default());
+        let bar = Self { line, player, episodes, ended, replies, budget, is_shown, told, is_waiting };
         bar.line.set_message(bar.message());
         bar
     }
@@ -87,16 +92,35 @@ impl<'a> Bar<'a> {
         self.line.finish_and_clear();
     }
 
-    /// How many episodes have ended, and what was spent.
+    /// The replies so far.
+    pub(super) fn replies(&self) -> RepliesAnswer {
+        self.replies.answer()
+    }
+
+    /// How many episodes have ended, how many replies could not be read, and what was spent.
     fn message(&self) -> String {
+        let unreadable = unreadable(&self.replies.counts()).map_or_else(String::new, |words| format!(", {words}"));
         let spent = self.player.spend().map_or_else(String::new, |spend| format!(", {}", spent(&spend)));
-        format!("{} of {} episodes{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
+        format!("{} of {} episodes{unreadable}{spent}", self.ended.load(Ordering::Relaxed), self.episodes)
+    }
+
+    /// A line above the bar, or in a log.
+    fn say(&self, line: &str) {
+        self.line.suspend(|| {
+            // With standard error closed there is nobody left to tell.
+            let _ = writeln!(io::stderr(), "{line}");
+        });
+    }
+
+    /// Whether a line in a log says more than that steps are played.
+    fn has_news(&self) -> bool {
+        self.player.spend().is_some() || self.replies.counts().all_unreadable() > 0
     }
 
     /// A line for a log, now and then.
     fn write_line(&self) {
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
-        if self.is_shown || self.player.spend().is_none() || told.elapsed() < BETWEEN_LINES {
+        if self.is_shown || told.elapsed() < BETWEEN_LINES || !self.has_news() {
             return;
         }
         *told = Instant::now();
@@ -107,8 +131,11 @@ impl<'a> Bar<'a> {
 }
 
 impl Progress for Bar<'_> {
-    fn step(&self) {
+    fn step(&self, episode: Key, t: i32, row: &Step) {
         self.line.inc(1);
+        if let Some(first) = self.replies.add(self.player.model(), episode, t, row) {
+            self.say(&format!("a reply could not be read: {}: {}", first.status, quoted(&first)));
+        }
         if self.is_shown {
             self.line.set_message(self.message());
         } else {
@@ -125,11 +152,37 @@ impl Progress for Bar<'_> {
     }
 
     fn lost(&self, id: &str, reason: &str) {
-        self.line.suspend(|| {
-            // With standard error closed there is nobody left to tell.
-            let _ = writeln!(io::stderr(), "lost {}: {}", visible(id), visible(reason));
-        });
+        self.say(&format!("lost {}: {}", visible(id), visible(reason)));
     }
+
+    fn waiting(&self, id: &str, held: Held) {
+        if !self.is_waiting.swap(true, Ordering::Relaxed) {
+            self.say(&waiting(id, held));
+        }
+    }
+}
+
+/// Which episodes are waited for, and who has them.
+fn waiting(id: &str, held: Held) -> String {
+    let others = match held.count - 1 {
+        0 => String::new(),
+        more => format!(" and {}", counted(more as u64, "other episode")),
+    };
+    let process = held.process.map_or_else(|| "another process".to_owned(), |process| format!("process {process}"));
+    format!("waiting for {}{others}: {process} records it into the same folder; Ctrl-C ends the waiting", visible(id))
+}
+
+/// How many replies could not be read, and why, in words; `None` if all could.
+fn unreadable(counts: &ReplyCounts) -> Option<String> {
+    let (bad, all) = (counts.all_unreadable(), counts.replies);
+    let noun = if all == 1 { "reply" } else { "replies" };
+    (bad > 0).then(|| format!("{bad} of {all} {noun} could not be read: {counts}"))
+}
+
+/// What an unreadable reply says, and where it is.
+fn quoted(reply: &UnreadableReply) -> String {
+    let words = reply.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
+    format!("{words} ({}, step {})", visible(&reply.episode_id), reply.step)
 }
 
 /// What was spent, in words.
@@ -165,6 +218,14 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
         0 => writeln!(out)?,
         found => writeln!(out, "; {found} of {} were there before", answer.asked)?,
     }
+    if answer.elsewhere > 0 {
+        let episodes = counted(answer.elsewhere as u64, "episode");
+        writeln!(out, "another process recorded {episodes} into the same folder meanwhile")?;
+    }
+    if let Some(words) = unreadable(&answer.replies.counts) {
+        let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, quoted);
+        writeln!(out, "{words}; first: {first}")?;
+    }
     if let Some(shares) = shares(times) {
         writeln!(out, "time: {shares}")?;
     }
@@ -180,7 +241,7 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
         )?;
     }
     if answer.stopped {
-        let left = answer.asked - answer.found - answer.recorded - answer.lost.len();
+        let left = answer.asked - answer.found - answer.recorded - answer.elsewhere - answer.lost.len();
         writeln!(out, "stopped, {} to go: the same command continues", counted(left as u64, "episode"))?;
     }
     Ok(())
@@ -203,9 +264,42 @@ fn shares(times: Spent) -> Option<String> {
 mod tests {
     use std::time::Duration;
 
-    use super::{dollars, shares, spent};
+    use super::{Bar, dollars, shares, spent, waiting};
+    use crate::agent::scripted::Scripted;
     use crate::agent::vlm::limits::Spend;
-    use crate::record::run::Spent;
+    use crate::record::plan::Key;
+    use crate::record::queue::Held;
+    use crate::record::run::{Progress as _, Spent};
+    use crate::sim::Experiment;
+    use crate::trace::episode::{Extra, Step};
+
+    #[test]
+    fn who_is_waited_for_is_said() {
+        let key = Key { experiment: Experiment::E1, seed: 1, run: 3 };
+        let one = Held { key, process: Some(4711), count: 1 };
+        let expected = "waiting for E1/a/s1/r3: process 4711 records it into the same folder; Ctrl-C ends the waiting";
+        assert_eq!(waiting("E1/a/s1/r3", one), expected);
+        let more = waiting("E1/a/s1/r3", Held { process: None, count: 3, ..one });
+        assert!(more.starts_with("waiting for E1/a/s1/r3 and 2 other episodes: another process records it"), "{more}");
+    }
+
+    #[test]
+    fn the_progress_tells_of_replies_that_cannot_be_read() {
+        let player = Scripted::named("frozen").unwrap();
+        let bar = Bar::new(&player, 2, 10);
+        let row = |status: &str| {
+            let extra = Extra { reply_status: Some(status.to_owned()), ..Extra::default() };
+            Step { action: None, self_color: None, selected_cube: None, mirror_visible: false, extra }
+        };
+        let key = Key { experiment: Experiment::E1, seed: 1, run: 1 };
+        bar.step(key, 1, &row("ok"));
+        assert_eq!((bar.message().as_str(), bar.has_news()), ("0 of 2 episodes", false));
+        for (t, status) in [(2, "refusal"), (3, "parse_failed"), (4, "refusal")] {
+            bar.step(key, t, &row(status));
+        }
+        let expected = "0 of 2 episodes, 3 of 4 replies could not be read: parse_failed 1, refusal 2";
+        assert_eq!((bar.message().as_str(), bar.has_news()), (expected, true));
+    }
 
     #[test]
     fn what_is_not_known_of_a_cost_is_said() {

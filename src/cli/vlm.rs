@@ -34,8 +34,8 @@ pub struct VlmArgs {
     /// Let the prompt alone ask for the reply's shape, and not the provider enforce it
     #[arg(long)]
     prompt_only: bool,
-    /// Stop before more US dollars are spent, over all starts of this recording
-    #[arg(long, value_name = "USD")]
+    /// Stop before more US dollars are spent, over all starts of this recording; needs both prices of the model
+    #[arg(long, value_name = "USD", value_parser = amount)]
     max_cost: Option<f64>,
     /// Stop before more tokens are used, over all starts of this recording
     #[arg(long, value_name = "N")]
@@ -81,6 +81,9 @@ impl VlmArgs {
         if let Some(folder) = &self.cassette {
             let vlm = Arc::new(Vlm::cassette(choice, folder.clone(), self.max_output_tokens));
             return Ok(VlmPlayer { vlm, at_once: 1, network: None });
+        }
+        if self.max_cost.is_some() {
+            choice.check_prices().map_err(Failure::input)?;
         }
         let network = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
@@ -153,6 +156,12 @@ impl VlmArgs {
     }
 }
 
+/// An amount of money, as typed.
+fn amount(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().map_err(|fault| fault.to_string())?;
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("expected a finite number from 0".to_owned()) }
+}
+
 /// A model as a player.
 pub struct VlmPlayer {
     vlm: Arc<Vlm>,
@@ -184,6 +193,10 @@ impl Player for VlmPlayer {
 
     fn in_flight(&self) -> usize {
         self.at_once
+    }
+
+    fn resumes(&self) {
+        self.vlm.note_answered();
     }
 
     /// A cassette costs nothing.

@@ -5,14 +5,14 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
 
-use mcap::io::MessageReader;
 use mcap::records::Metadata;
 use mcap::{Compression, Message, WriteOptions, Writer};
 use serde_json::Value;
 
 use super::message::{EpisodeMessage, Head};
+use super::messages::Messages;
 use super::{LogError, METADATA, METADATA_KEY, topic};
-use crate::base::temporary;
+use crate::base::replace::NewFile;
 
 /// What orders the episodes of a log: seed and run.
 pub type Place = (i32, i32);
@@ -35,23 +35,61 @@ pub(super) fn write_recording<W: Write + Seek>(out: &mut Writer<W>, recording: &
     out.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })
 }
 
-/// Puts the episodes of the log at `out`, if there is one, and of these logs of one episode each into one log, which
-/// replaces the one at `out` in one step; it is written in `scratch`, a folder of the same disk. Of an episode that is
-/// there twice the one in the log counts.
+/// Writes one log of these logs of one episode each, which replaces the one at `out` in one step.
 ///
 /// # Errors
 /// When a log cannot be read or is damaged, and whatever writing gives; the log at `out` is as it was then.
-pub fn assemble(out: &Path, parts: &[(Place, PathBuf)], recording: &Value, scratch: &Path) -> Result<(), LogError> {
-    let file = temporary::file_in(scratch).map_err(LogError::io("write", out))?;
+pub fn write(out: &Path, parts: &[(Place, PathBuf)], recording: &Value) -> Result<(), LogError> {
+    let file = NewFile::create(out).map_err(LogError::io("write", out))?;
+    join(file, None, out, parts, recording)
+}
+
+/// Puts the episodes of the log `before`, if there is one, and of these logs of one episode each into one log, which
+/// replaces whatever is at `out` in one step; it is written in `scratch`, a folder of the same disk. Of an episode that is
+/// there twice the one in the log `before` counts. That `before` was recorded as `recording` says is for the caller to know.
+///
+/// # Errors
+/// When a log cannot be read or is damaged, and whatever writing gives; what is at `out` stays as it was then.
+pub fn assemble(
+    out: &Path,
+    before: Option<&Path>,
+    parts: &[(Place, PathBuf)],
+    recording: &Value,
+    scratch: &Path,
+) -> Result<(), LogError> {
+    let file = NewFile::create_in(scratch, out).map_err(LogError::io("write", out))?;
+    join(file, before.map(Source::open).transpose()?, out, parts, recording)
+}
+
+/// Writes a log and gives it its name.
+fn join(
+    file: NewFile,
+    before: Option<Source>,
+    out: &Path,
+    parts: &[(Place, PathBuf)],
+    recording: &Value,
+) -> Result<(), LogError> {
     let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(out))?;
     write_recording(&mut log, recording).map_err(LogError::writing(out))?;
-    let mut before = if out.exists() { Some(Source::open(out)?) } else { None };
+    copy_all(&mut log, before, out, parts)?;
+    log.finish().map_err(LogError::writing(out))?;
+    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", out)(error.into_error()))?;
+    file.commit().map_err(LogError::io("write", out))
+}
+
+/// Copies the episodes of both, by seed and run.
+fn copy_all<W: Write + Seek>(
+    log: &mut Writer<W>,
+    mut before: Option<Source>,
+    out: &Path,
+    parts: &[(Place, PathBuf)],
+) -> Result<(), LogError> {
     let mut parts = parts.to_vec();
     parts.sort();
     for (place, part) in &parts {
         while let Some(earlier) = before.as_ref().and_then(Source::place).filter(|earlier| earlier <= place) {
             if let Some(source) = &mut before {
-                source.copy_episode(&mut log, out)?;
+                source.copy_episode(log, out)?;
             }
             if earlier == *place {
                 break;
@@ -59,16 +97,13 @@ pub fn assemble(out: &Path, parts: &[(Place, PathBuf)], recording: &Value, scrat
         }
         if !is_written(before.as_ref(), *place) {
             let mut source = Source::open(part)?;
-            source.copy_episode(&mut log, out)?;
+            source.copy_episode(log, out)?;
         }
     }
     while let Some(source) = before.as_mut().filter(|source| source.place().is_some()) {
-        source.copy_episode(&mut log, out)?;
+        source.copy_episode(log, out)?;
     }
-    log.finish().map_err(LogError::writing(out))?;
-    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", out)(error.into_error()))?;
-    file.as_file().sync_all().map_err(LogError::io("write", out))?;
-    file.persist(out).map(drop).map_err(|error| LogError::io("write", out)(error.error))
+    Ok(())
 }
 
 fn is_written(before: Option<&Source>, place: Place) -> bool {
@@ -78,7 +113,7 @@ fn is_written(before: Option<&Source>, place: Place) -> bool {
 /// A log that is copied episode by episode.
 struct Source {
     path: PathBuf,
-    messages: MessageReader<BufReader<File>>,
+    messages: Messages<BufReader<File>>,
     /// The message with which the next episode begins.
     begin: Option<(Head, Message<'static>)>,
     /// The episode that was copied last.
@@ -87,8 +122,7 @@ struct Source {
 
 impl Source {
     fn open(path: &Path) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(LogError::io("open", path))?;
-        let messages = MessageReader::new(BufReader::new(file));
+        let messages = Messages::open(path)?;
         let mut source = Self { path: path.to_owned(), messages, begin: None, last: None };
         source.advance()?;
         Ok(source)
@@ -101,9 +135,8 @@ impl Source {
 
     /// Goes on to the next episode's first message.
     fn advance(&mut self) -> Result<(), LogError> {
-        for message in self.messages.by_ref() {
-            let message = message.map_err(LogError::reading(&self.path))?;
-            if let Some(EpisodeMessage::Begin(head)) = episode_message(&self.path, &message)? {
+        while let Some(message) = self.messages.next().transpose()? {
+            if let Some(EpisodeMessage::Begin(head)) = self.episode_message(&message)? {
                 self.begin = Some((head, message));
                 return Ok(());
             }
@@ -116,10 +149,9 @@ impl Source {
         let Some((head, begin)) = self.begin.take() else { return Ok(()) };
         log.write(&begin).map_err(LogError::writing(out))?;
         let mut has_ended = false;
-        for message in self.messages.by_ref() {
-            let message = message.map_err(LogError::reading(&self.path))?;
+        while let Some(message) = self.messages.next().transpose()? {
             log.write(&message).map_err(LogError::writing(out))?;
-            if let Some(EpisodeMessage::End { .. }) = episode_message(&self.path, &message)? {
+            if let Some(EpisodeMessage::End { .. }) = self.episode_message(&message)? {
                 has_ended = true;
                 break;
             }
@@ -132,14 +164,12 @@ impl Source {
         self.last = Some((head.seed, head.run));
         self.advance()
     }
-}
 
-fn episode_message(path: &Path, message: &Message<'_>) -> Result<Option<EpisodeMessage>, LogError> {
-    if message.channel.topic != topic::EPISODE {
-        return Ok(None);
+    fn episode_message(&self, message: &Message<'_>) -> Result<Option<EpisodeMessage>, LogError> {
+        if message.channel.topic != topic::EPISODE {
+            return Ok(None);
+        }
+        let found = serde_json::from_slice(&message.data);
+        found.map(Some).map_err(|fault| self.messages.damaged(&format!("a message of {}: {fault}", topic::EPISODE)))
     }
-    serde_json::from_slice(&message.data).map(Some).map_err(|fault| LogError::Damaged {
-        file: path.display().to_string(),
-        fault: format!("a message of {}: {fault}", topic::EPISODE),
-    })
 }

@@ -20,6 +20,8 @@
 
 pub mod assemble;
 pub mod message;
+mod messages;
+mod parse;
 pub mod read;
 mod records;
 pub mod recover;
@@ -85,7 +87,7 @@ pub enum LogError {
 impl LogError {
     fn io(doing: &'static str, path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
         let file = path.display().to_string();
-        move |source| Self::Io { doing, file, source: crate::base::temporary::without_name(source) }
+        move |source| Self::Io { doing, file, source: crate::base::replace::without_name(source) }
     }
 
     /// An error of the MCAP library while writing.
@@ -100,12 +102,8 @@ impl LogError {
         }
     }
 
-    /// An error of the MCAP library while reading.
-    fn reading(path: &std::path::Path) -> impl FnOnce(mcap::McapError) -> Self {
-        let file = path.display().to_string();
-        move |error| match error {
-            mcap::McapError::Io(source) => Self::Io { doing: "read", file, source },
-            other => Self::Damaged { file, fault: other.to_string() },
-        }
+    /// The bytes are not those of a log.
+    fn no_log(path: &std::path::Path) -> Self {
+        Self::Foreign { file: path.display().to_string(), fault: "it does not begin as an MCAP file does".to_owned() }
     }
 }

@@ -1,15 +1,13 @@
 //! A log as its messages, one after the other, in memory that does not grow with it.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
-use std::path::{Path, PathBuf};
+use std::io::BufReader;
+use std::path::Path;
 
-use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
 use serde_json::Value;
 
 use super::message::{Decision, EpisodeMessage};
-use super::records::LONGEST;
+use super::messages::Messages;
 use super::{LogError, topic};
 
 /// What a message says.
@@ -36,44 +34,45 @@ pub struct Timed {
     pub event: Event,
 }
 
-/// The messages of a log.
-pub struct LogReader<R: Read> {
-    path: PathBuf,
-    messages: MessageReader<R>,
-}
+/// What a log says, message by message.
+pub struct LogReader(Messages<BufReader<File>>);
 
-impl LogReader<BufReader<File>> {
+impl LogReader {
     /// Opens a log.
     ///
     /// # Errors
-    /// When the file cannot be opened.
+    /// When the file cannot be opened or read, or does not begin as a log does.
     pub fn open(path: &Path) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(LogError::io("open", path))?;
-        Ok(Self::new(path, BufReader::new(file)))
+        Messages::open(path).map(Self)
     }
 }
 
-impl<R: Read> LogReader<R> {
-    /// The messages in these bytes; `path` is for messages of errors.
-    pub fn new(path: &Path, bytes: R) -> Self {
-        let options =
-            LinearReaderOptions::default().with_prevalidate_chunk_crcs(true).with_record_length_limit(LONGEST);
-        Self { path: path.to_owned(), messages: MessageReader::new_with_options(bytes, options) }
+/// An episode of a log that is not the one of this id; `None` if there is none.
+///
+/// # Errors
+/// When the log cannot be read to its end.
+pub fn other_episode(path: &Path, id: &str) -> Result<Option<String>, LogError> {
+    for message in LogReader::open(path)? {
+        if let Event::Episode(EpisodeMessage::Begin(head)) = message?.event
+            && head.episode_id != id
+        {
+            return Ok(Some(head.episode_id));
+        }
     }
+    Ok(None)
 }
 
-impl<R: Read> Iterator for LogReader<R> {
+impl Iterator for LogReader {
     type Item = Result<Timed, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let message = match self.messages.next()? {
+        let message = match self.0.next()? {
             Ok(message) => message,
-            Err(error) => return Some(Err(LogError::reading(&self.path)(error))),
+            Err(error) => return Some(Err(error)),
         };
-        let event = event(&message.channel.topic, &message.data).map_err(|fault| LogError::Damaged {
-            file: self.path.display().to_string(),
-            fault: format!("a message of {}: {fault}", message.channel.topic),
-        });
+        let topic = &message.channel.topic;
+        let event = event(topic, &message.data)
+            .map_err(|fault| self.0.damaged(&format!("a message of {topic} cannot be read: {fault}")));
         Some(event.map(|event| Timed { time: message.log_time, event }))
     }
 }

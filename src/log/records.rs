@@ -6,9 +6,10 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 use mcap::MAGIC;
-use mcap::read::parse_record;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use super::parse::parsed;
 
 /// No record of a log is longer, chunks included; a longer one is damage.
 pub(super) const LONGEST: usize = 1 << 30;
@@ -16,13 +17,16 @@ pub(super) const LONGEST: usize = 1 << 30;
 /// Of an opcode and a length.
 const FRAME: usize = 9;
 
+/// The header of a chunk without the name of its compression.
+const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
+
 /// What lies at a place of the file.
 #[derive(Debug)]
 pub(super) enum Piece {
     /// A record other than a chunk.
     Record(Record<'static>),
-    /// A chunk: its opcode, its length and its bytes.
-    Chunk(Vec<u8>),
+    /// A chunk: where it begins, and its opcode, its length and its bytes.
+    Chunk(u64, Vec<u8>),
     /// Bytes that are no record; the next piece follows them.
     Damage(String),
     /// Nothing can be read from here on: why, and the bytes of the chunk that is cut off, if it is one.
@@ -89,7 +93,7 @@ impl<R: Read + Seek> Records<R> {
         // Its length is right if a record follows it.
         let is_followed = frame.opcode == op::FOOTER || behind == self.end || self.frame(behind)?.is_some();
         let from = self.at;
-        match decode(frame.opcode, &whole) {
+        match decode(from, frame.opcode, &whole) {
             Ok(piece) => {
                 self.sum(frame.opcode, &whole);
                 let next = if is_followed { None } else { self.landmark(from + 1)? };
@@ -121,7 +125,7 @@ impl<R: Read + Seek> Records<R> {
         const FOOTER: usize = FRAME + 20;
         let last = self.end.saturating_sub((FOOTER + MAGIC.len()) as u64);
         let footer = self.read(last, FOOTER)?;
-        let start = match footer.first().map(|opcode| decode(*opcode, &footer)) {
+        let start = match footer.first().map(|opcode| decode(last, *opcode, &footer)) {
             Some(Ok(Piece::Record(Record::Footer(footer)))) if footer.summary_start < last => footer.summary_start,
             _ => return Ok(Vec::new()),
         };
@@ -129,7 +133,7 @@ impl<R: Read + Seek> Records<R> {
         let mut at = start;
         while let Some(frame) = self.frame(at)?.filter(|_| at < last) {
             let whole = self.whole(at, frame)?;
-            if let Ok(Piece::Record(Record::Channel(channel))) = decode(frame.opcode, &whole) {
+            if let Ok(Piece::Record(Record::Channel(channel))) = decode(at, frame.opcode, &whole) {
                 found.push(channel);
             }
             at += whole.len() as u64;
@@ -222,35 +226,34 @@ impl<R: Read + Seek> Records<R> {
     }
 }
 
-/// The record of these bytes, which begin with its frame.
-fn decode(opcode: u8, whole: &[u8]) -> Result<Piece, String> {
+/// The record at this place, of these bytes, which begin with its frame.
+fn decode(at: u64, opcode: u8, whole: &[u8]) -> Result<Piece, String> {
     let body = whole.get(FRAME..).unwrap_or_default();
     match opcode {
-        op::CHUNK => match parse_record(op::CHUNK, body) {
-            Ok(Record::Chunk { header, data }) if header.compressed_size == data.len() as u64 && !data.is_empty() => {
-                Ok(Piece::Chunk(whole.to_vec()))
+        op::CHUNK => match parsed(op::CHUNK, body) {
+            Ok(Record::Chunk { header, data })
+                if CHUNK_HEADER + header.compression.len() + data.len() == body.len() && !data.is_empty() =>
+            {
+                Ok(Piece::Chunk(at, whole.to_vec()))
             }
             Ok(_) => Err("a chunk of another length than it says".to_owned()),
-            Err(fault) => Err(fault.to_string()),
+            Err(fault) => Err(fault),
         },
         // An end is believed at its exact length alone: nothing behind it is looked at for episodes.
         op::DATA_END if body.len() != 4 => Err("an end record of another length".to_owned()),
         // No log of ours has any, and the library expects that they are sound.
         op::ATTACHMENT => Ok(Piece::Record(Record::Unknown { opcode, data: Vec::new().into() })),
-        _ => {
-            let record = parse_record(opcode, body).map_err(|fault| fault.to_string())?;
-            Ok(Piece::Record(record.into_owned()))
-        }
+        _ => Ok(Piece::Record(parsed(opcode, body)?.into_owned())),
     }
 }
 
-/// The records in a chunk, all of them or none: nothing is looked at before the chunk's checksum holds.
+/// The records in a chunk, all of them or none: none is given before the chunk's checksum holds.
 ///
 /// # Errors
 /// When the chunk is damaged, in words.
 pub(super) fn inside(chunk: &[u8]) -> Result<Vec<Record<'static>>, String> {
     let mut found = Vec::new();
-    let options = LinearReaderOptions::default().with_prevalidate_chunk_crcs(true);
+    let options = LinearReaderOptions::default().with_validate_chunk_crcs(true);
     unpacked(chunk, options, |record| found.push(record))?;
     Ok(found)
 }
@@ -264,10 +267,14 @@ pub(super) fn glimpse(chunk: &[u8]) -> Vec<Record<'static>> {
     found
 }
 
-/// Gives the channels and messages of a chunk one after the other.
+/// Gives the schemas, channels and messages of a chunk one after the other.
+///
+/// The library makes room for what a length says, and only then finds that the data ends before it. So a record may be as
+/// long as the chunk says it is when unpacked, and the size of the chunk itself is not asked for at once: of lengths that
+/// contradict each other the smaller one counts.
 fn unpacked(chunk: &[u8], options: LinearReaderOptions, mut give: impl FnMut(Record<'static>)) -> Result<(), String> {
-    let options = options.with_skip_start_magic(true).with_skip_end_magic(true).with_record_length_limit(LONGEST);
-    let mut reader = LinearReader::new_with_options(options);
+    let options = options.with_skip_start_magic(true).with_skip_end_magic(true);
+    let mut reader = LinearReader::new_with_options(options.with_record_length_limit(size_unpacked(chunk)));
     let mut rest = chunk;
     while let Some(event) = reader.next_event() {
         match event.map_err(|fault| fault.to_string())? {
@@ -277,11 +284,19 @@ fn unpacked(chunk: &[u8], options: LinearReaderOptions, mut give: impl FnMut(Rec
                 reader.notify_read(now.len());
                 rest = later;
             }
-            LinearReadEvent::Record { data, opcode: opcode @ (op::CHANNEL | op::MESSAGE) } => {
-                give(parse_record(opcode, data).map_err(|fault| fault.to_string())?.into_owned());
+            LinearReadEvent::Record { data, opcode: opcode @ (op::SCHEMA | op::CHANNEL | op::MESSAGE) } => {
+                give(parsed(opcode, data)?.into_owned());
             }
             LinearReadEvent::Record { .. } => {}
         }
     }
     Ok(())
+}
+
+/// The size that the header of a chunk gives for what is in it, as far as any chunk may be that large.
+fn size_unpacked(chunk: &[u8]) -> usize {
+    // Behind the frame stand two times of 8 bytes each.
+    let size = chunk.get(FRAME + 16..FRAME + 24).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);
+    // The library holds the header of the chunk against the same limit.
+    size.and_then(|size| usize::try_from(size).ok()).map_or(LONGEST, |size| size.clamp(1 << 16, LONGEST))
 }

@@ -64,6 +64,14 @@ impl Losses {
     pub fn is_any(&self) -> bool {
         *self != Self::default()
     }
+
+    /// One of them in words; `None` if there is none.
+    pub fn first(&self) -> Option<String> {
+        let episode = self.episodes.first().map(|lost| format!("the episode `{}`: {}", lost.episode_id, lost.reason));
+        let told = self.damage.first().or(self.cut.as_ref()).or(self.recording.as_ref()).cloned();
+        let counted = || format!("{} damaged chunks, {} rows of no episode", self.damaged_chunks, self.stray_rows);
+        episode.or(told).or_else(|| self.is_any().then(counted))
+    }
 }
 
 /// Saves what can be saved of the log at `path`.
@@ -80,13 +88,13 @@ pub fn recover(path: &Path) -> Result<Recovered, LogError> {
 /// # Errors
 /// As [`recover`].
 pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, LogError> {
-    let foreign = |fault: &str| LogError::Foreign { file: path.display().to_string(), fault: fault.to_owned() };
     let records = Records::new(bytes).map_err(LogError::io("read", path))?;
-    let mut records = records.ok_or_else(|| foreign("it does not begin as an MCAP file does"))?;
+    let mut records = records.ok_or_else(|| LogError::no_log(path))?;
     let salvage = Salvage::of(&mut records).map_err(LogError::io("read", path))?;
     let is_ours = salvage.channels.values().any(|found| found == topic::EPISODE);
     if !is_ours && !salvage.result.losses.is_any() {
-        return Err(foreign("it has no topic /episode; `mirrorstats record` writes logs that do"));
+        let fault = "it has no topic /episode; `mirrorstats record` writes logs that do".to_owned();
+        return Err(LogError::Foreign { file: path.display().to_string(), fault });
     }
     Ok(salvage.finished())
 }
@@ -115,7 +123,7 @@ impl Salvage {
                     break;
                 }
                 Piece::Record(record) => salvage.record(record),
-                Piece::Chunk(chunk) => salvage.chunk(&chunk),
+                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk),
                 Piece::Damage(fault) => salvage.result.losses.damage.push(fault),
                 Piece::Cut(fault, tail) => {
                     salvage.close("the log ends before the episode does");
@@ -141,7 +149,7 @@ impl Salvage {
                     }
                     return Ok(());
                 }
-                Piece::Record(_) | Piece::Chunk(_) => {}
+                Piece::Record(_) | Piece::Chunk(..) => {}
                 Piece::Damage(fault) => self.result.losses.damage.push(fault),
                 Piece::Cut(..) => break,
             }
@@ -172,12 +180,12 @@ impl Salvage {
         self.result.recording = text.and_then(|text| serde_json::from_str(text).ok());
     }
 
-    fn chunk(&mut self, chunk: &[u8]) {
+    fn chunk(&mut self, at: u64, chunk: &[u8]) {
         match inside(chunk) {
-            Err(_) => {
+            Err(fault) => {
                 self.result.losses.damaged_chunks += 1;
-                self.close("a chunk with its rows is damaged");
-                self.lose_all(chunk, "its chunk is damaged");
+                self.close(&format!("a chunk with its rows is damaged, at byte {at}: {fault}"));
+                self.lose_all(chunk, &format!("its chunk is damaged, at byte {at}: {fault}"));
             }
             Ok(records) => records.into_iter().for_each(|record| self.record(record)),
         }

@@ -1,8 +1,7 @@
 //! The log of one episode, written while it is played.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File};
-use std::io::{BufWriter, Write};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use foxglove::messages::{
@@ -18,6 +17,7 @@ use serde::Serialize;
 use super::assemble::writer;
 use super::message::{Decision, EpisodeMessage, Head};
 use super::{LogError, topic};
+use crate::base::replace::NewFile;
 
 /// Something that moves, in the frame of the room.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,24 +77,15 @@ pub struct View<'a, C> {
 /// The frame of reference that everything is in.
 const ROOM: &str = "room";
 
-/// The log of an episode under way; it gets its name when the episode has ended.
+/// The log of an episode under way. It is a temporary file until the episode has ended, and is removed if it does not.
 pub struct EpisodeLog {
     path: PathBuf,
-    unfinished: Unfinished,
-    out: Writer<BufWriter<File>>,
+    out: Writer<Out>,
     channels: Channels,
     sequence: u32,
 }
 
-/// A file that goes away with the episode that it was begun for.
-struct Unfinished(PathBuf);
-
-impl Drop for Unfinished {
-    fn drop(&mut self) {
-        // It has its own name by then, or the episode did not end; there is nobody to tell that it stays.
-        let _ = fs::remove_file(&self.0);
-    }
-}
+type Out = BufWriter<NewFile>;
 
 struct Channels {
     episode: u16,
@@ -111,11 +102,10 @@ impl EpisodeLog {
     /// # Errors
     /// When the file cannot be made or written.
     pub fn create(path: &Path, head: &Head, census: &serde_json::Value, time: u64) -> Result<Self, LogError> {
-        let unfinished = Unfinished(path.with_extension("mcap.unfinished"));
-        let file = File::create(&unfinished.0).map_err(LogError::io("write", path))?;
+        let file = NewFile::create(path).map_err(LogError::io("write", path))?;
         let mut out = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
-        let mut log = Self { path: path.to_owned(), unfinished, out, channels, sequence: 0 };
+        let mut log = Self { path: path.to_owned(), out, channels, sequence: 0 };
         let channel = log.channels.episode;
         log.json(channel, time, &EpisodeMessage::Begin(head.clone()))?;
         Ok(log)
@@ -160,10 +150,8 @@ impl EpisodeLog {
         self.json(self.channels.episode, time, &end)?;
         self.out.finish().map_err(LogError::writing(&self.path))?;
         let failed = |error| LogError::io("write", &self.path)(error);
-        let mut file = self.out.into_inner();
-        file.flush().map_err(failed)?;
-        file.get_ref().sync_all().map_err(failed)?;
-        fs::rename(&self.unfinished.0, &self.path).map_err(failed)
+        let file = self.out.into_inner().into_inner().map_err(|error| failed(error.into_error()))?;
+        file.commit().map_err(failed)
     }
 
     fn json(&mut self, channel: u16, time: u64, message: &impl Serialize) -> Result<(), LogError> {
@@ -185,7 +173,7 @@ impl EpisodeLog {
     }
 }
 
-fn channels(out: &mut Writer<BufWriter<File>>, census: &serde_json::Value) -> mcap::McapResult<Channels> {
+fn channels(out: &mut Writer<Out>, census: &serde_json::Value) -> mcap::McapResult<Channels> {
     let mut json = |name: &str, title: &str, schema: &serde_json::Value| {
         let schema = out.add_schema(title, "jsonschema", schema.to_string().as_bytes())?;
         out.add_channel(schema, name, "json", &BTreeMap::new())

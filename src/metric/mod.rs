@@ -18,6 +18,7 @@ pub mod fault;
 pub mod file;
 mod functions;
 mod keys;
+pub mod names;
 pub mod origin;
 pub mod overflow;
 mod pattern;

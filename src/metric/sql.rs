@@ -106,7 +106,7 @@ impl Dialect {
     }
 
     /// A pattern of the `regex` crate as it stands in a statement.
-    fn pattern(self, pattern: &str) -> String {
+    pub(crate) fn pattern(self, pattern: &str) -> String {
         match self {
             Self::Spark => self.text(&java(pattern).unwrap_or_else(|| unreachable!("the binder has read the pattern"))),
             Self::Portable | Self::Duckdb | Self::Polars => self.text(pattern),

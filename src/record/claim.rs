@@ -1,18 +1,20 @@
 //! Who else is recording into a folder.
 //!
 //! ```text
-//! OUT/.lock             held while a trace is put together, and while a process comes or goes
-//! OUT/.parts/.present   shared by every process that records here: who can have it alone is alone
+//! OUT/.lock                          held while a trace is put together, and while a process comes or goes
+//! OUT/.parts/.present                shared by every process that records here: who can have it alone is alone
+//! OUT/.parts/E1-oracle-s1-r3.lock    held by the process that records the episode
 //! ```
 //!
-//! Rule: both are locks of the operating system, which end with the process however it ends; what the files hold is
-//! nothing, and a folder that nobody records into has neither.
+//! Rule: all are locks of the operating system, which end with the process however it ends; a folder that nobody records
+//! into has none of these files. Only a process that is alone clears away what others have left.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::store::StoreError;
+use super::fault::StoreError;
+use super::lock::{lock_folder, lock_of};
 
 /// The folder of parts within the folder of a recording.
 const PARTS: &str = ".parts";
@@ -37,17 +39,25 @@ impl Claim {
     /// # Errors
     /// When the folder cannot be made, written to or locked.
     pub fn stake(folder: &Path) -> Result<Self, StoreError> {
-        let is_new = !folder.exists();
-        fs::create_dir_all(folder).map_err(StoreError::io("make the folder", folder))?;
-        let claim = Self::enter(folder, is_new);
-        if claim.is_err() && is_new {
-            let _ = fs::remove_dir(folder);
+        loop {
+            let is_new = !folder.exists();
+            fs::create_dir_all(folder).map_err(StoreError::io("make the folder", folder))?;
+            match Self::enter(folder, is_new) {
+                Ok(claim) => return Ok(claim),
+                // A process that recorded nothing has removed the folder that was made for it.
+                Err(_) if !folder.exists() => {}
+                Err(error) => {
+                    if is_new {
+                        let _ = fs::remove_dir(folder);
+                    }
+                    return Err(error);
+                }
+            }
         }
-        claim
     }
 
     fn enter(folder: &Path, is_new: bool) -> Result<Self, StoreError> {
-        let _lock = lock(folder)?;
+        let _lock = lock_folder(folder)?;
         let parts = parts_of(folder);
         fs::create_dir_all(&parts).map_err(StoreError::io("make the folder", &parts))?;
         let path = parts.join(".present");
@@ -75,7 +85,7 @@ impl Claim {
     /// # Errors
     /// When the lock cannot be made or had.
     pub fn lock(&self) -> Result<File, StoreError> {
-        lock(&self.folder)
+        lock_folder(&self.folder)
     }
 
     fn leave(&self) -> Result<(), StoreError> {
@@ -88,7 +98,7 @@ impl Claim {
             fs::remove_file(&path).map_err(StoreError::io("remove", &path))?;
             // What is not empty stays: parts wait there for the recording to go on.
             let _ = fs::remove_dir(&parts);
-            let lock = self.folder.join(".lock");
+            let lock = lock_of(&self.folder);
             fs::remove_file(&lock).map_err(StoreError::io("remove", &lock))?;
             if self.is_new {
                 let _ = fs::remove_dir(&self.folder);
@@ -103,31 +113,6 @@ impl Drop for Claim {
         // What cannot be cleared away now is cleared away by the next recording.
         let _ = self.leave();
     }
-}
-
-fn lock(folder: &Path) -> Result<File, StoreError> {
-    let path = folder.join(".lock");
-    loop {
-        let file = File::create(&path).map_err(StoreError::io("write into the folder: cannot make", &path))?;
-        file.lock().map_err(StoreError::io("lock", &path))?;
-        // The one who had it may have been the last to leave, and have removed it: then it locks nothing any more.
-        if is_at(&file, &path) {
-            return Ok(file);
-        }
-    }
-}
-
-#[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt as _;
-    let place = |metadata: &fs::Metadata| (metadata.dev(), metadata.ino());
-    matches!((file.metadata(), fs::metadata(path)), (Ok(ours), Ok(there)) if place(&ours) == place(&there))
-}
-
-#[cfg(not(unix))]
-fn is_at(_: &File, _: &Path) -> bool {
-    // A file that is open cannot be removed.
-    true
 }
 
 /// Whether no other process is there; nothing stays locked.
@@ -153,9 +138,11 @@ fn clear(parts: &Path) -> Result<(), StoreError> {
     Ok(())
 }
 
-/// Whether a file was being written, or is the log of an episode that did not get to its trace.
+/// Whether a file was being written, is the lock of an episode, or the log of one that did not get to its trace. Former
+/// versions wrote logs as `.unfinished`.
 fn is_unfinished(path: &Path) -> bool {
     let has_ending = |ending: &str| path.extension().is_some_and(|found| found == ending);
     let is_temporary = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(".mirrorstats-"));
-    is_temporary || has_ending("unfinished") || (has_ending("mcap") && !path.with_extension("parquet").exists())
+    let is_without_trace = has_ending("mcap") && !path.with_extension("parquet").exists();
+    is_temporary || has_ending("lock") || has_ending("unfinished") || is_without_trace
 }

@@ -11,10 +11,10 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::fault::StoreError;
 use super::plan::Key;
-use super::store::StoreError;
 use crate::agent::Lost;
-use crate::base::temporary;
+use crate::base::replace::NewFile;
 
 /// An episode that was lost to a failure which is not the agent's.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -86,14 +86,12 @@ fn read(path: &Path) -> Result<Vec<LostEpisode>, StoreError> {
 }
 
 fn write(path: &Path, episodes: &[&LostEpisode]) -> io::Result<()> {
-    let mut file = temporary::file_in(path.parent().unwrap_or(Path::new(".")))?;
+    let mut file = NewFile::create(path)?;
     for episode in episodes {
         serde_json::to_writer(&mut file, episode)?;
         file.write_all(b"\n")?;
     }
-    file.as_file().sync_all()?;
-    file.persist(path).map_err(|error| error.error)?;
-    Ok(())
+    file.commit()
 }
 
 #[cfg(test)]

@@ -6,6 +6,9 @@ use crate::agent::Player;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::SCENE_VERSION;
 
+/// The key that grows with the recording's episodes.
+pub(super) const SEEDS: &str = "seeds";
+
 /// The version of this object's shape.
 const VERSION: u32 = 1;
 
@@ -20,4 +23,37 @@ pub fn recording(config: &WorldConfig, player: &dyn Player) -> Value {
         "world": config,
         "world_hash": config.hash(),
     })
+}
+
+/// Where two recordings differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Difference {
+    /// The key of the metadata.
+    pub what: String,
+    /// What this recording has.
+    pub expected: String,
+    /// What the other one has.
+    pub found: String,
+}
+
+/// The first key in which the metadata of two recordings differ, but for the one that grows with the episodes.
+pub(super) fn difference(ours: &Value, theirs: &Value) -> Option<Difference> {
+    let keys = |value: &Value| -> Vec<String> {
+        value.as_object().map(|object| object.keys().cloned().collect()).unwrap_or_default()
+    };
+    let mut names = keys(ours).into_iter().chain(keys(theirs)).filter(|name| name != SEEDS);
+    let name = names.find(|name| ours.get(name) != theirs.get(name))?;
+    Some(first_difference(&name, ours.get(&name), theirs.get(&name)))
+}
+
+/// The innermost key in which two values differ, and both sides of it.
+fn first_difference(name: &str, ours: Option<&Value>, theirs: Option<&Value>) -> Difference {
+    if let (Some(Value::Object(a)), Some(Value::Object(b))) = (ours, theirs) {
+        let inner = a.keys().chain(b.keys()).find(|key| a.get(*key) != b.get(*key));
+        if let Some(key) = inner {
+            return first_difference(&format!("{name}.{key}"), a.get(key), b.get(key));
+        }
+    }
+    let text = |value: Option<&Value>| value.map_or_else(|| "nothing".to_owned(), Value::to_string);
+    Difference { what: name.to_owned(), expected: text(ours), found: text(theirs) }
 }

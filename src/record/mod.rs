@@ -15,18 +15,28 @@
 //! | [`shelf`] | what is recorded in a folder already |
 //! | [`store`] | the folder: how an episode commits, how the final files are made |
 //! | [`claim`] | who else records into the folder |
+//! | [`lock`] | the locks of a folder and of an episode |
+//! | [`queue`] | the episodes still to take, and which of them other processes have |
+//! | `continued` | whether the log that is there belongs to the recording |
+//! | [`fault`] | why a folder cannot be used |
 //! | [`lost`] | the list of episodes that failures kept from being recorded |
+//! | [`replies`] | how many replies gave no decision |
 //! | [`run`] | threads, episodes under way, stopping, what took the time |
 //!
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
 //! shards, interruptions and their order change nothing in a trace. Nothing here knows a metric.
 
 pub mod claim;
+mod continued;
+pub mod fault;
+pub mod lock;
 pub mod log;
 pub mod lost;
 pub mod metadata;
 pub mod plan;
 pub mod play;
+pub mod queue;
+pub mod replies;
 pub mod run;
 pub mod shelf;
 pub mod store;

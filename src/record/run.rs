@@ -5,18 +5,18 @@
 //! end in one go.
 
 use std::cell::RefCell;
-use std::collections::VecDeque;
 use std::num::NonZeroUsize;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
+use super::lock::EpisodeLock;
 use super::log::Log;
 use super::lost::LostEpisode;
 use super::plan::Key;
 use super::play::{self, Broken, Onlooker, Seen, Stage};
+use super::queue::{Held, Next, Queue};
 use super::store::Store;
 use crate::agent::{Ended, Player};
 use crate::sim::config::WorldConfig;
@@ -81,13 +81,18 @@ fn add(share: &AtomicU64, start: Instant) {
 
 /// What happens while a recording runs; called from its threads.
 pub trait Progress: Sync {
-    /// A step was played.
-    fn step(&self);
+    /// A step of an episode was played: its number, from 1, and its row.
+    fn step(&self, episode: Key, t: i32, row: &Step);
     /// An episode is committed.
     fn episode(&self, id: &str, steps: usize);
     /// An episode is lost, for this reason.
     fn lost(&self, id: &str, reason: &str);
+    /// Nothing is left to do but episodes that other processes have; this one is among them. Told again and again.
+    fn waiting(&self, id: &str, held: Held);
 }
+
+/// The time between two looks at episodes that other processes have.
+const AGAIN: Duration = Duration::from_millis(50);
 
 /// How a recording is run.
 #[derive(Clone, Copy, Debug)]
@@ -110,7 +115,9 @@ pub struct Tally {
     /// Their steps.
     pub steps: u64,
     /// Episodes that were lost, and why.
-    pub lost: Vec<LostEpisode>,
+    pub lost: Vec<(Key, LostEpisode)>,
+    /// Episodes that other processes recorded meanwhile.
+    pub elsewhere: Vec<Key>,
     /// The recording was stopped before its end.
     pub stopped: bool,
 }
@@ -139,7 +146,7 @@ impl Recording<'_> {
     /// # Errors
     /// The first failure that every episode would meet; episodes committed before it stay.
     pub fn run(&self, keys: &[Key]) -> Result<Tally, Broken> {
-        let queue = Mutex::new(keys.iter().copied().collect::<VecDeque<_>>());
+        let queue = Queue::new(self.store, keys);
         let in_flight = self.settings.in_flight.get();
         let threads = self.settings.threads.get().min(in_flight).min(keys.len().max(1));
         let results = std::thread::scope(|scope| {
@@ -148,7 +155,7 @@ impl Recording<'_> {
             let workers: Vec<_> = (0..threads).map(|at| scope.spawn(move || self.thread(queue, share(at)))).collect();
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
         });
-        let mut tally = Tally::default();
+        let mut tally = Tally { elsewhere: queue.elsewhere(), stopped: queue.has_more(), ..Tally::default() };
         for result in results {
             let part = result?;
             tally.recorded.extend(part.recorded);
@@ -157,12 +164,12 @@ impl Recording<'_> {
             tally.stopped |= part.stopped;
         }
         tally.recorded.sort_unstable();
-        tally.lost.sort_by_key(|lost| (lost.experiment.clone(), lost.seed, lost.run));
+        tally.lost.sort_by_key(|(key, _)| *key);
         Ok(tally)
     }
 
     /// One thread: its eye, and up to `each` episodes under way.
-    fn thread(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
+    fn thread(&self, queue: &Queue<'_>, each: usize) -> Result<Tally, Broken> {
         let start = Instant::now();
         let result = self.episodes(queue, each);
         self.shares.thread(start);
@@ -172,7 +179,7 @@ impl Recording<'_> {
         result
     }
 
-    fn episodes(&self, queue: &Mutex<VecDeque<Key>>, each: usize) -> Result<Tally, Broken> {
+    fn episodes(&self, queue: &Queue<'_>, each: usize) -> Result<Tally, Broken> {
         let is_needed = self.settings.frames || self.player.looks();
         let start = Instant::now();
         let eye = is_needed.then(|| Eye::new(self.config)).transpose().map_err(Broken::fatal)?.map(RefCell::new);
@@ -180,24 +187,57 @@ impl Recording<'_> {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(Broken::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
+            let play = |key, lock| {
+                let eye = eye.as_ref();
+                async move { (key, self.episode(key, lock, eye).await) }
+            };
             let mut under_way = FuturesUnordered::new();
             loop {
-                while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
-                    let Some(key) = next(queue) else { break };
-                    let eye = eye.as_ref();
-                    under_way.push(async move { (key, self.episode(key, eye).await) });
+                let held = self.take_up(queue, each, &mut under_way, play)?;
+                let ended = match held {
+                    None => under_way.next().await,
+                    Some(held) if under_way.is_empty() => self.wait(held).await,
+                    Some(_) => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
+                };
+                match ended {
+                    Some((key, result)) => self.note(key, result, &mut tally)?,
+                    None if held.is_none() => break,
+                    None => {}
                 }
-                let Some((key, result)) = under_way.next().await else { break };
-                self.note(key, result, &mut tally)?;
             }
             Ok::<(), Broken>(())
         })?;
-        tally.stopped |= has_more(queue);
         Ok(tally)
     }
 
+    /// Takes episodes until so many are under way. Gives one that another process has, if other processes have all that
+    /// are left.
+    fn take_up<F>(
+        &self,
+        queue: &Queue<'_>,
+        each: usize,
+        under_way: &mut FuturesUnordered<F>,
+        play: impl Fn(Key, EpisodeLock) -> F,
+    ) -> Result<Option<Held>, Broken> {
+        while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
+            match queue.next().map_err(Broken::fatal)? {
+                Next::Play(key, lock) => under_way.push(play(key, lock)),
+                Next::Held(held) => return Ok(Some(held)),
+                Next::Nothing => break,
+            }
+        }
+        Ok(None)
+    }
+
+    /// Waits for a moment, with nothing to do but what other processes are doing.
+    async fn wait<T>(&self, held: Held) -> Option<T> {
+        self.progress.waiting(&held.key.episode_id(self.player.model()), held);
+        tokio::time::sleep(AGAIN).await;
+        None
+    }
+
     /// One episode, from its scene to its commit.
-    async fn episode(&self, key: Key, eye: Option<&RefCell<Eye>>) -> Result<usize, Broken> {
+    async fn episode(&self, key: Key, _lock: EpisodeLock, eye: Option<&RefCell<Eye>>) -> Result<usize, Broken> {
         let start = Instant::now();
         let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(Broken::fatal)?;
         let episode = play::head(&scene, key, self.player.model());
@@ -209,7 +249,7 @@ impl Recording<'_> {
         let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
         let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
         let frames = self.settings.frames;
-        let mut onlooker = Onlookers { progress: self.progress, shares: self.shares, frames, log };
+        let mut onlooker = Onlookers { key, progress: self.progress, shares: self.shares, frames, log };
         let played = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await;
         let committed = match &played {
             Ok(episode) => self.commit(key, episode, onlooker.log),
@@ -244,7 +284,7 @@ impl Recording<'_> {
             Err(Broken::Stopped) => tally.stopped = true,
             Err(Broken::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
-                tally.lost.push(LostEpisode::of(key, self.player.model(), step, lost));
+                tally.lost.push((key, LostEpisode::of(key, self.player.model(), step, lost)));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }
@@ -267,22 +307,13 @@ fn ended(played: &Result<Episode, Broken>) -> Option<Ended> {
     }
 }
 
-/// The next episode to play.
-fn next(queue: &Mutex<VecDeque<Key>>) -> Option<Key> {
-    queue.lock().unwrap_or_else(PoisonError::into_inner).pop_front()
-}
-
-/// Whether episodes were left unplayed.
-fn has_more(queue: &Mutex<VecDeque<Key>>) -> bool {
-    !queue.lock().unwrap_or_else(PoisonError::into_inner).is_empty()
-}
-
 fn panicked() -> Broken {
     Broken::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
 }
 
 /// Counts steps, and writes the log if there is one.
 struct Onlookers<'a> {
+    key: Key,
     progress: &'a dyn Progress,
     shares: &'a Shares,
     /// Whether the log has frames.
@@ -301,7 +332,7 @@ impl Onlooker for Onlookers<'_> {
     }
 
     fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken> {
-        self.progress.step();
+        self.progress.step(self.key, t, row);
         let start = Instant::now();
         if let Some(log) = &mut self.log {
             log.done(t, row)?;

@@ -1,24 +1,25 @@
 //! What is in the folder of a recording: read, and never written.
 
-use std::collections::BTreeSet;
-use std::fs;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::Value;
 
 use super::claim;
+use super::continued;
+use super::fault::StoreError;
+use super::lock::is_at;
+use super::metadata::{Difference, difference};
 use super::plan::slug;
-use super::store::StoreError;
 use crate::sim::Experiment;
 use crate::trace::finding::TraceError;
 use crate::trace::inputs::Input;
-use crate::trace::merge;
+use crate::trace::merge::{self, EpisodeRows};
 use crate::trace::open::TraceFile;
 use crate::trace::schema::RECORDING_KEY;
-
-/// The key of the recording's metadata that grows with its episodes.
-pub(super) const SEEDS: &str = "seeds";
 
 /// The recordings of one model in a folder, which need not be there.
 #[derive(Debug)]
@@ -26,12 +27,25 @@ pub struct Shelf {
     folder: PathBuf,
     model: String,
     recording: Value,
+    /// What was read of traces.
+    traces: Mutex<BTreeMap<Experiment, InTrace>>,
+}
+
+/// The episodes of a trace, by seed and run.
+type Places = Arc<BTreeSet<(i32, i32)>>;
+
+/// What was read of a trace, good for as long as this file has its name. An open file's place on the disk is not used for
+/// another one.
+#[derive(Debug)]
+struct InTrace {
+    file: File,
+    places: Places,
 }
 
 impl Shelf {
     /// The recordings of a model in a folder, with what a trace of it says of how it was recorded.
     pub fn new(folder: &Path, model: &str, recording: Value) -> Self {
-        Self { folder: folder.to_owned(), model: model.to_owned(), recording }
+        Self { folder: folder.to_owned(), model: model.to_owned(), recording, traces: Mutex::default() }
     }
 
     pub(super) fn model(&self) -> &str {
@@ -55,36 +69,65 @@ impl Shelf {
     /// The episodes of an experiment that are recorded, in the trace or as parts.
     ///
     /// # Errors
-    /// When a trace or part cannot be read, or was recorded differently.
+    /// When a trace, part or log cannot be read or was recorded differently, or the log is not that of the trace.
     pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError> {
-        let mut found = BTreeSet::new();
+        let episodes = self.episodes(experiment)?;
+        self.check_log(experiment, &episodes)?;
+        Ok(places(&episodes))
+    }
+
+    /// The episodes of an experiment in its trace and its parts, by seed and run.
+    ///
+    /// # Errors
+    /// When a trace or part cannot be read, or was recorded differently.
+    pub(super) fn episodes(&self, experiment: Experiment) -> Result<Vec<EpisodeRows>, StoreError> {
         let trace = self.trace(experiment);
         let parts = self.parts_of(experiment)?;
+        let mut episodes = Vec::new();
         for path in trace.exists().then_some(trace).iter().chain(&parts) {
             self.check(path)?;
-            for episode in merge::read(path)? {
-                found.insert((narrow(episode.seed), narrow(episode.run)));
-            }
+            episodes.extend(merge::read(path)?);
         }
-        Ok(found)
+        // An episode that is in the trace and a part is the same one: the trace was put together, and the process ended
+        // before it removed the part.
+        episodes.sort_by_key(|episode| (episode.seed, episode.run));
+        episodes.dedup_by(|later, earlier| later.episode_id == earlier.episode_id);
+        Ok(episodes)
+    }
+
+    /// The episodes in the trace of an experiment, read again only if the trace was replaced.
+    ///
+    /// # Errors
+    /// When the trace cannot be read, or was recorded differently.
+    pub(super) fn in_trace(&self, experiment: Experiment) -> Result<Places, StoreError> {
+        let path = self.trace(experiment);
+        let mut traces = self.traces.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = traces.get(&experiment).filter(|known| is_at(&known.file, &path)) {
+            return Ok(Arc::clone(&known.places));
+        }
+        let file = match File::open(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Places::default()),
+            file => file.map_err(StoreError::io("open", &path))?,
+        };
+        self.check(&path)?;
+        let places = Arc::new(places(&merge::read(&path)?));
+        traces.insert(experiment, InTrace { file, places: Arc::clone(&places) });
+        Ok(places)
+    }
+
+    /// Refuses the log of an experiment that is not the log of these episodes, which are those of its trace and its parts.
+    pub(super) fn check_log(&self, experiment: Experiment, episodes: &[EpisodeRows]) -> Result<(), StoreError> {
+        continued::check(&self.log(experiment), &self.trace(experiment), &self.recording, episodes)
     }
 
     /// Refuses a file that was recorded with anything else than this recording.
     pub(super) fn check(&self, path: &Path) -> Result<(), StoreError> {
-        let found = recording_of(path)?;
-        let keys = |value: &Value| -> Vec<String> {
-            value.as_object().map(|object| object.keys().cloned().collect()).unwrap_or_default()
-        };
-        let names = keys(&self.recording).into_iter().chain(keys(&found)).filter(|name| name != SEEDS);
-        for name in names {
-            let (ours, theirs) = (self.recording.get(&name), found.get(&name));
-            if ours != theirs {
-                let (expected, found) = first_difference(&name, ours, theirs);
-                let path = path.to_owned();
-                return Err(StoreError::Different { path, what: expected.0, expected: expected.1, found });
+        match difference(&self.recording, &recording_of(path)?) {
+            None => Ok(()),
+            Some(Difference { what, expected, found }) => {
+                Err(StoreError::Different { path: path.to_owned(), what, expected, found })
             }
         }
-        Ok(())
     }
 
     /// The parts of an experiment, by name.
@@ -124,14 +167,6 @@ fn unreachable_fault(path: &Path) -> StoreError {
     StoreError::io("read", path)(io::Error::other("the file cannot be opened as a trace"))
 }
 
-/// The innermost key in which two values differ, and both sides of it.
-fn first_difference(name: &str, ours: Option<&Value>, theirs: Option<&Value>) -> ((String, String), String) {
-    if let (Some(Value::Object(a)), Some(Value::Object(b))) = (ours, theirs) {
-        let inner = a.keys().chain(b.keys()).find(|key| a.get(*key) != b.get(*key));
-        if let Some(key) = inner {
-            return first_difference(&format!("{name}.{key}"), a.get(key), b.get(key));
-        }
-    }
-    let text = |value: Option<&Value>| value.map_or_else(|| "nothing".to_owned(), Value::to_string);
-    ((name.to_owned(), text(ours)), text(theirs))
+fn places(episodes: &[EpisodeRows]) -> BTreeSet<(i32, i32)> {
+    episodes.iter().map(|episode| (narrow(episode.seed), narrow(episode.run))).collect()
 }

@@ -7,30 +7,30 @@
 //! OUT/.parts/E1-oracle-s1-r3.*     episodes that are whole, and not in the trace yet
 //! ```
 //!
-//! Rule: an episode is written under a temporary name, synchronised, and renamed, its trace last: it is there whole or
-//! not at all. The trace is put together from the parts and from what was there, by seed and run, and replaced in one
-//! step; so any number of processes may record into one folder, and each leaves the same trace.
+//! Rule: one process at a time plays an episode: the one that has its lock. The episode is written under a temporary name
+//! of that process, synchronised, and renamed, its trace last: it is there whole or not at all. The trace is put together
+//! from the parts and from what was there, by seed and run, and replaced in one step. So any number of processes may
+//! record into one folder, the same episodes or others, and together they leave the trace that one of them would.
 
 use std::collections::BTreeSet;
-use std::fs::{self, File};
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
 use super::claim::Claim;
+use super::fault::StoreError;
+use super::lock::{Attempt, EpisodeLock};
 use super::lost::{self, LostEpisode};
+use super::metadata::SEEDS;
 use super::plan::Key;
-use super::shelf::{SEEDS, Shelf, narrow};
+use super::shelf::{Shelf, narrow};
 use crate::log::{LogError, assemble};
 use crate::sim::Experiment;
 use crate::trace::episode::Episode;
-use crate::trace::finding::TraceError;
 use crate::trace::merge;
 use crate::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
-
-/// A trace that is being put together; by its name it is cleared away if that is not brought to an end.
-const UNFINISHED_TRACE: &str = ".mirrorstats-assembled";
 
 /// The folder of a recording, for one model.
 #[derive(Debug)]
@@ -40,47 +40,15 @@ pub struct Store {
     columns: OptionalColumns,
 }
 
-/// Why the folder cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum StoreError {
-    /// The operating system refuses.
-    #[error("cannot {doing} `{}`: {source}\n  help: is the folder writable, and the disk not full?", path.display())]
-    Io {
-        /// What was being done.
-        doing: &'static str,
-        /// To which file.
-        path: PathBuf,
-        /// Why not.
-        source: io::Error,
-    },
-    /// What is there was recorded differently.
-    #[error(
-        "`{}` was recorded with another {what}: expected {expected}, found {found}\n  \
-         help: record into another folder, or remove the file to record it anew",
-        path.display()
-    )]
-    Different {
-        /// The file.
-        path: PathBuf,
-        /// What differs: a key of the recording's metadata.
-        what: String,
-        /// What this recording has.
-        expected: String,
-        /// What the file has.
-        found: String,
-    },
-    /// A trace cannot be read or written.
-    #[error(transparent)]
-    Trace(#[from] TraceError),
-    /// A log cannot be read or written.
-    #[error(transparent)]
-    Log(#[from] LogError),
-}
-
-impl StoreError {
-    pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
-        move |source| Self::Io { doing, path: path.to_owned(), source: crate::base::temporary::without_name(source) }
-    }
+/// Whose turn it is to record an episode.
+#[derive(Debug)]
+pub enum Turn {
+    /// This process's, as long as it keeps the lock.
+    Ours(EpisodeLock),
+    /// Another process's, of this id as far as it is known.
+    Theirs(Option<u32>),
+    /// Nobody's: the episode is recorded.
+    Recorded,
 }
 
 impl Store {
@@ -126,14 +94,51 @@ impl Store {
         self.shelf.recorded(experiment)
     }
 
-    /// Brings the list of lost episodes up to date: these are recorded, those were lost now.
+    /// Takes an episode, unless it is recorded or another process has it.
     ///
     /// # Errors
-    /// When the list cannot be read or written.
-    pub fn note_lost(&self, recorded: impl Iterator<Item = Key>, lost: &[LostEpisode]) -> Result<(), StoreError> {
+    /// When the lock cannot be made, the trace cannot be read, or it was recorded differently.
+    pub fn turn(&self, key: Key) -> Result<Turn, StoreError> {
+        let lock = match EpisodeLock::attempt(&self.part(key).with_extension("lock"))? {
+            Attempt::Theirs(process) => return Ok(Turn::Theirs(process)),
+            Attempt::Ours(lock) => lock,
+        };
+        if self.is_recorded(key)? {
+            return Ok(Turn::Recorded);
+        }
+        // A process that was killed before it committed the episode may have left its log.
+        let log = self.log_part(key);
+        match fs::remove_file(&log) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(StoreError::io("remove", &log)(error)),
+            _ => Ok(Turn::Ours(lock)),
+        }
+    }
+
+    /// Whether an episode is in the trace, or waits for it as a part.
+    fn is_recorded(&self, key: Key) -> Result<bool, StoreError> {
+        // In this order: a part is removed only when its episode is in the trace.
+        Ok(self.part(key).exists() || self.shelf.in_trace(key.experiment)?.contains(&(key.seed, key.run)))
+    }
+
+    /// Brings the list of lost episodes up to date: these are recorded, those were lost now. Gives those of them that no
+    /// other process has recorded by now.
+    ///
+    /// # Errors
+    /// When the list or a trace cannot be read, or the list cannot be written.
+    pub fn note_lost(&self, recorded: &[Key], lost: Vec<(Key, LostEpisode)>) -> Result<Vec<LostEpisode>, StoreError> {
         let _lock = self.claim.lock()?;
-        let recorded = recorded.map(|key| key.episode_id(self.shelf.model())).collect();
-        lost::update(&self.lost_list(), &recorded, lost)
+        let mut recorded: BTreeSet<Key> = recorded.iter().copied().collect();
+        let mut still = Vec::new();
+        for (key, lost) in lost {
+            if self.is_recorded(key)? {
+                recorded.insert(key);
+            } else {
+                still.push(lost);
+            }
+        }
+        let recorded = recorded.into_iter().map(|key| key.episode_id(self.shelf.model())).collect();
+        lost::update(&self.lost_list(), &recorded, &still)?;
+        Ok(still)
     }
 
     /// Where lost episodes are listed.
@@ -150,8 +155,7 @@ impl Store {
         let metadata = TraceMetadata { recording: Some(self.shelf.recording().clone()), columns: self.columns.clone() };
         let mut writer = TraceWriter::create(&path, &metadata)?;
         writer.write(episode)?;
-        writer.finish_durably()?;
-        synchronise(&self.parts())
+        Ok(writer.finish()?)
     }
 
     /// Puts the trace and the log of an experiment together from what is there; nothing if there are no parts.
@@ -165,24 +169,14 @@ impl Store {
             return Ok(());
         }
         let trace = self.trace(experiment);
-        let mut episodes = if trace.exists() { merge::read(&trace)? } else { Vec::new() };
-        for part in &parts {
-            self.shelf.check(part)?;
-            episodes.extend(merge::read(part)?);
-        }
-        // An episode that was committed and is in the trace already is the same one: the trace was put together, and the
-        // process ended before the part was removed.
-        episodes.sort_by_key(|episode| (episode.seed, episode.run));
-        episodes.dedup_by(|later, earlier| later.episode_id == earlier.episode_id);
+        let episodes = self.shelf.episodes(experiment)?;
+        self.shelf.check_log(experiment, &episodes)?;
         let log_parts: Vec<PathBuf> = parts.iter().map(|part| part.with_extension("mcap")).collect();
         let mut recording = self.shelf.recording().clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
         self.assemble_log(experiment, &parts, &recording)?;
-        let whole = self.parts().join(UNFINISHED_TRACE);
-        merge::write(&whole, Some(&recording), &episodes)?;
-        fs::rename(&whole, &trace).map_err(StoreError::io("write", &trace))?;
-        synchronise(self.claim.folder())?;
+        merge::write_in(&self.parts(), &trace, Some(&recording), &episodes)?;
         for part in parts.iter().chain(log_parts.iter().filter(|part| part.exists())) {
             fs::remove_file(part).map_err(StoreError::io("remove", part))?;
         }
@@ -202,10 +196,13 @@ impl Store {
         if logs.is_empty() {
             return Ok(());
         }
-        Ok(assemble::assemble(&self.log(experiment), &logs, recording, &self.parts())?)
+        let log = self.log(experiment);
+        let before = log.exists().then_some(log.as_path());
+        assemble::assemble(&log, before, &logs, recording, &self.parts()).map_err(|error| match error {
+            LogError::Damaged { file, fault } if Path::new(&file) != log => {
+                StoreError::DamagedPart { path: file.into(), fault }
+            }
+            error => error.into(),
+        })
     }
-}
-
-fn synchronise(path: &Path) -> Result<(), StoreError> {
-    File::open(path).and_then(|file| file.sync_all()).map_err(StoreError::io("write", path))
 }

@@ -1,25 +1,27 @@
-//! The folder of a report: every file in it whole, or none of them changed.
+//! The folder of a report: the whole new report in place of the whole old one, or the old one unchanged.
 //!
-//! All files are written into a temporary folder first and moved into place together. In a folder that
-//! exists, only the files that a report has are replaced; whatever else is there stays.
+//! The files of the old report are those that its manifest lists as outputs. They are replaced, or removed where the new
+//! report does not have them; whatever else is in the folder stays.
+
+mod old;
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use tempfile::TempDir;
 
+use crate::base::hash;
 use crate::base::number::full_precision;
-use crate::base::temporary;
+use crate::base::replace::{self, FolderFiles, TargetIsInput};
 use crate::cells::cell::{Cells, Group};
 use crate::metric::catalog::{Catalog, Metric};
 use crate::report::style::Style;
 use crate::report::table::Table;
 use crate::report::tables::{csv, latex, markdown};
 use crate::report::value::interval;
+use old::MANIFEST;
 
 /// What goes into the folder.
 #[derive(Clone, Copy, Debug)]
@@ -30,8 +32,10 @@ pub struct Bundle<'a> {
     pub tables: &'a [Table],
     /// The bytes of `episodes.parquet`.
     pub episodes: &'a [u8],
-    /// For `manifest.json`.
+    /// For `manifest.json`, which gets its outputs when they are written.
     pub manifest: &'a Manifest,
+    /// The files that are read, which no output may replace.
+    pub read: &'a [PathBuf],
     /// Figures and whatever else, by their path inside the folder.
     pub others: &'a [OutputFile],
 }
@@ -63,6 +67,10 @@ pub struct Manifest {
     pub filter: Option<String>,
     /// What was read, ordered by path, then hash.
     pub inputs: Vec<Input>,
+    /// What was written beside this manifest, ordered by path. Absent in reports of earlier versions, and in the copy
+    /// inside `report.html`, whose own hash would have to be in it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<Output>,
     /// The definitions that gave the values.
     pub definitions: Catalog,
 }
@@ -87,6 +95,17 @@ pub struct Input {
     pub bytes: u64,
 }
 
+/// One file of the report.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct Output {
+    /// The path inside the folder, `/` between its parts.
+    pub path: String,
+    /// SHA-256 of its content.
+    pub sha256: String,
+    /// Its size.
+    pub bytes: u64,
+}
+
 /// Why a report cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum BundleError {
@@ -102,6 +121,9 @@ pub enum BundleError {
         /// The path.
         path: PathBuf,
     },
+    /// A file of the report would replace one that is read.
+    #[error("cannot write the report: {0}, or the report another --out")]
+    Input(#[from] TargetIsInput),
     /// The file system refuses.
     #[error("cannot write the report to {}; is the folder writable?", path.display())]
     Unwritable {
@@ -125,8 +147,16 @@ impl Manifest {
             metrics: cells.metrics.clone(),
             filter,
             inputs,
+            outputs: Vec::new(),
             definitions: cells.catalog.clone(),
         }
+    }
+
+    /// The manifest of a report with these files beside it.
+    fn with_outputs(&self, files: &[OutputFile]) -> Self {
+        let mut outputs: Vec<Output> = files.iter().map(Output::new).collect();
+        outputs.sort();
+        Self { outputs, ..self.clone() }
     }
 
     /// The text of `manifest.json`.
@@ -149,45 +179,65 @@ impl Input {
     }
 }
 
-/// Writes the report into the folder `out`; returns the files written, in order.
+impl Output {
+    fn new(file: &OutputFile) -> Self {
+        Self {
+            path: Input::new(&file.path, String::new(), 0).path,
+            sha256: hash::of_bytes(&file.bytes),
+            bytes: file.bytes.len() as u64,
+        }
+    }
+}
+
+/// A report that was written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Written {
+    /// Its files, ordered by path.
+    pub files: Vec<PathBuf>,
+    /// Its manifest, with the outputs.
+    pub manifest: Manifest,
+}
+
+/// Writes the report into the folder `out`, in place of the report that is there.
 ///
 /// # Errors
-/// Where `out` is no folder or cannot be written. The folder is then as it was, unless moving a finished file into
-/// place failed half-way.
-pub fn write(out: &Path, bundle: &Bundle) -> Result<Vec<PathBuf>, BundleError> {
-    let files = files(bundle);
+/// Where `out` is no folder or cannot be written, and where a file that is read is in the way. The folder is then as it
+/// was; where the system cannot exchange folders, and an error comes while files are moved, it has no manifest.
+pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
+    let mut files = files(bundle);
+    let manifest = bundle.manifest.with_outputs(&files);
+    files.push(OutputFile { path: MANIFEST.into(), bytes: manifest.json().into_bytes() });
+    files.sort_by(|a, b| a.path.cmp(&b.path));
     check_paths(&files)?;
     if out.exists() && !out.is_dir() {
         return Err(BundleError::NotAFolder { path: out.to_owned() });
     }
-    let stage = stage_for(out)?;
-    // The temporary folder is private; the one in it gets the permissions that any new folder has.
-    let staged = stage.path().join("report");
-    for file in &files {
-        write_file(&staged.join(&file.path), &file.bytes)?;
-    }
-    put_in_place(&staged, out, &files)?;
-    Ok(files.into_iter().map(|file| out.join(file.path)).collect())
+    check_old(out, bundle.read)?;
+    let new: Vec<_> = files.iter().map(|file| (file.path.as_path(), file.bytes.as_slice())).collect();
+    check_inputs(out, &new.iter().map(|(path, _)| path).collect::<Vec<_>>(), bundle.read)?;
+    replace::replace_folder(out, &FolderFiles { new: &new, index: Path::new(MANIFEST), old: &old::files })
+        .map_err(|error| BundleError::Unwritable { path: error.path, source: error.source })?;
+    Ok(Written { files: files.into_iter().map(|file| out.join(file.path)).collect(), manifest })
 }
 
-/// A temporary folder on the file system of `out`: inside it if it exists, which may be a mounted volume, else beside.
-fn stage_for(out: &Path) -> Result<TempDir, BundleError> {
-    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let place = if out.is_dir() { out } else { parent };
-    let unwritable =
-        |source| BundleError::Unwritable { path: place.to_owned(), source: temporary::without_name(source) };
-    fs::create_dir_all(place).map_err(unwritable)?;
-    tempfile::Builder::new().prefix(".mirrorstats-").tempdir_in(place).map_err(unwritable)
+/// That no file of the report which is in `out` is among those that are read: a new report there would replace it.
+///
+/// # Errors
+/// When one is.
+pub fn check_old(out: &Path, read: &[PathBuf]) -> Result<(), BundleError> {
+    check_inputs(out, &old::files(out), read)
 }
 
-/// Every file of the folder, ordered by path.
+fn check_inputs<P: AsRef<Path>>(out: &Path, targets: &[P], read: &[PathBuf]) -> Result<(), BundleError> {
+    let mut targets = targets.iter().map(|path| out.join(path));
+    Ok(targets.try_for_each(|target| replace::check_target(&target, read, "one that is read"))?)
+}
+
+/// Every file of the folder but the manifest.
 fn files(bundle: &Bundle) -> Vec<OutputFile> {
     let file = |path: &str, bytes: &[u8]| OutputFile { path: PathBuf::from(path), bytes: bytes.to_vec() };
-    let mut files = vec![
-        file("cells.csv", cells_csv(bundle.cells).as_bytes()),
-        file("episodes.parquet", bundle.episodes),
-        file("manifest.json", bundle.manifest.json().as_bytes()),
-    ];
+    let mut files =
+        vec![file("cells.csv", cells_csv(bundle.cells).as_bytes()), file("episodes.parquet", bundle.episodes)];
     for table in bundle.tables {
         for (ending, text) in
             [("tex", latex::render(table)), ("md", markdown::render(table)), ("csv", csv::render(table))]
@@ -196,7 +246,6 @@ fn files(bundle: &Bundle) -> Vec<OutputFile> {
         }
     }
     files.extend_from_slice(bundle.others);
-    files.sort_by(|a, b| a.path.cmp(&b.path));
     files
 }
 
@@ -239,33 +288,4 @@ fn check_paths(files: &[OutputFile]) -> Result<(), BundleError> {
         }
     }
     Ok(())
-}
-
-fn write_file(path: &Path, bytes: &[u8]) -> Result<(), BundleError> {
-    let unwritable = |source| BundleError::Unwritable { path: path.to_owned(), source };
-    make_folder_of(path)?;
-    fs::write(path, bytes).map_err(unwritable)
-}
-
-fn put_in_place(staged: &Path, out: &Path, files: &[OutputFile]) -> Result<(), BundleError> {
-    let unwritable = |path: &Path| {
-        let path = path.to_owned();
-        move |source| BundleError::Unwritable { path, source }
-    };
-    if !out.exists() {
-        return fs::rename(staged, out).map_err(unwritable(out));
-    }
-    for file in files {
-        make_folder_of(&out.join(&file.path))?;
-    }
-    for file in files {
-        let target = out.join(&file.path);
-        fs::rename(staged.join(&file.path), &target).map_err(unwritable(&target))?;
-    }
-    Ok(())
-}
-
-fn make_folder_of(path: &Path) -> Result<(), BundleError> {
-    let Some(folder) = path.parent() else { return Ok(()) };
-    fs::create_dir_all(folder).map_err(|source| BundleError::Unwritable { path: folder.to_owned(), source })
 }

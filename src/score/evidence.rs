@@ -28,6 +28,7 @@ use super::run::{ScoreError, projection};
 use super::segments::Segments;
 use super::values::truths;
 use crate::base::near::nearest;
+use crate::base::visible::visible;
 use crate::metric::columns::Type;
 use crate::metric::definitions::Definitions;
 use crate::metric::plan::{Aggregate, NodeId, Op, Plan};
@@ -299,7 +300,7 @@ fn decided(timesteps: &[i64]) -> String {
 
 impl fmt::Display for Evidence {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {} steps", self.episode_id.escape_debug(), self.length)?;
+        write!(f, "{}: {} steps", visible(&self.episode_id), self.length)?;
         for metric in &self.metrics {
             let value = metric.value.map_or_else(|| "undefined".to_owned(), |value| value.to_string());
             write!(f, "\n\n{} = {value}   decided at {}", metric.metric, decided(&metric.timesteps))?;
@@ -309,8 +310,8 @@ impl fmt::Display for Evidence {
                 write!(
                     f,
                     "\n  {name}{} is {}   ({})",
-                    fact.expression,
-                    value.escape_debug(),
+                    visible(&fact.expression),
+                    visible(value),
                     decided(&fact.timesteps)
                 )?;
             }

@@ -12,6 +12,7 @@
 pub mod engine;
 pub mod evidence;
 pub mod format;
+mod row_bytes;
 pub mod rows;
 pub mod run;
 pub mod segments;

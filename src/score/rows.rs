@@ -8,7 +8,8 @@
 //! record   seed  run  episode_id 00 00  labels  metrics
 //! ```
 //!
-//! Zero bytes within a text are followed by FF, integers are big-endian with the sign bit turned over.
+//! [`super::row_bytes`] spells texts, integers and metrics. Few bytes of a trace can be many here, as a dictionary holds a
+//! text once and rows hold it each: a batch is made into rows in [`Parts`].
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
@@ -18,9 +19,9 @@ use arrow::array::{
     Array, ArrayAccessor as _, ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray, TypedDictionaryArray,
 };
 use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
-use memchr::memchr;
 
 use super::engine::Scores;
+use super::row_bytes::{Bytes, Metrics, put_label, put_text};
 use super::table::{EpisodeKey, EpisodeRow, Header};
 use crate::base::runs::{self, Merge, Place, Run, Runs, Section};
 use crate::trace::scan::EPISODE_COLUMNS;
@@ -33,6 +34,12 @@ const SORTED: usize = 1 << 20;
 
 /// What a row takes, about.
 const USUAL_BYTES: usize = 64;
+
+/// Bytes of the rows of one batch that are held at a time.
+const PART: usize = 16 << 20;
+
+/// The bytes that a row or a title must stay below: their lengths are numbers of 31 bits where they are put away.
+const TOO_LARGE: usize = 1 << 31;
 
 /// Some rows as bytes.
 #[derive(Debug, Default)]
@@ -50,26 +57,47 @@ struct Record {
     numbers: u64,
 }
 
+/// A row with so long names that it cannot be sorted.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "an episode of the model `{model}`: expected names and labels of less than 2 GiB, found more; group by other columns"
+)]
+pub struct RowTooLarge {
+    /// The beginning of the model's name.
+    pub model: String,
+}
+
 impl Rows {
-    /// The scores of the episodes of one batch.
-    pub fn of(episodes: &RecordBatch, scores: &Scores, labels: &[String]) -> Self {
+    /// The scores of the episodes of one batch, from the one at `from` among those kept: as many as take `most` bytes,
+    /// and one at least. Comes with the place of the next one.
+    ///
+    /// # Errors
+    /// Names and labels of 2 GiB.
+    pub fn of(
+        episodes: &RecordBatch,
+        scores: &Scores,
+        labels: &[String],
+        from: usize,
+        most: usize,
+    ) -> Result<(Self, usize), RowTooLarge> {
         let keys = KeyColumns::of(episodes);
         let column = |name: &String| episodes.column_by_name(name).expect("the projection asks for this column");
         let labels: Vec<&ArrayRef> = labels.iter().map(column).collect();
         let metrics = Metrics::of(&scores.metrics, scores.kept.len());
-        let mut bytes = Vec::with_capacity(scores.kept.len() * USUAL_BYTES);
+        let most = most.min(PART);
+        let mut bytes = Vec::with_capacity(most.min((scores.kept.len() - from) * USUAL_BYTES));
         let mut titled: Vec<(Vec<u8>, Vec<Record>)> = Vec::new();
         let mut known: HashMap<[Option<i32>; 2], usize> = HashMap::new();
-        let mut rows = scores.kept.iter().copied().enumerate().peekable();
+        let mut next = from;
         // Experiment and model seldom change from row to row.
-        while let Some(&(_, first)) = rows.peek() {
+        while let Some(&first) = scores.kept.get(next).filter(|_| next == from || bytes.len() < most) {
             let names = keys.names(first);
             let title = *known.entry(names).or_insert_with(|| {
                 titled.push((keys.title(first), Vec::new()));
                 titled.len() - 1
             });
-            let records = &mut titled[title].1;
-            while let Some((at, row)) = rows.next_if(|(_, row)| keys.names(*row) == names) {
+            let (title, records) = &mut titled[title];
+            while let Some(&row) = scores.kept.get(next).filter(|row| keys.names(**row) == names) {
                 let start = bytes.len();
                 let numbers = keys.numbers(row);
                 bytes.extend_from_slice(&numbers.to_be_bytes());
@@ -77,17 +105,66 @@ impl Rows {
                 for label in &labels {
                     put_label(&mut bytes, shown(label, row).as_deref());
                 }
-                metrics.put(&mut bytes, at);
-                let place = Place { start: narrow(start), length: narrow(bytes.len() - start) };
-                records.push(Record { place, numbers });
+                metrics.put(&mut bytes, next);
+                let length = bytes.len() - start;
+                if length.max(title.len()) >= TOO_LARGE {
+                    return Err(keys.too_large(row));
+                }
+                records.push(Record { place: Place { start: narrow(start), length: narrow(length) }, numbers });
+                next += 1;
+                if bytes.len() >= most {
+                    break;
+                }
             }
         }
-        Self { bytes, titled }
+        Ok((Self { bytes, titled }, next))
     }
 }
 
 fn narrow(count: usize) -> u32 {
-    u32::try_from(count).expect("rows are sorted some thousands at a time, and each is a few names and numbers")
+    u32::try_from(count).expect("rows are made some MiB at a time, and each is smaller than 2 GiB")
+}
+
+/// The rows of one batch, some MiB at a time: the first of them made at once, the others when they are asked for.
+pub struct Parts {
+    episodes: RecordBatch,
+    scores: Scores,
+    labels: Vec<String>,
+    first: Option<Rows>,
+    /// The place of the next row among those kept.
+    next: usize,
+    most: usize,
+}
+
+impl Parts {
+    /// The scores of the episodes of one batch.
+    ///
+    /// # Errors
+    /// Names and labels of 2 GiB.
+    pub fn of(episodes: RecordBatch, scores: Scores, labels: &[String]) -> Result<Self, RowTooLarge> {
+        Self::within(PART, episodes, scores, labels)
+    }
+
+    fn within(most: usize, episodes: RecordBatch, scores: Scores, labels: &[String]) -> Result<Self, RowTooLarge> {
+        let (first, next) = Rows::of(&episodes, &scores, labels, 0, most)?;
+        Ok(Self { episodes, scores, labels: labels.to_vec(), first: Some(first), next, most })
+    }
+}
+
+impl Iterator for Parts {
+    type Item = Result<Rows, RowTooLarge>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if let Some(first) = self.first.take() {
+            return Some(Ok(first));
+        }
+        let left = self.next < self.scores.kept.len();
+        left.then(|| {
+            let (rows, next) = Rows::of(&self.episodes, &self.scores, &self.labels, self.next, self.most)?;
+            self.next = next;
+            Ok(rows)
+        })
+    }
 }
 
 /// Sorts rows as they come, in bounded memory.
@@ -261,6 +338,10 @@ impl<'a> KeyColumns<'a> {
         title
     }
 
+    fn too_large(&self, row: usize) -> RowTooLarge {
+        RowTooLarge { model: text(self.model, row).unwrap_or_default().chars().take(40).collect() }
+    }
+
     /// Seed and run, as a number that compares as they do.
     fn numbers(&self, row: usize) -> u64 {
         // The scan has checked that seed and run fit.
@@ -291,142 +372,11 @@ fn shown(column: &ArrayRef, row: usize) -> Option<Cow<'_, str>> {
     }
 }
 
-/// Ends a text, and sorts before anything that could stand there.
-const END: [u8; 2] = [0, 0];
-/// A zero byte within a text.
-const ZERO: [u8; 2] = [0, 0xFF];
-
-fn put_text(bytes: &mut Vec<u8>, text: &str) {
-    let mut rest = text.as_bytes();
-    while let Some(zero) = memchr(0, rest) {
-        bytes.extend_from_slice(&rest[..zero]);
-        bytes.extend_from_slice(&ZERO);
-        rest = &rest[zero + 1..];
-    }
-    bytes.extend_from_slice(rest);
-    bytes.extend_from_slice(&END);
-}
-
-const NO_LABEL: u8 = 0;
-const LABEL: u8 = 1;
-
-fn put_label(bytes: &mut Vec<u8>, label: Option<&str>) {
-    match label {
-        None => bytes.push(NO_LABEL),
-        Some(text) => {
-            bytes.push(LABEL);
-            put_text(bytes, text);
-        }
-    }
-}
-
-/// An undefined metric.
-const UNDEFINED: u8 = 0xFF;
-/// A metric whose value follows in eight bytes behind the codes of all; any other code is the value.
-const LARGE: u8 = 0xFE;
-
-/// The metrics of some rows, to be written as bytes: a code each, then the values that no code stands for.
-struct Metrics<'a> {
-    metrics: &'a [Int64Array],
-    /// The codes of all rows, row by row.
-    codes: Vec<u8>,
-}
-
-impl<'a> Metrics<'a> {
-    fn of(metrics: &'a [Int64Array], rows: usize) -> Self {
-        let mut codes = vec![UNDEFINED; rows * metrics.len()];
-        for (first, metric) in metrics.iter().enumerate() {
-            let codes = codes.iter_mut().skip(first).step_by(metrics.len());
-            match metric.nulls() {
-                None => codes.zip(metric.values()).for_each(|(place, value)| *place = code(*value)),
-                Some(nulls) => codes
-                    .zip(metric.values().iter().zip(nulls))
-                    .for_each(|(place, (value, defined))| *place = if defined { code(*value) } else { UNDEFINED }),
-            }
-        }
-        Self { metrics, codes }
-    }
-
-    fn put(&self, bytes: &mut Vec<u8>, row: usize) {
-        let count = self.metrics.len();
-        let codes = &self.codes[row * count..(row + 1) * count];
-        bytes.extend_from_slice(codes);
-        for (metric, _) in self.metrics.iter().zip(codes).filter(|(_, code)| **code == LARGE) {
-            bytes.extend_from_slice(&metric.value(row).to_le_bytes());
-        }
-    }
-}
-
-fn code(value: i64) -> u8 {
-    u8::try_from(value).map_or(LARGE, |small| small.min(LARGE))
-}
-
-/// What is left of a row's bytes.
-struct Bytes<'a>(&'a [u8]);
-
-impl Bytes<'_> {
-    fn take(&mut self, length: usize) -> io::Result<&[u8]> {
-        let (taken, rest) = self.0.split_at_checked(length).ok_or_else(damaged)?;
-        self.0 = rest;
-        Ok(taken)
-    }
-
-    fn array<const N: usize>(&mut self) -> io::Result<[u8; N]> {
-        self.take(N)?.try_into().map_err(|_| damaged())
-    }
-
-    /// Reads a text into a buffer.
-    fn text(&mut self, text: &mut String) -> io::Result<()> {
-        text.clear();
-        loop {
-            let until = memchr(0, self.0).ok_or_else(damaged)?;
-            text.push_str(str::from_utf8(self.take(until)?).map_err(|_| damaged())?);
-            match self.array()? {
-                END => return Ok(()),
-                _ => text.push('\0'),
-            }
-        }
-    }
-
-    fn int(&mut self) -> io::Result<i32> {
-        Ok(i32::from_be_bytes(self.array()?) ^ i32::MIN)
-    }
-
-    fn label(&mut self, label: &mut Option<String>) -> io::Result<()> {
-        match self.array()? {
-            [NO_LABEL] => {
-                *label = None;
-                Ok(())
-            }
-            _ => self.text(label.get_or_insert_default()),
-        }
-    }
-
-    /// Reads so many metrics, the last ones of a row.
-    fn metrics(mut self, count: usize, metrics: &mut Vec<Option<i64>>) -> io::Result<()> {
-        let (codes, rest) = self.0.split_at_checked(count).ok_or_else(damaged)?;
-        self.0 = rest;
-        metrics.clear();
-        for code in codes {
-            metrics.push(match *code {
-                UNDEFINED => None,
-                LARGE => Some(i64::from_le_bytes(self.array()?)),
-                small => Some(small.into()),
-            });
-        }
-        Ok(())
-    }
-}
-
-fn damaged() -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidData, "a temporary file was changed by another program")
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
 
-    use arrow::array::{DictionaryArray, Int64Array};
+    use arrow::array::{DictionaryArray, Int32Array, Int64Array};
     use proptest::collection::vec;
     use proptest::option;
     use proptest::prelude::*;
@@ -455,8 +405,8 @@ mod tests {
         })
     }
 
-    /// Rows as one batch gives them.
-    fn batch(rows: &[EpisodeRow]) -> Rows {
+    /// Rows as one batch gives them, parts of so many bytes.
+    fn batch(rows: &[EpisodeRow], most: usize) -> Parts {
         let texts = |of: fn(&EpisodeKey) -> &str| {
             let texts = rows.iter().map(|row| Some(of(&row.key)));
             Arc::new(texts.collect::<DictionaryArray<Int32Type>>()) as ArrayRef
@@ -476,17 +426,55 @@ mod tests {
         ]);
         let metrics = (0..2).map(|metric| rows.iter().map(|row| row.metrics[metric]).collect()).collect();
         let scores = Scores { kept: (0..rows.len()).collect(), metrics };
-        Rows::of(&episodes.unwrap(), &scores, &["distractors".to_owned()])
+        Parts::within(most, episodes.unwrap(), scores, &["distractors".to_owned()]).unwrap()
+    }
+
+    /// Episodes of one step with the same label, which is in memory once.
+    fn alike(count: usize, label: &str) -> (RecordBatch, Scores) {
+        let same = |text: &str| {
+            let keys = Int32Array::from(vec![0; count]);
+            let texts = Arc::new(StringArray::from(vec![text]));
+            Arc::new(DictionaryArray::<Int32Type>::new(keys, texts)) as ArrayRef
+        };
+        let ints = || Arc::new(Int64Array::from(vec![1; count])) as ArrayRef;
+        let episodes = RecordBatch::try_from_iter([
+            ("episode_id", same("e")),
+            ("model", same("m")),
+            ("experiment", same("E1")),
+            ("seed", ints()),
+            ("run", ints()),
+            ("stated_color", same(label)),
+        ]);
+        (episodes.unwrap(), Scores { kept: (0..count).collect(), metrics: Vec::new() })
+    }
+
+    #[test]
+    fn more_than_4_gib_of_labels_come_in_parts_that_fit_into_memory() {
+        let (count, label) = (70_000, "x".repeat(64 * 1024));
+        let (episodes, scores) = alike(count, &label);
+        let (mut found, mut bytes) = (0, 0);
+        for rows in Parts::of(episodes, scores, &["stated_color".to_owned()]).unwrap() {
+            let rows = rows.unwrap();
+            assert!(rows.bytes.len() < PART + 2 * label.len());
+            let records: usize = rows.titled.iter().map(|(_, records)| records.len()).sum();
+            found += records;
+            bytes += rows.bytes.len();
+        }
+        assert_eq!(found, count);
+        assert!(bytes > u32::MAX as usize, "{bytes}");
     }
 
     proptest! {
         #[test]
         fn rows_come_out_as_they_went_in_and_in_the_order_of_keys(
             rows in vec(row(), 1..30), batches in 1_usize..10, at_a_time in 1_usize..200, memory in 1_usize..400,
+            most in 1_usize..300,
         ) {
             let mut sorter = RowSorter { at_a_time, memory, ..RowSorter::new(header()) };
             for some in rows.chunks(rows.len().div_ceil(batches)) {
-                sorter.add(&batch(some)).unwrap();
+                for part in batch(some, most) {
+                    sorter.add(&part.unwrap()).unwrap();
+                }
             }
             let mut sorted = sorter.finish().unwrap();
             let mut found = Vec::new();

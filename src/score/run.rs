@@ -4,7 +4,7 @@ use std::io;
 use std::num::NonZeroUsize;
 
 use super::engine::{Batch, Engine, EngineError, Scores};
-use super::rows::{RowSorter, Rows, SortedRows};
+use super::rows::{Parts, RowSorter, RowTooLarge, SortedRows};
 use super::segments::Segments;
 use super::table::{EpisodeTable, Header};
 use crate::base::near::nearest;
@@ -80,6 +80,9 @@ pub enum ScoreError {
     /// Rows that do not fit into memory could not be put away.
     #[error("cannot sort the scores in a temporary file; is there space where temporary files are (TMPDIR)?")]
     Spill(#[source] io::Error),
+    /// Names and labels that are too long to be sorted.
+    #[error(transparent)]
+    RowTooLarge(#[from] RowTooLarge),
     /// A number could not be computed.
     #[error("{file}: {source}")]
     Engine {
@@ -243,14 +246,19 @@ fn sorted(
     traces.scan(
         projection,
         threads,
-        |batch| -> Result<Rows, ScoreError> {
+        |batch| -> Result<Parts, ScoreError> {
             let scores = score(&batch).map_err(|source| ScoreError::Engine {
                 file: traces.files()[batch.origin.file].name().to_owned(),
                 source,
             })?;
-            Ok(Rows::of(&batch.episodes, &scores, &labels))
+            Ok(Parts::of(batch.episodes, scores, &labels)?)
         },
-        |rows: Rows| sorter.add(&rows).map_err(ScoreError::Spill),
+        |parts| {
+            for rows in parts {
+                sorter.add(&rows?).map_err(ScoreError::Spill)?;
+            }
+            Ok(())
+        },
     )?;
     sorter.finish().map_err(ScoreError::Spill)
 }
@@ -293,7 +301,7 @@ pub(super) fn projection(
     });
     let known = &definitions.catalog;
     let experiments = (!known.open).then(|| known.experiment.keys().cloned().collect());
-    Ok(Projection { steps, constants, experiments })
+    Ok(Projection { steps, constants, experiments, ..Projection::default() })
 }
 
 /// Refuses a column to group by that is not constant in an episode, or not in every trace.

@@ -18,6 +18,7 @@ use crate::metric::columns::{Level, Type};
 use crate::metric::definitions::Definitions;
 use crate::metric::plan::NodeId;
 use crate::trace::open::TraceSet;
+use crate::trace::scan::EpisodeBatch;
 
 /// One episode along its time.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -50,23 +51,29 @@ struct Moments {
 impl Moments {
     /// `None` where the definitions do not name them all, with the types and levels they have in the paper's.
     fn of(definitions: &Definitions) -> Option<Self> {
-        let plan = &definitions.plan;
-        let named = |name: &str, ty: Type, level: Level| {
-            let (_, node) = plan.lets.iter().find(|(known, _)| known == name)?;
-            (plan.node(*node).ty == ty && plan.node(*node).level == level).then_some(*node)
-        };
         Some(Self {
-            visible: named("visible", Type::Bool, Level::Step)?,
-            sight: named("sight", Type::Int, Level::Episode)?,
-            claim: named("claim", Type::Int, Level::Episode)?,
-            done: named("done", Type::Int, Level::Episode)?,
-            answered: named("answered", Type::Bool, Level::Episode)?,
+            visible: named(definitions, "visible", Type::Bool, Level::Step)?,
+            sight: named(definitions, "sight", Type::Int, Level::Episode)?,
+            claim: named(definitions, "claim", Type::Int, Level::Episode)?,
+            done: named(definitions, "done", Type::Int, Level::Episode)?,
+            answered: answered_node(definitions)?,
         })
     }
 
     fn nodes(&self) -> [NodeId; 5] {
         [self.visible, self.sight, self.claim, self.done, self.answered]
     }
+}
+
+/// The node of a `let` that has this type and level; `None` where the definitions have no such one.
+fn named(definitions: &Definitions, name: &str, ty: Type, level: Level) -> Option<NodeId> {
+    let plan = &definitions.plan;
+    let (_, node) = plan.lets.iter().find(|(known, _)| known == name)?;
+    (plan.node(*node).ty == ty && plan.node(*node).level == level).then_some(*node)
+}
+
+fn answered_node(definitions: &Definitions) -> Option<NodeId> {
+    named(definitions, "answered", Type::Bool, Level::Episode)
 }
 
 /// The timelines of all episodes that the definitions' filter keeps, in the order of their keys.
@@ -81,30 +88,67 @@ pub fn timelines(
     threads: NonZeroUsize,
 ) -> Result<Option<Vec<Timeline>>, ScoreError> {
     let Some(moments) = Moments::of(definitions) else { return Ok(None) };
-    let filter = definitions.plan.filter;
-    let engine = Engine::for_nodes(&definitions.plan, moments.nodes().into_iter().chain(filter));
-    let projection = projection(traces, definitions, &engine, &[])?;
     let mut found = Vec::new();
-    traces.scan(
-        &projection,
-        threads,
-        |batch| -> Result<Vec<Timeline>, ScoreError> {
-            let file = || traces.files()[batch.origin.file].name().to_owned();
-            let segments = Segments::new(&batch.offsets);
-            let values =
-                engine.evaluate(&view(&batch)).map_err(|source| ScoreError::Engine { file: file(), source })?;
-            let keys = keys(&batch.episodes, 0..segments.len());
-            let kept = |episode: usize| filter.is_none_or(|node| truths(values.of(node).bools()).value(episode));
-            let episodes = keys.into_iter().enumerate().filter(|(episode, _)| kept(*episode));
-            Ok(episodes.map(|(episode, key)| timeline(&values, &moments, segments, episode, key)).collect())
-        },
-        |part| {
-            found.extend(part);
-            Ok(())
-        },
-    )?;
+    let of_episode =
+        |values: &Evaluated, segments: Segments<'_>, episode, key| timeline(values, &moments, segments, episode, key);
+    each_episode(traces, definitions, &moments.nodes(), threads, of_episode, |timeline| found.push(timeline))?;
     found.sort_by(|a, b| a.key.cmp(&b.key));
     Ok(Some(found))
+}
+
+/// For each of `episodes`, which ascend, whether its decision committed to a colour; `false` for those that the traces
+/// lack. Takes a byte per episode, whatever its length.
+///
+/// `None` where the definitions do not name `answered`.
+///
+/// # Errors
+/// As [`score`](super::run::score).
+pub fn answered(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    episodes: &[EpisodeKey],
+    threads: NonZeroUsize,
+) -> Result<Option<Vec<bool>>, ScoreError> {
+    let Some(node) = answered_node(definitions) else { return Ok(None) };
+    let mut answered = vec![false; episodes.len()];
+    let place = |values: &Evaluated, _: Segments<'_>, episode: usize, key: EpisodeKey| {
+        let committed = truths(values.of(node).bools()).value(episode);
+        committed.then(|| episodes.binary_search(&key).ok()).flatten()
+    };
+    each_episode(traces, definitions, &[node], threads, place, |place| {
+        if let Some(place) = place {
+            answered[place] = true;
+        }
+    })?;
+    Ok(Some(answered))
+}
+
+/// Evaluates these nodes in one scan and gives `receive` what `of_episode` makes of each episode that the filter keeps.
+fn each_episode<T: Send>(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    nodes: &[NodeId],
+    threads: NonZeroUsize,
+    of_episode: impl Fn(&Evaluated, Segments<'_>, usize, EpisodeKey) -> T + Sync,
+    mut receive: impl FnMut(T),
+) -> Result<(), ScoreError> {
+    let filter = definitions.plan.filter;
+    let engine = Engine::for_nodes(&definitions.plan, nodes.iter().copied().chain(filter));
+    let projection = projection(traces, definitions, &engine, &[])?;
+    let work = |batch: EpisodeBatch| -> Result<Vec<T>, ScoreError> {
+        let file = || traces.files()[batch.origin.file].name().to_owned();
+        let segments = Segments::new(&batch.offsets);
+        let values = engine.evaluate(&view(&batch)).map_err(|source| ScoreError::Engine { file: file(), source })?;
+        let keys = keys(&batch.episodes, 0..segments.len());
+        let kept = |episode: usize| filter.is_none_or(|node| truths(values.of(node).bools()).value(episode));
+        let episodes = keys.into_iter().enumerate().filter(|(episode, _)| kept(*episode));
+        Ok(episodes.map(|(episode, key)| of_episode(&values, segments, episode, key)).collect())
+    };
+    traces.scan(&projection, threads, work, |part| {
+        part.into_iter().for_each(&mut receive);
+        Ok(())
+    })?;
+    Ok(())
 }
 
 fn timeline(

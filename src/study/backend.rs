@@ -1,9 +1,11 @@
 //! What computes the scores: the native kernels, or the SQL lowering on another engine. The results are the same.
 
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
 use super::error::StudyError;
 use super::{Question, Study};
+use crate::base::replace::check_target;
 use crate::engine::spark::source::{Sources, is_uri};
 use crate::engine::spark::{self, Cluster, Job, SparkError, Written};
 use crate::metric::definitions::Definitions;
@@ -30,6 +32,8 @@ pub struct SparkJob {
     definitions: Definitions,
     labels: Vec<String>,
     cluster: Cluster,
+    /// The files of this machine that are read.
+    read: Vec<PathBuf>,
 }
 
 impl SparkJob {
@@ -44,7 +48,11 @@ impl SparkJob {
         let definitions = study.question.bind(traces)?;
         let sources = Sources::files(&study.inputs, traces)
             .map_err(|source| SparkError::System { what: "name the traces for Spark".to_owned(), source })?;
-        Ok(Self { sources, definitions, labels, cluster })
+        let read = study.files_read(None);
+        if let Some(log) = &cluster.log {
+            check_target(log, &read, "one that is read")?;
+        }
+        Ok(Self { sources, definitions, labels, cluster, read })
     }
 
     /// URIs that Spark alone can read.
@@ -53,7 +61,13 @@ impl SparkJob {
     /// Every fault of the definitions.
     pub(crate) fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
         let definitions = question.bind_to(&crate::score::run::schema_columns())?;
-        Ok(Self { sources: Sources::Uris(uris), definitions, labels: question.labels(), cluster })
+        let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
+        Ok(Self { sources, definitions, labels, cluster, read })
+    }
+
+    /// The files of this machine that are read.
+    pub(crate) fn read(&self) -> &[PathBuf] {
+        &self.read
     }
 
     /// The scores, brought here.

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::error::StudyError;
 use super::inputs::{ScoreFile, Source, Stamp};
-use super::{Question, scores};
+use super::{Question, Study, scores};
 use crate::base::near::nearest;
 use crate::cells::changes::{Changes, Flip, Overlap};
 use crate::cells::group::DEFAULT_BY;
@@ -92,10 +92,14 @@ pub(super) struct Scored {
 /// # Errors
 /// What is wrong with definitions, scores or traces; a metric that neither side has; definitions without traces.
 pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> Result<Diff, StudyError> {
+    let inputs = traces;
     let style = Style::load("default")?;
     let stamps = traces.iter().map(Stamp::of).collect::<Result<Vec<_>, _>>()?;
     let traces = if traces.is_empty() { None } else { Some(Source::open(traces)?.into_traces()?) };
     let pair = Pair::score(old, new, traces.as_ref(), request)?;
+    if pair.before.table.is_empty() && pair.after.table.is_empty() {
+        new.study(inputs, request)?.check_filter(0)?;
+    }
     let mut changes = pair.changes(&request.by)?;
     TableOrder { catalog: &pair.after.table.catalog, style: &style }.sort(&mut changes);
     let notes = match &traces {
@@ -131,6 +135,25 @@ impl Side {
         }
     }
 
+    /// How it is scored, or how its scores are read.
+    fn question(&self, request: &DiffRequest) -> Question {
+        let definitions = match self {
+            Self::Definitions(name) => Some(name.clone()),
+            Self::Scores(files) if files.iter().any(|file| file.carries_definitions) => None,
+            Self::Scores(_) => request.definitions_of_scores.clone(),
+        };
+        Question { definitions, filter: request.filter.clone(), metrics: None, by: request.by.clone() }
+    }
+
+    /// The side by itself.
+    fn study(&self, traces: &[Input], request: &DiffRequest) -> Result<Study, StudyError> {
+        let inputs = match self {
+            Self::Definitions(_) => traces.to_vec(),
+            Self::Scores(files) => files.iter().map(|file| file.input.clone()).collect(),
+        };
+        Study::of(inputs)?.threads(request.threads).asked(self.question(request))
+    }
+
     /// Its metrics, and its scores if it is scores.
     fn read(
         &self,
@@ -144,13 +167,7 @@ impl Side {
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
             Self::Scores(files) => {
-                let carry = files.iter().any(|file| file.carries_definitions);
-                let question = Question {
-                    definitions: request.definitions_of_scores.clone().filter(|_| !carry),
-                    filter: request.filter.clone(),
-                    ..Question::default()
-                };
-                let table = scores::read(files, &question)?;
+                let table = scores::read(files, &Question { by: Vec::new(), ..self.question(request) })?;
                 Ok((table.metrics.iter().map(|metric| metric.name.clone()).collect(), Some(table)))
             }
         }
@@ -169,13 +186,8 @@ impl Side {
                 table.metrics.retain(|metric| common.contains(&metric.name));
                 Ok((table, None))
             }
-            (Self::Definitions(name), None, Some(traces)) => {
-                let question = Question {
-                    definitions: Some(name.clone()),
-                    metrics: Some(common.to_vec()),
-                    filter: request.filter.clone(),
-                    by: request.by.clone(),
-                };
+            (Self::Definitions(_), None, Some(traces)) => {
+                let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
                 let definitions = question.bind(traces)?;
                 let table = run::score(traces, &definitions, &question.labels(), request.threads)?;
                 Ok((table, Some(definitions)))

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::io;
 
 use super::provenance::ProvenanceError;
+use crate::base::replace::TargetIsInput;
 use crate::cells::group::GroupError;
 use crate::cells::moments::MomentOverflow;
 use crate::engine::spark::SparkError;
@@ -112,6 +113,12 @@ pub enum StudyError {
         /// As given.
         argument: String,
     },
+    /// A filter that keeps no episode.
+    #[error("{words}\n  help: give a filter that holds for some of them, or none")]
+    EmptyFilter {
+        /// How many there are, and the values of the columns that the filter names.
+        words: String,
+    },
     /// A report would be written over the one that it is made from.
     #[error(
         "{out}: expected a folder beside the report, found the report itself\n  \
@@ -215,6 +222,9 @@ pub enum StudyError {
     #[cfg(feature = "polars")]
     #[error(transparent)]
     Polars(#[from] crate::engine::polars::run::PolarsError),
+    /// An output is one of the files that are read.
+    #[error(transparent)]
+    Target(#[from] TargetIsInput),
     /// The operating system refuses.
     #[error(transparent)]
     System(#[from] io::Error),

@@ -5,7 +5,6 @@ use super::scan::Results;
 use crate::cells::cell::Cells;
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::report::bundle::OutputFile;
-use crate::report::figures::e5_outcomes::Outcomes;
 use crate::report::figures::{self, Figure, FigureError, FigureFormat, FigureName, Input};
 use crate::report::style::Style;
 
@@ -15,7 +14,6 @@ pub struct FigureInputs<'a> {
     cells: Cells,
     order: &'a [String],
     results: &'a Results,
-    outcomes: Option<Outcomes>,
 }
 
 /// The figures of a report.
@@ -34,8 +32,7 @@ impl<'a> FigureInputs<'a> {
     /// Sums of squares that leave 128 bits.
     pub fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        let outcomes = results.timelines.as_deref().and_then(|timelines| Outcomes::of(&results.episodes, timelines));
-        Ok(Self { cells, order: &style.sheet.row_order, results, outcomes })
+        Ok(Self { cells, order: &style.sheet.row_order, results })
     }
 
     /// One figure.
@@ -63,7 +60,7 @@ impl<'a> FigureInputs<'a> {
             cells: &self.cells,
             order: self.order,
             episodes: Some(&self.results.episodes),
-            outcomes: self.outcomes.as_ref(),
+            outcomes: self.results.outcomes.as_ref(),
             timelines: self.results.timelines.as_deref(),
         }
     }

@@ -11,6 +11,7 @@
 
 mod backend;
 mod diff;
+mod empty_filter;
 mod error;
 mod figure_inputs;
 mod input_hashes;
@@ -22,7 +23,7 @@ mod scan;
 mod scores;
 
 use std::num::NonZeroUsize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::cells::cell::Cells;
 use crate::cells::group::{DEFAULT_BY, KEY_COLUMNS, group};
@@ -47,7 +48,7 @@ pub use error::StudyError;
 pub use figure_inputs::{Drawings, FigureInputs};
 pub use inputs::{ScoreFile, Source, resolve};
 pub use provenance::ProvenanceError;
-pub use report::{Report, ReportOptions};
+pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
 pub use scan::{Outputs, Results};
 
@@ -242,6 +243,7 @@ impl Study {
     /// As [`Study::score`]; sums of squares beyond 128 bits.
     pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
         let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
+        self.check_filter(results.episodes.len())?;
         let cells = group(&results.episodes, &self.question.by)?;
         let options = Options { lost: results.lost, ..options.clone() };
         Ok(Statistics::of(&results.episodes, &cells, &options)?)
@@ -253,7 +255,8 @@ impl Study {
     /// As [`Study::score`]; inputs that lack what the figure needs.
     pub fn figure(&self, name: FigureName, style: &str) -> Result<Figure, StudyError> {
         let style = Style::load(style)?;
-        let results = self.scan(Outputs { timelines: true, ..Outputs::default() })?;
+        let results = self.scan(Outputs::of_figures(&[name]))?;
+        self.check_filter(results.episodes.len())?;
         Ok(FigureInputs::of(&results, &style)?.draw(name)?)
     }
 
@@ -286,6 +289,13 @@ impl Study {
         let style = Style::load(style)?;
         let tables = layout::tables(&self.cells()?, &style)?;
         Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
+    }
+
+    /// The files that an answer is made from: inputs, definitions and, where there is one, a style. An output that is one of
+    /// them would replace what it is made from. Names of built-in definitions and styles are in it too.
+    pub fn files_read(&self, style: Option<&str>) -> Vec<PathBuf> {
+        let named = self.question.definitions.as_deref().into_iter().chain(style).map(PathBuf::from);
+        self.inputs.iter().map(|input| input.path.clone()).chain(named).collect()
     }
 
     /// Refuses inputs that are not what they were when they were opened.

@@ -1,6 +1,6 @@
 //! The report of a study: tables, figures, a page, and the folder that holds them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Study;
 use super::error::StudyError;
@@ -53,9 +53,28 @@ pub struct Report {
     pub(super) style: Style,
     /// Figures and the page.
     illustrations: Vec<OutputFile>,
+    /// The files that it is made from, none of which it may replace.
+    read: Vec<PathBuf>,
+}
+
+/// A report that was written.
+#[derive(Clone, Debug)]
+pub struct WrittenReport {
+    /// The paths of its files inside the folder, in order.
+    pub files: Vec<String>,
+    /// Its manifest, with the outputs.
+    pub manifest: Manifest,
 }
 
 impl Study {
+    /// Refuses a folder whose report has a file that this study reads, before anything is read.
+    ///
+    /// # Errors
+    /// When it has one.
+    pub fn check_folder(&self, out: &Path, options: &ReportOptions) -> Result<(), StudyError> {
+        Ok(bundle::check_old(out, &self.files_read(Some(&options.style)))?)
+    }
+
     /// Makes the report of the study.
     ///
     /// # Errors
@@ -63,13 +82,15 @@ impl Study {
     pub fn report(&self, options: &ReportOptions) -> Result<Report, StudyError> {
         // Small files first: a slip in the style should not cost a pass over the traces.
         let style = Style::load(&options.style)?;
-        let results = self.scan(Outputs { timelines: options.figures, losses: options.figures, hashes: true })?;
+        let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
+        let results = self.scan(Outputs { losses: options.figures, hashes: true, ..Outputs::of_figures(figures) })?;
+        self.check_filter(results.episodes.len())?;
         let cells = group(&results.episodes, &self.question.by)?;
         let tables = layout::tables(&cells, &style)?;
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
-        let (notes, illustrations) = (Vec::new(), Vec::new());
-        let mut report = Report { results, cells, tables, manifest, notes, style, illustrations };
+        let (notes, illustrations, read) = (Vec::new(), Vec::new(), self.files_read(Some(&options.style)));
+        let mut report = Report { results, cells, tables, manifest, notes, style, illustrations, read };
         if options.figures {
             report.illustrate()?;
         }
@@ -88,16 +109,18 @@ impl Report {
         self.tables.iter().find(|table| table.name == name).map(markdown::render)
     }
 
-    /// Writes the folder of the report; returns the paths of its files inside it, in order.
+    /// Writes the folder of the report, in place of the report that is there.
     ///
     /// # Errors
-    /// Where `out` is no folder or cannot be written; the folder is then as it was.
-    pub fn write(&self, out: &Path) -> Result<Vec<String>, StudyError> {
+    /// Where `out` is no folder or cannot be written; the folder is then as it was, or has no manifest. A file of the old
+    /// report that this one is made from.
+    pub fn write(&self, out: &Path) -> Result<WrittenReport, StudyError> {
         let mut episodes = Vec::new();
         format::write(&self.results.episodes, Format::Parquet, &mut episodes)?;
-        let Self { cells, tables, manifest, illustrations: others, .. } = self;
-        let written = bundle::write(out, &Bundle { cells, tables, episodes: &episodes, manifest, others })?;
-        Ok(written.iter().map(|path| path.strip_prefix(out).unwrap_or(path).display().to_string()).collect())
+        let Self { cells, tables, manifest, illustrations: others, read, .. } = self;
+        let written = bundle::write(out, &Bundle { cells, tables, episodes: &episodes, manifest, read, others })?;
+        let inside = |path: &PathBuf| path.strip_prefix(out).unwrap_or(path).display().to_string();
+        Ok(WrittenReport { files: written.files.iter().map(inside).collect(), manifest: written.manifest })
     }
 
     /// Adds the figures and the page.

@@ -26,6 +26,8 @@ pub struct RescoreRequest {
     pub definitions: String,
     /// Folders or files where the traces are; the current folder, the report's folder and those above it if empty.
     pub places: Vec<PathBuf>,
+    /// The folder that the new report is for.
+    pub out: PathBuf,
     /// Another style than the report's.
     pub style: Option<String>,
     /// Other metrics than the report's.
@@ -54,6 +56,7 @@ impl RescoreRequest {
         let inputs = provenance::traces(&manifest, &provenance::places(&self.report, &self.places))?;
         let study = Study::of(inputs)?.threads(self.threads).asked(self.question(&manifest))?;
         study.source.traces()?;
+        study.check_folder(&self.out, &options)?;
         let before = self.scores_before(&manifest);
         let report = study.report(&options)?;
         let changes = match before {

@@ -3,12 +3,17 @@
 //! Rule: all forms say the same. What asks for single rows may take either; what needs an array asks for one
 //! ([`Column::flat`]), which costs as much as the rows are many.
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, Int32Array, StringArray, UInt8Array, UInt32Array};
-use arrow::compute::{cast, concat, take};
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+
+use arrow::array::{
+    Array as _, ArrayBuilder as _, ArrayRef, AsArray as _, DictionaryArray, Int32Array, Int32Builder, StringArray,
+    StringBuilder, UInt8Array, UInt32Array,
+};
+use arrow::compute::{concat, take};
 use arrow::datatypes::{ArrowNativeType as _, DataType, Int32Type, Int64Type};
 use arrow::error::ArrowError;
-
-use super::open::text_type;
 
 /// The values of some rows.
 #[derive(Clone, Debug)]
@@ -126,20 +131,46 @@ impl Column {
 
     /// The rows of some columns of one kind, one after the other.
     pub(super) fn concat<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Result<Self, ArrowError> {
-        let arrays = parts.into_iter().map(|part| plain(&part.flat()?)).collect::<Result<Vec<_>, _>>()?;
+        let parts: Vec<&Self> = parts.into_iter().collect();
+        if parts.iter().all(|part| part.holds_texts()) {
+            return joined_texts(&parts).map(Self::Flat);
+        }
+        let arrays = parts.into_iter().map(Self::flat).collect::<Result<Vec<_>, _>>()?;
         let arrays: Vec<_> = arrays.iter().map(AsRef::as_ref).collect();
-        let joined = concat(&arrays)?;
-        let texts = *joined.data_type() == DataType::Utf8;
-        Ok(Self::Flat(if texts { cast(&joined, &text_type())? } else { joined }))
+        Ok(Self::Flat(concat(&arrays)?))
+    }
+
+    fn holds_texts(&self) -> bool {
+        let (Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. })) = self;
+        matches!(values.data_type(), DataType::Dictionary(_, _) | DataType::Utf8)
     }
 }
 
-/// Texts without a dictionary: theirs may be large, and the rows few.
-fn plain(values: &ArrayRef) -> Result<ArrayRef, ArrowError> {
-    match values.data_type() {
-        DataType::Dictionary(_, _) => cast(values, &DataType::Utf8),
-        _ => Ok(values.clone()),
+/// The texts of some columns under one dictionary of those that rows have. A text of many rows stays one text: written
+/// out they could be more than an array holds.
+fn joined_texts(parts: &[&Column]) -> Result<ArrayRef, ArrowError> {
+    let mut texts = StringBuilder::new();
+    let mut keys = Int32Builder::new();
+    // The parts stay as they are meanwhile: what is at the same place is the same text.
+    let mut known: HashMap<(*const u8, usize), i32> = HashMap::new();
+    for (part, row) in parts.iter().flat_map(|part| (0..part.len()).map(move |row| (part, row))) {
+        let key = |text: &str| match known.entry((text.as_ptr(), text.len())) {
+            Entry::Occupied(key) => Ok(*key.get()),
+            Entry::Vacant(place) => {
+                let next = narrow_key(texts.len())?;
+                narrow_key(texts.values_slice().len() + text.len())?;
+                texts.append_value(text);
+                Ok::<_, ArrowError>(*place.insert(next))
+            }
+        };
+        keys.append_option(part.text(row).map(key).transpose()?);
     }
+    Ok(Arc::new(DictionaryArray::try_new(keys.finish(), Arc::new(texts.finish()))?))
+}
+
+/// A place in an array of texts, which has at most 2^31.
+fn narrow_key(place: usize) -> Result<i32, ArrowError> {
+    i32::try_from(place).map_err(|_| ArrowError::OffsetOverflowError(place))
 }
 
 impl From<ArrayRef> for Column {
@@ -173,8 +204,11 @@ impl Keys {
 
     /// The values of some keys.
     fn of(&self, keys: &UInt8Array) -> Result<ArrayRef, ArrowError> {
-        let values = take(&self.values, keys, None)?;
-        if *values.data_type() == DataType::Utf8 { cast(&values, &text_type()) } else { Ok(values) }
+        if *self.values.data_type() != DataType::Utf8 {
+            return take(&self.values, keys, None);
+        }
+        let keys = keys.iter().map(|key| key.map(i32::from)).collect::<Int32Array>();
+        Ok(Arc::new(DictionaryArray::try_new(keys, Arc::clone(&self.values))?))
     }
 
     /// Whether the integers of each stretch of rows, bounded by `offsets`, are 1, 2, and so on. May say no where they
@@ -318,8 +352,8 @@ fn narrow(row: usize) -> u32 {
 mod tests {
     use std::sync::Arc;
 
-    use arrow::array::{ArrayRef, AsArray as _, Int64Array};
-    use arrow::datatypes::Int64Type;
+    use arrow::array::{Array as _, ArrayRef, AsArray as _, DictionaryArray, Int64Array, StringArray, UInt8Array};
+    use arrow::datatypes::{Int32Type, Int64Type};
     use proptest::collection::vec;
     use proptest::option;
     use proptest::prelude::*;
@@ -388,6 +422,51 @@ mod tests {
             prop_assert_eq!(&column.at(&odd).unwrap(), &flat.at(&odd).unwrap());
             prop_assert!((0..flat.len()).all(|row| column.int(row) == flat.int(row)));
         }
+    }
+
+    /// Rows of texts in the three forms; `None` is null, and no run.
+    fn forms(rows: &[Option<&str>]) -> Vec<Column> {
+        let flat: DictionaryArray<Int32Type> = rows.iter().copied().collect();
+        let texts: StringArray = rows.iter().flatten().copied().collect::<Vec<_>>().into();
+        let mut next = 0..;
+        let keys: UInt8Array = rows.iter().map(|row| row.and_then(|_| next.next())).collect();
+        let mut forms =
+            vec![Column::Flat(Arc::new(flat.clone())), Column::Keys(Keys::new(keys, Arc::new(texts)).unwrap())];
+        if rows.iter().all(Option::is_some) {
+            let ends = (1..).take(rows.len()).collect();
+            forms.push(Column::Runs(Runs::new(Arc::new(flat), ends)));
+        }
+        forms
+    }
+
+    #[test]
+    fn texts_of_all_forms_are_put_together() {
+        let (some, others) = ([Some("a"), Some("a"), Some(""), Some("é")], [None, Some("a"), Some("b"), None]);
+        for (first, second) in forms(&some).iter().flat_map(|a| forms(&others).into_iter().map(move |b| (a, b))) {
+            let joined = Column::concat([first, &second]).unwrap();
+            let found: Vec<Option<&str>> = (0..joined.len()).map(|row| joined.text(row)).collect();
+            assert_eq!(found, [&some[..], &others[..]].concat());
+            let flat = second.flat().unwrap();
+            let flat = flat.as_dictionary::<Int32Type>().downcast_dict::<StringArray>().unwrap();
+            assert_eq!(flat.into_iter().collect::<Vec<_>>(), others);
+        }
+    }
+
+    #[test]
+    fn more_than_4_gib_of_one_text_are_put_together_without_writing_it_out() {
+        let rows = 35_000;
+        let text = "x".repeat(64 * 1024);
+        let texts = || Arc::new(StringArray::from(vec![text.as_str()])) as ArrayRef;
+        let keyed = Column::Keys(Keys::new(vec![0; rows].into(), texts()).unwrap());
+        let values = DictionaryArray::<Int32Type>::new(vec![0].into(), texts());
+        let runs = Column::Runs(Runs::new(Arc::new(values), vec![u32::try_from(rows).unwrap()]));
+        assert_eq!(keyed.flat().unwrap().len(), rows);
+        assert!(2 * rows * text.len() > u32::MAX as usize);
+        let joined = Column::concat([&keyed, &runs]).unwrap();
+        assert_eq!(joined.len(), 2 * rows);
+        assert!([0, rows, 2 * rows - 1].iter().all(|row| joined.text(*row) == Some(&text)));
+        let Column::Flat(values) = joined else { unreachable!() };
+        assert!(values.get_array_memory_size() < 2 << 20);
     }
 
     #[test]

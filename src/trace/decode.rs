@@ -2,7 +2,6 @@
 //!
 //! Rule: whatever bytes a file holds, decoding gives rows or a finding, never a panic.
 
-use std::fs::File;
 use std::sync::Arc;
 
 use arrow::array::{Array, ArrayRef, AsArray as _, new_null_array};
@@ -10,9 +9,8 @@ use arrow::compute::{cast, concat};
 use arrow::datatypes::{DataType, Int32Type, UInt64Type};
 use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
-use parquet::arrow::arrow_reader::{
-    ArrowReaderMetadata, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowSelection, RowSelector,
-};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader, RowSelection, RowSelector};
+use parquet::basic::Type as Physical;
 
 use super::ahead::Ids;
 use super::column::{Column, all_within};
@@ -21,11 +19,14 @@ use super::finding::{Code, Finding};
 use super::footer::{plain, rows_of};
 use super::layout::{EPISODE_ID, Layout, T};
 use super::open::{TraceFile, text_type};
-use super::pages::{Cursor, Form, Unfit};
+use super::pages::{self, Cursor, FaultSlot, Form, Place, Store, Unfit};
 use super::schema::Kind;
 
 /// Rows that are decoded at a time: the columns of so many stay in a core's cache.
 const BATCH_ROWS: usize = 32 * 1024;
+
+/// Bytes of one column's texts that are decoded at a time, about: an array holds 2 GiB, and texts are not all as long.
+const BATCH_TEXT: u64 = 256 << 20;
 
 /// Some rows of one row group: a column for each of the layout, in its order.
 #[derive(Clone, Debug)]
@@ -68,6 +69,8 @@ pub(super) struct RowGroup<'a> {
     sources: Vec<Source>,
     /// Where the next rows start in the row group.
     first: usize,
+    /// Rows that are decoded at a time.
+    at_a_time: usize,
     /// Nothing more comes: the end, or a fault.
     over: bool,
 }
@@ -89,6 +92,8 @@ struct Library {
     reader: ParquetRecordBatchReader,
     /// Decoded rows that are still to be given.
     held: Vec<ArrayRef>,
+    /// Where the first fault of a page is found.
+    slot: FaultSlot,
 }
 
 impl Library {
@@ -122,16 +127,20 @@ impl<'a> RowGroup<'a> {
         row_group: usize,
         ids: Option<Ids>,
     ) -> Result<Self, Box<Finding>> {
-        let handle = handle(file)?;
+        let store = store(file)?;
         let footer = file.footer()?;
-        let mut rows = Self { file, layout, footer, index: row_group, ids, sources: Vec::new(), first: 0, over: false };
+        let roots = (0..layout.columns.len()).filter_map(|at| root(file, layout, at));
+        let text = roots.filter_map(|root| text_bytes(&footer, root, row_group)).max().unwrap_or(0);
+        let at_a_time = rows_at_a_time(file.row_group_rows(row_group), text);
+        let sources = Vec::new();
+        let mut rows = Self { file, layout, footer, index: row_group, ids, sources, first: 0, at_a_time, over: false };
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {
                 None => Source::Absent,
                 Some(_) if at == EPISODE_ID && rows.ids.is_some() => Source::Ahead,
-                Some(root) => match contained(|| cursor(&rows.footer, &handle, root, row_group, form(layout, at))) {
+                Some(root) => match contained(|| cursor(&rows.footer, &store, root, row_group, form(layout, at))) {
                     Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
-                    Ok(Err(Unfit)) | Err(_) => rows.library(root)?,
+                    Ok(Err(Unfit)) | Err(_) => rows.library(at, root)?,
                 },
             };
             rows.sources.push(source);
@@ -140,18 +149,25 @@ impl<'a> RowGroup<'a> {
     }
 
     /// A column as the library decodes it, from the next row on.
-    fn library(&self, root: usize) -> Result<Source, Box<Finding>> {
-        let corrupt = |error: String| corrupt(self.file, self.index, &error);
-        let handle = handle(self.file)?;
-        let reader = contained(|| reader(&self.footer, handle, root, self.index, self.first)).map_err(corrupt)?;
-        let reader = reader.map_err(|error| corrupt(plain(&error)))?;
-        Ok(Source::Library(Box::new(Library { reader, held: Vec::new() })))
+    fn library(&self, at: usize, root: usize) -> Result<Source, Box<Finding>> {
+        let (store, slot) = (store(self.file)?, FaultSlot::default());
+        let made = contained(|| self.reader(store, root, self.first, &slot));
+        match made.and_then(|reader| reader.map_err(|error| plain(&error))) {
+            Ok(reader) => Ok(Source::Library(Box::new(Library { reader, held: Vec::new(), slot }))),
+            Err(error) => Err(self.damaged(at, &slot, &error)),
+        }
+    }
+
+    /// A column that the library cannot decode, or that it is not given because of a page.
+    fn damaged(&self, at: usize, slot: &FaultSlot, error: &str) -> Box<Finding> {
+        let finding = pages::damaged(self.file.name(), slot, error).in_row_group(self.index);
+        Box::new(finding.in_column(&self.layout.columns[at].name))
     }
 
     fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
         let left = self.file.row_group_rows(self.index) - self.first;
         // Whole episodes where it is known where they end.
-        let most = BATCH_ROWS.min(left);
+        let most = self.at_a_time.min(left);
         let count = self.ids.as_ref().filter(|_| left > 0).map_or(most, |ids| ids.runs.until(self.first, most));
         let columns = (0..self.sources.len()).map(|at| self.column(at, count));
         let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
@@ -175,7 +191,7 @@ impl<'a> RowGroup<'a> {
                 return Ok(column);
             }
             let root = *root;
-            self.sources[at] = self.library(root)?;
+            self.sources[at] = self.library(at, root)?;
         }
         if let (Source::Ahead, Some(ids)) = (&self.sources[at], &self.ids) {
             return Ok(Column::Runs(ids.runs.slice(self.first, count)));
@@ -193,8 +209,14 @@ impl<'a> RowGroup<'a> {
                 return column.map(Column::Flat).map_err(|error| corrupt(self.file, self.index, &error.to_string()));
             }
             let batch = contained(|| library.reader.next())
-                .and_then(|next| next.transpose().map_err(|error| error.to_string()))
-                .map_err(|error| corrupt(self.file, self.index, &error))?;
+                .and_then(|next| next.transpose().map_err(|error| error.to_string()));
+            let batch = match batch {
+                Ok(batch) => batch,
+                Err(error) => {
+                    let slot = Arc::clone(&library.slot);
+                    return Err(self.damaged(at, &slot, &error));
+                }
+            };
             let Some(batch) = batch else {
                 if count == 0 {
                     return Ok(new_null_array(&held_as(kind), 0).into());
@@ -239,9 +261,27 @@ impl<'a> RowGroup<'a> {
     /// A column from a row on, read once more.
     fn anew(&self, at: usize, first: usize) -> Option<Column> {
         let root = root(self.file, self.layout, at)?;
-        let handle = self.file.reader().ok()?;
-        let decoded = contained(|| reader(&self.footer, handle, root, self.index, first).ok()?.next()?.ok()).ok()?;
+        let (store, slot) = (store(self.file).ok()?, FaultSlot::default());
+        let read = || self.reader(store, root, first, &slot).ok()?.next()?.ok();
+        let decoded = contained(read).ok()?;
         normal_column(decoded?.column(0), self.layout.columns[at].kind).ok().map(Column::Flat)
+    }
+
+    /// A reader of one column, from a row on.
+    fn reader(
+        &self,
+        store: Store,
+        root: usize,
+        first: usize,
+        slot: &FaultSlot,
+    ) -> parquet::errors::Result<ParquetRecordBatchReader> {
+        let rows = rows_of(self.footer.metadata().row_group(self.index));
+        let (metadata, slot) = (Arc::clone(self.footer.metadata()), Arc::clone(slot));
+        let library = pages::Library { store, metadata, row_groups: vec![self.index], slot };
+        let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
+        let selection = (first > 0).then(|| RowSelection::from(rest));
+        let column = ProjectionMask::roots(self.footer.parquet_schema(), [root]);
+        library.reader(column, Some(self.footer.schema().fields()), rows.clamp(1, self.at_a_time), selection)
     }
 }
 
@@ -261,13 +301,13 @@ impl Iterator for RowGroup<'_> {
 /// The ids of the episodes of a row group, if its pages are such that they can be had without the other columns.
 pub(super) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
     let root = root(file, layout, EPISODE_ID)?;
-    let (handle, footer) = (file.reader().ok()?, file.footer().ok()?);
-    let read = || cursor(&footer, &handle, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
+    let (store, footer) = (store(file).ok()?, file.footer().ok()?);
+    let read = || cursor(&footer, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
     contained(read).ok()?.ok()
 }
 
-fn handle(file: &TraceFile) -> Result<File, Box<Finding>> {
-    file.reader().map_err(|error| {
+fn store(file: &TraceFile) -> Result<Store, Box<Finding>> {
+    file.reader().map(Store::File).map_err(|error| {
         Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
     })
 }
@@ -284,41 +324,38 @@ fn form(layout: &Layout, at: usize) -> Form {
 
 fn cursor(
     footer: &ArrowReaderMetadata,
-    handle: &File,
+    store: &Store,
     root: usize,
     row_group: usize,
     form: Form,
 ) -> Result<Cursor, Unfit> {
-    let schema = footer.parquet_schema();
-    let leaf = (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root).ok_or(Unfit)?;
-    let row_group = footer.metadata().row_group(row_group);
-    let stored = footer.schema().field(root).data_type();
-    Cursor::open(handle, row_group.column(leaf), stored, rows_of(row_group), form)
+    let leaf = leaf(footer, root).ok_or(Unfit)?;
+    let place = Place { metadata: footer.metadata(), row_group, column: leaf };
+    Cursor::open(store, place, footer.schema().field(root).data_type(), form)
 }
 
-/// A reader of one column, from a row on.
-fn reader(
-    footer: &ArrowReaderMetadata,
-    handle: File,
-    root: usize,
-    row_group: usize,
-    first: usize,
-) -> parquet::errors::Result<ParquetRecordBatchReader> {
-    let rows = rows_of(footer.metadata().row_group(row_group));
-    let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(handle, footer.clone())
-        .with_row_groups(vec![row_group])
-        .with_projection(ProjectionMask::roots(footer.parquet_schema(), [root]))
-        .with_batch_size(rows.clamp(1, BATCH_ROWS));
-    if first == 0 {
-        return reader.build();
-    }
-    let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
-    reader.with_row_selection(RowSelection::from(rest)).build()
+fn leaf(footer: &ArrowReaderMetadata, root: usize) -> Option<usize> {
+    let schema = footer.parquet_schema();
+    (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root)
+}
+
+/// The bytes of a column's texts in a row group, written out if the file says so; `None` for other columns.
+fn text_bytes(footer: &ArrowReaderMetadata, root: usize, row_group: usize) -> Option<u64> {
+    let column = footer.metadata().row_group(row_group).columns().get(leaf(footer, root)?)?;
+    let written_out = column.unencoded_byte_array_data_bytes().unwrap_or_default();
+    let bytes = u64::try_from(column.uncompressed_size().max(written_out)).unwrap_or_default();
+    (column.column_type() == Physical::BYTE_ARRAY).then_some(bytes)
+}
+
+/// Rows to decode at a time of a row group whose largest column has so many bytes of text.
+fn rows_at_a_time(rows: usize, text: u64) -> usize {
+    let fitting = u64::try_from(rows).unwrap_or(u64::MAX).saturating_mul(BATCH_TEXT).checked_div(text);
+    let fitting = fitting.and_then(|rows| usize::try_from(rows).ok()).unwrap_or(usize::MAX);
+    fitting.clamp(1, BATCH_ROWS)
 }
 
 fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {
-    let found = found.split_whitespace().collect::<Vec<_>>().join(" ");
-    Box::new(Finding::new(Code::CorruptData, file.name(), "data that decodes", found).in_row_group(row_group))
+    Box::new(pages::damaged(file.name(), &FaultSlot::default(), found).in_row_group(row_group))
 }
 
 /// How a column of this kind is held in memory.
@@ -370,4 +407,23 @@ fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
     let good = column.values().null_count() == 0
         && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
     if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BATCH_ROWS, BATCH_TEXT, rows_at_a_time};
+
+    #[test]
+    fn long_texts_are_decoded_some_rows_at_a_time() {
+        for (rows, text, expected) in [
+            (0, 0, BATCH_ROWS),
+            (100_000, 0, BATCH_ROWS),
+            (100_000, 100_000 * 100, BATCH_ROWS),
+            (100_000, 100_000 << 16, 4096),
+            (10, 10 * BATCH_TEXT, 1),
+            (10, u64::MAX, 1),
+        ] {
+            assert_eq!(rows_at_a_time(rows, text), expected, "{rows} rows, {text} bytes");
+        }
+    }
 }

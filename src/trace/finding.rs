@@ -102,13 +102,19 @@ pub enum Code {
     UnknownAction,
     /// The reply status is none of the schema's.
     UnknownReplyStatus,
+    /// A colour is not spelled as colours are, or none of the palette.
+    InvalidColor,
+    /// A claimed colour is no body's and no cube's in all inputs.
+    UnseenColor,
     /// An episode's rows lie in more than one row group.
     SplitEpisode,
+    /// Replies of the file gave no decision.
+    UnreadableReplies,
 }
 
 impl Code {
     /// All codes, in the order of the documentation.
-    pub const ALL: [Self; 27] = [
+    pub const ALL: [Self; 30] = [
         Self::Unreadable,
         Self::EmptyFile,
         Self::NotParquet,
@@ -135,7 +141,10 @@ impl Code {
         Self::UnknownExperiment,
         Self::UnknownAction,
         Self::UnknownReplyStatus,
+        Self::InvalidColor,
+        Self::UnseenColor,
         Self::SplitEpisode,
+        Self::UnreadableReplies,
     ];
 
     /// The stable name, `t-gap`.
@@ -156,7 +165,7 @@ impl Code {
     /// How much it matters.
     pub const fn severity(self) -> Severity {
         match self {
-            Self::SplitEpisode => Severity::Note,
+            Self::UnseenColor | Self::SplitEpisode | Self::UnreadableReplies => Severity::Note,
             _ => Severity::Error,
         }
     }
@@ -184,7 +193,7 @@ impl Code {
             ),
             Self::InvalidMetadata => (
                 "invalid-metadata",
-                "`mirrorstats.schema_version` is a whole number from 1",
+                "`mirrorstats.schema_version` is a whole number from 1; a `palette` in `mirrorstats.recording` lists colours",
                 "correct or remove that key in the footer; a file without it is read as version 1",
             ),
             Self::NewerSchema => (
@@ -256,10 +265,25 @@ impl Code {
             Self::UnknownReplyStatus => {
                 ("unknown-reply-status", "a reply status is one of the schema's", "use one of the names, or null")
             }
+            Self::InvalidColor => (
+                "invalid-color",
+                "a colour is a lower-case name, of the palette in the footer where there is one, and has one spelling",
+                "write the colour as the palette or the other rows do",
+            ),
+            Self::UnseenColor => (
+                "unseen-color",
+                "a claimed colour is that of a body or of a selected cube in the inputs",
+                "nothing to do where the agent said so: the claim counts as a wrong one",
+            ),
             Self::SplitEpisode => (
                 "split-episode",
                 "an episode's rows are in one row group",
                 "nothing to do: the episode is read whole; mirrorstats' own writer keeps it together",
+            ),
+            Self::UnreadableReplies => (
+                "unreadable-replies",
+                "every reply could be read: its status is `ok` or `repaired`",
+                "the column `reply` holds what was replied; to the metrics these are steps without a decision",
             ),
         }
     }
@@ -332,15 +356,15 @@ impl fmt::Display for Finding {
             write!(f, ", row group {row_group}")?;
         }
         if let Some(episode) = &self.episode {
-            write!(f, ", episode `{}`", episode.escape_debug())?;
+            write!(f, ", episode `{}`", visible(episode))?;
         }
         if let Some(t) = self.t {
             write!(f, ", t = {t}")?;
         }
         if let Some(column) = &self.column {
-            write!(f, ", column `{}`", column.escape_debug())?;
+            write!(f, ", column `{}`", visible(column))?;
         }
-        write!(f, "\n  expected {}\n  found {}\n  help: {}", self.expected, self.found, self.help)
+        write!(f, "\n  expected {}\n  found {}\n  help: {}", visible(&self.expected), visible(&self.found), self.help)
     }
 }
 

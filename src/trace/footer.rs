@@ -14,6 +14,7 @@ use parquet::file::metadata::{
 
 use super::contain::contained;
 use super::finding::{Code, Finding};
+use super::footer_shape;
 use super::inputs::Input;
 use super::open::{FileColumn, text_type};
 use super::schema::Kind;
@@ -70,6 +71,7 @@ pub(super) fn footer(input: &Input, extent: Extent) -> Result<(u64, ParquetMetaD
         let found = format!("{bytes} bytes that end without it");
         return Err(finding(Code::Truncated, "a footer at the end, closed with `PAR1`", found));
     }
+    footer_shape::check_file(&file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
     let reader = || ParquetMetaDataReader::new().with_metadata_options(Some(extent.options()));
     match contained(|| reader().parse_and_finish(&file)) {
         Ok(Ok(metadata)) => Ok((bytes, metadata)),

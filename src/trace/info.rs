@@ -10,6 +10,7 @@ use serde::Serialize;
 use super::column::text_at;
 use super::finding::TraceError;
 use super::open::{TraceFile, TraceSet};
+use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::rules::int_at;
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{self, Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
@@ -32,6 +33,8 @@ pub struct Info {
     pub runs: Vec<i64>,
     /// Every experiment with every model, in that order.
     pub coverage: Vec<Cell>,
+    /// What became of the replies; null where no file has the column `reply_status`.
+    pub replies: Option<ReplyCounts>,
     /// The columns of all files.
     pub columns: Vec<ColumnInfo>,
     /// The files, in their order.
@@ -99,18 +102,23 @@ pub struct FileInfo {
     pub recording: Option<serde_json::Value>,
 }
 
-/// Summarises these traces; reads the key columns of all rows, and every byte for its hash.
+/// Summarises these traces; reads the key columns and `reply_status` of all rows, and every byte for its hash.
 ///
 /// # Errors
 /// The first fault of the traces, or a file that cannot be read.
 pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
+    let statuses: Vec<String> = set.column(REPLY_STATUS).map(|_| REPLY_STATUS.to_owned()).into_iter().collect();
+    let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
     let summary = set.scan(
-        &Projection::default(),
+        &Projection { unchecked: statuses, ..Projection::default() },
         threads,
-        |batch| Ok::<_, TraceError>(keys(&batch)),
-        |keys| {
+        |batch| Ok::<_, TraceError>((keys(&batch), ReplyCounts::of_batch(&batch))),
+        |(keys, counts)| {
             tally.add(keys);
+            if let Some(replies) = &mut replies {
+                replies.merge(&counts);
+            }
             Ok(())
         },
     )?;
@@ -119,6 +127,7 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
         episodes: summary.episodes,
         steps: summary.steps,
         coverage: tally.coverage(),
+        replies,
         columns: columns(set),
         files: files.collect::<Result<_, _>>()?,
         seeds: tally.pairs.iter().map(|pair| pair.seed).collect::<BTreeSet<_>>().into_iter().collect(),

@@ -56,6 +56,13 @@ impl Layout {
         Ok(())
     }
 
+    /// Takes the values of a column as they are, whatever the schema says of them.
+    pub(super) fn without_rules(&mut self, name: &str) {
+        for column in self.columns.iter_mut().filter(|column| column.name == name) {
+            column.known = None;
+        }
+    }
+
     /// Where the column of this name is.
     pub(super) fn position(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| column.name == name)

@@ -9,18 +9,25 @@ use std::sync::Arc;
 use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Int64Type, SchemaRef};
-use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::arrow::arrow_writer::ArrowWriterOptions;
-use parquet::file::reader::ChunkReader;
-use tempfile::NamedTempFile;
+use parquet::arrow::{ArrowWriter, ProjectionMask};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader};
 
+use super::bounds;
 use super::contain::contained;
 use super::episode::Episode;
-use super::finding::TraceError;
+use super::finding::{Code, Finding, TraceError};
+use super::footer::{Extent, footer, plain};
+use super::inputs::Input;
+use super::open::is_nested;
+use super::pages::{FaultSlot, Library, Store, damaged};
 use super::restore::{self, NotAnEpisode};
 use super::write::{self, OptionalColumns, ROW_GROUP_ROWS, TraceEncoder, TraceMetadata};
-use crate::base::temporary;
+use crate::base::replace::{self, NewFile};
+
+/// Rows that are decoded at a time.
+const BATCH_ROWS: usize = 8 << 10;
 
 /// The rows of one episode, with what it is ordered and found by.
 #[derive(Clone, Debug)]
@@ -77,18 +84,30 @@ impl EpisodeRows {
 /// When the file cannot be read, is damaged, or lacks the columns that tell episodes apart.
 pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     let name = path.display().to_string();
+    let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
     let file = File::open(path).map_err(|error| unreadable(&name, error.into()))?;
-    decode(&name, file)
+    let (bytes, metadata) = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
+    match bounds::fault(&name, bytes, &metadata) {
+        // Whoever puts traces together takes one without rows as it is.
+        Some(fault) if fault.code != Code::NoEpisodes => Err(damaged(fault)),
+        _ => decode(&name, Store::File(file), metadata),
+    }
 }
 
-fn decode(name: &str, bytes: impl ChunkReader + 'static) -> Result<Vec<EpisodeRows>, TraceError> {
+fn decode(name: &str, store: Store, metadata: ParquetMetaData) -> Result<Vec<EpisodeRows>, TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
+    let columns = metadata.file_metadata().schema_descr().columns();
+    if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
+        return Err(failed(is_nested(name, &nested.path().parts()[0]).to_string().into()));
+    }
     contained(|| {
-        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let reader = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options)
-            .and_then(ParquetRecordBatchReaderBuilder::build)
-            .map_err(|error| failed(error.into()))?;
-        let batches = reader.collect::<Result<Vec<_>, _>>().map_err(|error| failed(error.into()))?;
+        let row_groups = (0..metadata.num_row_groups()).collect();
+        let slot = FaultSlot::default();
+        let library = Library { store, metadata: Arc::new(metadata), row_groups, slot: Arc::clone(&slot) };
+        let damaged = |error: String| failed(damaged(name, &slot, &error).to_string().into());
+        let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, None);
+        let batches = reader.map_err(|error| damaged(plain(&error)))?.collect::<Result<Vec<_>, _>>();
+        let batches = batches.map_err(|error| damaged(error.to_string()))?;
         let Some(first) = batches.first() else { return Ok(Vec::new()) };
         let rows = concat_batches(&first.schema(), &batches).map_err(|error| failed(error.into()))?;
         episodes(&rows).map_err(|fault| failed(fault.into()))
@@ -134,15 +153,30 @@ pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows,
     let mut encoder = TraceEncoder::new(Vec::new(), &metadata)?;
     encoder.write(episode)?;
     let bytes = bytes::Bytes::from(encoder.finish()?);
-    let mut rows = decode("memory", bytes)?;
+    let failed = |error: ParquetError| unreadable("memory", error.into());
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&bytes).map_err(failed)?;
+    let mut rows = decode("memory", Store::memory(bytes), metadata)?;
     rows.pop().ok_or_else(|| TraceError::Part { file: "memory".to_owned(), source: "no episode came back".into() })
 }
 
-/// Writes these episodes, in this order, as the trace at `path`, which appears whole or not at all.
+/// Replaces the trace at `path` by one of these episodes, in this order.
 ///
 /// # Errors
-/// When the episodes do not have the same columns, or whatever writing gives.
+/// When the episodes do not have the same columns, or whatever writing gives; the trace at `path` is as it was then.
 pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
+    write_in(replace::folder_of(path), path, recording, episodes)
+}
+
+/// As [`write()`], with the temporary file in `scratch`, a folder of the same file system.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_in(
+    scratch: &Path,
+    path: &Path,
+    recording: Option<&serde_json::Value>,
+    episodes: &[EpisodeRows],
+) -> Result<(), TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write {
         file: path.display().to_string(),
         source,
@@ -152,11 +186,9 @@ pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[Epi
     if let Some(other) = episodes.iter().find(|episode| !same_columns(&schema, &episode.rows.schema())) {
         return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = temporary::file_in(folder).map_err(|error| failed(error.into()))?;
+    let file = NewFile::create_in(scratch, path).map_err(|error| failed(error.into()))?;
     let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
-    file.as_file().sync_all().map_err(|error| failed(error.into()))?;
-    file.persist(path).map(drop).map_err(|error| failed(error.error.into()))
+    file.commit().map_err(|error| failed(error.into()))
 }
 
 fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
@@ -167,11 +199,11 @@ fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
 }
 
 fn encode(
-    file: NamedTempFile,
+    file: NewFile,
     schema: &SchemaRef,
     recording: Option<&serde_json::Value>,
     episodes: &[EpisodeRows],
-) -> parquet::errors::Result<NamedTempFile> {
+) -> parquet::errors::Result<NewFile> {
     let options =
         ArrowWriterOptions::new().with_properties(write::properties(recording)).with_skip_arrow_metadata(true);
     let mut parquet = ArrowWriter::try_new_with_options(file, Arc::clone(schema), options)?;

@@ -3,6 +3,8 @@
 //! Rule: only this room opens traces. It knows no metric.
 
 mod ahead;
+mod bounds;
+pub mod colors;
 mod column;
 pub(crate) mod contain;
 mod decode;
@@ -10,6 +12,7 @@ pub mod describe;
 pub mod episode;
 pub mod finding;
 mod footer;
+pub(crate) mod footer_shape;
 mod ids;
 pub mod import;
 pub mod info;
@@ -19,11 +22,14 @@ pub mod merge;
 pub mod open;
 mod pages;
 mod pass;
+pub mod replies;
 pub mod restore;
 pub mod rewrite;
 mod rules;
 pub mod scan;
 pub mod schema;
 mod source;
+mod thrift;
 pub mod validate;
+pub mod verify;
 pub mod write;

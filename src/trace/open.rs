@@ -15,12 +15,15 @@ use parquet::basic::ConvertedType;
 use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 
+use super::bounds;
+use super::colors::palette::{Declared, Palette};
 use super::contain::contained;
 use super::finding::{Code, Finding, TraceError};
 use super::footer::{Extent, footer, plain, readable, rows_of};
 use super::inputs::Input;
 use super::schema::{self, COLUMNS, Kind};
 use crate::base::near::nearest;
+use crate::base::visible::visible;
 
 /// Traces that are open: every footer is read and good, no row is read yet.
 #[derive(Debug)]
@@ -38,6 +41,7 @@ pub struct TraceFile {
     /// The rows of each row group.
     rows: Vec<usize>,
     pairs: Vec<KeyValue>,
+    colors: Declared,
     /// What a reader needs, while somebody reads: footers of many row groups are large.
     footer: Mutex<Weak<ArrowReaderMetadata>>,
 }
@@ -138,16 +142,17 @@ impl TraceFile {
         check_version(&input.name, &metadata).map_err(|finding| vec![*finding])?;
         let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
         let mut findings = check_columns(&input.name, &columns);
-        findings.extend(check_rows(&input.name, bytes, &metadata));
+        findings.extend(bounds::fault(&input.name, bytes, &metadata));
         if !findings.is_empty() {
             return Err(findings);
         }
         let rows = metadata.row_groups().iter().map(rows_of).collect();
         let pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        let colors = Declared::of(&input.name, value(&pairs, schema::RECORDING_KEY)).map_err(|f| vec![*f])?;
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
         let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
-        Ok(Self { name, path, bytes, columns, rows, pairs, footer })
+        Ok(Self { name, path, bytes, columns, rows, pairs, colors, footer })
     }
 
     /// The name in messages and outputs.
@@ -206,6 +211,16 @@ impl TraceFile {
         &self.pairs
     }
 
+    /// The palette that the footer declares, if it declares one.
+    pub(crate) fn palette(&self) -> Option<&Palette> {
+        self.colors.palette.as_ref()
+    }
+
+    /// The colours that the footer declares.
+    pub(super) fn colors(&self) -> &Declared {
+        &self.colors
+    }
+
     /// A value of the footer's key-value metadata.
     pub fn metadata_value(&self, key: &str) -> Option<&str> {
         value(&self.pairs, key)
@@ -254,7 +269,7 @@ fn check_version(file: &str, metadata: &ParquetMetaData) -> Result<(), Box<Findi
         Ok(version) if version > 0 => Ok(()),
         _ => {
             let expected = format!("`{}` to be a whole number from 1", schema::VERSION_KEY);
-            Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", text.escape_debug()))))
+            Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", visible(text)))))
         }
     }
 }
@@ -266,11 +281,22 @@ fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColum
         .map_err(corrupt)?
         .map_err(|error| corrupt(plain(&error)))?;
     let roots = descriptor.root_schema().get_fields();
+    let nested: Vec<Finding> = roots.iter().filter(|root| root.is_group()).map(|root| is_nested(file, root.name())).collect();
+    if !nested.is_empty() {
+        return Err(nested);
+    }
     let columns = fields.fields().iter().zip(roots).map(|(field, root)| {
         let text = root.get_basic_info().converted_type() == ConvertedType::UTF8;
         FileColumn { name: field.name().clone(), kind: kind_of(field.data_type(), text) }
     });
     Ok(columns.collect())
+}
+
+/// Lists, structs and maps are refused whether or not somebody reads them: their levels declare how many values there are,
+/// and no count of the file bounds those.
+pub(super) fn is_nested(file: &str, column: &str) -> Finding {
+    let expected = "a column with one value per row; leave it out, or write its parts as columns of their own";
+    Finding::new(Code::WrongType, file, expected, "a list, a struct or a map").in_column(column)
 }
 
 fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
@@ -314,32 +340,6 @@ fn check_columns(file: &str, columns: &[FileColumn]) -> Vec<Finding> {
         }
     }
     findings
-}
-
-/// What the footer says about rows and where they lie.
-fn check_rows(file: &str, bytes: u64, metadata: &ParquetMetaData) -> Option<Finding> {
-    let groups = metadata.row_groups();
-    let declared = metadata.file_metadata().num_rows();
-    let counted = groups.iter().try_fold(0_i64, |sum, group| {
-        let rows = group.num_rows();
-        if rows < 0 { None } else { sum.checked_add(rows) }
-    });
-    if counted != Some(declared) {
-        let found = counted.map_or("counts that make no sum".to_owned(), |counted| counted.to_string());
-        return Some(Finding::new(Code::CorruptFooter, file, format!("row groups of {declared} rows together"), found));
-    }
-    for (i, group) in groups.iter().enumerate() {
-        for chunk in group.columns() {
-            let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
-            let end = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok());
-            if end.and_then(|(start, length)| start.checked_add(length)).is_none_or(|end| end > bytes) {
-                let found = "one that lies outside of it";
-                let finding = Finding::new(Code::CorruptFooter, file, "columns that lie within the file", found);
-                return Some(finding.in_row_group(i).in_column(chunk.column_path().string()));
-            }
-        }
-    }
-    (declared == 0).then(|| Finding::new(Code::NoEpisodes, file, "at least one episode", "no row"))
 }
 
 /// How text is held in memory: keys into the distinct values.

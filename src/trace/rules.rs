@@ -6,12 +6,15 @@
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 
+use super::colors::{self, palette::Palette};
 use super::column::{Column as Held, Keys, Runs, text_at};
 use super::finding::{Code, Finding};
 use super::layout::{EPISODE_ID, EXPERIMENT, Layout, LayoutColumn, T};
+use super::open::TraceFile;
 use super::pass::Episodes;
 use super::schema::{Column, Kind};
 use crate::base::near::nearest;
+use crate::base::visible::visible;
 
 /// A finding and its row among the episodes'.
 pub(super) struct Located {
@@ -37,17 +40,19 @@ struct Look<'a> {
 
 impl Rules<'_> {
     /// Everything that is wrong with these episodes, by row and then by column.
-    pub(super) fn check(&self, file: &str, episodes: &Episodes) -> Vec<Located> {
+    pub(super) fn check(&self, file: &TraceFile, episodes: &Episodes) -> Vec<Located> {
         let mut found = Vec::new();
+        let palette = file.palette();
+        let file = file.name();
         for (at, column) in self.layout.columns.iter().enumerate() {
             let held = &episodes.columns[at];
             if let Held::Runs(runs) = held
-                && self.keeps(at, runs, &episodes.offsets)
+                && self.keeps(at, runs, &episodes.offsets, palette)
             {
                 continue;
             }
             if let Held::Keys(keys) = held
-                && self.keeps_keyed(at, keys, &episodes.offsets)
+                && self.keeps_keyed(at, keys, &episodes.offsets, palette)
             {
                 continue;
             }
@@ -63,6 +68,7 @@ impl Rules<'_> {
             if let Some(known) = column.known {
                 look.nulls(known);
                 look.values(known);
+                look.colors(known, palette);
                 // That t counts from 1 says more than any range.
                 if at != T {
                     look.range(known);
@@ -84,40 +90,44 @@ impl Rules<'_> {
 
 impl Rules<'_> {
     /// The fast look at a column that is held as runs. May say no where the slow one finds nothing.
-    fn keeps(&self, at: usize, runs: &Runs, offsets: &[usize]) -> bool {
+    fn keeps(&self, at: usize, runs: &Runs, offsets: &[usize], palette: Option<&Palette>) -> bool {
         let values = runs.values();
         // Only columns that are constant in an episode are held as runs.
         if at == T || values.null_count() > 0 || !runs.start_only_at(offsets) {
             return false;
         }
         let values = values.as_any_dictionary_opt().map_or(values, |texts| texts.values());
-        let harmless = self.layout.columns[at].known.is_none_or(|known| harmless(known, values));
+        let harmless = self.layout.columns[at].known.is_none_or(|known| harmless(known, values, palette));
         let experiments = self.experiments.filter(|_| at == EXPERIMENT);
         harmless && experiments.is_none_or(|known| !any_text(values, |text| !known.iter().any(|k| k == text)))
     }
 
     /// The fast look at a column that is held as keys. May say no where the slow one finds nothing.
-    fn keeps_keyed(&self, at: usize, keys: &Keys, offsets: &[usize]) -> bool {
+    fn keeps_keyed(&self, at: usize, keys: &Keys, offsets: &[usize], palette: Option<&Palette>) -> bool {
         let column = &self.layout.columns[at];
         let nulls = keys.keys().null_count() > 0;
         match column.known {
             _ if column.constant => false,
             _ if at == T => keys.count_from_one(offsets),
-            Some(known) => (known.nullable || !nulls) && harmless(known, keys.values()),
+            Some(known) => (known.nullable || !nulls) && harmless(known, keys.values(), palette),
             None => true,
         }
     }
 }
 
 /// Whether no value, an integer or a text, breaks a rule of its column.
-fn harmless(known: &Column, values: &ArrayRef) -> bool {
+fn harmless(known: &Column, values: &ArrayRef, palette: Option<&Palette>) -> bool {
     match known.stored.kind() {
         Kind::Int => {
             let (lowest, highest) = known.stored.range().unwrap_or((i64::MIN, i64::MAX));
             let (min, max) = extent(values.as_primitive::<Int64Type>().values());
             min >= lowest && max <= highest && !(known.counts() && min < 0)
         }
-        Kind::String => odd_text(known).is_none_or(|(_, odd)| !any_text(values, odd)),
+        Kind::String => {
+            let colors = colors::column(known.name);
+            odd_text(known).is_none_or(|(_, odd)| !any_text(values, odd))
+                && colors.is_none_or(|colors| !any_text(values, |text| !colors.may_hold(text, palette)))
+        }
         _ => false,
     }
 }
@@ -228,6 +238,16 @@ impl Look<'_> {
         if odd_keys.contains(&true) {
             let bad = |row| texts.key(row).is_some_and(|key| odd_keys[key]);
             self.each_episode(code, expected, bad, |row| shown(values, row));
+        }
+    }
+
+    /// Colours that the column may not hold.
+    fn colors(&mut self, known: &Column, palette: Option<&Palette>) {
+        let Some(column) = colors::column(known.name) else { return };
+        let before = self.found.len();
+        self.odd_texts(Code::InvalidColor, &column.expected(palette), |text| !column.may_hold(text, palette));
+        for located in &mut self.found[before..] {
+            located.finding.help = column.help(text_at(self.values, located.row).unwrap_or_default(), palette);
         }
     }
 
@@ -368,7 +388,7 @@ fn shown(values: &ArrayRef, row: usize) -> String {
         return "null".into();
     }
     if values.as_dictionary_opt::<Int32Type>().is_some() {
-        return format!("`{}`", text_at(values, row).unwrap_or_default().escape_debug());
+        return format!("`{}`", visible(text_at(values, row).unwrap_or_default()));
     }
     let any = values.as_any();
     let number = any.downcast_ref::<Int64Array>().map(|ints| ints.value(row).to_string());

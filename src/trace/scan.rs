@@ -10,6 +10,7 @@ use arrow::array::{Array as _, ArrayRef, RecordBatch, RecordBatchOptions, String
 use arrow::datatypes::{Field, Schema};
 use arrow::error::ArrowError;
 
+use super::colors::set::{Spellings, other_names};
 use super::finding::TraceError;
 use super::ids::{Prints, hashes};
 use super::layout::Layout;
@@ -22,10 +23,19 @@ use super::rules::{Located, Rules};
 pub struct Projection {
     /// Columns with a value a step.
     pub steps: Vec<String>,
+    /// Columns with a value a step that are taken as they are: the schema's rules about values do not count.
+    pub unchecked: Vec<String>,
     /// Columns with a value an episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
     pub constants: Vec<String>,
     /// The experiments that are known; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
+}
+
+impl Projection {
+    /// The columns with a value a step.
+    fn step_columns(&self) -> impl Iterator<Item = &str> {
+        self.steps.iter().chain(&self.unchecked).map(String::as_str)
+    }
 }
 
 /// The first columns of [`EpisodeBatch::episodes`].
@@ -40,9 +50,9 @@ pub const EPISODE_COLUMNS: [&str; 5] = ["episode_id", "model", "experiment", "se
 pub struct EpisodeBatch {
     /// The rows of episode `i` in `steps` are `offsets[i]..offsets[i + 1]`; its timesteps are 1, 2, ... in that order.
     pub offsets: Vec<usize>,
-    /// A row a step: the columns of [`Projection::steps`], but for those in `texts`.
+    /// A row a step: the columns of [`Projection::steps`] and [`Projection::unchecked`], but for those in `texts`.
     pub steps: RecordBatch,
-    /// Columns of [`Projection::steps`].
+    /// Columns of [`Projection::steps`] and [`Projection::unchecked`].
     pub texts: Vec<Texts>,
     /// A row an episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
     pub episodes: RecordBatch,
@@ -104,25 +114,30 @@ impl TraceSet {
         work: impl Fn(EpisodeBatch) -> Result<T, E> + Sync,
         mut sink: impl FnMut(T) -> Result<(), E>,
     ) -> Result<ScanSummary, E> {
-        let layout = Layout::new(
+        let mut layout = Layout::new(
             self,
-            projection.steps.iter().map(String::as_str),
+            projection.step_columns(),
             EPISODE_COLUMNS.into_iter().chain(projection.constants.iter().map(String::as_str)),
         )?;
+        for column in &projection.unchecked {
+            layout.without_rules(column);
+        }
         let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
         let shape = Shape::new(&layout, projection);
         let mut prints = Prints::default();
+        let mut spellings = Spellings::new(self.files());
         let mut summary = ScanSummary::default();
         let checked = |episodes: Episodes| {
-            let fault = rules.check(self.files()[episodes.file].name(), &episodes).into_iter().next();
+            let fault = rules.check(&self.files()[episodes.file], &episodes).into_iter().next();
             let last = fault.as_ref().map_or(usize::MAX, |fault| fault.row);
             let ids = hashes(&episodes, last);
             let (count, steps) = (episodes.len(), episodes.columns[0].len());
+            let colors = other_names(&layout, &episodes);
             let outcome = match fault {
                 Some(fault) => Outcome::Fault(fault),
                 None => Outcome::Done(shape.batch(episodes).map_err(E::from).and_then(&work)),
             };
-            Checked { ids, count, steps, outcome }
+            Checked { ids, count, steps, colors, outcome }
         };
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
@@ -130,6 +145,7 @@ impl TraceSet {
                 Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
             };
             prints.add(&checked.ids)?;
+            spellings.add(checked.colors);
             summary.episodes += checked.count as u64;
             summary.steps += checked.steps as u64;
             match checked.outcome {
@@ -138,9 +154,14 @@ impl TraceSet {
             }
         });
         // An id that was there before is found at the end, though it comes before whatever ended the pass.
-        match prints.first_repeated(self.files(), &layout)? {
-            Some(finding) => Err(TraceError::from(*finding).into()),
-            None => passed.map(|()| summary),
+        if let Some(finding) = prints.first_repeated(self.files(), &layout)? {
+            return Err(TraceError::from(*finding).into());
+        }
+        passed?;
+        // That two names are spellings of one colour shows when all are known.
+        match spellings.first_conflict(self.files(), &layout, threads)? {
+            Some(finding) => Err(TraceError::from(finding).into()),
+            None => Ok(summary),
         }
     }
 }
@@ -151,6 +172,8 @@ struct Checked<T, E> {
     ids: Vec<u64>,
     count: usize,
     steps: usize,
+    /// Names of colours beyond those of the study.
+    colors: Vec<String>,
     outcome: Outcome<T, E>,
 }
 
@@ -171,7 +194,7 @@ impl<'a> Shape<'a> {
         let constants = projection.constants.iter().map(String::as_str);
         Self {
             layout,
-            steps: projection.steps.iter().filter_map(|name| layout.position(name)).collect(),
+            steps: projection.step_columns().filter_map(|name| layout.position(name)).collect(),
             episodes: EPISODE_COLUMNS.into_iter().chain(constants).filter_map(|name| layout.position(name)).collect(),
         }
     }

@@ -189,9 +189,13 @@ pub const COLUMNS: &[Column] = &[
         .required()
         .constant(),
     Column::new("run", Stored::Int32, "The run within its seed; 7 in the paper.").required().constant(),
-    Column::new("body_color", Stored::String, "The true colour of the agent's own body, c* in the paper.")
-        .required()
-        .constant(),
+    Column::new(
+        "body_color",
+        Stored::String,
+        "The true colour of the agent's own body, c* in the paper; a lower-case name.",
+    )
+    .required()
+    .constant(),
     Column::new("t", Stored::Int32, "The timestep: 1 in an episode's first row, one more in each that follows.")
         .required()
         .unit("steps"),
@@ -202,14 +206,24 @@ pub const COLUMNS: &[Column] = &[
     Column::new(
         "self_color",
         Stored::String,
-        "The self-attribution: a colour, `unknown`, or null where the reply gave none.",
+        "The self-attribution: the lower-case name of a colour, `unknown`, or null where the reply gave none.",
     )
     .required()
     .nullable(),
-    Column::new("selected_cube", Stored::String, "The selected cube: a colour, `none`, or null.").required().nullable(),
+    Column::new(
+        "selected_cube",
+        Stored::String,
+        "The selected cube: the lower-case name of a colour, `none`, or null.",
+    )
+    .required()
+    .nullable(),
     Column::new("mirror_visible", Stored::Bool, "Ground truth: mirror evidence is in view at t.").required(),
-    Column::new("stated_color", Stored::String, "The false body colour told to the agent, where one was (E3).")
-        .constant(),
+    Column::new(
+        "stated_color",
+        Stored::String,
+        "The false body colour told to the agent, where one was (E3); a lower-case name.",
+    )
+    .constant(),
     Column::new("distractors", Stored::Int8, "Other agents in the room.").constant().unit("agents"),
     Column::new(
         "mirror_self_px",
@@ -279,7 +293,8 @@ pub const METADATA: &[MetadataKey] = &[
     MetadataKey {
         key: RECORDING_KEY,
         doc: "How the recording was made, a JSON object: scene, prompt and configuration hashes, view size, \
-              visibility threshold in pixels, model id as returned, seeds.",
+              visibility threshold in pixels, model id as returned, seeds. A `palette` in it, a list of lower-case names, \
+              holds all colours of the trace; another value is refused.",
     },
 ];
 

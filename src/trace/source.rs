@@ -7,8 +7,10 @@ use arrow::array::{
 };
 use arrow::datatypes::{DataType, Field};
 
+use super::colors;
 use super::episode::{Action, Episode};
 use super::schema::{Column, Stored};
+use crate::base::visible::visible;
 
 /// How to get a column's value in an episode at the step of an index (0-based).
 #[derive(Clone, Copy)]
@@ -117,9 +119,10 @@ fn text_fault(column: &Column, text: &str) -> Option<(String, String)> {
     } else if text.is_empty() && column.names() {
         format!("`{}` not to be empty", column.name)
     } else {
-        return None;
+        let color = colors::column(column.name).filter(|color| !color.may_hold(text, None))?;
+        format!("`{}` to be {}", column.name, color.expected(None))
     };
-    Some((expected, format!("`{}`", text.escape_debug())))
+    Some((expected, format!("`{}`", visible(text))))
 }
 
 /// The values of one column, gathered episode by episode.

@@ -7,12 +7,14 @@ use std::num::NonZeroUsize;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::colors::set::{Tally, sightings};
 use super::finding::{Code, Finding, Severity, TraceError};
 use super::ids::{Ids, Start, starts};
 use super::inputs::Input;
 use super::layout::Layout;
 use super::open::{TraceFile, TraceSet};
 use super::pass::{Episodes, Event, pass};
+use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::rules::{Located, Rules};
 use super::schema::COLUMNS;
 
@@ -21,7 +23,7 @@ use super::schema::COLUMNS;
 pub struct Validation {
     /// The files, in their order.
     pub files: Vec<CheckedFile>,
-    /// All findings, by file, row group and row.
+    /// All findings, by file, row group and row; what only all inputs together show comes last of its file.
     pub findings: Vec<Finding>,
 }
 
@@ -100,6 +102,7 @@ pub fn validate(
         }
     }
     let set = TraceSet::of(opened);
+    let mut replies = vec![ReplyCounts::default(); inputs.len()];
     check_rows(&set, experiments, threads, |file, checked| {
         let place = places[file];
         match checked {
@@ -107,19 +110,39 @@ pub fn validate(
                 report.files[place].complete = false;
                 found[place].push(*finding);
             }
-            Event::Whole((findings, episodes, steps)) => {
-                report.files[place].episodes += episodes;
-                report.files[place].steps += steps;
-                found[place].extend(findings);
+            Event::Whole(checked) => {
+                report.files[place].episodes += checked.episodes;
+                report.files[place].steps += checked.steps;
+                found[place].extend(checked.findings);
+                replies[place].merge(&checked.replies);
             }
         }
     })?;
+    for ((found, input), replies) in found.iter_mut().zip(inputs).zip(replies) {
+        // A status that the schema does not know is a finding already.
+        found.extend(unreadable(&input.name, &replies.of_known_statuses()));
+    }
     report.findings = found.into_iter().flatten().collect();
     Ok(report)
 }
 
-/// Findings, episodes and steps of some whole episodes.
-type Checked = (Vec<Finding>, u64, u64);
+/// A note for a file with replies that gave no decision.
+fn unreadable(file: &str, replies: &ReplyCounts) -> Option<Finding> {
+    let (bad, all) = (replies.all_unreadable(), replies.replies);
+    let finding = || {
+        let found = format!("{bad} of {all} steps with another status: {replies}");
+        Finding::new(Code::UnreadableReplies, file, "the status `ok` or `repaired`", found).in_column(REPLY_STATUS)
+    };
+    (bad > 0).then(finding)
+}
+
+/// What there is to say of some whole episodes.
+struct Checked {
+    findings: Vec<Finding>,
+    episodes: u64,
+    steps: u64,
+    replies: ReplyCounts,
+}
 
 fn check_rows(
     set: &TraceSet,
@@ -133,23 +156,37 @@ fn check_rows(
     }
     let layout = Layout::new(set, present, [])?;
     let rules = Rules { layout: &layout, experiments };
+    let statuses = layout.position(REPLY_STATUS);
     let name = |file: usize| set.files()[file].name().to_owned();
     let work = |episodes: Episodes| {
-        let mut found = rules.check(&name(episodes.file), &episodes);
+        let mut found = rules.check(&set.files()[episodes.file], &episodes);
         found.extend(split(&name(episodes.file), &episodes));
-        (found, starts(&episodes), episodes.len() as u64, episodes.columns[0].len() as u64)
+        let checked = Checked {
+            findings: Vec::new(),
+            episodes: episodes.len() as u64,
+            steps: episodes.columns[0].len() as u64,
+            replies: statuses.map_or_else(ReplyCounts::default, |at| ReplyCounts::of_column(&episodes.columns[at])),
+        };
+        let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
+        (found, colors, starts(&episodes), checked)
     };
-    let mut ids = Ids::default();
+    let (mut ids, mut tally) = (Ids::default(), Tally::new(set.files()));
     pass(set.files(), &layout, threads, &work, |file, event| {
         let event = match event {
             Event::Fault(finding) => Event::Fault(finding),
-            Event::Whole((found, starts, episodes, steps)) => {
-                Event::Whole((with_repeated(found, starts, &mut ids, file, name), episodes, steps))
+            Event::Whole((found, colors, starts, checked)) => {
+                tally.add(set.files(), file, colors);
+                Event::Whole(Checked { findings: with_repeated(found, starts, &mut ids, file, name), ..checked })
             }
         };
         receive(file, event);
-        Ok(())
-    })
+        Ok::<_, TraceError>(())
+    })?;
+    for (file, finding) in tally.findings(set.files()) {
+        let checked = Checked { findings: vec![finding], episodes: 0, steps: 0, replies: ReplyCounts::default() };
+        receive(file, Event::Whole(checked));
+    }
+    Ok(())
 }
 
 /// The findings of some episodes and those about their ids, by row.

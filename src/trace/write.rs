@@ -17,13 +17,12 @@ use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
-use tempfile::NamedTempFile;
 
 use super::episode::Episode;
 use super::finding::TraceError;
 use super::schema::{self, COLUMNS, Column, REPLY_REPAIR};
 use super::source::{Gathered, Source, field};
-use crate::base::temporary;
+use crate::base::replace::NewFile;
 
 /// What a trace file is created with, besides its episodes.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -208,7 +207,7 @@ fn failed(error: ParquetError) -> TraceError {
 
 /// Writes a trace file, which appears under its name when [`finish`](Self::finish) returns.
 pub struct TraceWriter {
-    encoder: TraceEncoder<NamedTempFile>,
+    encoder: TraceEncoder<NewFile>,
     path: PathBuf,
 }
 
@@ -218,9 +217,7 @@ impl TraceWriter {
     /// # Errors
     /// When no file can be made in that folder.
     pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
-        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let file = temporary::file_in(folder)
-            .map_err(|source| TraceError::Write { file: path.display().to_string(), source: Box::new(source) })?;
+        let file = NewFile::create(path).map_err(|source| unwritable(path, source))?;
         let encoder = TraceEncoder::new(file, metadata).map_err(|error| named(error, path))?;
         Ok(Self { encoder, path: path.to_owned() })
     }
@@ -233,29 +230,14 @@ impl TraceWriter {
         self.encoder.write(episode).map_err(|error| named(error, &self.path))
     }
 
-    /// Completes the file and gives it its name.
+    /// Completes the file, synchronises it with the disk and gives it its name.
     ///
     /// # Errors
-    /// Whatever writing gives; nothing is left behind then.
+    /// Whatever writing gives; the file at the path is as it was then.
     pub fn finish(self) -> Result<(), TraceError> {
-        self.persist(|_| Ok(()))
-    }
-
-    /// As [`finish`](Self::finish), with the rows on the disk before the file has its name: not even a loss of power
-    /// leaves a part of it. That the name itself is on the disk is for the caller to see to.
-    ///
-    /// # Errors
-    /// As [`finish`](Self::finish).
-    pub fn finish_durably(self) -> Result<(), TraceError> {
-        self.persist(|file| file.as_file().sync_all())
-    }
-
-    fn persist(self, before: impl FnOnce(&NamedTempFile) -> io::Result<()>) -> Result<(), TraceError> {
         let Self { encoder, path } = self;
-        let failed = |error: io::Error| TraceError::Write { file: path.display().to_string(), source: Box::new(error) };
         let file = encoder.finish().map_err(|error| named(error, &path))?;
-        before(&file).map_err(failed)?;
-        file.persist(&path).map(drop).map_err(|error| failed(error.error))
+        file.commit().map_err(|source| unwritable(&path, source))
     }
 }
 
@@ -274,6 +256,10 @@ pub fn write_episodes(
         writer.write(episode)?;
     }
     writer.finish()
+}
+
+pub(super) fn unwritable(path: &Path, source: io::Error) -> TraceError {
+    TraceError::Write { file: path.display().to_string(), source: Box::new(source) }
 }
 
 fn named(error: TraceError, path: &Path) -> TraceError {

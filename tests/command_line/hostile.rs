@@ -6,18 +6,37 @@ use mirrorstats::trace::write::write_episodes;
 
 use crate::{Answer, contents, episode, run};
 
-const NAMES: [&str; 6] = [
+const NAMES: [&str; 8] = [
     "\u{1b}[31mred\u{1b}[0m",
     "bell\u{7}\rover\u{8}\u{8}",
     "line\nbreak\ttab",
     "right\u{202e}tfel",
     "=cmd|' /C calc'!A0",
     "a,b\"c'd|e&f_%#$\\{}~^<script>",
+    "soft\u{ad}zero\u{200b}mark\u{61c}\u{200e}line\u{2028}",
+    "tags\u{e0041}\u{e007f}bom\u{feff}note\u{fff9}filler\u{3164}selector\u{fe0f}private\u{e000}",
+];
+
+/// Characters of [`NAMES`] that are no control characters and still must not be shown as they are.
+const HIDDEN: [char; 13] = [
+    '\u{202e}',
+    '\u{ad}',
+    '\u{200b}',
+    '\u{61c}',
+    '\u{200e}',
+    '\u{2028}',
+    '\u{e0041}',
+    '\u{e007f}',
+    '\u{feff}',
+    '\u{fff9}',
+    '\u{3164}',
+    '\u{fe0f}',
+    '\u{e000}',
 ];
 
 /// Whether every character only shows itself; line breaks are the program's own.
 fn is_tame(text: &str) -> bool {
-    text.chars().all(|c| c == '\n' || !(c.is_control() || ('\u{202a}'..='\u{202e}').contains(&c)))
+    text.chars().all(|c| c == '\n' || !(c.is_control() || HIDDEN.contains(&c)))
 }
 
 #[track_caller]
@@ -31,7 +50,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let episodes: Vec<_> =
-        NAMES.iter().flat_map(|name| [episode(name, "E1", 0, "red"), episode(name, "E1", 1, name)]).collect();
+        NAMES.iter().flat_map(|name| [episode(name, "E1", 0, "red"), episode(name, "E1", 1, "blue")]).collect();
     write_episodes(&at.join("a.parquet"), None, &episodes).unwrap();
     for arguments in [
         ["report", "a.parquet"].as_slice(),
@@ -41,10 +60,16 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
         &["info", "a.parquet"],
         &["validate", "a.parquet"],
         &["score", "a.parquet", "--explain", "E1-\u{1b}[31mred\u{1b}[0m-0"],
+        &["diff", "paper", "extended", "a.parquet"],
     ] {
         let answer = run(at, arguments);
         assert_eq!(answer.code, 0, "{arguments:?}: {}", answer.stderr);
         check(&answer);
+    }
+    for (path, bytes) in contents(&at.join("reports/latest")) {
+        let is_shown = [".md", ".tex", ".html", ".svg"].iter().any(|ending| path.ends_with(ending));
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(!is_shown || !text.contains(HIDDEN), "{path}");
     }
     for arguments in [
         ["score", "a.parquet", "--explain", "\u{1b}[31mnone"].as_slice(),

@@ -1,11 +1,21 @@
 //! The program at the process boundary: exit codes, what is said where, and that nothing is left half done.
 
+mod colors;
 mod extended;
+mod generated;
+#[path = "../../examples/generate/generation/mod.rs"]
+mod generation;
+mod filters;
 mod help;
 mod hostile;
 mod options;
+#[cfg(target_os = "linux")]
+mod outputs;
 mod refusals;
+#[cfg(unix)]
+mod reports;
 mod scores;
+mod widths;
 
 use std::path::{Path, PathBuf};
 

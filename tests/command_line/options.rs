@@ -180,16 +180,31 @@ fn the_same_arguments_write_the_same_bytes() {
 
 #[test]
 fn a_closed_pipe_is_no_error() {
+    // More than a buffer of output, and less.
+    let traces = fixtures().join("paper");
+    let traces = traces.to_str().unwrap();
+    let published = fixtures().join("published/main_table.csv");
     let folder = two_files();
     for arguments in [
         ["score", "."].as_slice(),
+        &["score", traces],
         &["score", ".", "--json"],
+        &["score", traces, "--json"],
+        &["score", ".", "--explain", "E1-ant-0"],
         &["report", "."],
         &["stats", ".", "--metric", "all"],
+        &["stats", traces, "--json"],
+        &["figure", "heatmap", "."],
+        &["compare", traces, "--published", published.to_str().unwrap(), "--json"],
+        &["diff", "paper", "extended", ".", "--json"],
+        &["sql", "--dialect", "duckdb"],
         &["schema"],
+        &["schema", "--json"],
         &["info", "."],
+        &["info", ".", "--json"],
         &["validate", "."],
         &["definitions", "show"],
+        &["definitions", "check", "extended"],
         &["definitions", "explain", "TSA"],
         &["--help"],
         &["report", "--help"],
@@ -206,5 +221,34 @@ fn a_closed_pipe_is_no_error() {
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
         assert_eq!(child.wait().unwrap().code(), Some(0), "{arguments:?}: {said}");
         assert!(!said.contains("error"), "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_behind_standard_output_is_an_error() {
+    let traces = fixtures().join("paper");
+    let folder = two_files();
+    for arguments in [
+        ["score", "."].as_slice(),
+        &["score", traces.to_str().unwrap()],
+        &["score", ".", "--json"],
+        &["report", "."],
+        &["stats", "."],
+        &["figure", "heatmap", "."],
+        &["sql"],
+        &["schema"],
+        &["info", "."],
+        &["validate", "."],
+        &["definitions", "show"],
+        &["definitions", "explain", "TSA"],
+        &["--help"],
+    ] {
+        let mut command = Process::new(env!("CARGO_BIN_EXE_mirrorstats"));
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = command.current_dir(folder.path()).args(arguments).stdout(full).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
+        assert!(said.contains("error: cannot write the output\n  caused by: No space left"), "{arguments:?}: {said}");
     }
 }

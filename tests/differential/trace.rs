@@ -67,7 +67,8 @@ pub const OPTIONAL: [&str; 11] = [
     "n4",
 ];
 
-const COLORS: [&str; 4] = ["red", "blue", "unknown", "none"];
+const CLAIMS: [&str; 3] = ["red", "blue", "unknown"];
+const CUBES: [&str; 3] = ["red", "blue", "none"];
 const ACTIONS: [&str; 5] = ["move_forward", "move_backward", "turn_left", "turn_right", "done"];
 const TEXTS: [&str; 10] = ["I think", "maybe me", "", "done", "Z", "é", "😀 non", "it's", "a\\b", "é"];
 
@@ -89,7 +90,7 @@ fn step() -> impl Strategy<Value = Step> {
     let points = select([&[0, 1, 2, -1, -7, 40, (1 << 53) + 1][..], extremes()].concat());
     let floats = select(vec![0.0, -0.0, 1.5, -2.25, f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.1, 1e30]);
     let weights = select(vec![0.0, -0.0, 1.5, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.1, -3e200]);
-    let texts = (text(&ACTIONS), text(&COLORS), text(&COLORS), text(&TEXTS), text(&TEXTS));
+    let texts = (text(&ACTIONS), text(&CLAIMS), text(&CUBES), text(&TEXTS), text(&TEXTS));
     let bools = (any::<bool>(), any::<Option<bool>>(), any::<Option<bool>>());
     let ints = (int(&[0, 1, 2, 3, i32::MAX]), int(&[0, 1, 2, 3, 900]), int(&[0, -1, 5, i32::MIN, i32::MAX]));
     (texts, bools, ints, option::of(points), option::of(floats), option::of(weights)).prop_map(
@@ -109,7 +110,7 @@ fn step() -> impl Strategy<Value = Step> {
 fn episode() -> impl Strategy<Value = Episode> {
     let names = (select(vec!["m", "é model", "third"]), select(vec!["E1", "E2", "E5"]), select(vec!["red", "blue"]));
     let numbers = (select(vec![0, 1, 2, i32::MAX]), select(vec![0, 3, i32::MAX]), int(&[0, 1, 5]));
-    (names, numbers, text(&COLORS[..2]), vec(step(), 1..9)).prop_map(
+    (names, numbers, text(&CLAIMS[..2]), vec(step(), 1..9)).prop_map(
         |((model, experiment, body_color), numbers, stated_color, steps)| Episode {
             model,
             experiment,

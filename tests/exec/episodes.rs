@@ -5,6 +5,7 @@ use std::process::Command;
 
 use base64::Engine as _;
 use mirrorstats::agent::exec::message::Message;
+use mirrorstats::agent::{Family, reply};
 use schemars::schema_for;
 use serde_json::Value;
 
@@ -30,7 +31,7 @@ fn a_program_is_told_its_task_each_observation_and_the_end() {
     );
     let stated = task["stated_color"].as_str().unwrap();
     assert!(task["system_prompt"].as_str().unwrap().starts_with(&format!("You are a {stated} robot.")));
-    assert_eq!(task["reply_schema"]["properties"]["action"]["enum"][4], "done");
+    assert_eq!(task["reply_schema"], reply::structure(Family::CubeSelection));
     assert_eq!((&end["reason"], &end["steps"]), (&"budget".into(), &20.into()));
 
     let [first, second] = [&heard[1], &heard[2]];
@@ -158,4 +159,21 @@ fn the_example_in_python_plays() {
     for trace in ["runs/E1-exec.parquet", "runs/E5-exec.parquet"] {
         assert_eq!(bench.texts(trace, "reply_status"), vec![Some("ok".to_owned()); 20], "{trace}");
     }
+}
+
+#[test]
+fn replies_of_a_program_that_cannot_be_read_are_told() {
+    let Some(bench) = Bench::new() else { return };
+    bench.program("printf 'I go \\033[31mon.\\n'");
+    let output = bench.record(&[]).output().unwrap();
+    let (code, answer, said) = outcome(&output);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(
+        said.starts_with("a reply could not be read: parse_failed: `I go \\u{1b}[31mon.` (E1/exec/s1/r1, step 1)"),
+        "{said}"
+    );
+    let summary =
+        "\n20 of 20 replies could not be read: parse_failed; first: `I go \\u{1b}[31mon.` (E1/exec/s1/r1, step 1)\n";
+    assert!(said.contains(summary), "{said}");
+    assert_eq!(answer["replies"]["unreadable"]["parse_failed"], 20);
 }

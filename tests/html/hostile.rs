@@ -40,6 +40,49 @@ fn hostile_names_make_no_tag() {
     assert_eq!(tags(&page(HOSTILE)), tags(&page(["plain"; 8])));
 }
 
+/// Characters that reorder or hide text, of every kind.
+const HIDDEN: [char; 14] = [
+    '\u{ad}',
+    '\u{61c}',
+    '\u{180e}',
+    '\u{200b}',
+    '\u{200e}',
+    '\u{2028}',
+    '\u{202e}',
+    '\u{2067}',
+    '\u{3164}',
+    '\u{e000}',
+    '\u{feff}',
+    '\u{fffb}',
+    '\u{e0041}',
+    '\u{e0100}',
+];
+
+#[test]
+fn no_character_of_a_name_reorders_or_hides_text_of_the_page() {
+    let names = HIDDEN.map(|c| format!("a{c}b"));
+    for names in names.chunks(7) {
+        let name = |at: usize| names.get(at).map_or("plain", String::as_str);
+        let page = page([0, 1, 2, 3, 4, 5, 6, 7].map(name));
+        for (c, name) in HIDDEN.iter().zip(&HIDDEN.map(|c| format!("a{c}b"))) {
+            assert!(!page.contains(*c), "{name:?} is in the page as it is");
+        }
+        for name in names {
+            let code = name.chars().nth(1).unwrap().escape_unicode();
+            assert!(page.contains(&format!("a{code}b")), "{name:?} is not in the page");
+        }
+    }
+}
+
+#[test]
+fn names_in_any_script_are_in_the_page_as_they_are() {
+    let names = ["日本", "עברית", "می\u{200c}خواهم", "👩🏽\u{200d}🚀", "❤\u{fe0f}", "é", "ไทย", "Ж"];
+    let page = page(names);
+    for name in names {
+        assert!(page.contains(&format!("data-model=\"{}{name}\"", names.iter().position(|n| *n == name).unwrap())));
+    }
+}
+
 #[test]
 fn hostile_names_are_shown_and_do_nothing() {
     let Some(mut browser) = Browser::open("hostile names", &page(HOSTILE)) else { return };

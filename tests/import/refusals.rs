@@ -86,6 +86,42 @@ fn a_name_that_is_none() {
 }
 
 #[test]
+fn a_color_that_is_none() {
+    let [body, claim, cube] = [
+        "the lower-case name of a colour",
+        "the lower-case name of a colour, `unknown`, or null",
+        "the lower-case name of a colour, `none`, or null",
+    ];
+    let stated = "the lower-case name of a colour, or null";
+    for (key, expected) in
+        [("body_color", body), ("self_color", claim), ("selected_cube", cube), ("stated_color", stated)]
+    {
+        check(json!({ key: "Red" }), expected, "the text `Red`", "did you mean `red`?");
+        check(json!({ key: "red\u{a0}" }), expected, "the text `red\\u{a0}`", "did you mean `red`?");
+        check(json!({ key: "Dark  Teal" }), expected, "the text `Dark  Teal`", "did you mean `dark teal`?");
+    }
+    let check = |key: &str, text: &str, expected, help| {
+        check(json!({ key: text }), expected, &format!("the text `{text}`"), help)
+    };
+    check("body_color", "unknown", body, "give the true colour of the body");
+    check("self_color", "None", claim, "`unknown`, or null where the reply gave none");
+    check("self_color", "UNKNOWN", claim, "did you mean `unknown`?");
+    check("selected_cube", "unknown", cube, "`none`, or null where the reply gave none");
+    check("stated_color", "none", stated, "null where no colour was stated");
+}
+
+#[test]
+fn two_spellings_of_one_color_are_no_trace() {
+    let steps = [
+        step_with("a", 1, json!({ "body_color": "light blue" })),
+        step_with("a", 2, json!({ "body_color": "light blue", "self_color": "lightblue" })),
+    ];
+    let said = refused(lines(&steps));
+    assert!(said.contains("episode `a`, t = 2, column `self_color`\n  expected one spelling"), "{said}");
+    assert!(said.contains("found `lightblue`\n  help: did you mean `light blue`?"), "{said}");
+}
+
+#[test]
 fn a_key_that_is_missing_twice_or_empty() {
     let mut bare = step("a", 1);
     bare.as_object_mut().unwrap().remove("self_color");

@@ -18,11 +18,13 @@ pub struct Recording {
     pub chunks: Vec<(usize, usize)>,
 }
 
+/// What the recording of these tests changes in the world.
+pub const SMALL: &str = "eye.width = 64\neye.height_px = 48\neye.samples = 0\nepisode.steps = 40\n";
+
 /// The recording of these tests; made once.
 pub static RECORDING: LazyLock<Recording> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
-    let small = "eye.width = 64\neye.height_px = 48\neye.samples = 0\nepisode.steps = 40\n";
-    fs::write(folder.path().join("small.toml"), small).unwrap();
+    fs::write(folder.path().join("small.toml"), SMALL).unwrap();
     let words = "record --config small.toml --out runs --agent random --experiment E1 --seeds 1 --runs 3 --no-frames";
     let output = program().current_dir(folder.path()).args(words.split(' ')).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -4,5 +4,6 @@
 
 mod cuts;
 mod damage;
+mod lengths;
 mod logs;
 mod whole;

@@ -46,6 +46,42 @@ fn what_is_no_log_is_refused_and_nothing_is_written() {
 }
 
 #[test]
+fn a_trace_that_has_more_than_the_log_is_not_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("small.toml"), super::logs::SMALL).unwrap();
+    let words = "record --config small.toml --agent random --experiment E1 --seeds 1 --no-frames --runs";
+    let record = |more: &str| {
+        let words = format!("{words} {more}");
+        let output = program().current_dir(folder.path()).args(words.split(' ')).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    let recover =
+        |trace: &str| program().current_dir(folder.path()).args(["recover", "log.mcap", "-o", trace]).output();
+    fs::write(path("log.mcap"), &RECORDING.log).unwrap();
+    record("4 --out more");
+    fs::write(path("small.toml"), format!("{}eye.fovy = 90.0\n", super::logs::SMALL)).unwrap();
+    record("3 --out other");
+    for (trace, expected) in [
+        ("more/E1-random.parquet", "has the episode `E1/random/s1/r4`, which cannot be recovered from the log"),
+        ("other/E1-random.parquet", "is a trace of another recording than the log"),
+    ] {
+        let before = fs::read(path(trace)).unwrap();
+        let output = recover(trace).unwrap();
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        assert!(said.contains(trace) && said.contains(expected) && said.contains("help: name another file"), "{said}");
+        assert!(fs::read(path(trace)).unwrap() == before);
+    }
+    // One of the same recording, or what is no trace any more, is what a recovery replaces.
+    for before in [&RECORDING.trace[..], &RECORDING.trace[..1_000]] {
+        fs::write(path("trace.parquet"), before).unwrap();
+        assert_eq!(recover("trace.parquet").unwrap().status.code(), Some(0));
+        assert!(fs::read(path("trace.parquet")).unwrap() == RECORDING.trace);
+    }
+}
+
+#[test]
 fn a_log_that_is_not_there_and_a_place_that_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("whole.mcap"), &RECORDING.log).unwrap();

@@ -6,8 +6,10 @@
 #![cfg(feature = "sim")]
 
 mod contents;
+mod continued;
 mod forecasts;
 mod interruptions;
 mod recordings;
 mod refusals;
 mod same_bytes;
+mod together;

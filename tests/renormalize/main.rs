@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{Array, AsArray, Int32Array, RecordBatch, StringArray, StructArray, TimestampMicrosecondArray};
+use arrow::array::{Array, AsArray, Int32Array, RecordBatch, StringArray, TimestampMicrosecondArray};
 use arrow::compute::concat_batches;
 use arrow::datatypes::{DataType, Field, Schema};
 use assert_cmd::Command;
@@ -190,10 +190,8 @@ fn foreign(path: &Path, identification: &[Option<&str>]) {
     let ints = |value: i32| Arc::new(Int32Array::from(vec![value; n])) as Arc<dyn Array>;
     let ids: Vec<String> = (0..n).map(|at| format!("e{at}")).collect();
     let dictionary = DataType::Dictionary(Box::new(DataType::Int8), Box::new(DataType::LargeUtf8));
-    let nested = StructArray::from(vec![(Arc::new(Field::new("a", DataType::Int32, false)), ints(3))]);
     let times = TimestampMicrosecondArray::from(vec![1_700_000_000_000_001; n]).with_timezone("UTC");
     let columns: Vec<(&str, Arc<dyn Array>)> = vec![
-        ("nested", Arc::new(nested)),
         ("episode_id", Arc::new(StringArray::from(ids))),
         ("model", arrow::compute::cast(&texts("m"), &dictionary).unwrap()),
         ("experiment", texts("E1")),

@@ -5,6 +5,8 @@
 
 mod altered;
 mod matching;
+#[cfg(unix)]
+mod outputs;
 mod pictures;
 mod recounted;
 mod traces;

@@ -32,6 +32,35 @@ fn frames_and_a_log_of_a_replay() {
     assert!(again == fs::read(recorded("E1")).unwrap(), "the trace of the log has other bytes");
 }
 
+#[cfg(unix)]
+#[test]
+fn the_log_that_is_there_stays_if_the_new_one_cannot_be_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("again.mcap");
+    let replay = |blocks: &str| {
+        let script = format!(
+            "trap '' XFSZ; ulimit -f {blocks}; exec '{}' replay '{}' --mcap again.mcap",
+            env!("CARGO_BIN_EXE_mirrorstats"),
+            recorded("E1").display()
+        );
+        std::process::Command::new("sh").current_dir(folder.path()).args(["-c", &script]).output().unwrap()
+    };
+    let output = replay("unlimited");
+    if cannot_draw(&output) {
+        return;
+    }
+    assert!(output.status.success(), "{}", stderr(&output));
+    let whole = fs::read(&log).unwrap();
+    // The limit of the size of files stands in for a full disk: each episode fits, all of them do not.
+    let output = replay(&(whole.len() * 4 / 5 / 512).to_string());
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(stderr(&output).contains("cannot write the log `again.mcap`"), "{}", stderr(&output));
+    assert!(fs::read(&log).unwrap() == whole);
+    // One that is there is replaced, not added to.
+    assert!(replay("unlimited").status.success());
+    assert!(fs::read(&log).unwrap() == whole);
+}
+
 #[test]
 fn a_film_strip_is_the_same_from_the_log_and_from_the_trace() {
     let folder = tempfile::tempdir().unwrap();

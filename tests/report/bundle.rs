@@ -26,7 +26,8 @@ fn report() -> Report {
 
 fn write_to(out: &Path, report: &Report, others: &[OutputFile]) -> Result<Vec<PathBuf>, BundleError> {
     let Report { cells, tables, manifest } = report;
-    write(out, &Bundle { cells, tables, episodes: b"PAR1", manifest, others })
+    let bundle = Bundle { cells, tables, episodes: b"PAR1", manifest, read: &[], others };
+    write(out, &bundle).map(|written| written.files)
 }
 
 fn names(folder: &Path, files: &[PathBuf]) -> Vec<String> {

@@ -35,11 +35,11 @@ fn changed(change: impl Fn(&str) -> String) -> Comparison {
 fn all_but_two_published_cells_are_as_published() {
     let main = against(&paper("main"), &Errata::of_paper());
     assert!(main.holds());
-    insta::assert_snapshot!(side_by_side::render(&main));
+    insta::assert_snapshot!(side_by_side::render(&main, None));
     let appendix = against(&paper("appendix"), &Errata::of_paper());
     assert!(appendix.holds());
     assert_eq!(
-        side_by_side::render(&appendix),
+        side_by_side::render(&appendix, None),
         "appendix: 280 cells: 280 as published, 0 excused by errata, 0 differ\n"
     );
 }
@@ -76,7 +76,9 @@ fn an_erratum_excuses_exactly_what_it_states() {
     let found = changed(|text| text.replace("57.90,10.07", "57.91,10.07"));
     assert!(found.holds());
     assert_eq!(found.unused_errata.len(), 1);
-    insta::assert_snapshot!(side_by_side::render(&found).lines().find(|line| line.contains("not needed")).unwrap());
+    insta::assert_snapshot!(
+        side_by_side::render(&found, None).lines().find(|line| line.contains("not needed")).unwrap()
+    );
 }
 
 #[test]
@@ -86,7 +88,7 @@ fn cells_that_one_side_lacks_are_told() {
     assert_eq!((found.cells, found.unpublished.len()), (239, 1));
     let found = changed(|text| format!("{text}E1,Unheard Of,TSA,0.57,0.11,\n"));
     assert!(!found.holds());
-    insta::assert_snapshot!(side_by_side::render(&found));
+    insta::assert_snapshot!(side_by_side::render(&found, None));
 }
 
 #[test]

@@ -94,8 +94,6 @@ fn write_as(layout: Layout, rows: &RecordBatch, path: &Path) {
         let count = i64::try_from(rows.num_rows()).unwrap();
         columns.push(("finish".into(), Arc::new(Int64Array::from_iter_values(0..count)), true));
         columns.push(("notes".into(), Arc::new(StringArray::from(vec![None::<&str>; rows.num_rows()])), true));
-        let nested = arrow::array::StructArray::from(rows.slice(0, rows.num_rows()));
-        columns.push(("nested".into(), Arc::new(nested), true));
     }
     if layout.reversed_columns {
         columns.reverse();

@@ -6,10 +6,9 @@ use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-const COLORS: [&str; 4] = ["red", "blue", "unknown", "none"];
-
-fn color() -> impl Strategy<Value = Option<String>> {
-    option::of(select(&COLORS[..]).prop_map(str::to_owned))
+/// Null, one of two colours, or one of the words that a column may hold besides.
+fn color(words: &[&'static str]) -> impl Strategy<Value = Option<String>> {
+    option::of(select([&["red", "blue"], words].concat()).prop_map(str::to_owned))
 }
 
 fn float() -> impl Strategy<Value = f32> {
@@ -32,7 +31,7 @@ fn extra() -> impl Strategy<Value = Extra> {
 
 fn step() -> impl Strategy<Value = Step> {
     let action = option::of(select(&Action::ALL[..]));
-    (action, color(), color(), any::<bool>(), extra()).prop_map(
+    (action, color(&["unknown"]), color(&["none"]), any::<bool>(), extra()).prop_map(
         |(action, self_color, selected_cube, mirror_visible, extra)| Step {
             action,
             self_color,
@@ -46,7 +45,7 @@ fn step() -> impl Strategy<Value = Step> {
 fn episode() -> impl Strategy<Value = Episode> {
     let names = (select(vec!["m", "other", "third"]), select(vec!["E1", "E2", "E5"]), select(vec!["red", "blue"]));
     let numbers = (0..3_i32, 0..8_i32, option::of(0..3_i8));
-    (names, numbers, color(), vec(step(), 1..9)).prop_map(
+    (names, numbers, color(&[]), vec(step(), 1..9)).prop_map(
         |((model, experiment, body_color), (seed, run, distractors), stated_color, steps)| Episode {
             episode_id: String::new(),
             model: model.into(),

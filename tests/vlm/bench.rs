@@ -32,7 +32,7 @@ pub fn patience() -> Patience {
 }
 
 pub fn choice(dialect: Dialect) -> Choice {
-    let prices = Some(Prices { input: 1.0, output: 10.0 });
+    let prices = Prices { input: Some(1.0), output: Some(10.0) };
     Choice {
         name: "Loopback".to_owned(),
         model: Model {

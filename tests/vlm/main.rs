@@ -6,6 +6,8 @@ mod killed;
 mod languages;
 mod memory;
 mod recordings;
+mod refusals;
 mod server;
 mod spending;
 mod statuses;
+mod unreadable;

@@ -5,7 +5,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use arrow::array::AsArray as _;
+use arrow::compute::cast;
+use arrow::datatypes::DataType;
 use mirrorstats::agent::vlm::journal::Entry;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use tempfile::TempDir;
 
 use super::bench::KEY;
@@ -57,6 +61,18 @@ pub fn counting(request: &Request, last: u32, mark: usize) -> String {
     let step = before.map_or(1, |(count, _)| count.parse::<u32>().unwrap() + 1);
     let action = if step < last { "a" } else { "done" };
     decision(action).replace("went on", &format!("counted to {step} in answer {mark}"))
+}
+
+/// The column `reply_status` of the trace of E1 in this folder.
+pub fn rows(folder: &Folder, runs: &str) -> Vec<String> {
+    let file = fs::File::open(folder.path().join(runs).join("E1-own.parquet")).unwrap();
+    let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap().build().unwrap();
+    let mut statuses = Vec::new();
+    for batch in reader.map(Result::unwrap) {
+        let texts = cast(batch.column_by_name("reply_status").unwrap(), &DataType::Utf8).unwrap();
+        statuses.extend(texts.as_string::<i32>().iter().map(|text| text.unwrap().to_owned()));
+    }
+    statuses
 }
 
 pub fn stderr(output: &Output) -> String {

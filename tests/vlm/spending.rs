@@ -49,3 +49,38 @@ fn limits_count_what_earlier_starts_spent() {
         assert_eq!((code, server.count()), (Some(0), 4), "{said}");
     }
 }
+
+#[test]
+fn a_limit_of_cost_without_prices_is_refused_before_anything_is_sent_or_made() {
+    let own = "[model.own]\nbackend = \"compatible\"\nid = \"own-1\"\n";
+    let cases = [
+        ("", "`own` has no input and no output price"),
+        ("prices = { input = 1.0 }\n", "`own` has no output price"),
+        ("prices = { output = 1.0 }\n", "`own` has no input price"),
+    ];
+    for (prices, reason) in cases {
+        let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done")));
+        let folder = Folder::new();
+        std::fs::write(folder.path().join("own.toml"), format!("{own}{prices}")).unwrap();
+        let (code, said) = started(&folder, &server, "--max-cost 1");
+        assert_eq!((code, server.count()), (Some(2), 0), "{said}");
+        assert!(said.contains(reason) && said.contains("--models") && said.contains("[model.\"own\"]"), "{said}");
+        assert!(!folder.path().join("runs").exists(), "{said}");
+        // Without the limit, and with one that can be held, it records.
+        let (code, said) = started(&folder, &server, "--max-requests 200");
+        assert_eq!(code, Some(0), "{said}");
+    }
+    let (server, folder) = (Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done"))), Folder::new());
+    let output = folder.record(&server, "unknown-model", "--max-cost 1").output().unwrap();
+    assert_eq!((output.status.code(), server.count()), (Some(2), 0), "{}", stderr(&output));
+    assert!(stderr(&output).contains("`unknown-model` has no input and no output price"), "{}", stderr(&output));
+}
+
+#[test]
+fn a_limit_of_cost_is_an_amount() {
+    let (server, folder) = (Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done"))), Folder::new());
+    for limit in ["nan", "inf", "-1", "much"] {
+        let output = folder.record(&server, "own", &format!("--max-cost={limit}")).output().unwrap();
+        assert_eq!((output.status.code(), server.count()), (Some(2), 0), "{limit}: {}", stderr(&output));
+    }
+}

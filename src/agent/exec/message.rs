@@ -53,7 +53,7 @@ pub struct TaskMessage {
     pub seed: u64,
     /// The system prompt that a model gets.
     pub system_prompt: String,
-    /// The JSON Schema of a reply.
+    /// The JSON Schema of a reply: its keys and their types, as providers get it.
     pub reply_schema: Value,
 }
 

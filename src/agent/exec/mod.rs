@@ -111,6 +111,7 @@ impl Player for Exec {
             "protocol": PROTOCOL,
             "images": images.name(),
             "prompts": prompt::hashes(),
+            "reply_schemas": reply::structure_hashes(),
             "identification_version": super::identification::VERSION,
         })
     }
@@ -204,7 +205,7 @@ impl ExecAgent {
             max_steps: self.task.step_budget,
             seed: self.task.seed,
             system_prompt,
-            reply_schema: reply::schema(self.task.family),
+            reply_schema: reply::structure(self.task.family),
         })
     }
 
@@ -294,7 +295,7 @@ impl Frames {
     fn new(scratch: &Path) -> Result<Self, Lost> {
         let made =
             std::path::absolute(scratch).and_then(|folder| tempfile::Builder::new().prefix(FRAMES).tempdir_in(folder));
-        made.map(Self).map_err(|fault| unusable(crate::base::temporary::without_name(fault)))
+        made.map(Self).map_err(|fault| unusable(crate::base::replace::without_name(fault)))
     }
 
     /// Writes a frame and says where it is.

@@ -5,20 +5,24 @@
 //! ```
 //!
 //! Rule: nothing is made up. A reply is taken as it is, or after a repair that has a name, or it is no decision: then
-//! action, cube and attribution are absent, and the raw text is all there is.
+//! action, cube and attribution are absent, and the raw text is all there is. The raw text keeps how `selected_cube` and
+//! `identification` were written: letter case and white space mean nothing in either, and are no repair.
 //!
 //! A `selected_cube` other than `none` beside another action than `done` breaks a rule of the prompt, but not the
 //! shape of the object: it is kept as replied, and the metrics look at the cube of the `done` step alone.
 
 mod object;
 mod repair;
+mod thoughts;
 
 use serde_json::{Value, json};
 
+use repair::NoObject;
 pub use repair::Repair;
 
 use super::{Family, Reply, Status, Usage, Words, identification, prompt};
 use crate::base::palette::Color;
+use crate::trace::colors::spelling;
 use crate::trace::episode::Action;
 
 /// How a provider says that a reply ended.
@@ -89,13 +93,23 @@ pub fn read(raw: &str, family: Family, ending: Ending) -> Reading {
     }
     let (object, repairs) = match repair::object(raw) {
         Ok(found) => found,
-        Err(fault) => return Reading::without_decision(Status::ParseFailed, Some(fault)),
+        Err(fault) => return without_object(fault),
     };
     match decision(&object, family) {
         Ok(reading) if repairs.is_empty() => reading,
         Ok(reading) => Reading { status: Status::Repaired, repairs, ..reading },
         Err(fault) => Reading::without_decision(Status::SchemaInvalid, Some(fault)),
     }
+}
+
+/// The reading of a reply without an object.
+fn without_object(fault: NoObject) -> Reading {
+    let (status, fault) = match fault {
+        NoObject::Unreadable(fault) => (Status::ParseFailed, Some(fault)),
+        NoObject::OpenThoughts => (Status::Truncated, Some("the reply ends within <think>".to_owned())),
+        NoObject::ThoughtsAlone => (Status::Empty, None),
+    };
+    Reading::without_decision(status, fault)
 }
 
 /// The keys of a family, in the order of the prompt.
@@ -126,7 +140,7 @@ fn decision(object: &object::Object, family: Family) -> Result<Reading, String> 
     let action = prompt::action(&action)
         .ok_or_else(|| format!("\"action\" is \"{action}\", expected one of w, s, a, d, done"))?;
     let selected_cube = match family {
-        Family::CubeSelection => Some(cube(text("selected_cube")?)?),
+        Family::CubeSelection => Some(cube(&text("selected_cube")?)?),
         Family::Exploration => None,
     };
     let identification = text("identification")?;
@@ -146,9 +160,11 @@ fn decision(object: &object::Object, family: Family) -> Result<Reading, String> 
     })
 }
 
-fn cube(name: String) -> Result<String, String> {
-    if name == "none" || Color::named(&name).is_some() {
-        return Ok(name);
+/// The cube that a reply names. Letter case and white space do not matter, as in an identification.
+fn cube(name: &str) -> Result<String, String> {
+    let cube = spelling::normal(name);
+    if cube == "none" || Color::named(&cube).is_some() {
+        return Ok(cube);
     }
     Err(format!("\"selected_cube\" is \"{name}\", expected a colour of the palette or none"))
 }
@@ -168,7 +184,29 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// The JSON Schema of a family's reply: what providers are asked to enforce where they can.
+/// The structure of a family's reply as JSON Schema: what agents are sent, and what providers enforce where they can.
+///
+/// It has keys and types alone. A provider may show the schema to its model, and the prompt is all that a model may be
+/// told: a description, a title or a list of colours would say what E5 leaves for the model to find out.
+pub fn structure(family: Family) -> Value {
+    let property = |key: &&str| ((*key).to_owned(), json!({ "type": "string" }));
+    json!({
+        "type": "object",
+        "properties": keys(family).iter().map(property).collect::<serde_json::Map<_, _>>(),
+        "required": keys(family),
+        "additionalProperties": false,
+    })
+}
+
+/// The SHA-256 of both structures, for recordings.
+#[cfg(feature = "sim")]
+pub(super) fn structure_hashes() -> Value {
+    let hash = |family| crate::base::hash::of_bytes(structure(family).to_string().as_bytes());
+    json!({ "cube_selection": hash(Family::CubeSelection), "exploration": hash(Family::Exploration) })
+}
+
+/// The JSON Schema of a family's reply for people, with descriptions and the values that are read. No agent gets it; see
+/// [`structure`].
 pub fn schema(family: Family) -> Value {
     let description = |key: &str| match key {
         "view-description" => "What the image shows.",

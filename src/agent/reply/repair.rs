@@ -1,16 +1,20 @@
 //! The repairs a reply may get before it counts as unreadable, each with a name, none of which changes a word.
 //!
 //! They come in a fixed order, each on top of those before it, until the text is one JSON object:
-//! take the text out of a code fence; take the one object out of the text around it; drop commas before a closing
-//! bracket; turn strings in single quotes into strings in double quotes.
+//! take the text out of a code fence; drop the thoughts before the answer, and take that out of a code fence; take the one
+//! object out of the text around it; drop commas before a closing bracket; turn strings in single quotes into strings in
+//! double quotes.
 
 use super::object::Object;
+use super::thoughts::{self, Thoughts};
 
 /// What was repaired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Repair {
     /// The object stood in a Markdown code fence.
     CodeFence,
+    /// Thoughts, which end with `</think>`, stood before the object.
+    Thoughts,
     /// There was text before or after the object.
     SurroundingText,
     /// A comma stood before a closing bracket.
@@ -24,6 +28,7 @@ impl Repair {
     pub const fn name(self) -> &'static str {
         match self {
             Self::CodeFence => "code_fence",
+            Self::Thoughts => "thoughts",
             Self::SurroundingText => "surrounding_text",
             Self::TrailingComma => "trailing_comma",
             Self::SingleQuotes => "single_quotes",
@@ -50,21 +55,37 @@ impl Repair {
 /// The changed text; `None` where there is nothing to repair.
 type Change = fn(&str) -> Option<String>;
 
-/// The object in a reply, and what had to be repaired to read it; else what the strict parser said of the text as it came.
-pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), String> {
+/// Why there is no object in a reply.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum NoObject {
+    /// What the strict parser said of the text as it came.
+    Unreadable(String),
+    /// The reply ends within its thoughts.
+    OpenThoughts,
+    /// Nothing follows the thoughts.
+    ThoughtsAlone,
+}
+
+/// The object in a reply, and what had to be repaired to read it.
+pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
     let first = match Object::parse(raw.trim()) {
         Ok(object) => return Ok((object, Vec::new())),
-        Err(fault) => fault,
+        Err(fault) => NoObject::Unreadable(fault.to_string()),
     };
     let mut text = raw.trim().to_owned();
     let mut repairs = Vec::new();
-    let steps: [(Repair, Change); 4] = [
+    let steps: [(Repair, Change); 6] = [
+        (Repair::CodeFence, without_fence),
+        (Repair::Thoughts, without_thoughts),
         (Repair::CodeFence, without_fence),
         (Repair::SurroundingText, without_surroundings),
         (Repair::TrailingComma, without_trailing_commas),
         (Repair::SingleQuotes, with_double_quotes),
     ];
     for (repair, change) in steps {
+        if repair == Repair::Thoughts {
+            has_answer(&text)?;
+        }
         let Some(changed) = change(&text) else { continue };
         text = changed;
         repairs.push(repair);
@@ -72,7 +93,24 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), String> {
             return Ok((object, repairs));
         }
     }
-    Err(first.to_string())
+    Err(first)
+}
+
+/// Refuses a text that is thoughts alone: whatever object they hold is no answer.
+fn has_answer(text: &str) -> Result<(), NoObject> {
+    match thoughts::of(text) {
+        Thoughts::Open => Err(NoObject::OpenThoughts),
+        Thoughts::Before("") => Err(NoObject::ThoughtsAlone),
+        Thoughts::Before(_) | Thoughts::None => Ok(()),
+    }
+}
+
+/// What follows the thoughts.
+fn without_thoughts(text: &str) -> Option<String> {
+    match thoughts::of(text) {
+        Thoughts::Before(answer) => Some(answer.to_owned()),
+        Thoughts::None | Thoughts::Open => None,
+    }
 }
 
 /// The inside of the one code fence, if the text is nothing else.

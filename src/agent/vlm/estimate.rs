@@ -4,8 +4,8 @@
 //! providers advise for English; a frame as the provider of its language documents it. Prices that nobody knows give no
 //! cost, rather than a cost of zero.
 
-use super::TEMPERATURE;
 use super::dialect::{Dialect, Question};
+use super::model::TEMPERATURE;
 use super::models::{Choice, Contract};
 use crate::agent::prompt::Prompt;
 use crate::agent::{Family, Observation, Task, reply};
@@ -24,7 +24,7 @@ const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn ri
 /// A built-in prompt cannot be made, which a test rules out.
 pub fn prompt_tokens(choice: &Choice, family: Family, view: [u32; 2]) -> Result<u64, minijinja::Error> {
     let words = Prompt::of(family)?.render(&task(family), &observation())?;
-    let schema = reply::schema(family);
+    let schema = reply::structure(family);
     let question = Question {
         model: &choice.model.id,
         system: &words.system,

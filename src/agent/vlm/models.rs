@@ -50,33 +50,49 @@ pub struct Model {
     pub backend: String,
     /// The backend's id of the model.
     pub id: String,
-    /// What it costs; without prices nothing is known of the cost.
-    pub prices: Option<Prices>,
+    /// What it costs; unless both prices are known, nothing is known of the cost.
+    #[serde(default)]
+    pub prices: Prices,
     /// Whether the backend is asked to enforce the reply's schema, or the prompt alone has to do.
     #[serde(default)]
     pub contract: Contract,
 }
 
-/// US dollars for a million tokens.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+/// US dollars per million tokens; `None` where a price is not known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Prices {
     /// Of the request.
-    pub input: f64,
+    pub input: Option<f64>,
     /// Of the reply.
-    pub output: f64,
+    pub output: Option<f64>,
 }
 
 impl Prices {
-    /// What so many tokens cost, US dollars.
-    pub fn cost_usd(self, prompt_tokens: u32, completion_tokens: u32) -> f64 {
+    /// What so many tokens cost, US dollars; `None` unless both prices are known.
+    pub fn cost_usd(self, prompt_tokens: u32, completion_tokens: u32) -> Option<f64> {
         self.cost_of(prompt_tokens.into(), completion_tokens.into())
     }
 
-    /// What the tokens of a whole run cost, US dollars.
+    /// What the tokens of a whole run cost, US dollars; `None` unless both prices are known.
     #[expect(clippy::cast_precision_loss, reason = "nobody pays for 2^53 tokens")]
-    pub fn cost_of(self, prompt_tokens: u64, completion_tokens: u64) -> f64 {
-        (prompt_tokens as f64 * self.input + completion_tokens as f64 * self.output) / 1e6
+    pub fn cost_of(self, prompt_tokens: u64, completion_tokens: u64) -> Option<f64> {
+        Some((prompt_tokens as f64 * self.input? + completion_tokens as f64 * self.output?) / 1e6)
+    }
+
+    /// What the requests of a whole run cost, US dollars; `None` unless their price is known.
+    pub fn cost_of_requests(self, prompt_tokens: u64) -> Option<f64> {
+        Self { output: Some(0.0), ..self }.cost_of(prompt_tokens, 0)
+    }
+
+    /// The names of the prices that are not known.
+    pub fn unknown(self) -> Vec<&'static str> {
+        let prices = [("input", self.input), ("output", self.output)];
+        prices.into_iter().filter(|(_, price)| price.is_none()).map(|(name, _)| name).collect()
+    }
+
+    fn are_amounts(self) -> bool {
+        [self.input, self.output].into_iter().flatten().all(|price| price.is_finite() && price >= 0.0)
     }
 }
 
@@ -124,8 +140,31 @@ pub enum ModelsError {
         "no model is called `{name}`{near}; expected the name or the id of one of: {known}\n  help: `--models FILE` adds models, `--backend NAME` or `--base-url URL` takes any id"
     )]
     Unknown { name: String, near: String, known: String },
+    #[error(
+        "--max-cost needs the prices of the model, and `{name}` has no {missing} price: its cost would never be known and \
+         the limit never reached\n  help: give both prices, US dollars per million tokens, in a file for --models:\n    \
+         [model.\"{name}\"]\n    backend = \"{backend}\"\n    id = \"{id}\"\n    \
+         prices = {{ input = ..., output = ... }}\n  or limit --max-tokens or --max-requests instead"
+    )]
+    NoPrices { name: String, missing: String, backend: String, id: String },
     #[error("no backend is called `{name}`; expected one of: {known}")]
     UnknownBackend { name: String, known: String },
+}
+
+impl Choice {
+    /// Both prices are known, so that a limit of cost can be held.
+    ///
+    /// # Errors
+    /// [`ModelsError::NoPrices`], which names the model and the prices that are missing.
+    pub fn check_prices(&self) -> Result<(), ModelsError> {
+        let missing = self.model.prices.unknown();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let (name, missing) = (self.name.clone(), missing.join(" and no "));
+        let (backend, id) = (self.model.backend.clone(), self.model.id.clone());
+        Err(ModelsError::NoPrices { name, missing, backend, id })
+    }
 }
 
 impl Models {
@@ -151,6 +190,10 @@ impl Models {
             return Err(ModelsError::Invalid { file: origin(), fault });
         }
         for (name, model) in &models.model {
+            if !model.prices.are_amounts() {
+                let fault = format!("a price of the model `{name}` is not an amount: expected a finite number from 0");
+                return Err(ModelsError::Invalid { file: origin(), fault });
+            }
             if !models.backend.contains_key(&model.backend) {
                 let fault = format!("the backend `{}` of the model `{name}` is not there", model.backend);
                 return Err(ModelsError::Invalid { file: origin(), fault });
@@ -173,7 +216,7 @@ impl Models {
                     vendor: None,
                     backend: backend.to_owned(),
                     id: name.to_owned(),
-                    prices: None,
+                    prices: Prices::default(),
                     contract: Contract::default(),
                 },
             ),
@@ -209,7 +252,33 @@ fn is_variable(name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::Models;
+    use super::{Models, Prices};
+
+    #[test]
+    fn a_cost_needs_both_prices() {
+        let [none, input, output] =
+            [(None, None), (Some(2.0), None), (None, Some(3.0))].map(|(input, output)| Prices { input, output });
+        assert_eq!([none, input, output].map(|prices| prices.cost_of(1, 1)), [None; 3]);
+        assert_eq!(
+            [none, input, output].map(Prices::unknown),
+            [vec!["input", "output"], vec!["output"], vec!["input"]]
+        );
+        assert_eq!([none, input].map(|prices| prices.cost_of_requests(500_000)), [None, Some(1.0)]);
+        let both = Prices { input: Some(2.0), output: Some(3.0) };
+        assert_eq!((both.cost_usd(500_000, 1_000_000), both.unknown()), (Some(4.0), vec![]));
+    }
+
+    #[test]
+    fn a_price_that_is_no_amount_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("own.toml");
+        for price in ["-1.0", "nan", "inf"] {
+            let model = format!("[model.own]\nbackend = \"google\"\nid = \"x\"\nprices = {{ input = {price} }}\n");
+            std::fs::write(&file, model).unwrap();
+            let fault = Models::load(Some(&file)).unwrap_err().to_string();
+            assert!(fault.contains("a price of the model `own` is not an amount"), "{fault}");
+        }
+    }
 
     #[test]
     fn a_key_in_place_of_its_variable_is_refused_and_not_repeated() {

@@ -1,18 +1,20 @@
 //! One provider: requests go out, answers come in, or a failure with a name.
 //!
 //! A failure that may pass is tried again after a growing, jittered delay, or after what the provider asks for; one
-//! that will not pass (a refused key, an unknown model, a malformed request) is told at once.
+//! that will not pass (a refused key, an unknown model, a malformed request) is told at once. A provider that declines
+//! what the request is about has answered, whatever the status.
 
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
-use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue, RETRY_AFTER};
+use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
 
 use super::dialect::{Answer, Dialect};
+use super::failure::{Failure, FailureKind, broken, failed, retry_after, server, shortened};
 use super::pace::Pace;
 use super::secrets::Secret;
-use crate::agent::Status;
+use crate::agent::reply::Ending;
 
 /// How patient a provider is dealt with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,41 +45,6 @@ impl Default for Patience {
             longest_delay: Duration::from_mins(1),
             longest_asked_delay: Duration::from_mins(10),
             largest_answer: 4 * 1024 * 1024,
-        }
-    }
-}
-
-/// Why there is no answer.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Failure {
-    /// What it counts as.
-    pub kind: FailureKind,
-    /// What happened, without any key.
-    pub detail: String,
-    /// How long the provider asks to wait.
-    pub after: Option<Duration>,
-}
-
-/// The kinds of failure.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FailureKind {
-    /// Too many requests.
-    RateLimited,
-    /// The provider failed, the connection broke, or what came is no answer.
-    Server,
-    /// Nothing whole came in time.
-    Timeout,
-    /// The provider refuses this request, and will again.
-    Rejected,
-}
-
-impl FailureKind {
-    /// The status of a step that ends in this failure.
-    pub const fn status(self) -> Status {
-        match self {
-            Self::RateLimited => Status::RateLimited,
-            Self::Server | Self::Rejected => Status::ServerError,
-            Self::Timeout => Status::Timeout,
         }
     }
 }
@@ -203,7 +170,11 @@ impl Provider {
         if !status.is_success() {
             // The status stands, whatever becomes of the words beside it.
             let said = self.whole(response).await.unwrap_or_default();
-            return Err(refused(status, after, &self.without_secret(&String::from_utf8_lossy(&said))));
+            let said = String::from_utf8_lossy(&said).into_owned();
+            return match self.declined(status, &said) {
+                Some(answer) => Ok(self.received(answer, said, start.elapsed())),
+                None => Err(failed(status, after, &self.without_secret(&said))),
+            };
         }
         let bytes = self.whole(response).await?;
         let latency = start.elapsed();
@@ -215,12 +186,29 @@ impl Provider {
         let value: Value =
             serde_json::from_str(&text).map_err(|fault| server(format!("the answer is not JSON: {fault}")))?;
         let answer = self.dialect.answer(&value).ok_or_else(|| server(unexpected(&self.without_secret(&text))))?;
+        Ok(self.received(answer, text, latency))
+    }
+
+    /// The refusal in an error that is about what the request holds. Providers send it as a bad request, routers also as a
+    /// forbidden one.
+    fn declined(&self, status: StatusCode, said: &str) -> Option<Answer> {
+        const ABOUT_CONTENT: [StatusCode; 3] =
+            [StatusCode::BAD_REQUEST, StatusCode::FORBIDDEN, StatusCode::UNPROCESSABLE_ENTITY];
+        if !ABOUT_CONTENT.contains(&status) {
+            return None;
+        }
+        let answer = self.dialect.answer(&serde_json::from_str(said).ok()?)?;
+        (answer.ending == Ending::Refused).then_some(answer)
+    }
+
+    /// An answer without the key.
+    fn received(&self, answer: Answer, body: String, latency: Duration) -> Received {
         let kept = |text: String| match &self.secret {
             Some(secret) => secret.without_in_answer(&text),
             None => text,
         };
         let answer = Answer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
-        Ok(Received { answer, body: kept(text), latency })
+        Received { answer, body: kept(body), latency }
     }
 
     /// The body, up to the limit.
@@ -271,84 +259,14 @@ fn is_json(kind: &str) -> bool {
     kind == "application/json" || kind.ends_with("+json")
 }
 
-fn server(detail: String) -> Failure {
-    Failure { kind: FailureKind::Server, detail, after: None }
-}
-
 /// What the provider says in place of an answer, shortened.
 fn unexpected(text: &str) -> String {
     format!("the answer is not of the provider's language: {}", shortened(text))
 }
 
-fn shortened(text: &str) -> String {
-    const LONGEST: usize = 300;
-    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    match line.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{}...", &line[..end]),
-        None => line,
-    }
-}
-
-/// A failure below HTTP. The address is left out: it may be a private one.
-fn broken(error: reqwest::Error) -> Failure {
-    let kind = if error.is_timeout() { FailureKind::Timeout } else { FailureKind::Server };
-    let error = error.without_url();
-    let mut detail = error.to_string();
-    let mut cause = std::error::Error::source(&error);
-    while let Some(inner) = cause {
-        let words = inner.to_string();
-        if !detail.contains(&words) {
-            detail = format!("{detail}: {words}");
-        }
-        cause = inner.source();
-    }
-    Failure { kind, detail, after: None }
-}
-
-/// A status that is not success.
-fn refused(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
-    let kind = match status {
-        StatusCode::TOO_MANY_REQUESTS if is_out_of_credit(body) => FailureKind::Rejected,
-        StatusCode::TOO_MANY_REQUESTS => FailureKind::RateLimited,
-        StatusCode::REQUEST_TIMEOUT | StatusCode::GATEWAY_TIMEOUT => FailureKind::Timeout,
-        status if status.is_server_error() => FailureKind::Server,
-        StatusCode::CONFLICT | StatusCode::TOO_EARLY => FailureKind::Server,
-        _ => FailureKind::Rejected,
-    };
-    let detail = match shortened(body) {
-        said if said.is_empty() => format!("HTTP {status}"),
-        said => format!("HTTP {status}: {said}"),
-    };
-    Failure { kind, detail, after }
-}
-
-/// Whether too many requests means that there is no money left, which waiting does not mend.
-fn is_out_of_credit(body: &str) -> bool {
-    const CODE: &str = "insufficient_quota";
-    let error = serde_json::from_str::<Value>(body).map(|mut body| body["error"].take()).unwrap_or_default();
-    error["code"] == CODE || error["type"] == CODE
-}
-
-/// The wait that a provider asks for: seconds, whole or not, or a date. A date that is over asks for none, what is
-/// neither asks for nothing, and what no duration can hold asks for the longest.
-fn retry_after(headers: &HeaderMap) -> Option<Duration> {
-    let value = headers.get(RETRY_AFTER)?.to_str().ok()?.trim();
-    if let Ok(seconds) = value.parse::<f64>() {
-        let is_wait = seconds >= 0.0;
-        return is_wait.then(|| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
-    }
-    let date = httpdate::parse_http_date(value).ok()?;
-    Some(date.duration_since(SystemTime::now()).unwrap_or_default())
-}
-
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
-    use reqwest::StatusCode;
-    use reqwest::header::{HeaderMap, HeaderValue, RETRY_AFTER};
-
-    use super::{FailureKind, SetupError, address, is_json, refused, retry_after};
+    use super::{SetupError, address, is_json};
 
     #[test]
     fn addresses_take_paths_and_refuse_credentials() {
@@ -358,32 +276,6 @@ mod tests {
         assert!(matches!(address("host/v1", "a"), Err(SetupError::Address { .. })));
         assert!(matches!(address("ftp://host/v1", "a"), Err(SetupError::Address { .. })));
         assert!(matches!(address("http://host/v1?key=secret", "a"), Err(SetupError::Query)));
-    }
-
-    #[test]
-    fn the_wait_asked_for_is_read_or_left() {
-        let asked = |value: &'static str| {
-            let mut headers = HeaderMap::new();
-            headers.insert(RETRY_AFTER, HeaderValue::from_static(value));
-            retry_after(&headers)
-        };
-        assert_eq!(asked(" 7 "), Some(Duration::from_secs(7)));
-        assert_eq!(asked("0.25"), Some(Duration::from_millis(250)));
-        assert_eq!(asked("Sun, 06 Nov 1994 08:49:37 GMT"), Some(Duration::ZERO));
-        assert!(asked("Fri, 31 Dec 9999 23:59:59 GMT").is_some_and(|wait| wait > Duration::from_hours(24)));
-        assert_eq!(asked("99999999999999999999999999"), Some(Duration::MAX));
-        for nothing in ["-1", "NaN", "soon", ""] {
-            assert_eq!(asked(nothing), None, "{nothing:?}");
-        }
-        assert_eq!(retry_after(&HeaderMap::new()), None);
-    }
-
-    #[test]
-    fn no_money_left_is_not_too_many_requests() {
-        let kind = |body| refused(StatusCode::TOO_MANY_REQUESTS, None, body).kind;
-        assert_eq!(kind(r#"{"error": {"code": "insufficient_quota"}}"#), FailureKind::Rejected);
-        assert_eq!(kind(r#"{"error": {"code": "rate_limit_exceeded"}}"#), FailureKind::RateLimited);
-        assert_eq!(kind("slow down"), FailureKind::RateLimited);
     }
 
     #[test]

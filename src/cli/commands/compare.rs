@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use crate::cells::group::DEFAULT_BY;
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::terminal;
 use crate::report::comparison::Comparison;
 use crate::report::errata::Errata;
 use crate::report::tables::side_by_side;
@@ -68,7 +69,7 @@ fn print(comparison: &Comparison, json: bool) -> Result<(), Failure> {
         serde_json::to_writer_pretty(&mut out, comparison).map_err(io::Error::from)?;
         writeln!(out)?;
     } else {
-        out.write_all(side_by_side::render(comparison).as_bytes())?;
+        out.write_all(side_by_side::render(comparison, terminal::width()).as_bytes())?;
     }
     Ok(())
 }

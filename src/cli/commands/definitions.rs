@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::super::outcome::{Failure, Outcome};
 use super::super::output;
 use crate::base::near::nearest;
+use crate::base::visible::visible;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::FaultRecord;
 use crate::metric::file::{FileError, built_in, built_in_names};
@@ -104,9 +105,10 @@ fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> 
             let metrics: Vec<&str> = catalog.metric.keys().map(String::as_str).collect();
             writeln!(
                 io::stdout().lock(),
-                "{file}: no fault\n  {} metrics: {}\n  {} named expressions, {} experiments\n  sha256 {}",
+                "{}: no fault\n  {} metrics: {}\n  {} named expressions, {} experiments\n  sha256 {}",
+                visible(file),
                 metrics.len(),
-                metrics.join(", "),
+                visible(&metrics.join(", ")),
                 catalog.lets.len(),
                 catalog.experiment.len(),
                 catalog.hash

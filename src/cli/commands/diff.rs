@@ -4,8 +4,7 @@ use std::io::{self, Write as _};
 
 use super::super::args::ThreadArgs;
 use super::super::outcome::{Failure, Outcome};
-use super::super::output;
-use super::report::tell_notes;
+use super::super::{output, terminal};
 use crate::cells::changes::Changes;
 use crate::cells::group::DEFAULT_BY;
 use crate::report::changes::{self, Limit};
@@ -58,7 +57,7 @@ impl DiffArgs {
         let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
         let traces = resolve(&self.traces, io::stdin().lock())?;
         let found = diff(&old, &new, &traces, &self.request())?;
-        tell_notes(&found.notes)?;
+        output::notes(&found.notes);
         self.print(&found.changes)
     }
 
@@ -76,7 +75,7 @@ impl DiffArgs {
         if self.json {
             output::print_json(changes)?;
         } else {
-            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit)).as_bytes())?;
+            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit), terminal::width()).as_bytes())?;
         }
         let failed = self.fail_on_change && !changes.is_empty();
         Ok(if failed { Outcome::CheckFailed } else { Outcome::Done })

@@ -64,6 +64,9 @@ impl FigureArgs {
         // An ending of no known format should not cost a pass over the traces.
         let format = self.format()?;
         let study = self.traces.study_on(&self.engine, &self.scoring, &DEFAULT_BY.map(str::to_owned))?;
+        if let Some(path) = &self.output {
+            output::check_target(path, study.files_read(Some(&self.style)))?;
+        }
         let figure = study.figure(self.name, &self.style)?;
         let bytes = format.encode(&figure).map_err(Failure::input)?;
         match &self.output {

@@ -85,6 +85,7 @@ impl FilmstripArgs {
     /// Looks for the episode in logs first: frames are there.
     fn reel(&self) -> Result<Reel, Failure> {
         let (logs, traces) = self.sources()?;
+        output::check_target(&self.out, &logs)?;
         for log in &logs {
             if let Some(reel) = self.in_log(log)? {
                 return Ok(reel);
@@ -148,6 +149,7 @@ impl FilmstripArgs {
 
     fn in_traces(&self, traces: &[String]) -> Result<Option<Reel>, Failure> {
         let files = inputs::resolve(traces, io::stdin()).map_err(Failure::input)?;
+        output::check_target(&self.out, files.iter().map(|file| &file.path))?;
         let set = TraceSet::open(&files).map_err(Failure::input)?;
         for (input, file) in files.iter().zip(set.files()) {
             let rows = merge::read(&input.path).map_err(Failure::input)?;

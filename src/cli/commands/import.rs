@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::replace;
 use crate::base::visible::visible;
 use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
@@ -89,14 +90,8 @@ impl ImportArgs {
             let words = "error: `-`: expected standard input once, found it twice\n  help: name it once";
             return Err(Failure::Rendered(words.to_owned()));
         }
-        let Ok(out) = self.out.canonicalize() else { return Ok(()) };
-        match self.steps.iter().find(|path| path.canonicalize().is_ok_and(|path| path == out)) {
-            None => Ok(()),
-            Some(path) => Err(Failure::Rendered(format!(
-                "error: {}: expected another file to write, found the steps themselves\n  help: give another --out",
-                Input::new(path).name
-            ))),
-        }
+        replace::check_target(&self.out, &self.steps, "the steps themselves").map_err(Failure::input)?;
+        output::check_target(&self.out, [&self.definitions])
     }
 }
 

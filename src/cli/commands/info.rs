@@ -9,6 +9,8 @@ use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::terminal;
+use crate::report::tables::fit::{fitted, wrapped};
 use crate::trace::info::{Cell, Info, SeedRun, info};
 use crate::trace::inputs;
 use crate::trace::open::TraceSet;
@@ -36,32 +38,39 @@ impl InfoCommand {
         if self.json {
             writeln!(out, "{:#}", serde_json::json!(info))?;
         } else {
-            print(&mut out, &info)?;
+            print(&mut out, &info, terminal::width())?;
         }
         Ok(Outcome::Done)
     }
 }
 
-fn print(out: &mut impl Write, info: &Info) -> io::Result<()> {
+fn print(out: &mut impl Write, info: &Info, width: Option<usize>) -> io::Result<()> {
     let bytes: u64 = info.files.iter().map(|file| file.bytes).sum();
     let (episodes, steps) = (counted(info.episodes, "episode"), counted(info.steps, "step"));
     writeln!(out, "{episodes}, {steps}, {}, {}\n", counted(info.files.len() as u64, "file"), counted(bytes, "byte"))?;
-    list(out, "models", &info.models)?;
-    list(out, "experiments", &info.experiments)?;
-    list(out, "seeds", &info.seeds)?;
-    list(out, "runs", &info.runs)?;
+    list(out, "models", &info.models, width)?;
+    list(out, "experiments", &info.experiments, width)?;
+    list(out, "seeds", &info.seeds, width)?;
+    list(out, "runs", &info.runs, width)?;
     let own: Vec<_> = info.columns.iter().filter(|column| !column.known).map(|column| &column.name).collect();
     if !own.is_empty() {
-        list(out, "own columns", &own)?;
+        list(out, "own columns", &own, width)?;
     }
-    writeln!(out, "\nepisodes by experiment and model\n{}", coverage(info).trim_fmt())?;
+    if let Some(replies) = info.replies.as_ref().filter(|replies| replies.all_unreadable() > 0) {
+        let (bad, all) = (replies.all_unreadable(), replies.replies);
+        writeln!(out, "\n{bad} of {all} replies could not be read: {replies} (`reply_status`)")?;
+    }
+    writeln!(out, "\nepisodes by experiment and model\n{}", fitted(&coverage(info), 1, width))?;
     gaps(out, info)?;
-    writeln!(out, "\nfiles\n{}", files(info).trim_fmt())
+    writeln!(out, "\nfiles\n{}", fitted(&files(info), 1, width))
 }
 
-fn list(out: &mut impl Write, what: &str, values: &[impl Display]) -> io::Result<()> {
+fn list(out: &mut impl Write, what: &str, values: &[impl Display], width: Option<usize>) -> io::Result<()> {
     let shown: Vec<_> = values.iter().map(|value| visible(&value.to_string())).collect();
-    writeln!(out, "{what:<12} {:>3}   {}", values.len(), shown.join(", "))
+    let head = format!("{what:<12} {:>3}   ", values.len());
+    let indent = head.len();
+    let lines = wrapped(&shown.join(", "), width.map_or(usize::MAX, |width| width.saturating_sub(indent)), 0);
+    writeln!(out, "{head}{}", lines.join(&format!("\n{}", " ".repeat(indent))))
 }
 
 fn coverage(info: &Info) -> Table {

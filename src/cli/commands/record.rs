@@ -17,18 +17,19 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::vlm::VlmArgs;
+use crate::record::fault::StoreError;
 use crate::record::plan::{Experiments, Key, Plan, Shard};
-use crate::record::run::{Recording, Settings, Shares};
+use crate::record::run::{Recording, Settings, Shares, Tally};
 use crate::record::shelf::Shelf;
-use crate::record::store::{Store, StoreError};
+use crate::record::store::Store;
 use crate::record::{claim, metadata};
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
-/// The same command again continues where it stopped. Ctrl-C ends a recording when the steps under way are done, a
-/// second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's, and
+/// The same command again continues where it stopped. Several at once divide the episodes among themselves. Ctrl-C ends a
+/// recording when the steps under way are done, a second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's, and
 /// with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
@@ -135,6 +136,9 @@ impl RecordArgs {
     ) -> Result<Outcome, Failure> {
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| store.recorded(experiment))?;
+        if todo.len() < planned.len() {
+            player.resumes();
+        }
         let bar = Bar::new(player, todo.len(), config.episode.steps);
         let shares = Shares::default();
         let start = Instant::now();
@@ -147,9 +151,25 @@ impl RecordArgs {
         let tally = outcome.map_err(|broken| Failure::input(broken.to_string()))?;
         assembled.map_err(Failure::input)?;
         let missing: BTreeSet<Key> = todo.iter().copied().collect();
-        let found = planned.iter().filter(|key| !missing.contains(key));
-        store.note_lost(found.chain(&tally.recorded).copied(), &tally.lost).map_err(Failure::input)?;
-        let answer = RecordAnswer::of(tally, player, planned.len(), planned.len() - todo.len(), files(plan, store));
+        let found: Vec<Key> = planned.iter().copied().filter(|key| !missing.contains(key)).collect();
+        let Tally { recorded, elsewhere, lost, steps, stopped } = tally;
+        let all = [found.as_slice(), &recorded, &elsewhere].concat();
+        let lost_here = lost.len();
+        let lost = store.note_lost(&all, lost).map_err(Failure::input)?;
+        let answer = RecordAnswer {
+            model: player.model().to_owned(),
+            asked: planned.len(),
+            found: found.len(),
+            recorded: recorded.len(),
+            elsewhere: elsewhere.len() + lost_here - lost.len(),
+            steps,
+            replies: bar.replies(),
+            lost,
+            spend: player.spend(),
+            stopped,
+            traces: files(plan, |experiment| store.trace(experiment)),
+            logs: files(plan, |experiment| store.log(experiment)),
+        };
         recording::say(&answer, &store.lost_list(), start.elapsed(), shares.spent())?;
         if self.json {
             output::print_json(&answer)?;
@@ -192,13 +212,10 @@ fn outcome_of(answer: &RecordAnswer, player: &dyn Player) -> Result<Outcome, Fai
     }
 }
 
-/// The traces of a plan, and its logs, as far as they are there.
-fn files(plan: &Plan, store: &Store) -> [Vec<String>; 2] {
-    let those = |path: &dyn Fn(Experiment) -> PathBuf| {
-        let paths = plan.experiments.iter().map(|experiment| path(*experiment));
-        paths.filter(|path| path.exists()).map(|path| path.display().to_string()).collect()
-    };
-    [those(&|experiment| store.trace(experiment)), those(&|experiment| store.log(experiment))]
+/// The files of a plan's experiments, as far as they are there.
+fn files(plan: &Plan, path: impl Fn(Experiment) -> PathBuf) -> Vec<String> {
+    let paths = plan.experiments.iter().map(|experiment| path(*experiment));
+    paths.filter(|path| path.exists()).map(|path| path.display().to_string()).collect()
 }
 
 /// The agent of this name.

@@ -1,11 +1,13 @@
 //! `mirrorstats recover`: a trace out of a log, also of a cut one.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
@@ -13,14 +15,17 @@ use crate::cli::output;
 use crate::log::recover::{Losses, recover};
 use crate::trace::finding::Severity;
 use crate::trace::inputs::Input;
-use crate::trace::merge;
+use crate::trace::merge::{self, EpisodeRows};
+use crate::trace::open::TraceFile;
+use crate::trace::schema::RECORDING_KEY;
 use crate::trace::validate::validate;
 use crate::trace::write::OptionalColumns;
 
 /// Make a trace of a log, also of one that was cut off or damaged
 ///
-/// Every episode whose end is in the log is in the trace, which is checked against every rule. Exits with 3 if anything
-/// of the log is lost, be it the index at its end.
+/// Every episode whose end is in the log is in the trace, which is checked against every rule. A trace that is there is
+/// replaced if it is one of the same recording and the log has all its episodes. Exits with 3 if anything of the log is
+/// lost, be it the index at its end.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecoverArgs {
     /// The log
@@ -53,10 +58,12 @@ impl RecoverArgs {
     /// # Errors
     /// When the log cannot be read or is none, the trace cannot be written, or what was written breaks a rule.
     pub fn run(&self) -> Result<Outcome, Failure> {
+        output::check_target(&self.out, [&self.log])?;
         let recovered = recover(&self.log).map_err(Failure::input)?;
         let columns = recovered.recording.as_ref().map_or_else(OptionalColumns::all, OptionalColumns::recorded);
         let rows = recovered.episodes.iter().map(|episode| merge::rows(episode, &columns));
         let rows = rows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+        self.check_target(&rows, recovered.recording.as_ref())?;
         let answer = RecoverAnswer {
             episodes: rows.len(),
             steps: rows.iter().map(merge::EpisodeRows::len).sum(),
@@ -71,15 +78,49 @@ impl RecoverArgs {
         Ok(if answer.losses.is_any() { Outcome::Lossy } else { Outcome::Done })
     }
 
+    /// Refuses to write over a trace of another recording, or one with an episode that the log does not have.
+    fn check_target(&self, rows: &[EpisodeRows], recording: Option<&Value>) -> Result<(), Failure> {
+        // A file that cannot be read as a trace is what a recovery is there to replace.
+        let (Ok(file), Ok(there)) = (TraceFile::open(&self.target()), merge::read(&self.out)) else { return Ok(()) };
+        let help = "name another file, or move that one away";
+        let ids: BTreeSet<&str> = rows.iter().map(|episode| episode.episode_id.as_str()).collect();
+        if let Some(missing) = there.iter().find(|episode| !ids.contains(episode.episode_id.as_str())) {
+            let (out, id) = (self.out.display(), &missing.episode_id);
+            return Err(Failure::input(format!(
+                "`{out}` has the episode `{id}`, which cannot be recovered from the log\n  help: {help}"
+            )));
+        }
+        let theirs = file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok());
+        if without_seeds(theirs.as_ref()) != without_seeds(recording) {
+            let out = self.out.display();
+            return Err(Failure::input(format!(
+                "`{out}` is a trace of another recording than the log\n  help: {help}"
+            )));
+        }
+        Ok(())
+    }
+
+    fn target(&self) -> Input {
+        Input { name: self.out.display().to_string(), path: self.out.clone() }
+    }
+
     /// Holds the trace that was written against every rule of the schema.
     fn check(&self) -> Result<(), Failure> {
-        let input = Input { name: self.out.display().to_string(), path: self.out.clone() };
-        let report = validate(&[input], None, NonZeroUsize::MIN).map_err(Failure::input)?;
+        let report = validate(&[self.target()], None, NonZeroUsize::MIN).map_err(Failure::input)?;
         match report.findings.iter().find(|finding| finding.severity == Severity::Error) {
             None => Ok(()),
             Some(finding) => Err(Failure::input(format!("the recovered trace breaks a rule: {finding}"))),
         }
     }
+}
+
+/// The metadata of a recording but for the seeds, which grow with its episodes.
+fn without_seeds(recording: Option<&Value>) -> Value {
+    let mut recording = recording.cloned().unwrap_or_default();
+    if let Some(object) = recording.as_object_mut() {
+        object.remove("seeds");
+    }
+    recording
 }
 
 impl fmt::Display for RecoverAnswer {

@@ -7,15 +7,16 @@ use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
-use tempfile::NamedTempFile;
 
 use crate::agent::identification::VERSION;
 use crate::agent::renormalize::{Old, Renormalized};
+use crate::base::replace::{NewFile, is_same_file};
 use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::output;
+use crate::cli::{output, terminal};
+use crate::report::tables::fit::fitted;
 use crate::trace::finding::{Severity, TraceError};
 use crate::trace::inputs::Input;
 use crate::trace::validate::validate;
@@ -114,7 +115,7 @@ impl RenormalizeArgs {
             answer.add(input, place, result);
         }
         for (file, place) in new {
-            output::persist(file, place)?;
+            output::commit(file, place)?;
         }
         output::print(&answer, self.json)?;
         let has_failed = self.fail_on_change && !answer.flips.is_empty();
@@ -134,7 +135,7 @@ impl RenormalizeArgs {
             places.push(place);
         }
         for (place, input) in inputs.iter().flat_map(|input| places.iter().map(move |place| (place, input))) {
-            if is_same(place, &input.path) {
+            if is_same_file(place, &input.path) {
                 return Err(refused(input, "another folder for the new trace", "the trace itself"));
             }
         }
@@ -154,17 +155,13 @@ impl RenormalizeArgs {
 }
 
 /// The new trace in a temporary file beside its place, and what changes in it.
-fn renormalized(old: &Old, place: Option<&Path>) -> Result<(Option<NamedTempFile>, Renormalized), Failure> {
+fn renormalized(old: &Old, place: Option<&Path>) -> Result<(Option<NewFile>, Renormalized), Failure> {
     let Some(place) = place else {
         let (_, result) = old.renormalize(std::io::sink()).map_err(Failure::input)?;
         return Ok((None, result));
     };
-    let (file, result) = old.renormalize(output::beside(place)?).map_err(Failure::input)?;
+    let (file, result) = old.renormalize(output::create(place)?).map_err(Failure::input)?;
     Ok((Some(file), result))
-}
-
-fn is_same(a: &Path, b: &Path) -> bool {
-    a.canonicalize().is_ok_and(|a| b.canonicalize().is_ok_and(|b| a == b))
 }
 
 fn refused(input: &Input, expected: &str, found: &str) -> Failure {
@@ -210,7 +207,7 @@ impl fmt::Display for RenormalizeAnswer {
                     shortened(&flip.identification),
                 ]);
             }
-            writeln!(f, "{}\n", aligned_right(table, [1]).trim_fmt())?;
+            writeln!(f, "{}\n", fitted(&aligned_right(table, [1]), 2, terminal::width()))?;
         }
         let sum = |of: fn(&RenormalizedFile) -> u64| self.files.iter().map(of).sum::<u64>();
         let (flips, texts) = (counted(self.flips.len() as u64, "attribution"), sum(|file| file.texts));

@@ -12,10 +12,12 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::base::frame::Frame;
+use crate::base::replace::{self, is_same_file};
 use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::log::assemble::{self, Place};
+use crate::log::read::other_episode;
 use crate::record::log::Log;
 use crate::record::plan::Key;
 use crate::record::play::Seen;
@@ -44,7 +46,8 @@ pub struct ReplayArgs {
     /// Render every step into this folder, as EPISODE/t001.png
     #[arg(long, value_name = "DIR")]
     frames: Option<PathBuf>,
-    /// Write a log of the replay; for a single trace
+    /// Write a log of the replay in place of the log that is there; for a single trace. With --episode, a log that has
+    /// other episodes is refused
     #[arg(long, value_name = "LOG.mcap")]
     mcap: Option<PathBuf>,
     /// Count pixels and decide visibility anew, into the trace of --out; for a single trace
@@ -103,6 +106,7 @@ impl ReplayArgs {
         if traces.len() > 1 && (self.mcap.is_some() || self.recompute_visibility) {
             return Err(Failure::input("--mcap and --recompute-visibility take a single trace"));
         }
+        self.check_targets(&traces)?;
         let mut answer = ReplayAnswer::default();
         for trace in &traces {
             self.replay(trace, &mut answer)?;
@@ -132,6 +136,45 @@ impl ReplayArgs {
             )));
         }
         Ok(traces)
+    }
+
+    /// That no output is a trace that is read, and that no episode is lost with a log that is there.
+    fn check_targets(&self, traces: &[Trace]) -> Result<(), Failure> {
+        for (option, target) in [("--mcap", &self.mcap), ("--out", &self.out)] {
+            let is_trace = |target: &PathBuf| traces.iter().any(|trace| is_same_file(target, &trace.path));
+            if target.as_ref().is_some_and(is_trace) {
+                return Err(Failure::input(format!("{option} is the trace itself; name another file")));
+            }
+        }
+        if self.mcap.is_some() && self.mcap == self.out {
+            return Err(Failure::input("--mcap and --out: expected two files, found one name"));
+        }
+        for (folder, trace) in self.frames.iter().flat_map(|folder| traces.iter().map(move |trace| (folder, trace))) {
+            for (rows, t) in trace.rows.iter().flat_map(|rows| (1..=rows.len()).map(move |t| (rows, t))) {
+                output::check_target(&frame_path(folder, &rows.episode_id, t), traces.iter().map(|trace| &trace.path))?;
+            }
+        }
+        self.check_log()
+    }
+
+    /// That a log which is there holds no episode that this replay leaves out.
+    fn check_log(&self) -> Result<(), Failure> {
+        let (Some(path), Some(id)) = (&self.mcap, &self.episode) else { return Ok(()) };
+        if !path.is_file() {
+            return Ok(());
+        }
+        let found = match other_episode(path, id) {
+            Ok(None) => return Ok(()),
+            Ok(Some(other)) => format!("one with the episode `{other}`"),
+            Err(error) => {
+                let error = error.to_string();
+                format!("a file whose episodes cannot be read ({})", error.lines().next().unwrap_or_default())
+            }
+        };
+        Err(Failure::Rendered(format!(
+            "error: `{}`: expected no file, or a log of the episode `{id}` alone, found {found}\n  help: give --mcap another name, or leave out --episode to replace the whole log",
+            path.display()
+        )))
     }
 
     /// The configuration of the eye: the recorded one, or what was asked for.
@@ -172,13 +215,9 @@ impl ReplayArgs {
         }
         if let Some(path) = &self.mcap {
             let recording = trace.recording.clone().unwrap_or(Value::Null);
-            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-            assemble::assemble(&absent(path)?, &logs, &recording, folder).map_err(Failure::input)?;
+            assemble::write(path, &logs, &recording).map_err(Failure::input)?;
         }
         if let (true, Some(path)) = (self.recompute_visibility, &self.out) {
-            if fs::canonicalize(path).is_ok_and(|out| fs::canonicalize(&trace.path).is_ok_and(|own| own == out)) {
-                return Err(Failure::input("--out is the trace itself; name another file"));
-            }
             merge::write(path, Some(&recounted(trace.recording.as_ref(), &eye)), &rewritten).map_err(Failure::input)?;
         }
         Ok(())
@@ -203,7 +242,7 @@ impl ReplayArgs {
             let frame = renderer.as_mut().map(|renderer| renderer.frame(world)).transpose().map_err(Failure::input)?;
             let frame = frame.map(Arc::new);
             if let (Some(folder), Some(frame)) = (&self.frames, &frame) {
-                save(folder, episode, t, frame)?;
+                save(&frame_path(folder, &episode.episode_id, t), frame)?;
             }
             if let Some(log) = &mut log {
                 let seen = Seen { t, world, frame: frame.as_ref(), census };
@@ -270,16 +309,6 @@ fn key(episode: &Episode) -> Result<Key, Failure> {
     Ok(Key { experiment, seed: episode.seed, run: episode.run })
 }
 
-/// A log that is not put together with one that is there.
-fn absent(path: &Path) -> Result<PathBuf, Failure> {
-    match fs::remove_file(path) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => {
-            Err(Failure::input(format!("cannot replace `{}`: {error}", path.display())))
-        }
-        _ => Ok(path.to_owned()),
-    }
-}
-
 /// The metadata of a trace whose visibility was decided anew. The world stays: it is what a replay builds.
 fn recounted(recording: Option<&Value>, eye: &WorldConfig) -> Value {
     let mut recording = recording.cloned().unwrap_or_else(|| json!({}));
@@ -288,12 +317,16 @@ fn recounted(recording: Option<&Value>, eye: &WorldConfig) -> Value {
     recording
 }
 
-fn save(folder: &Path, episode: &Episode, t: i32, frame: &Frame) -> Result<(), Failure> {
-    let folder = folder.join(episode.episode_id.replace('/', "-"));
-    fs::create_dir_all(&folder)
+/// Where the frame of a step goes.
+fn frame_path(folder: &Path, episode_id: &str, t: impl fmt::Display) -> PathBuf {
+    folder.join(episode_id.replace('/', "-")).join(format!("t{t:0>3}.png"))
+}
+
+fn save(path: &Path, frame: &Frame) -> Result<(), Failure> {
+    let folder = replace::folder_of(path);
+    fs::create_dir_all(folder)
         .map_err(|error| Failure::input(format!("cannot make the folder `{}`: {error}", folder.display())))?;
-    let png = frame.to_png().map_err(Failure::input)?;
-    output::write_file(&folder.join(format!("t{t:03}.png")), png)
+    output::write_file(path, frame.to_png().map_err(Failure::input)?)
 }
 
 impl fmt::Display for ReplayAnswer {

@@ -1,6 +1,6 @@
 //! `report`: every table of the study from traces, on the terminal and as a folder.
 
-use std::io::{self, IsTerminal as _, Write as _};
+use std::io::{self, Write as _};
 use std::path::PathBuf;
 
 use schemars::JsonSchema;
@@ -12,8 +12,8 @@ use super::super::outcome::{Failure, Outcome};
 use super::super::output;
 use crate::cells::group::DEFAULT_BY;
 use crate::report::bundle::Manifest;
-use crate::report::tables::terminal::{self, Marks, Terminal};
-use crate::study::{Report, ReportOptions};
+use crate::report::tables::terminal;
+use crate::study::{Report, ReportOptions, WrittenReport};
 
 /// Compute the tables and figures of traces, print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
@@ -64,42 +64,24 @@ impl ReportArgs {
     /// Whatever is wrong with the traces, the definitions, the style or the folder.
     pub fn run(self) -> Result<Outcome, Failure> {
         let study = self.traces.study_on(&self.engine, &self.scoring, &self.by)?;
-        let report = study.report(&ReportOptions { style: self.style.clone(), figures: !self.no_figures })?;
-        tell_notes(&report.notes)?;
-        let files = report.write(&self.out)?;
+        let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };
+        study.check_folder(&self.out, &options)?;
+        let report = study.report(&options)?;
+        output::notes(&report.notes);
+        let WrittenReport { files, manifest } = report.write(&self.out)?;
         if self.json {
-            let out = self.out.display().to_string();
-            let Report { results, manifest, .. } = report;
-            return output::print_json(&ReportAnswer { out, files, episodes: results.episodes.len(), manifest });
+            let (out, episodes) = (self.out.display().to_string(), report.results.episodes.len());
+            return output::print_json(&ReportAnswer { out, files, episodes, manifest });
         }
         self.print(&report)
     }
 
     fn print(&self, report: &Report) -> Result<Outcome, Failure> {
         if let Some(table) = report.main_table() {
-            io::stdout().lock().write_all(terminal::render(table, terminal_now()).as_bytes())?;
+            io::stdout().lock().write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
         }
         let episodes = counted(report.results.episodes.len() as u64, "episode");
-        writeln!(io::stderr(), "{episodes}; the report is in {}", self.out.display())?;
+        output::say(&format!("{episodes}; the report is in {}", self.out.display()));
         Ok(Outcome::Done)
-    }
-}
-
-/// Says on standard error what a report lacks or leaves open.
-///
-/// # Errors
-/// When standard error cannot be written.
-pub fn tell_notes(notes: &[String]) -> io::Result<()> {
-    notes.iter().try_for_each(|note| writeln!(io::stderr(), "note: {note}"))
-}
-
-/// What standard output is.
-fn terminal_now() -> Terminal {
-    let is_terminal = io::stdout().is_terminal();
-    let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
-    let width = terminal_size::terminal_size().map(|(width, _)| usize::from(width.0));
-    Terminal {
-        width: if is_terminal { width } else { None },
-        emphasis: if is_terminal && !plain { Marks::Ansi } else { Marks::Signs },
     }
 }

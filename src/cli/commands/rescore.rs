@@ -9,12 +9,11 @@ use serde::Serialize;
 use super::super::args::ThreadArgs;
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
-use super::super::output;
-use super::report::tell_notes;
+use super::super::{output, terminal};
 use crate::cells::changes::Changes;
 use crate::report::bundle::Manifest;
 use crate::report::changes::{self, Limit};
-use crate::study::{RescoreRequest, Rescored, folder_of_rescored};
+use crate::study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored};
 
 /// Make a report again from the traces that it was made of, under other definitions
 ///
@@ -74,19 +73,20 @@ impl RescoreArgs {
     /// A folder that is no report, traces that are not what they were, whatever is wrong with the definitions.
     pub fn run(self) -> Result<Outcome, Failure> {
         let out = folder_of_rescored(&self.report, self.out.as_deref())?;
-        let rescored = self.request().run()?;
-        tell_notes(&rescored.report.notes)?;
-        let files = rescored.report.write(&out)?;
+        let rescored = self.request(&out).run()?;
+        output::notes(&rescored.report.notes);
+        let written = rescored.report.write(&out)?;
         match &rescored.changes {
-            Ok(diff) => tell_notes(&diff.notes)?,
-            Err(reason) => writeln!(io::stderr(), "note: no comparison with the old report: {reason}")?,
+            Ok(diff) => output::notes(&diff.notes),
+            Err(reason) => output::note(&format!("no comparison with the old report: {reason}")),
         }
-        self.print(&out, files, rescored)
+        self.print(&out, written, rescored)
     }
 
-    fn request(&self) -> RescoreRequest {
+    fn request(&self, out: &Path) -> RescoreRequest {
         RescoreRequest {
             report: self.report.clone(),
+            out: out.to_owned(),
             definitions: self.definitions.clone(),
             places: self.traces.clone(),
             style: self.style.clone(),
@@ -95,18 +95,18 @@ impl RescoreArgs {
         }
     }
 
-    fn print(&self, out: &Path, files: Vec<String>, rescored: Rescored) -> Result<Outcome, Failure> {
+    fn print(&self, out: &Path, written: WrittenReport, rescored: Rescored) -> Result<Outcome, Failure> {
         let Rescored { report, changes } = rescored;
         let changes = changes.ok().map(|diff| diff.changes);
         let (out, episodes) = (out.display().to_string(), report.results.episodes.len());
         if self.json {
-            let manifest = report.manifest;
+            let WrittenReport { files, manifest } = written;
             return output::print_json(&RescoreAnswer { out, files, episodes, manifest, changes });
         }
         if let Some(changes) = &changes {
-            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit)).as_bytes())?;
+            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit), terminal::width()).as_bytes())?;
         }
-        writeln!(io::stderr(), "{}; the report is in {out}", counted(episodes as u64, "episode"))?;
+        output::say(&format!("{}; the report is in {out}", counted(episodes as u64, "episode")));
         Ok(Outcome::Done)
     }
 }

@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use crate::agent::{Family, reply};
 use crate::cli::listing::listing;
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::terminal;
 use crate::trace::describe::SchemaDocument;
 use crate::trace::import;
 
@@ -49,8 +50,8 @@ impl Name {
     }
 }
 
-/// Columns of a terminal that text is wrapped to, wherever it goes.
-const WIDTH: u16 = 110;
+/// Columns that text is wrapped to wherever it goes, but for narrower terminals.
+const WIDTH: usize = 110;
 
 impl SchemaCommand {
     /// Prints the schema.
@@ -104,6 +105,10 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
 
 fn wrapped<const N: usize>(header: [&str; N]) -> Table {
     let mut table = listing(header);
-    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width());
     table
+}
+
+fn width() -> u16 {
+    u16::try_from(terminal::width().unwrap_or(WIDTH).min(WIDTH)).unwrap_or(u16::MAX)
 }

@@ -1,6 +1,6 @@
 //! `score`: the episode table of traces, or the evidence for one episode.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
@@ -50,10 +50,15 @@ impl ScoreArgs {
         // An output name of no known format should not cost a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
         let study = self.traces.study_on(&self.engine, &self.scoring, &[])?;
-        match &self.explain {
-            Some(episode) => output::print(&study.explain(episode)?, self.json),
-            None => self.deliver(format, |format, out| study.write_scores(format, out)),
+        self.check_target(study.files_read(None))?;
+        if let Some(episode) = &self.explain {
+            return output::print(&study.explain(episode)?, self.json);
         }
+        let rows = self.deliver(format, |format, out| study.write_scores(format, out))?;
+        if let Some(words) = study.empty_filter(rows)? {
+            output::note(&words);
+        }
+        Ok(Outcome::Done)
     }
 
     fn run_on_spark(&self) -> Result<Outcome, Failure> {
@@ -66,12 +71,20 @@ impl ScoreArgs {
             let name = folder.to_string_lossy();
             let written = self.spark_job()?.write(&name)?;
             let episodes = counted(written.episodes, "episode");
-            writeln!(io::stderr(), "{episodes}; `mirrorstats report {name}` goes on from here")?;
+            output::say(&format!("{episodes}; `mirrorstats report {name}` goes on from here"));
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let table = self.spark_job()?.score()?;
-        self.deliver(format, |format, out| Ok(format::write(&table, format, out)?))
+        let job = self.spark_job()?;
+        self.check_target(job.read().to_vec())?;
+        let table = job.score()?;
+        self.deliver(format, |format, out| Ok(format::write(&table, format, out)?))?;
+        Ok(Outcome::Done)
+    }
+
+    /// That the output is no file which is read.
+    fn check_target(&self, read: Vec<PathBuf>) -> Result<(), Failure> {
+        self.output.as_ref().map_or(Ok(()), |path| output::check_target(path, read))
     }
 
     /// What Spark is to compute, of files of this machine or of URIs that it alone can read.
@@ -84,17 +97,16 @@ impl ScoreArgs {
     }
 
     /// Writes the table to where it was asked for.
-    fn deliver(
+    fn deliver<T>(
         &self,
         format: Option<Format>,
-        write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<(), StudyError>,
-    ) -> Result<Outcome, Failure> {
+        write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<T, StudyError>,
+    ) -> Result<T, Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
         match &self.output {
-            Some(path) => output::write_file_with(path, |file| Ok(write(format, &mut BufWriter::new(file))?))?,
-            None => write(format, &mut BufWriter::new(io::stdout()))?,
+            Some(path) => output::write_file_with(path, |file| Ok(write(format, &mut BufWriter::new(file))?)),
+            None => Ok(write(format, &mut BufWriter::new(io::stdout()))?),
         }
-        Ok(Outcome::Done)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::base::near::nearest;
 use crate::cells::group::DEFAULT_BY;
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::terminal;
 use crate::report::statistics::{Options, Statistics, text};
 
 /// The word that stands for every metric.
@@ -63,7 +64,7 @@ impl StatsArgs {
         let text = if self.json {
             serde_json::to_string_pretty(&statistics).map_err(Failure::input)? + "\n"
         } else {
-            text::render(&statistics, &self.chosen(&statistics)?)
+            text::render(&statistics, &self.chosen(&statistics)?, terminal::width())
         };
         std::io::stdout().lock().write_all(text.as_bytes())?;
         Ok(Outcome::Done)

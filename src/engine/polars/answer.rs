@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use polars::prelude::{
     AnyValue, CsvWriter, DataFrame, Engine, JsonFormat, JsonWriter, LazyFrame, ParquetWriter, PlanCallback,
-    PolarsResult, Schema, SerWriter as _,
+    PolarsError as Inner, PolarsResult, Schema, SerWriter as _,
 };
 use polars::sql::SQLContext;
 
@@ -96,7 +96,7 @@ pub fn write(frame: LazyFrame, format: Format, out: impl Write + Send + 'static)
             let writer = each(frame, out, |out, mut batch| {
                 Ok(JsonWriter::new(out).with_json_format(JsonFormat::JsonLines).finish(&mut batch)?)
             })?;
-            with(writer, |mut out| out.flush().map_err(|error| PolarsError::Failed(error.to_string())))
+            with(writer, |mut out| Ok(out.flush().map_err(Inner::from)?))
         }
         Format::Parquet => {
             let writer = ParquetWriter::new(out).batched(&schema)?;

@@ -5,8 +5,10 @@ use std::fs;
 use polars::prelude::{DataType, Expr, LazyFrame, NULL, PlRefPath, ScanArgsParquet, UnionArgs, col, concat, lit};
 
 use super::run::PolarsError;
+use crate::score::run::ScoreError;
 use crate::trace::open::{TraceFile, TraceSet};
 use crate::trace::schema::{self, Kind, Stored};
+use crate::trace::verify::verify_pages;
 
 /// A column of the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -58,11 +60,13 @@ impl FrameColumn {
     }
 }
 
-/// The steps of all files in their order; nothing is read before the frame is collected.
+/// The steps of all files in their order; no row is read before the frame is collected. Polars does not verify the
+/// checksums of pages, so that they are verified here.
 ///
 /// # Errors
-/// When a file is gone, or its path is no text.
+/// When a page is damaged, a file is gone, or its path is no text.
 pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
+    verify_pages(traces).map_err(ScoreError::from)?;
     let frames = traces.files().iter().map(|file| scan(file, columns)).collect::<Result<Vec<_>, _>>()?;
     Ok(concat(frames, UnionArgs { rechunk: false, ..UnionArgs::default() })?)
 }

@@ -9,6 +9,7 @@ use serde_json::Value;
 
 use super::{Job, SparkError, cause, check, request, source};
 use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use crate::trace::colors;
 use crate::trace::finding::{Code, Finding};
 
 /// What happened.
@@ -83,9 +84,16 @@ fn no_episodes(job: Job<'_>) -> Finding {
 
 fn finding(fault: Fault, job: Job<'_>) -> Option<Finding> {
     let columns = request::columns(&job.definitions.plan, job.labels);
-    let mut rules = check::rules(columns.iter().map(|(name, _)| name.as_str()), &job.definitions.catalog);
+    let palette = job.sources.palette();
+    let mut rules = check::rules(columns.iter().map(|(name, _)| name.as_str()), &job.definitions.catalog, palette);
     let rule = (fault.rule < rules.len()).then(|| rules.swap_remove(fault.rule))?;
-    let finding = Finding::new(rule.code, job.sources.name(), rule.expected, fault.found).in_column(rule.column);
+    let mut finding = Finding::new(rule.code, job.sources.name(), rule.expected, fault.found).in_column(&rule.column);
+    if let Some(color) = colors::column(&rule.column).filter(|_| rule.code == Code::InvalidColor) {
+        let quoted = finding.found.strip_prefix('`').and_then(|found| found.strip_suffix('`'));
+        let text = quoted.unwrap_or(&finding.found).to_owned();
+        finding.found = format!("`{}`", text.escape_debug());
+        finding.help = color.help(&text, palette);
+    }
     Some(match fault.episode {
         Some(episode) => finding.in_episode(episode),
         None => finding,
@@ -136,5 +144,35 @@ fn text(value: Value) -> Option<Option<String>> {
         Value::Null => Some(None),
         Value::String(text) => Some(Some(text)),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Fault, check, finding, request};
+    use crate::engine::spark::Job;
+    use crate::engine::spark::source::Sources;
+    use crate::metric::definitions::Definitions;
+    use crate::score::run::schema_columns;
+    use crate::trace::finding::Code;
+
+    #[test]
+    fn a_color_is_refused_in_the_words_of_the_native_engine() {
+        let definitions = Definitions::load("paper", &schema_columns()).unwrap();
+        let sources = Sources::Uris(vec!["s3a://b/x".to_owned()]);
+        let job = Job { definitions: &definitions, labels: &[], sources: &sources };
+        let columns = request::columns(&definitions.plan, &[]);
+        let rules = check::rules(columns.iter().map(|(name, _)| name.as_str()), &definitions.catalog, None);
+        for column in ["body_color", "self_color", "selected_cube"] {
+            let is_wanted = |rule: &check::Rule| rule.code == Code::InvalidColor && rule.column == column;
+            let rule = rules.iter().position(is_wanted).unwrap();
+            let fault = Fault { episode: Some("e".to_owned()), rule, found: "`Red\u{a0}`".to_owned() };
+            let found = finding(fault, job).unwrap().to_string();
+            assert!(
+                found.starts_with(&format!("invalid-color: s3a://b/x, episode `e`, column `{column}`\n")),
+                "{found}"
+            );
+            assert!(found.ends_with("\n  found `Red\\u{a0}`\n  help: did you mean `red`?"), "{found}");
+        }
     }
 }

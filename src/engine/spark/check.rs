@@ -6,8 +6,12 @@
 
 use std::fmt::Write as _;
 
+use crate::base::palette::Color;
 use crate::metric::catalog::Catalog;
 use crate::metric::sql::Dialect;
+use crate::trace::colors::palette::Palette;
+use crate::trace::colors::spelling::{STRAY, WORDS};
+use crate::trace::colors::{self, ColorColumn};
 use crate::trace::finding::Code;
 use crate::trace::schema::{self, Column, Kind};
 
@@ -21,12 +25,18 @@ pub(super) struct Rule {
 }
 
 /// The rules for some columns, in the order of the columns.
-pub(super) fn rules<'a>(columns: impl IntoIterator<Item = &'a str>, catalog: &Catalog) -> Vec<Rule> {
+///
+/// `palette` has the colours of the traces, if every one of them declares a palette.
+pub(super) fn rules<'a>(
+    columns: impl IntoIterator<Item = &'a str>,
+    catalog: &Catalog,
+    palette: Option<&Palette>,
+) -> Vec<Rule> {
     let known = columns.into_iter().filter_map(schema::column);
-    known.flat_map(|column| rules_of(column, catalog)).collect()
+    known.flat_map(|column| rules_of(column, catalog, palette)).collect()
 }
 
-fn rules_of(column: &Column, catalog: &Catalog) -> Vec<Rule> {
+fn rules_of(column: &Column, catalog: &Catalog, palette: Option<&Palette>) -> Vec<Rule> {
     let x = format!("s.{}", column.name);
     let mut rules = Vec::new();
     let mut rule = |code, expected: String, found: String| {
@@ -53,6 +63,9 @@ fn rules_of(column: &Column, catalog: &Catalog) -> Vec<Rule> {
         let code = if column.name == "action" { Code::UnknownAction } else { Code::UnknownReplyStatus };
         rule(code, column.values.join(", "), found);
     }
+    if let Some(color) = colors::column(column.name) {
+        rule(Code::InvalidColor, color.expected(palette), first_bad(no_color(&x, color, palette)));
+    }
     if column.name == "experiment" && !catalog.open {
         let known: Vec<&str> = catalog.experiment.keys().map(String::as_str).collect();
         let unknown =
@@ -68,6 +81,20 @@ fn rules_of(column: &Column, catalog: &Catalog) -> Vec<Rule> {
         rules.extend(sequence(&x));
     }
     rules
+}
+
+/// That a text is none that a column of colours may hold.
+fn no_color(x: &str, column: ColorColumn, palette: Option<&Palette>) -> String {
+    if let Some(palette) = palette {
+        let names = palette.names().iter().map(String::as_str).chain(column.word);
+        return format!("{x} NOT IN ({})", texts(names));
+    }
+    let words = texts(WORDS.into_iter().filter(|word| column.word != Some(*word)));
+    let stray = Dialect::Spark.pattern(STRAY);
+    let study = texts(Color::ALL.map(Color::name));
+    format!(
+        "{x} IN ({words}) OR {x} <> LOWER({x}) OR regexp_like({x}, {stray}) OR ({x} LIKE '% %' AND REPLACE({x}, ' ', '') IN ({study}))"
+    )
 }
 
 /// t is 1..T, each once.
@@ -114,4 +141,57 @@ pub(super) fn statement(rules: &[Rule]) -> String {
     }
     text.push_str("\n    END AS fault\n  FROM episodes\n)\n");
     text + "SELECT COALESCE(SUM(steps), 0) AS steps, COUNT(*) AS episodes, COUNT(fault) AS faults, MIN(fault) AS fault\nFROM faults\n"
+}
+
+#[cfg(all(test, feature = "polars"))]
+mod tests {
+    use polars::prelude::{IntoLazy as _, df};
+    use polars::sql::SQLContext;
+
+    use super::no_color;
+    use crate::trace::colors::{COLOR_COLUMNS, palette::Palette};
+
+    const TEXTS: [&str; 22] = [
+        "red",
+        "teal",
+        "dark teal",
+        "grün",
+        "olive2",
+        "dark-red",
+        "none",
+        "unknown",
+        "None",
+        "Unknown ",
+        "Red",
+        "GRÜN",
+        " red",
+        "red ",
+        "red\u{a0}",
+        "dark\u{a0}teal",
+        "dark  teal",
+        "r\u{200b}ed",
+        "\u{feff}red",
+        "red\n",
+        "re d",
+        "none ",
+    ];
+
+    /// Polars stands in for Spark: it has the same functions, and patterns of which this one means the same.
+    #[test]
+    fn the_condition_is_the_rule() {
+        let palette = Palette::of_all([Some(&Palette::new(vec!["teal".into(), "grün".into()]))].into_iter());
+        for palette in [None, palette.as_ref()] {
+            for column in COLOR_COLUMNS {
+                let mut context = SQLContext::new();
+                context.register("steps", df!["color" => TEXTS].unwrap().lazy());
+                let condition = no_color("s.color", column, palette).replace("\\\\", "\\");
+                let rows =
+                    context.execute(&format!("SELECT {condition} AS bad FROM steps s")).unwrap().collect().unwrap();
+                let bad: Vec<bool> =
+                    rows.column("bad").unwrap().bool().unwrap().iter().map(|bad| bad.unwrap()).collect();
+                let expected: Vec<bool> = TEXTS.map(|text| !column.may_hold(text, palette)).to_vec();
+                assert_eq!(bad, expected, "{} {palette:?}", column.name);
+            }
+        }
+    }
 }

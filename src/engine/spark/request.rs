@@ -51,7 +51,8 @@ impl Request {
         folder: Option<String>,
     ) -> Result<Self, SparkError> {
         let columns = columns(&job.definitions.plan, job.labels);
-        let rules = check::rules(columns.iter().map(|(name, _)| name.as_str()), &job.definitions.catalog);
+        let names = columns.iter().map(|(name, _)| name.as_str());
+        let rules = check::rules(names, &job.definitions.catalog, job.sources.palette());
         let secrets = cluster.settings.iter().filter(|setting| setting.is_secret());
         let rows = match job.sources {
             Sources::Files { rows, .. } => Some(*rows),
@@ -192,7 +193,7 @@ mod tests {
             let sources = Sources::Uris(Vec::new());
             let job = Job { definitions: &definitions, labels: &labels, sources: &sources };
             let read = columns(&definitions.plan, &labels);
-            let rules = check::rules(read.iter().map(|(name, _)| name.as_str()), &definitions.catalog);
+            let rules = check::rules(read.iter().map(|(name, _)| name.as_str()), &definitions.catalog, None);
             for text in [statement(job).unwrap(), check::statement(&rules)] {
                 let own = |name: &String| {
                     let stage = name.strip_prefix('e').is_some_and(|number| number.parse::<usize>().is_ok());

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use crate::trace::colors::palette::Palette;
 use crate::trace::inputs::Input;
 use crate::trace::open::{TraceFile, TraceSet};
 
@@ -20,6 +21,8 @@ pub enum Sources {
         groups: Vec<Group>,
         /// How many rows they have together.
         rows: u64,
+        /// The colours of all of them, if each declares a palette.
+        palette: Option<Palette>,
     },
     /// URIs, as typed; nothing is known of them here.
     Uris(Vec<String>),
@@ -51,7 +54,15 @@ impl Sources {
             names: inputs.iter().map(|input| input.name.clone()).collect(),
             groups: groups.into_iter().map(|(void, paths)| Group { paths, void }).collect(),
             rows: traces.files().iter().map(TraceFile::rows).sum(),
+            palette: Palette::of_all(traces.files().iter().map(TraceFile::palette)),
         })
+    }
+
+    pub(super) fn palette(&self) -> Option<&Palette> {
+        match self {
+            Self::Files { palette, .. } => palette.as_ref(),
+            Self::Uris(_) => None,
+        }
     }
 
     pub(super) fn groups(&self) -> Vec<Group> {

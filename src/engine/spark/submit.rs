@@ -16,7 +16,7 @@ use super::answer::Answer;
 use super::locate::{Spark, locate};
 use super::request::Request;
 use super::{Cluster, SparkError, cause};
-use crate::base::temporary;
+use crate::base::replace;
 
 const DRIVER: &str = include_str!("../../../assets/spark/driver.py");
 /// How long a master may take to accept a connection.
@@ -32,7 +32,7 @@ impl Place {
         // The request may hold secrets.
         #[cfg(unix)]
         folder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
-        let made = folder.tempdir().map_err(temporary::without_name);
+        let made = folder.tempdir().map_err(replace::without_name);
         made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
     }
 

@@ -6,18 +6,20 @@ use indexmap::IndexMap;
 use super::{Limit, words};
 use crate::base::visible::visible;
 use crate::cells::changes::{Changes, Flip, Rewritten};
+use crate::report::tables::fit::fitted;
 
 /// Expressions that are not written the same.
-pub(super) fn rewritten(all: &[Rewritten], limit: Limit) -> Option<String> {
+pub(super) fn rewritten(all: &[Rewritten], limit: Limit, width: Option<usize>) -> Option<String> {
     let written = |text: &Option<String>| text.as_ref().map_or_else(|| "(none)".to_owned(), |text| visible(text));
     let rows = all.iter().map(|one| {
         [visible(&one.name), one.part.to_owned(), written(&one.text.before), written(&one.text.after)].to_vec()
     });
-    listed(["name", "part", "before", "after"].map(str::to_owned).to_vec(), rows, all.len(), limit)
+    let header = ["name", "part", "before", "after"].map(str::to_owned).to_vec();
+    List { header, names: 2, rows, count: all.len() }.render(limit, width)
 }
 
 /// The cells that moved.
-pub(super) fn cells(changes: &Changes, limit: Limit) -> Option<String> {
+pub(super) fn cells(changes: &Changes, limit: Limit, width: Option<usize>) -> Option<String> {
     let header = changes.by.iter().map(|name| visible(name));
     let header = header.chain(["metric", "n", "mean", "change", "se"].map(str::to_owned)).collect();
     let rows = changes.cells.iter().map(|cell| {
@@ -30,7 +32,7 @@ pub(super) fn cells(changes: &Changes, limit: Limit) -> Option<String> {
         ];
         cell.key.values().map(words::key).chain(fields).collect()
     });
-    listed(header, rows, changes.cells.len(), limit)
+    List { header, names: changes.by.len() + 1, rows, count: changes.cells.len() }.render(limit, width)
 }
 
 /// How often each metric went from which value to which: `0 -> 1`; a quantity may only rise or fall.
@@ -58,7 +60,7 @@ fn direction(flip: &Flip) -> &'static str {
 }
 
 /// The episodes that flipped, with the timesteps that decided where some are known.
-pub(super) fn flips(flips: &[Flip], limit: Limit) -> Option<String> {
+pub(super) fn flips(flips: &[Flip], limit: Limit, width: Option<usize>) -> Option<String> {
     let explained = flips.iter().any(|flip| flip.timesteps.before.is_some() || flip.timesteps.after.is_some());
     let mut header = ["metric", "experiment", "model", "episode", "before", "after"].map(str::to_owned).to_vec();
     if explained {
@@ -74,20 +76,32 @@ pub(super) fn flips(flips: &[Flip], limit: Limit) -> Option<String> {
         }
         row
     });
-    listed(header, rows, flips.len(), limit)
+    List { header, names: 4, rows, count: flips.len() }.render(limit, width)
 }
 
-/// A list under its header, cut at the limit; `None` for no line.
-fn listed(header: Vec<String>, rows: impl Iterator<Item = Vec<String>>, count: usize, limit: Limit) -> Option<String> {
-    let rest = words::left_out(count, limit);
-    match (count, limit) {
-        (0, _) => return None,
-        (_, Limit(0)) => return rest.map(|rest| format!("  {rest}")),
-        _ => {}
+/// A list under its header.
+struct List<R> {
+    header: Vec<String>,
+    /// How many of the first columns name a row.
+    names: usize,
+    rows: R,
+    /// How many rows there are.
+    count: usize,
+}
+
+impl<R: Iterator<Item = Vec<String>>> List<R> {
+    /// The list, cut at the limit; `None` for no line.
+    fn render(self, limit: Limit, width: Option<usize>) -> Option<String> {
+        let rest = words::left_out(self.count, limit);
+        match (self.count, limit) {
+            (0, _) => return None,
+            (_, Limit(0)) => return rest.map(|rest| format!("  {rest}")),
+            _ => {}
+        }
+        let mut table = Table::new();
+        table.load_style(presets::NOTHING.header_separator(LineStyle::none().fill('─').junction('─')));
+        table.set_header(self.header).add_rows(self.rows.take(limit.0));
+        let rest = rest.map_or_else(String::new, |rest| format!("\n  {rest}"));
+        Some(format!("{}{rest}", fitted(&table, self.names, width)))
     }
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING.header_separator(LineStyle::none().fill('─').junction('─')));
-    table.set_header(header).add_rows(rows.take(limit.0));
-    let rest = rest.map_or_else(String::new, |rest| format!("\n  {rest}"));
-    Some(format!("{}{rest}", table.trim_fmt()))
 }

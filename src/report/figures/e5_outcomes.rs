@@ -1,6 +1,6 @@
 //! `e5-outcomes`: how the episodes of an open question ended, a stacked bar a model.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use super::frame::{Frame, many};
 use super::legend::Swatch;
@@ -12,8 +12,7 @@ use super::sheet::{Align, Fill, Lettering, Sheet, Stroke};
 use super::tiles;
 use super::{Drawn, MARGIN, Scene};
 use crate::metric::catalog::Experiment;
-use crate::score::table::{EpisodeKey, EpisodeTable};
-use crate::score::timeline::Timeline;
+use crate::score::table::EpisodeTable;
 
 /// The metric that says whether a decision was right.
 const SUCCESS: &str = "TSA";
@@ -49,26 +48,38 @@ impl Outcomes {
     /// The outcomes of the first experiment that has reference levels instead of a chance level for `TSA`: the one
     /// whose question is open. `None` where there is none, or no episode of it.
     ///
-    /// An episode is correct where `TSA` is 1, else wrong where its decision committed to a colour.
-    pub fn of(episodes: &EpisodeTable, timelines: &[Timeline]) -> Option<Self> {
-        let open = |(_, experiment): &(&String, &Experiment)| experiment.reference.contains_key(SUCCESS);
-        let (experiment, _) = episodes.catalog.experiment.iter().find(open)?;
+    /// An episode is correct where `TSA` is 1, else wrong where its decision committed to a colour: where `answered`,
+    /// which has a value per episode of the table, is true.
+    pub fn of(episodes: &EpisodeTable, answered: &[bool]) -> Option<Self> {
+        let experiment = open_experiment(episodes)?;
         let success = episodes.metrics.iter().find(|metric| metric.name == SUCCESS)?;
-        let answered: HashMap<&EpisodeKey, bool> =
-            timelines.iter().map(|timeline| (&timeline.key, timeline.answered)).collect();
         let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
-        for (key, value) in episodes.keys.iter().zip(&success.values).filter(|(key, _)| key.experiment == *experiment) {
+        let all = episodes.keys.iter().zip(&success.values).zip(answered);
+        for ((key, value), answered) in all.filter(|((key, _), _)| key.experiment == experiment) {
             let empty = || OutcomeRow { model: key.model.clone(), correct: 0, wrong: 0, uncommitted: 0 };
             let row = rows.entry(&key.model).or_insert_with(empty);
-            match (value, answered.get(key)?) {
+            match (value, answered) {
                 (Some(1), _) => row.correct += 1,
                 (_, true) => row.wrong += 1,
                 (_, false) => row.uncommitted += 1,
             }
         }
         let rows: Vec<OutcomeRow> = rows.into_values().collect();
-        (!rows.is_empty()).then(|| Self { experiment: experiment.clone(), rows })
+        (!rows.is_empty()).then(|| Self { experiment: experiment.to_owned(), rows })
     }
+
+    /// Whether there is an episode that [`of`](Self::of) would count.
+    pub fn are_there(episodes: &EpisodeTable) -> bool {
+        let has_success = episodes.metrics.iter().any(|metric| metric.name == SUCCESS);
+        let open = open_experiment(episodes).filter(|_| has_success);
+        open.is_some_and(|experiment| episodes.keys.iter().any(|key| key.experiment == experiment))
+    }
+}
+
+/// The first experiment with reference levels instead of a chance level for `TSA`.
+fn open_experiment(episodes: &EpisodeTable) -> Option<&str> {
+    let open = |(_, experiment): &(&String, &Experiment)| experiment.reference.contains_key(SUCCESS);
+    episodes.catalog.experiment.iter().find(open).map(|(name, _)| name.as_str())
 }
 
 impl OutcomeRow {

@@ -9,6 +9,8 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use ttf_parser::Face;
 
+use crate::base::visible::visible;
+
 /// The family's name: private, so that no installed font is taken in its place.
 pub const FAMILY: &str = "Mirrorstats Sans";
 
@@ -69,15 +71,13 @@ pub fn drop_to_baseline(size: f64) -> f64 {
     f64::from(capital) * size / f64::from(face.units_per_em()) / 2.0
 }
 
-/// `text` in characters that the font has: blanks and control characters become spaces, others a hollow square.
+/// `text` in characters that the font has: blanks and control characters become spaces, characters that act or hide
+/// are spelled out, others become a hollow square.
 pub fn drawable(text: &str) -> String {
     let has = |c: char| face(Weight::Regular).glyph_index(c).is_some();
-    let spelled = text.chars().map(|c| match c {
-        c if c.is_whitespace() || c.is_control() => ' ',
-        c if has(c) => c,
-        _ => SUBSTITUTE,
-    });
-    let spelled: String = spelled.collect();
+    let blank = |c: char| c.is_whitespace() || c.is_control();
+    let text: String = text.chars().map(|c| if blank(c) { ' ' } else { c }).collect();
+    let spelled: String = visible(&text).chars().map(|c| if has(c) { c } else { SUBSTITUTE }).collect();
     spelled.split(' ').filter(|word| !word.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
@@ -115,5 +115,6 @@ mod tests {
         assert_eq!(drawable("a\u{4e2d}\u{6587}b"), "a□□b");
         assert_eq!(drawable("  a\t\n b\u{0}"), "a b");
         assert_eq!(drawable("Ωμέγα Ж é"), "Ωμέγα Ж é");
+        assert_eq!(drawable("a\u{ad}\u{202e}b"), "a\\u{ad}\\u{202e}b");
     }
 }

@@ -12,6 +12,9 @@ use super::tiles;
 use super::{Drawn, MARGIN, Scene};
 use crate::score::timeline::Timeline;
 
+/// The most episodes of the raster: with more, the thinnest rows make a picture that no reader can take in.
+pub const MOST_EPISODES: usize = 2_000;
+
 /// The height of all rows of a column together that is aimed at, px.
 const AIM: f64 = 420.0;
 const THINNEST_ROW: f64 = 1.6;

@@ -1,12 +1,14 @@
 //! What a mark stands for: its title on hover, and its values as attributes that programs read back.
 //!
-//! Rule: `data-value` has every digit, as in `cells.csv`, and is empty where there is no value.
+//! Rule: `data-value` has every digit, as in `cells.csv`, and is empty where there is no value. Names are spelled as the
+//! page spells them.
 
 use std::fmt::Write as _;
 
 use super::ink::escaped;
 use super::matrix::Reading;
 use crate::base::number;
+use crate::base::visible::visible;
 
 /// The title and values of one group of shapes.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,9 +55,9 @@ impl Mark {
     pub fn opening(&self) -> String {
         let mut tag = String::from("<g class=\"mark\"");
         for (name, value) in &self.data {
-            let _ = write!(tag, " data-{name}=\"{}\"", escaped(value));
+            let _ = write!(tag, " data-{name}=\"{}\"", escaped(&visible(value)));
         }
-        let _ = writeln!(tag, "><title>{}</title>", escaped(&self.title));
+        let _ = writeln!(tag, "><title>{}</title>", escaped(&visible(&self.title)));
         tag
     }
 }

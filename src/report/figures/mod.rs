@@ -258,6 +258,19 @@ pub enum FigureError {
         /// What it needs.
         needed: &'static str,
     },
+    /// More episodes than a figure shows one by one.
+    #[error(
+        "figure `{figure}` shows each episode and at most {most} of them, found {found}; choose some with --where, such \
+         as --where \"run = 1\""
+    )]
+    TooManyEpisodes {
+        /// The figure.
+        figure: FigureName,
+        /// How many it shows.
+        most: usize,
+        /// How many there are.
+        found: usize,
+    },
     /// A figure of changes between experiments, and only one experiment.
     #[error("figure `slopes` needs two experiments or more, found {found}; add traces of another one")]
     OneExperiment {
@@ -329,7 +342,14 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
         FigureName::DecisionCurve => {
             decision_curve::draw(scene, input.episodes.ok_or_else(|| missing("the episode table"))?)?
         }
-        FigureName::Gaze => gaze::draw(scene, input.timelines.ok_or_else(|| missing("the steps of each episode"))?),
+        FigureName::Gaze => {
+            let found = input.episodes.map_or(0, EpisodeTable::len);
+            let most = gaze::MOST_EPISODES;
+            if found > most {
+                return Err(FigureError::TooManyEpisodes { figure: name, most, found });
+            }
+            gaze::draw(scene, input.timelines.ok_or_else(|| missing("the steps of each episode"))?)
+        }
     };
     Ok(Figure { drawing: sheet.finish(height, name.title(), name.caption()) })
 }

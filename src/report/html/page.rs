@@ -239,7 +239,7 @@ impl StatisticsView {
         Self {
             conclusions: all(&statistics.conclusions),
             warnings: all(&statistics.warnings),
-            text: text::render(statistics, &statistics.headline),
+            text: text::render(statistics, &statistics.headline, None),
         }
     }
 }

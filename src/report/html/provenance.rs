@@ -16,7 +16,7 @@ pub(super) struct Provenance {
     by: String,
     metrics: String,
     inputs: Vec<InputView>,
-    /// The whole of `manifest.json`.
+    /// The text of `manifest.json` without its outputs: the hash of the page is among them.
     manifest: String,
 }
 

@@ -1,6 +1,6 @@
 //! Statistics for people: conclusions first, then the tables they rest on.
 //!
-//! Rule: text from traces is shown, never obeyed: control characters come out as escapes.
+//! Rule: text from traces is shown, never obeyed ([`visible`]).
 
 use std::fmt::Write as _;
 
@@ -8,13 +8,15 @@ use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use super::{CellRow, Intervals, Role, Statistics, Verdict};
 use crate::base::estimate::{bounds, fixed, p_value};
+use crate::base::visible::visible;
 use crate::cells::interval::Interval;
 use crate::metric::catalog::Kind;
+use crate::report::tables::fit::{fitted, wrapped};
 
-/// The whole text, its tables about these metrics alone.
+/// The whole text, its tables about these metrics alone, in lines of at most `width` columns.
 ///
 /// A table that has nothing to show is left out. [`Statistics::headline`] is what a reader wants who did not choose.
-pub fn render(statistics: &Statistics, metrics: &[String]) -> String {
+pub fn render(statistics: &Statistics, metrics: &[String], width: Option<usize>) -> String {
     let shown = |metric: &String| metrics.contains(metric);
     let percent = percent(statistics.confidence);
     let mut text = format!(
@@ -22,38 +24,54 @@ pub fn render(statistics: &Statistics, metrics: &[String]) -> String {
         statistics.episodes,
         visible(&statistics.definitions)
     );
-    list(&mut text, "What can be concluded", &statistics.conclusions);
-    list(&mut text, "What can not", &statistics.warnings);
-    section(&mut text, &format!("Rates, {percent} intervals"), &rates(statistics, &shown));
-    section(&mut text, &format!("Quantities, {percent} intervals of the mean"), &quantities(statistics, &shown));
-    section(&mut text, "Against chance: exact binomial test, Holm over the models", &chance(statistics, &shown));
-    section(&mut text, "Models told apart: exact McNemar test, Holm over all pairs", &separated(statistics, &shown));
-    section(&mut text, "Between conditions: first experiment minus the other", &conditions(statistics, &shown));
-    section(&mut text, "By seed: clustered standard errors, t(seeds - 1)", &clusters(statistics, &shown));
-    section(&mut text, "Durations: unfinished episodes censored at their length", &durations(statistics, &shown));
-    section(&mut text, "Lost to infrastructure", &losses(statistics, &shown));
-    text.push_str("\nMethods: Wilson, Clopper-Pearson and Jeffreys intervals of rates; Student's t and a seeded BCa bootstrap of means;\n");
-    text.push_str(
-        "differences by Newcombe's method 10 (paired and independent) or Welch's t, not adjusted for their number.\n",
-    );
+    list(&mut text, "What can be concluded", &statistics.conclusions, width);
+    list(&mut text, "What can not", &statistics.warnings, width);
+    for (title, grid) in [
+        (&*format!("Rates, {percent} intervals"), rates(statistics, &shown)),
+        (&*format!("Quantities, {percent} intervals of the mean"), quantities(statistics, &shown)),
+        ("Against chance: exact binomial test, Holm over the models", chance(statistics, &shown)),
+        ("Models told apart: exact McNemar test, Holm over all pairs", separated(statistics, &shown)),
+        ("Between conditions: first experiment minus the other", conditions(statistics, &shown)),
+        ("By seed: clustered standard errors, t(seeds - 1)", clusters(statistics, &shown)),
+        ("Durations: unfinished episodes censored at their length", durations(statistics, &shown)),
+        ("Lost to infrastructure", losses(statistics, &shown)),
+    ] {
+        section(&mut text, title, &grid, width);
+    }
+    text.push('\n');
+    for line in METHODS {
+        push_wrapped(&mut text, line, width, 0);
+    }
     text
+}
+
+/// The methods, in the lines that they have where there is room.
+const METHODS: [&str; 2] = [
+    "Methods: Wilson, Clopper-Pearson and Jeffreys intervals of rates; Student's t and a seeded BCa bootstrap of means;",
+    "differences by Newcombe's method 10 (paired and independent) or Welch's t, not adjusted for their number.",
+];
+
+fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
+    for line in wrapped(words, width.unwrap_or(usize::MAX), indent) {
+        let _ = writeln!(text, "{line}");
+    }
 }
 
 type Shown<'a> = &'a dyn Fn(&String) -> bool;
 
-fn list(text: &mut String, title: &str, sentences: &[String]) {
+fn list(text: &mut String, title: &str, sentences: &[String], width: Option<usize>) {
     if sentences.is_empty() {
         return;
     }
     let _ = writeln!(text, "\n{title}");
     for sentence in sentences {
-        let _ = writeln!(text, "  - {}", visible(sentence));
+        push_wrapped(text, &format!("  - {}", visible(sentence)), width, 4);
     }
 }
 
-fn section(text: &mut String, title: &str, rows: &Grid) {
+fn section(text: &mut String, title: &str, rows: &Grid, width: Option<usize>) {
     if !rows.lines.is_empty() {
-        let _ = write!(text, "\n{title}\n{}", rows.render());
+        let _ = write!(text, "\n{title}\n{}", rows.render(width));
     }
 }
 
@@ -76,7 +94,7 @@ impl Grid {
         self
     }
 
-    fn render(&self) -> String {
+    fn render(&self, width: Option<usize>) -> String {
         let mut table = Table::new();
         table.load_style(presets::NOTHING).set_content_arrangement(ContentArrangement::Disabled);
         table.set_header(&self.header);
@@ -84,7 +102,7 @@ impl Grid {
         for (at, column) in table.column_iter_mut().enumerate() {
             column.set_cell_alignment(if at < self.texts { CellAlignment::Left } else { CellAlignment::Right });
         }
-        table.lines().fold(String::new(), |text, line| text + line.trim_end() + "\n")
+        fitted(&table, self.texts, width) + "\n"
     }
 }
 
@@ -247,28 +265,9 @@ fn percent(confidence: f64) -> String {
     format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// The text with control characters escaped, those that reverse or hide text included.
-fn visible(text: &str) -> String {
-    let hides =
-        |c: char| matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}');
-    text.chars().fold(String::with_capacity(text.len()), |mut shown, c| {
-        if c.is_control() || hides(c) {
-            shown.extend(c.escape_default());
-        } else {
-            shown.push(c);
-        }
-        shown
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{percent, visible};
-
-    #[test]
-    fn control_characters_are_shown() {
-        assert_eq!(visible("a\u{1b}[31mb\n\u{202e}é"), "a\\u{1b}[31mb\\n\\u{202e}é");
-    }
+    use super::percent;
 
     #[test]
     fn a_confidence_is_a_percentage() {

@@ -4,6 +4,7 @@
 //! format escapes it; the one exception is a style's `latex` header.
 
 pub mod csv;
+pub mod fit;
 pub mod latex;
 pub mod markdown;
 pub mod side_by_side;

@@ -5,14 +5,15 @@ use std::fmt::Write as _;
 use comfy_table::LineStyle;
 use comfy_table::{Table, presets};
 
+use super::fit::{fitted, wrapped};
 use crate::base::visible::visible;
 use crate::report::comparison::{Comparison, Difference};
 
-/// The whole answer of `compare`.
-pub fn render(comparison: &Comparison) -> String {
+/// The whole answer of `compare`, in lines of at most `width` columns.
+pub fn render(comparison: &Comparison, width: Option<usize>) -> String {
     let mut text = String::new();
     if !comparison.differences.is_empty() {
-        push_differences(&mut text, &comparison.differences);
+        push_differences(&mut text, &comparison.differences, width);
         text.push('\n');
     }
     for erratum in &comparison.unused_errata {
@@ -33,12 +34,19 @@ pub fn render(comparison: &Comparison) -> String {
     let _ = writeln!(
         text,
         "{}: {} cells: {} as published, {} excused by errata, {} differ",
-        comparison.table, comparison.cells, comparison.same, comparison.excused, comparison.differing
+        visible(&comparison.table),
+        comparison.cells,
+        comparison.same,
+        comparison.excused,
+        comparison.differing
     );
     text
 }
 
-fn push_differences(text: &mut String, differences: &[Difference]) {
+/// Experiment, model and metric: the columns that name a cell.
+const NAMES: usize = 3;
+
+fn push_differences(text: &mut String, differences: &[Difference], width: Option<usize>) {
     let mut table = Table::new();
     table.load_style(presets::UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
     table.set_header(["experiment", "model", "metric", "field", "published", "computed", "verdict"]);
@@ -53,9 +61,11 @@ fn push_differences(text: &mut String, differences: &[Difference]) {
         };
         table.add_row(record(difference, verdict));
     }
-    let _ = writeln!(text, "{}", table.trim_fmt());
+    let _ = writeln!(text, "{}", fitted(&table, NAMES, width));
     for (at, reason) in reasons.iter().enumerate() {
-        let _ = writeln!(text, "[{}] {}", at + 1, visible(reason));
+        let number = format!("[{}] ", at + 1);
+        let lines = wrapped(&format!("{number}{}", visible(reason)), width.unwrap_or(usize::MAX), number.len());
+        let _ = writeln!(text, "{}", lines.join("\n"));
     }
 }
 

@@ -1,11 +1,13 @@
 //! Tables for a terminal, and for a pipe.
 //!
 //! On a terminal the best is bold and the second best underlined; elsewhere they stand as `*0.91*` and `_0.86_`.
-//! A table wider than the terminal puts each cell's interval under its estimate. The layout is our own because
-//! headings span all columns and styled text must measure as what it shows.
+//! A table wider than the terminal puts each cell's interval under its estimate; where that is not enough, long names
+//! wrap and columns go on in further tables below. The layout is our own because headings span all columns and styled
+//! text must measure as what it shows.
 
 use unicode_width::UnicodeWidthStr;
 
+use super::fit::{broken, wrapped};
 use crate::base::visible::visible;
 use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 
@@ -31,20 +33,21 @@ pub enum Marks {
 /// Spaces between columns.
 const GAP: &str = "  ";
 
+/// The room for sentences on a terminal however narrow.
+const LEAST_ROOM: usize = 40;
+
 /// The whole table: title, rows, notes.
 pub fn render(table: &Table, terminal: Terminal) -> String {
-    let one_line = Grid::new(table, terminal.emphasis, Shape::OneLine);
-    let grid = match terminal.width {
-        Some(width) if one_line.width() > width => Grid::new(table, terminal.emphasis, Shape::TwoLines),
-        _ => one_line,
-    };
-    let room = terminal.width.unwrap_or_else(|| grid.width()).max(40);
-    let mut lines = wrapped(&format!("{}.", visible(&table.title)), room);
+    let grids = Grid::within(table, terminal);
+    let room = terminal.width.unwrap_or_else(|| grids[0].width()).max(LEAST_ROOM);
+    let mut lines = wrapped(&format!("{}.", visible(&table.title)), room, 0);
     lines.push(String::new());
-    lines.extend(grid.lines(table));
-    lines.push(String::new());
+    for grid in &grids {
+        lines.extend(grid.lines(table, terminal.width.map(|_| room)));
+        lines.push(String::new());
+    }
     for sentence in table.sentences() {
-        lines.extend(wrapped(&visible(sentence), room));
+        lines.extend(wrapped(&visible(sentence), room, 0));
     }
     if terminal.emphasis == Marks::Signs && is_any_emphasised(table) {
         lines.push("Marked as *best*, _second best_.".to_owned());
@@ -105,6 +108,53 @@ struct Grid {
 }
 
 impl Grid {
+    /// The table as one grid, or as several below each other where it must be.
+    fn within(table: &Table, terminal: Terminal) -> Vec<Self> {
+        let one_line = Self::new(table, terminal.emphasis, Shape::OneLine);
+        let Some(width) = terminal.width.filter(|width| one_line.width() > *width) else { return vec![one_line] };
+        let two_lines = Self::new(table, terminal.emphasis, Shape::TwoLines);
+        if two_lines.width() <= width { vec![two_lines] } else { two_lines.split(width) }
+    }
+
+    /// Grids of some columns each, none wider than `width` unless a single column is; each has the names of the rows.
+    fn split(mut self, width: usize) -> Vec<Self> {
+        self.break_names(width / 2);
+        let mut parts: Vec<Vec<usize>> = Vec::new();
+        let mut taken = 0;
+        for column in 1..self.widths.len() {
+            let room = GAP.len() + self.widths[column];
+            match parts.last_mut() {
+                Some(part) if taken + room <= width => part.push(column),
+                _ => {
+                    parts.push(vec![0, column]);
+                    taken = self.widths[0];
+                }
+            }
+            taken += room;
+        }
+        parts.into_iter().map(|part| self.only(&part)).collect()
+    }
+
+    /// Breaks the names of rows that are wider than `room` into lines.
+    fn break_names(&mut self, room: usize) {
+        for cell in self.groups.iter_mut().flatten().filter_map(|row| row.first_mut()) {
+            let lines = cell.iter().flat_map(|piece| broken(&piece.text, room));
+            *cell = lines.map(Piece::new).collect();
+        }
+        let names = self.groups.iter().flatten().filter_map(|row| row.first()).flatten();
+        self.widths[0] = names.map(|piece| piece.width).fold(self.header[0].width, usize::max);
+    }
+
+    /// These columns alone.
+    fn only(&self, columns: &[usize]) -> Self {
+        let row = |row: &Vec<Vec<Piece>>| columns.iter().map(|&at| row[at].clone()).collect();
+        Self {
+            header: columns.iter().map(|&at| self.header[at].clone()).collect(),
+            groups: self.groups.iter().map(|group| group.iter().map(row).collect()).collect(),
+            widths: columns.iter().map(|&at| self.widths[at]).collect(),
+        }
+    }
+
     fn new(table: &Table, marks: Marks, shape: Shape) -> Self {
         let header = header(table);
         let groups: Vec<Vec<Vec<Vec<Piece>>>> = table
@@ -125,8 +175,16 @@ impl Grid {
         self.widths.iter().sum::<usize>() + GAP.len() * self.widths.len().saturating_sub(1)
     }
 
-    fn lines(&self, table: &Table) -> Vec<String> {
-        let headings = table.groups.iter().filter_map(heading).map(|heading| heading.width());
+    /// The header, a rule, the rows; headings in lines of at most `room` columns.
+    fn lines(&self, table: &Table, room: Option<usize>) -> Vec<String> {
+        let heading = |group: &RowGroup| {
+            let heading = group.heading.as_deref().map(visible);
+            heading.map_or_else(Vec::new, |heading| match room {
+                Some(room) => broken(&heading, room),
+                None => vec![heading],
+            })
+        };
+        let headings = table.groups.iter().flat_map(heading).map(|heading| heading.width());
         let rule = "─".repeat(headings.fold(self.width(), usize::max));
         let mut lines = vec![self.line(&self.header), rule.clone()];
         for (at, (group, rows)) in table.groups.iter().zip(&self.groups).enumerate() {
@@ -152,10 +210,6 @@ impl Grid {
         });
         aligned.collect::<Vec<_>>().join(GAP).trim_end().to_owned()
     }
-}
-
-fn heading(group: &RowGroup) -> Option<String> {
-    group.heading.as_deref().map(visible)
 }
 
 fn header(table: &Table) -> Vec<Piece> {
@@ -192,20 +246,4 @@ fn spell(cell: &Cell, table: &Table, marks: Marks, shape: Shape) -> Vec<Piece> {
 fn is_any_emphasised(table: &Table) -> bool {
     let rows = table.groups.iter().flat_map(|group| &group.rows);
     rows.flat_map(|row| &row.cells).any(|cell| cell.emphasis != Emphasis::Plain)
-}
-
-/// `text` in lines of at most `width` columns where its words allow.
-fn wrapped(text: &str, width: usize) -> Vec<String> {
-    let mut lines = vec![String::new()];
-    for word in text.split(' ') {
-        match lines.last_mut() {
-            Some(line) if line.is_empty() => line.push_str(word),
-            Some(line) if line.width() + 1 + word.width() <= width => {
-                line.push(' ');
-                line.push_str(word);
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    lines
 }

@@ -42,8 +42,12 @@ impl<W: Write> Writer<W> {
     }
 }
 
+/// The system's own error: `csv` wraps it in another of a kind that says nothing, such as whether a pipe is closed.
 fn io(error: csv::Error) -> FormatError {
-    FormatError::Io(error.into())
+    FormatError::Io(match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => std::io::Error::other(format!("{other:?}")),
+    })
 }
 
 pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {

@@ -16,7 +16,7 @@ use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderB
 use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
-use parquet::file::metadata::{KeyValue, ParquetMetaDataReader};
+use parquet::file::metadata::{KeyValue, ParquetMetaData, ParquetMetaDataReader};
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::ChunkReader;
 use parquet::file::writer::SerializedFileWriter;
@@ -29,6 +29,7 @@ use crate::base::beside::beside;
 use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
 use crate::score::values::nulls_of;
 use crate::trace::contain::contained;
+use crate::trace::footer_shape;
 
 /// The footer key that tells scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -43,8 +44,7 @@ pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
 ///
 /// `folders` are columns that stand in the names of the file's folders.
 pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)]) -> bool {
-    let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
-    let Ok(Ok(metadata)) = footer else { return false };
+    let Some(metadata) = metadata(file) else { return false };
     if footer::value(metadata.file_metadata(), KIND_KEY).is_some() {
         return footer::value(metadata.file_metadata(), KIND_KEY).as_deref() == Some(SCORES_KIND);
     }
@@ -56,14 +56,21 @@ pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)
 
 /// Whether a file of scores carries the definitions that gave them.
 pub fn holds_definitions(file: &impl ChunkReader) -> bool {
-    let footer = contained(|| ParquetMetaDataReader::new().parse_and_finish(file));
-    matches!(footer, Ok(Ok(metadata)) if footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
+    metadata(file).is_some_and(|metadata| footer::value(metadata.file_metadata(), DEFINITIONS_KEY).is_some())
+}
+
+/// The footer of a file, if it has one that can be read.
+fn metadata(file: &impl ChunkReader) -> Option<ParquetMetaData> {
+    footer_shape::check_file(file).ok()?;
+    contained(|| ParquetMetaDataReader::new().parse_and_finish(file)).ok()?.ok()
 }
 
 /// Rows after which a row group is closed: what is encoded and not yet written stays small.
 const ROW_GROUP_ROWS: usize = 64 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 4 * 1024;
+/// Bytes of texts that are gathered at most, one row more or less: a column holds 2 GiB.
+const GATHERED_TEXT: usize = 256 << 20;
 
 /// Batches that wait for an encoder.
 const WAITING: usize = 2;
@@ -94,7 +101,7 @@ pub(super) fn write<E: From<FormatError>>(
         rows(&mut |row| {
             if !over {
                 gathered.add(row);
-                over = gathered.seed.len() == GATHERED_ROWS && !send(&mut gathered)?;
+                over = gathered.is_full() && !send(&mut gathered)?;
             }
             Ok(())
         })?;
@@ -211,6 +218,7 @@ struct Gathered {
     run: Int32Builder,
     labels: Vec<StringBuilder>,
     metrics: Vec<Numbers>,
+    text_bytes: usize,
 }
 
 /// Integers of which some are not there.
@@ -244,18 +252,25 @@ impl Gathered {
             run: Int32Builder::new(),
             labels: header.labels.iter().map(|_| StringBuilder::new()).collect(),
             metrics: header.metrics.iter().map(|_| Numbers::default()).collect(),
+            text_bytes: 0,
         }
+    }
+
+    fn is_full(&self) -> bool {
+        self.seed.len() == GATHERED_ROWS || self.text_bytes >= GATHERED_TEXT
     }
 
     fn add(&mut self, row: &EpisodeRow) {
         let EpisodeKey { experiment, model, seed, run, episode_id } = &row.key;
         for (column, text) in self.texts.iter_mut().zip([episode_id, model, experiment]) {
             column.append_value(text);
+            self.text_bytes += text.len();
         }
         self.seed.append_value(*seed);
         self.run.append_value(*run);
         for (column, label) in self.labels.iter_mut().zip(&row.labels) {
             column.append_option(label.as_deref());
+            self.text_bytes += label.as_ref().map_or(0, String::len);
         }
         for (column, metric) in self.metrics.iter_mut().zip(&row.metrics) {
             column.add(*metric);
@@ -264,6 +279,7 @@ impl Gathered {
 
     /// The columns in the order of the schema; none is left behind.
     fn take(&mut self) -> Vec<ArrayRef> {
+        self.text_bytes = 0;
         let mut columns: Vec<ArrayRef> = Vec::new();
         columns.extend(self.texts.iter_mut().map(taken));
         columns.extend([&mut self.seed, &mut self.run].map(|column| Arc::new(column.finish()) as ArrayRef));
@@ -289,6 +305,7 @@ pub(super) fn read(
 }
 
 fn decode(input: impl ChunkReader + 'static, surroundings: &Surroundings<'_>) -> Result<EpisodeTable, FormatError> {
+    footer_shape::check_file(&input).map_err(ParquetError::General)?;
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
     let catalog = match (footer::value(builder.metadata().file_metadata(), DEFINITIONS_KEY), surroundings.definitions) {

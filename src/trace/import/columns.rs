@@ -5,6 +5,7 @@
 
 use indexmap::IndexMap;
 
+use super::super::colors;
 use super::super::schema::{self, COLUMNS, Column, Kind, Stored};
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
@@ -185,8 +186,11 @@ fn misfit(column: &Column, value: &Value) -> Option<Fault> {
             }
         }
         (Kind::String, Value::Text(text)) if column.values.is_empty() => {
-            let is_nameless = column.names() && text.is_empty();
-            if is_nameless { refused("give the name, or null where allowed") } else { None }
+            if column.names() && text.is_empty() {
+                return refused("give the name, or null where allowed");
+            }
+            let color = colors::column(column.name).filter(|color| !color.may_hold(text, None))?;
+            Some(Fault::new(color.expected(None), value.shown(), color.help(text, None)))
         }
         (Kind::String, Value::Text(text)) if column.values.contains(&text.as_str()) => None,
         (Kind::String, Value::Text(text)) => match nearest(text, column.values.iter().copied()) {

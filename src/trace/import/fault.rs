@@ -68,7 +68,7 @@ impl fmt::Display for Fault {
             write!(f, ", line {line}")?;
         }
         if let Some(key) = &self.key {
-            write!(f, ", key `{}`", key.escape_debug())?;
+            write!(f, ", key `{}`", visible(key))?;
         }
         write!(f, "\n  expected {}\n  found {}\n  help: {}", self.expected, self.found, self.help)
     }

@@ -7,6 +7,7 @@ use super::super::schema::{COLUMNS, Column};
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
 use super::text::Line;
+use crate::base::visible::visible;
 
 /// Where a step lies.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +89,7 @@ impl Index {
 /// The first place where t is not one more than before.
 fn sequence_fault(id: &str, episode: &[Step], names: &[Arc<str>]) -> Option<Fault> {
     let place = |step: &Step| Place { file: Arc::clone(&names[step.text]), line: step.line };
-    let of = format!("of episode `{}`", id.escape_debug());
+    let of = format!("of episode `{}`", visible(id));
     let mut before: Option<&Step> = None;
     for step in episode {
         let wanted = before.map_or(1, |before| before.t.saturating_add(1));

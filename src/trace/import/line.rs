@@ -9,6 +9,7 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::fault::Fault;
+use crate::base::visible::visible;
 
 /// A value of a step.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,9 +41,9 @@ impl Value {
             Self::LargeInt(value) => value.to_string(),
             Self::Float(value) => format!("{value:?}"),
             Self::Text(text) if text.chars().count() > LONGEST => {
-                format!("the text `{}...`", text.chars().take(LONGEST).collect::<String>().escape_debug())
+                format!("the text `{}...`", visible(&text.chars().take(LONGEST).collect::<String>()))
             }
-            Self::Text(text) => format!("the text `{}`", text.escape_debug()),
+            Self::Text(text) => format!("the text `{}`", visible(text)),
             Self::List => "a list".into(),
             Self::Object(_) => "an object".into(),
         }

@@ -23,7 +23,6 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use serde_json::json;
-use tempfile::NamedTempFile;
 
 pub use columns::Own;
 pub use fault::{Fault, ImportError};
@@ -32,7 +31,8 @@ pub use text::Text;
 use super::finding::{Severity, TraceError};
 use super::inputs::Input;
 use super::validate::validate;
-use crate::base::temporary;
+use super::write::unwritable;
+use crate::base::replace::NewFile;
 use columns::Columns;
 use fault::Faults;
 use index::Index;
@@ -69,7 +69,7 @@ pub fn import(texts: &mut [Text], out: &Path, experiments: Option<&[String]>) ->
     faults.none()?;
     let file = write(texts, &columns, &steps, out)?;
     check(&file, out, experiments)?;
-    file.persist(out).map_err(|error| unwritable(out, error.error))?;
+    file.commit().map_err(|error| unwritable(out, error))?;
     Ok(Imported {
         episodes: steps.chunk_by(|a, b| a.episode == b.episode).count(),
         steps: steps.len(),
@@ -116,16 +116,10 @@ fn survey(
 }
 
 /// The second pass: the rows of every episode, in a temporary file beside `out`.
-fn write(
-    texts: &mut [Text],
-    columns: &Columns,
-    steps: &[index::Step],
-    out: &Path,
-) -> Result<NamedTempFile, ImportError> {
+fn write(texts: &mut [Text], columns: &Columns, steps: &[index::Step], out: &Path) -> Result<NewFile, ImportError> {
     let hashes = texts.iter_mut().map(Text::hash).collect::<Result<Vec<_>, _>>()?;
     let recording = json!({ "kind": "import", "sources": hashes });
-    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = temporary::file_in(folder).map_err(|error| unwritable(out, error))?;
+    let file = NewFile::create(out).map_err(|error| unwritable(out, error))?;
     let failed = |error: TraceError| match error {
         TraceError::Write { source, .. } => TraceError::Write { file: out.display().to_string(), source },
         other => other,
@@ -144,13 +138,9 @@ fn write(
 }
 
 /// Holds what was written against every rule of the schema.
-fn check(file: &NamedTempFile, out: &Path, experiments: Option<&[String]>) -> Result<(), ImportError> {
-    let input = Input { name: Input::new(out).name, path: file.path().to_owned() };
+fn check(file: &NewFile, out: &Path, experiments: Option<&[String]>) -> Result<(), ImportError> {
+    let input = Input { name: Input::new(out).name, path: file.temporary_path().to_owned() };
     let report = validate(&[input], experiments, NonZeroUsize::MIN)?;
     let errors = report.findings.into_iter().filter(|finding| finding.severity == Severity::Error).collect();
     TraceError::of(errors).map_or(Ok(()), |error| Err(error.into()))
-}
-
-fn unwritable(out: &Path, error: std::io::Error) -> TraceError {
-    TraceError::Write { file: out.display().to_string(), source: Box::new(temporary::without_name(error)) }
 }

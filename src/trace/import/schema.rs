@@ -2,6 +2,8 @@
 
 use serde_json::{Map, Value, json};
 
+use super::super::colors;
+use super::super::colors::spelling::WORDS;
 use super::super::schema::{COLUMNS, Column, Kind};
 
 /// What one line may hold: `schemas/step.schema.json`.
@@ -47,6 +49,12 @@ fn property(column: &Column) -> Value {
         property["enum"] = column.values.iter().map(|value| json!(value)).chain(nulls).collect();
     } else if column.names() {
         property["minLength"] = json!(1);
+    }
+    if let Some(color) = colors::column(column.name) {
+        // Letters beyond ASCII are left to the import.
+        property["pattern"] = json!(r"^[^\sA-Z]+( [^\sA-Z]+)*$");
+        let others: Vec<&str> = WORDS.into_iter().filter(|word| color.word != Some(*word)).collect();
+        property["not"] = json!({ "enum": others });
     }
     property
 }

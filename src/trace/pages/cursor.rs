@@ -1,21 +1,22 @@
 //! One column of one row group, read some rows at a time.
 
-use std::fs::File;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray};
-use arrow::buffer::{BooleanBuffer, NullBuffer};
+use arrow::buffer::NullBuffer;
 use arrow::datatypes::DataType;
 use bytes::Bytes;
 use parquet::basic::{Encoding, Type as Physical};
-use parquet::column::page::{Page, PageReader};
-use parquet::file::metadata::ColumnChunkMetaData;
+use parquet::column::page::{Page, PageReader as _};
 
 use super::super::column::{Column, Runs};
-use super::Unfit;
-use super::chunk::pages;
+use super::bytes::Store;
 use super::dictionary::Dictionary;
-use super::hybrid::{Hybrid, Number, Span};
+use super::hybrid::{Hybrid, Number, Span, prefixed};
+use super::reader::Pages;
+use super::spread::{spread_bits, spread_keys};
+use super::verified::FaultSlot;
+use super::{Place, Unfit};
 use crate::base::bits::Bits;
 
 /// How rows are to be held.
@@ -29,7 +30,7 @@ pub(in super::super) enum Form {
 
 /// Where the reading of a column is.
 pub(in super::super) struct Cursor {
-    pages: Box<dyn PageReader>,
+    pages: Pages,
     physical: Physical,
     /// Whether there may be nulls.
     optional: bool,
@@ -43,6 +44,9 @@ pub(in super::super) struct Cursor {
 /// A page of values and what is left of it.
 struct DataPage {
     rows: usize,
+    /// Values that were there so far, and that are expected, where the header says how many.
+    valid: usize,
+    expected: Option<usize>,
     /// One bit a row: whether there is a value.
     levels: Option<Hybrid>,
     values: Stored,
@@ -67,12 +71,12 @@ struct Stretches {
 impl Cursor {
     /// A column that is stored as `stored`.
     pub(in super::super) fn open(
-        file: &File,
-        column: &ColumnChunkMetaData,
+        store: &Store,
+        place: Place<'_>,
         stored: &DataType,
-        rows: usize,
         form: Form,
     ) -> Result<Self, Unfit> {
+        let (column, rows) = (place.chunk(), place.rows());
         let about = column.column_descr();
         let physical = about.physical_type();
         let known = match stored {
@@ -89,7 +93,7 @@ impl Cursor {
             return Err(Unfit);
         }
         Ok(Self {
-            pages: pages(file, column, rows)?,
+            pages: Pages::new(store, place, FaultSlot::default()).map_err(|_| Unfit)?,
             physical,
             optional: about.max_def_level() == 1,
             form: if physical == Physical::BOOLEAN { Form::Rows } else { form },
@@ -168,12 +172,16 @@ impl Cursor {
                 (Some(levels), Some(nulls)) => validity(levels, rows, nulls)?,
                 _ => rows,
             };
+            page.valid += values;
             take(&mut page.values, rows, values)?;
             self.unread -= rows;
             left -= rows;
         }
-        if self.unread == 0 && self.page.as_ref().is_none_or(|page| page.rows == 0) && self.next_page()?.is_some() {
-            return Err(Unfit);
+        if self.unread == 0 {
+            self.close_page()?;
+            if self.next_page()?.is_some() {
+                return Err(Unfit);
+            }
         }
         Ok(nulls.map(|nulls| NullBuffer::new(nulls.finish())).filter(|nulls| nulls.null_count() > 0))
     }
@@ -181,9 +189,15 @@ impl Cursor {
     /// The page under way, which has rows left.
     fn page(&mut self) -> Result<&mut DataPage, Unfit> {
         while self.page.as_ref().is_none_or(|page| page.rows == 0) {
+            self.close_page()?;
             self.page = Some(self.next_page()?.ok_or(Unfit)?);
         }
         self.page.as_mut().ok_or(Unfit)
+    }
+
+    /// The page under way is read: nothing must be left of it.
+    fn close_page(&mut self) -> Result<(), Unfit> {
+        self.page.take().map_or(Ok(()), |page| page.finish())
     }
 
     /// The next page with values, the dictionary before it taken in.
@@ -211,24 +225,35 @@ impl Cursor {
                         true => return Err(Unfit),
                         false => (None, buf),
                     };
-                    return self.data_page(num_values, levels, values, encoding).map(Some);
+                    return self.data_page((num_values, None), levels, values, encoding).map(Some);
                 }
-                Page::DataPageV2 { buf, num_values, encoding, def_levels_byte_len, rep_levels_byte_len, .. } => {
-                    let start = rep_levels_byte_len as usize;
-                    let end = start + def_levels_byte_len as usize;
-                    if end > buf.len() {
+                Page::DataPageV2 {
+                    buf,
+                    num_values,
+                    num_nulls,
+                    encoding,
+                    def_levels_byte_len,
+                    rep_levels_byte_len,
+                    ..
+                } => {
+                    let levels = def_levels_byte_len as usize;
+                    // Levels where there is but one: rare, and checked on the library's path.
+                    if levels > buf.len() || rep_levels_byte_len > 0 || (levels > 0 && !self.optional) {
                         return Err(Unfit);
                     }
-                    let levels = self.optional.then(|| buf.slice(start..end));
-                    return self.data_page(num_values, levels, buf.slice(end..), encoding).map(Some);
+                    let valid = num_values.checked_sub(num_nulls).ok_or(Unfit)?;
+                    let values = buf.slice(levels..);
+                    let levels = self.optional.then(|| buf.slice(..levels));
+                    return self.data_page((num_values, Some(valid)), levels, values, encoding).map(Some);
                 }
             }
         }
     }
 
+    /// A page of so many rows, and of so many values where its header says that.
     fn data_page(
         &self,
-        rows: u32,
+        (rows, valid): (u32, Option<u32>),
         levels: Option<Bytes>,
         values: Bytes,
         encoding: Encoding,
@@ -237,19 +262,34 @@ impl Cursor {
         if rows > self.unread {
             return Err(Unfit);
         }
-        let levels = levels.map(|levels| Hybrid::new(levels, 1)).transpose()?;
+        let levels = levels.map(|levels| Hybrid::new(levels, 1, rows)).transpose()?;
         let values = match (self.physical, encoding) {
             (Physical::BOOLEAN, Encoding::PLAIN) => Stored::Bits(values, 0),
-            (Physical::BOOLEAN, Encoding::RLE) => Stored::Hybrid(Hybrid::new(prefixed(&values)?.0, 1)?),
+            (Physical::BOOLEAN, Encoding::RLE) => Stored::Hybrid(Hybrid::new(prefixed(&values)?.0, 1, rows)?),
             (Physical::BOOLEAN, _) => return Err(Unfit),
             (_, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) if self.dictionary.is_some() => {
                 // A page of nothing but nulls may have no width at all.
                 let (width, keys) = if values.is_empty() { (0, values) } else { (values[0], values.slice(1..)) };
-                Stored::Hybrid(Hybrid::new(keys, width)?)
+                Stored::Hybrid(Hybrid::new(keys, width, rows)?)
             }
             _ => return Err(Unfit),
         };
-        Ok(DataPage { rows, levels, values })
+        Ok(DataPage { rows, valid: 0, expected: valid.map(|valid| valid as usize), levels, values })
+    }
+}
+
+impl DataPage {
+    /// All rows are read: whether they were all that there is.
+    fn finish(&self) -> Result<(), Unfit> {
+        if self.rows > 0 || self.expected.is_some_and(|expected| expected != self.valid) {
+            return Err(Unfit);
+        }
+        self.levels.as_ref().map_or(Ok(()), Hybrid::finish)?;
+        match &self.values {
+            Stored::Hybrid(values) => values.finish(),
+            Stored::Bits(values, at) if at.div_ceil(8) == values.len() => Ok(()),
+            Stored::Bits(..) => Err(Unfit),
+        }
     }
 }
 
@@ -323,8 +363,9 @@ impl Stretches {
 fn append(span: Span<'_>, out: &mut Bits) -> (usize, usize) {
     match span {
         Span::Same { value, count } => {
-            out.fill(count, value & 1 == 1);
-            (count, if value & 1 == 1 { count } else { 0 })
+            // A number of one bit: runs of others are refused.
+            out.fill(count, value == 1);
+            (count, if value == 1 { count } else { 0 })
         }
         Span::Packed(packed) => {
             let (data, start) = packed.bits();
@@ -342,39 +383,4 @@ fn validity(levels: &mut Hybrid, count: usize, nulls: &mut Bits) -> Result<usize
         valid += ones;
     }
     Ok(valid)
-}
-
-/// The length that stands before some bytes, what it bounds, and what comes after.
-fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unfit> {
-    let length = data.first_chunk().map(|length| u32::from_le_bytes(*length)).ok_or(Unfit)?;
-    let end = usize::try_from(length).ok().and_then(|length| length.checked_add(4)).ok_or(Unfit)?;
-    if end > data.len() {
-        return Err(Unfit);
-    }
-    Ok((data.slice(4..end), data.slice(end..)))
-}
-
-/// The keys of rows that have one, at their rows.
-fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {
-    let mut spread = vec![N::default(); valid.len()];
-    let mut keys = keys;
-    for (start, end) in valid.set_slices() {
-        let (here, rest) = keys.split_at(keys.len().min(end - start));
-        spread[start..start + here.len()].copy_from_slice(here);
-        keys = rest;
-    }
-    spread
-}
-
-/// The bits of rows that have one, at their rows.
-fn spread_bits(bits: &BooleanBuffer, valid: &BooleanBuffer) -> BooleanBuffer {
-    let mut spread = Bits::with_capacity(valid.len());
-    let mut taken = bits.offset();
-    for (start, end) in valid.set_slices() {
-        spread.fill(start - spread.count(), false);
-        spread.append(bits.values(), taken, end - start);
-        taken += end - start;
-    }
-    spread.fill(valid.len() - spread.count(), false);
-    spread.finish()
 }

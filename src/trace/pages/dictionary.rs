@@ -28,6 +28,9 @@ impl Dictionary {
             texts.append_value(std::str::from_utf8(text).map_err(|_| Unfit)?);
             data = rest;
         }
+        if !data.is_empty() {
+            return Err(Unfit);
+        }
         Ok(Self::Texts(Arc::new(texts.finish())))
     }
 

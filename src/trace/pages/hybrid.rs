@@ -15,6 +15,8 @@ pub(super) struct Hybrid {
     run: Run,
     /// What is left of the run.
     count: usize,
+    /// The most numbers that the runs behind it have.
+    left: usize,
 }
 
 #[derive(Clone, Copy)]
@@ -39,13 +41,13 @@ pub(super) struct Packed<'a> {
 }
 
 impl Hybrid {
-    /// Numbers of `width` bits, at most 32.
-    pub(super) fn new(data: Bytes, width: u8) -> Result<Self, Unfit> {
+    /// At most `most` numbers of `width` bits, which are at most 32.
+    pub(super) fn new(data: Bytes, width: u8, most: usize) -> Result<Self, Unfit> {
         let width = usize::from(width);
         if width > 32 {
             return Err(Unfit);
         }
-        Ok(Self { data, at: 0, width, run: Run::Same(0), count: 0 })
+        Ok(Self { data, at: 0, width, run: Run::Same(0), count: 0, left: most })
     }
 
     /// The next numbers, `most` of them at most and one at least.
@@ -96,8 +98,12 @@ impl Hybrid {
         let count = usize::try_from(header >> 1).map_err(|_| Unfit)?;
         if header & 1 == 0 {
             let stored = data.get(from..from + self.width.div_ceil(8)).ok_or(Unfit)?;
-            self.run = Run::Same(stored.iter().rev().fold(0, |value, byte| value << 8 | u32::from(*byte)));
-            (self.at, self.count) = (from + stored.len(), count);
+            let value = stored.iter().rev().fold(0, |value, byte| value << 8 | u64::from(*byte));
+            if count == 0 || count > self.left || value >> self.width != 0 {
+                return Err(Unfit);
+            }
+            self.run = Run::Same(low(value));
+            (self.at, self.count, self.left) = (from + stored.len(), count, self.left - count);
             return Ok(());
         }
         // Groups of eight. A writer may cut the last one short where the data end.
@@ -105,14 +111,26 @@ impl Hybrid {
         let there = data.len() - from;
         let (bytes, count) =
             if stored <= there { (stored, count.saturating_mul(8)) } else { (there, there * 8 / self.width) };
+        if count == 0 || count >= self.left + GROUP {
+            return Err(Unfit);
+        }
         self.run = Run::Packed(from * 8);
-        (self.at, self.count) = (from + bytes, count);
-        if count == 0 { Err(Unfit) } else { Ok(()) }
+        (self.at, self.count, self.left) = (from + bytes, count, self.left.saturating_sub(count));
+        Ok(())
+    }
+
+    /// When all numbers are taken: whether that was all. A group may be filled up, and zeros may follow it.
+    pub(super) fn finish(&self) -> Result<(), Unfit> {
+        let filled = match self.run {
+            Run::Same(_) => self.count == 0,
+            Run::Packed(_) => self.count < GROUP,
+        };
+        if filled && self.data[self.at..].iter().all(|byte| *byte == 0) { Ok(()) } else { Err(Unfit) }
     }
 }
 
 /// The number of variable length at a place, and the place behind it.
-fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unfit> {
+pub(super) fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unfit> {
     let mut value = 0;
     for shift in (0..35).step_by(7) {
         let byte = *data.get(at).ok_or(Unfit)?;
@@ -123,6 +141,26 @@ fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unfit> {
         }
     }
     Err(Unfit)
+}
+
+/// The length that stands before some bytes, what it bounds, and what comes after.
+pub(super) fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unfit> {
+    let length = data.first_chunk().map(|length| u32::from_le_bytes(*length)).ok_or(Unfit)?;
+    let end = usize::try_from(length).ok().and_then(|length| length.checked_add(4)).ok_or(Unfit)?;
+    if end > data.len() {
+        return Err(Unfit);
+    }
+    Ok((data.slice(4..end), data.slice(end..)))
+}
+
+impl Span<'_> {
+    /// How many numbers it has.
+    pub(super) fn count(&self) -> usize {
+        match self {
+            Self::Same { count, .. } => *count,
+            Self::Packed(packed) => packed.count,
+        }
+    }
 }
 
 /// Numbers of which a byte boundary follows.

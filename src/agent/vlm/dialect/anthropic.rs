@@ -24,11 +24,16 @@ pub(super) fn body(question: &Question<'_>) -> Value {
 }
 
 pub(super) fn answer(body: &Value) -> Option<Answer> {
-    let blocks = body.get("content")?.as_array()?;
+    let is_refused = body["stop_reason"] == "refusal";
+    let blocks = match body.get("content").filter(|content| !content.is_null()) {
+        Some(content) => content.as_array()?.as_slice(),
+        None if is_refused => &[],
+        None => return None,
+    };
     let words = blocks.iter().filter(|block| block["type"] == "text").filter_map(|block| block["text"].as_str());
     let ending = match body["stop_reason"].as_str() {
         Some("max_tokens" | "model_context_window_exceeded") => Ending::Truncated,
-        Some("refusal") => Ending::Refused,
+        _ if is_refused => Ending::Refused,
         _ => Ending::Whole,
     };
     let usage = &body["usage"];

@@ -24,6 +24,19 @@ pub(super) fn body(question: &Question<'_>) -> Value {
     body
 }
 
+/// The reasons to end a candidate that decline what it is about.
+const REFUSALS: [&str; 9] = [
+    "SAFETY",
+    "RECITATION",
+    "BLOCKLIST",
+    "PROHIBITED_CONTENT",
+    "SPII",
+    "IMAGE_SAFETY",
+    "IMAGE_PROHIBITED_CONTENT",
+    "IMAGE_RECITATION",
+    "MODEL_ARMOR",
+];
+
 pub(super) fn answer(body: &Value) -> Option<Answer> {
     let blocked = body["promptFeedback"]["blockReason"].as_str();
     let candidates = body.get("candidates").map(|candidates| candidates.as_array());
@@ -36,9 +49,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let ending = match (blocked, first.and_then(|candidate| candidate["finishReason"].as_str())) {
         (Some(_), _) => Ending::Refused,
         (None, Some("MAX_TOKENS")) => Ending::Truncated,
-        (None, Some("SAFETY" | "RECITATION" | "BLOCKLIST" | "PROHIBITED_CONTENT" | "SPII" | "IMAGE_SAFETY")) => {
-            Ending::Refused
-        }
+        (None, Some(reason)) if REFUSALS.contains(&reason) => Ending::Refused,
         (None, _) => Ending::Whole,
     };
     let usage = &body["usageMetadata"];

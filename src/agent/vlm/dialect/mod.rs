@@ -6,6 +6,7 @@
 mod anthropic;
 mod gemini;
 mod openai;
+mod refusal;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -100,13 +101,15 @@ impl Dialect {
         }
     }
 
-    /// What the body of an answer says; `None` if it is not of this language.
+    /// What the body of an answer says; `None` if it is not of this language. An error that refuses what the request is
+    /// about is an answer, too.
     pub fn answer(self, body: &Value) -> Option<Answer> {
-        match self {
+        let answer = match self {
             Self::OpenaiChat | Self::OpenaiCompatible => openai::answer(body),
             Self::Gemini => gemini::answer(body),
             Self::AnthropicMessages => anthropic::answer(body),
-        }
+        };
+        answer.or_else(|| refusal::answer(body))
     }
 }
 

@@ -50,7 +50,7 @@ fn reply(choice: &Value) -> (String, Ending) {
     let message = &choice["message"];
     let refusal = message["refusal"].as_str().filter(|words| !words.is_empty());
     let ending = match (refusal, choice["finish_reason"].as_str()) {
-        (Some(_), _) | (None, Some("content_filter")) => Ending::Refused,
+        (Some(_), _) | (None, Some("content_filter" | "refusal")) => Ending::Refused,
         (None, Some("length")) => Ending::Truncated,
         _ => Ending::Whole,
     };

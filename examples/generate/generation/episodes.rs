@@ -2,7 +2,8 @@
 
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 
-use crate::draw::Draw;
+use super::draw::Draw;
+use super::extras;
 
 const MODELS: [&str; 8] = [
     "Claude Sonnet 4.6",
@@ -15,50 +16,81 @@ const MODELS: [&str; 8] = [
     "Qwen3.5-VL-8B",
 ];
 const EXPERIMENTS: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
-const COLORS: [&str; 10] = ["red", "blue", "green", "yellow", "orange", "purple", "pink", "cyan", "brown", "white"];
+pub(super) const COLORS: [&str; 10] =
+    ["red", "blue", "green", "yellow", "orange", "purple", "pink", "cyan", "brown", "white"];
 const SEEDS: u64 = 3;
 /// Runs that are recorded one after the other.
 const RUNS: u64 = 7;
-/// The longest episode.
+/// The longest episode, in steps.
 const LIMIT: u64 = 100;
 
-/// What is generated.
+/// The study to generate.
 pub struct Study {
     /// Another seed gives other episodes.
     pub seed: u64,
     /// Steps of all episodes together.
     pub steps: u64,
+    /// Whether steps have values in optional columns.
+    pub optional: bool,
+    episodes: u64,
+    /// The number of steps of the last episode, which is cut to give `steps` in all.
+    last: u64,
 }
 
 impl Study {
-    /// The number of steps of an episode: a third of them reach the limit.
-    pub fn length(&self, episode: u64) -> u64 {
-        length(&mut Draw::of(self.seed, episode))
+    /// A study of as many episodes as it takes to have `steps` steps, at least 1.
+    pub fn new(seed: u64, steps: u64, optional: bool) -> Self {
+        let (mut episodes, mut last, mut left) = (0, 0, steps);
+        while left > 0 {
+            last = drawn_length(&mut Draw::of(seed, episodes)).min(left);
+            left -= last;
+            episodes += 1;
+        }
+        Self { seed, steps, optional, episodes, last }
+    }
+
+    /// The number of episodes.
+    pub fn episodes(&self) -> u64 {
+        self.episodes
+    }
+
+    /// The number of steps of an episode.
+    pub fn length(&self, number: u64) -> u64 {
+        if number + 1 == self.episodes { self.last } else { drawn_length(&mut Draw::of(self.seed, number)) }
     }
 
     /// The episode of this number.
     pub fn episode(&self, number: u64) -> Episode {
         let mut draw = Draw::of(self.seed, number);
-        let length = length(&mut draw);
+        let drawn_length = drawn_length(&mut draw);
         let (model, experiment, seed, run) = cell(number);
         let body_color = draw.one(&COLORS[..3]);
-        let mut scene = Scene::new(body_color, number, &mut draw);
-        Episode {
+        let mut scene = Scene::new(body_color, &mut draw);
+        let mut steps: Vec<_> =
+            (1..=drawn_length).map(|t| scene.step(t == drawn_length && t < LIMIT, &mut draw)).collect();
+        steps.truncate(usize::try_from(self.length(number)).unwrap_or(usize::MAX));
+        let mut episode = Episode {
             episode_id: format!("{experiment}-{}-s{seed}-r{run:03}-{number:07}", slug(model)),
             model: model.to_owned(),
             experiment: experiment.to_owned(),
             seed,
             run,
             body_color: body_color.to_owned(),
-            stated_color: (experiment == "E3").then(|| draw.one(&COLORS[..3]).to_owned()),
-            distractors: Some(if experiment == "E4" { 2 } else { 0 }),
-            steps: (1..=length).map(|t| scene.step(t == length && length < LIMIT, &mut draw)).collect(),
+            stated_color: None,
+            distractors: None,
+            steps,
+        };
+        if self.optional {
+            // Draws of their own, so that the required columns are the same with and without the optional ones.
+            extras::fill(&mut episode, number, &mut Draw::of(!self.seed, number));
         }
+        episode
     }
 }
 
-fn length(draw: &mut Draw) -> u64 {
-    if draw.percent(35) { LIMIT } else { 1 + draw.below(LIMIT) }
+/// The number of steps before any cut.
+fn drawn_length(draw: &mut Draw) -> u64 {
+    if draw.percent(41) { LIMIT } else { 1 + draw.below(LIMIT) }
 }
 
 /// Model, experiment, seed and run of an episode, in the order in which a study is recorded.
@@ -83,20 +115,16 @@ struct Scene {
     self_color: &'static str,
     selected_cube: &'static str,
     mirror_visible: bool,
-    pose: [f32; 3],
-    frame_time: i64,
 }
 
 impl Scene {
-    fn new(body_color: &'static str, number: u64, draw: &mut Draw) -> Self {
+    fn new(body_color: &'static str, draw: &mut Draw) -> Self {
         Self {
             body_color,
             action: draw.one(&Action::ALL[..4]),
             self_color: "unknown",
             selected_cube: "none",
             mirror_visible: draw.percent(20),
-            pose: [position(draw), position(draw), f32::from(draw.short(12)) * 30.0],
-            frame_time: i64::try_from(number).unwrap_or_default() * 1_000_000_000_000,
         }
     }
 
@@ -107,14 +135,13 @@ impl Scene {
             self.selected_cube = if draw.percent(50) { self.body_color } else { draw.one(&COLORS[..3]) };
         }
         // A reply that could not be read gives nothing.
-        let reply_status = if draw.percent(1) { "parse_failed" } else { "ok" };
-        let given = reply_status == "ok";
+        let given = !draw.percent(1);
         Step {
             action: given.then_some(self.action),
             self_color: given.then(|| self.self_color.to_owned()),
             selected_cube: given.then(|| self.selected_cube.to_owned()),
             mirror_visible: self.mirror_visible,
-            extra: self.extra(reply_status, draw),
+            extra: Extra::default(),
         }
     }
 
@@ -131,41 +158,5 @@ impl Scene {
         if draw.percent(12) {
             self.mirror_visible = !self.mirror_visible;
         }
-        match self.action {
-            Action::MoveForward | Action::MoveBackward => {
-                self.pose[0] += 0.25 * self.pose[2].to_radians().cos();
-                self.pose[1] += 0.25 * self.pose[2].to_radians().sin();
-            }
-            Action::TurnLeft => self.pose[2] = (self.pose[2] + 30.0) % 360.0,
-            Action::TurnRight => self.pose[2] = (self.pose[2] + 330.0) % 360.0,
-            Action::Done => {}
-        }
-        self.frame_time += 1_000_000_000 + i64::from(draw.small(1000)) * 1_000_000;
     }
-
-    fn extra(&self, reply_status: &str, draw: &mut Draw) -> Extra {
-        let seen = |pixels: i32| Some(if self.mirror_visible { pixels } else { 0 });
-        Extra {
-            mirror_self_px: seen(200 + draw.small(800)),
-            mirror_other_px: seen(0),
-            mirror_px: seen(4000 + draw.small(4000)),
-            direct_other_px: Some(0),
-            pose_x: Some(self.pose[0]),
-            pose_y: Some(self.pose[1]),
-            pose_yaw: Some(self.pose[2]),
-            bumped: Some(draw.percent(3)),
-            cube_distance: Some(self.pose[0].hypot(self.pose[1])),
-            reply_status: Some(reply_status.to_owned()),
-            latency_ms: Some(800 + draw.small(2000)),
-            prompt_tokens: Some(1500 + draw.small(64)),
-            completion_tokens: Some(60 + draw.small(120)),
-            frame_time: Some(self.frame_time),
-            ..Extra::default()
-        }
-    }
-}
-
-/// A coordinate in a room of 8 m, to the centimetre.
-fn position(draw: &mut Draw) -> f32 {
-    f32::from(draw.short(800)) / 100.0 - 4.0
 }

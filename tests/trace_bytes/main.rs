@@ -3,7 +3,10 @@
 use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
+use std::sync::Arc;
 
+use arrow::array::RecordBatch;
+use arrow::datatypes::Schema;
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use mirrorstats::trace::finding::{Severity, TraceError};
 use mirrorstats::trace::inputs::Input;
@@ -13,7 +16,14 @@ use mirrorstats::trace::validate::validate;
 use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
-use parquet::file::properties::{WriterProperties, WriterVersion};
+use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
+
+mod checksums;
+#[cfg(unix)]
+mod hostile;
+mod levels;
+mod oracle;
+mod pages;
 
 fn episodes() -> Vec<Episode> {
     let step = |t: usize| Step {
@@ -59,6 +69,21 @@ fn foreign(folder: &Path) -> Vec<u8> {
     let mut writer = ArrowWriter::try_new(Vec::new(), reader.schema().clone(), Some(properties)).unwrap();
     for batch in reader.build().unwrap() {
         writer.write(&batch.unwrap()).unwrap();
+    }
+    writer.into_inner().unwrap()
+}
+
+/// The same rows with these properties, every column of which may be null.
+fn stored(folder: &Path, properties: WriterPropertiesBuilder) -> Vec<u8> {
+    let path = folder.join("whole.parquet");
+    fs::write(&path, trace()).unwrap();
+    let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(&path).unwrap()).unwrap();
+    let fields = reader.schema().fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
+    let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+    let mut writer = ArrowWriter::try_new(Vec::new(), Arc::clone(&schema), Some(properties.build())).unwrap();
+    for batch in reader.build().unwrap() {
+        let rows = RecordBatch::try_new(Arc::clone(&schema), batch.unwrap().columns().to_vec()).unwrap();
+        writer.write(&rows).unwrap();
     }
     writer.into_inner().unwrap()
 }

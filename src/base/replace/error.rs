@@ -1,25 +1,6 @@
-//! Temporary files that become ordinary ones, and their errors without the name of the file, which differs at every run.
+//! Errors without the name of the temporary file, which differs at every run.
 
 use std::io;
-use std::path::Path;
-
-use tempfile::NamedTempFile;
-
-/// A temporary file in a folder, with the permissions of an ordinary new one, which `persist` gives its name.
-///
-/// # Errors
-/// Whatever the operating system says.
-pub fn file_in(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".mirrorstats-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        // The process's umask takes away from these, as with any other file.
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder).map_err(without_name)
-}
 
 /// The same error without the path that `tempfile` adds to it.
 pub fn without_name(error: io::Error) -> io::Error {

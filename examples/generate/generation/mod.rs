@@ -1,0 +1,105 @@
+//! Generates a study: which episodes there are, in which order, and the files that hold them.
+//!
+//! Rule: an episode depends on the seed and on its number alone. The order, the number of files, the number of threads
+//! and the optional columns change no value of a required column.
+
+mod draw;
+mod episodes;
+mod extras;
+mod order;
+
+use std::error::Error;
+use std::fs;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+
+pub use episodes::Study;
+pub use order::Order;
+
+/// The optional columns of a generated trace: those of a recording with a model, except texts.
+const OPTIONAL_COLUMNS: [&str; 16] = [
+    "mirror_self_px",
+    "mirror_other_px",
+    "mirror_px",
+    "direct_other_px",
+    "pose_x",
+    "pose_y",
+    "pose_yaw",
+    "bumped",
+    "distractors",
+    "stated_color",
+    "cube_distance",
+    "reply_status",
+    "latency_ms",
+    "prompt_tokens",
+    "completion_tokens",
+    "frame_time",
+];
+
+/// Why nothing could be generated.
+pub type Failure = Box<dyn Error + Send + Sync>;
+
+/// Where a study is written, and how it is divided.
+pub struct Files {
+    /// The folder of `steps-000.parquet`, ...; made if it is not there.
+    pub folder: PathBuf,
+    /// The number of files; all have about the same number of steps.
+    pub count: usize,
+    /// The number of files that are written at the same time.
+    pub threads: usize,
+}
+
+/// Writes the files of a study.
+///
+/// Memory does not grow with the steps; it grows by the episode's id and 4 bytes per episode.
+///
+/// # Errors
+/// If there are more than 2^32 episodes, or a file cannot be written.
+pub fn write(study: &Study, order: Order, files: &Files) -> Result<(), Failure> {
+    fs::create_dir_all(&files.folder)?;
+    let numbers = order.numbers(study.seed, u32::try_from(study.episodes())?);
+    let shares = shares(study, &numbers, files.count.max(1));
+    let next = AtomicUsize::new(0);
+    thread::scope(|scope| {
+        let worker = || {
+            loop {
+                let file = next.fetch_add(1, Ordering::Relaxed);
+                let Some(share) = shares.get(file) else { return Ok(()) };
+                write_file(study, &numbers[share.clone()], &files.folder.join(format!("steps-{file:03}.parquet")))?;
+            }
+        };
+        let workers: Vec<_> = (0..files.threads.max(1)).map(|_| scope.spawn(worker)).collect();
+        workers.into_iter().try_for_each(|worker| worker.join().unwrap_or_else(|_| Err("a writer panicked".into())))
+    })
+}
+
+/// Divides the episodes among files of about the same number of steps; positions in `numbers` per file.
+fn shares(study: &Study, numbers: &[u32], files: usize) -> Vec<Range<usize>> {
+    let mut shares = Vec::with_capacity(files);
+    let (mut end, mut steps) = (0, 0);
+    for file in 1..=files as u64 {
+        let start = end;
+        while steps < study.steps * file / files as u64 {
+            steps += study.length(numbers[end].into());
+            end += 1;
+        }
+        if start < end {
+            shares.push(start..end);
+        }
+    }
+    shares
+}
+
+fn write_file(study: &Study, numbers: &[u32], path: &Path) -> Result<(), Failure> {
+    let names: &[&str] = if study.optional { &OPTIONAL_COLUMNS } else { &[] };
+    let columns = OptionalColumns::named(names).ok_or("a column that the schema does not have")?;
+    let mut writer = TraceWriter::create(path, &TraceMetadata { recording: None, columns })?;
+    for number in numbers {
+        writer.write(&study.episode((*number).into()))?;
+    }
+    Ok(writer.finish()?)
+}

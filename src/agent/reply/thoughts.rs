@@ -1,0 +1,61 @@
+//! The thoughts that a reasoning model writes before its answer, `<think>...</think>`.
+//!
+//! Servers that keep them apart send none. Others send them in the text, and some of those without the opening tag, since
+//! it is the end of their prompt.
+//!
+//! Rule: what stands in thoughts is no answer, not even a whole object.
+
+const OPENING: &str = "<think>";
+const CLOSING: &str = "</think>";
+
+/// A text by its thoughts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Thoughts<'a> {
+    /// There are none.
+    None,
+    /// They end; this is what follows, without the white space around it.
+    Before(&'a str),
+    /// They do not end: the reply was cut off.
+    Open,
+}
+
+/// Takes the thoughts off a text.
+///
+/// They end with the last closing tag, so that thoughts may speak of the tag itself. An opening tag counts before the
+/// first brace alone: later ones may stand in the strings of the answer.
+pub(super) fn of(text: &str) -> Thoughts<'_> {
+    let after = text.rfind(CLOSING).map(|at| text[at + CLOSING.len()..].trim());
+    let rest = after.unwrap_or(text);
+    let before_brace = rest.split('{').next().unwrap_or_default();
+    match after {
+        _ if before_brace.contains(OPENING) => Thoughts::Open,
+        Some(answer) => Thoughts::Before(answer),
+        None => Thoughts::None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Thoughts, of};
+
+    #[test]
+    fn thoughts_end_with_the_last_closing_tag() {
+        for (text, expected) in [
+            ("{\"a\": 1}", Thoughts::None),
+            ("", Thoughts::None),
+            ("<think>hm</think> {} ", Thoughts::Before("{}")),
+            ("hm</think>{}", Thoughts::Before("{}")),
+            ("<think>a</think><think>b</think>{}", Thoughts::Before("{}")),
+            ("<think>I end with </think> and {1}</think>{2}", Thoughts::Before("{2}")),
+            ("Sure. <think>hm</think>{}", Thoughts::Before("{}")),
+            ("<think></think>", Thoughts::Before("")),
+            ("<think>hm {}", Thoughts::Open),
+            ("Well, <think>{}", Thoughts::Open),
+            ("<think>a</think><think>b {}", Thoughts::Open),
+            ("{\"a\": \"<think>\"}", Thoughts::None),
+            ("<think>hm</think>{\"a\": \"<think>\"}", Thoughts::Before("{\"a\": \"<think>\"}")),
+        ] {
+            assert_eq!(of(text), expected, "{text}");
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! A provider's refusal of what a request or an answer is about, said as an error.
+//!
+//! Providers say it with HTTP 400 or with 200, under names of their own. What is found here is an answer like any other
+//! refusal: the request was well-formed, and asking again would say the same.
+
+use serde_json::Value;
+
+use super::{Answer, text};
+use crate::agent::reply::Ending;
+
+/// The names of such errors, lower case.
+const NAMES: [&str; 17] = [
+    // OpenAI, Azure, and servers that speak their language.
+    "content_filter",
+    "content_policy_violation",
+    "image_content_policy_violation",
+    "moderation_blocked",
+    "responsibleaipolicyviolation",
+    // Anthropic, and routers that pass its refusals on.
+    "refusal",
+    // Google.
+    "safety",
+    "prohibited_content",
+    "blocklist",
+    "spii",
+    "recitation",
+    "image_safety",
+    "image_prohibited_content",
+    "model_armor",
+    // Alibaba.
+    "data_inspection_failed",
+    "datainspectionfailed",
+    "content_policy",
+];
+
+/// Words by which providers say it where the name is that of any invalid request, lower case.
+const WORDS: [&str; 6] = [
+    // Anthropic: "Output blocked by content filtering policy".
+    "content filtering policy",
+    // Azure: "... triggering Azure OpenAI's content management policy".
+    "content management policy",
+    // OpenAI: "Invalid prompt: your prompt was flagged as potentially violating our usage policy".
+    "flagged as potentially violating",
+    // Google: "... violate Google's Responsible AI practices".
+    "responsible ai practices",
+    "prohibited_content",
+    // LiteLLM.
+    "contentpolicyviolation",
+];
+
+/// The refusal in the body of an error; `None` for any other body.
+pub(super) fn answer(body: &Value) -> Option<Answer> {
+    let error = [&body["error"], &body["choices"][0]["error"]].into_iter().find(|error| is_refusal(error))?;
+    Some(Answer {
+        text: error["message"].as_str().map_or_else(|| error.to_string(), str::to_owned),
+        ending: Ending::Refused,
+        prompt_tokens: None,
+        completion_tokens: None,
+        cost_usd: None,
+        model: text(&body["model"]),
+    })
+}
+
+fn is_refusal(error: &Value) -> bool {
+    let details = error["details"].as_array().map(Vec::as_slice).unwrap_or_default();
+    let named = [&error["code"], &error["type"], &error["status"], &error["innererror"]["code"]];
+    let mut names = named.into_iter().chain(details.iter().map(|detail| &detail["reason"])).filter_map(Value::as_str);
+    let message = error["message"].as_str().unwrap_or_default().to_lowercase();
+    names.any(|name| NAMES.contains(&name.to_lowercase().as_str()))
+        || WORDS.iter().any(|words| message.contains(words))
+        || is_flagged(&error["metadata"])
+}
+
+/// What OpenRouter says beside an error: that a moderator flagged the request, or the provider's own error as text.
+fn is_flagged(metadata: &Value) -> bool {
+    let raw = metadata["raw"].as_str().and_then(|raw| serde_json::from_str::<Value>(raw).ok());
+    metadata.get("flagged_input").is_some() || raw.is_some_and(|raw| is_refusal(&raw["error"]))
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::answer;
+    use crate::agent::reply::Ending;
+
+    #[test]
+    fn each_providers_form_of_a_refusal_is_one() {
+        let azure = json!({ "error": { "message": "filtered", "type": null, "param": "prompt", "code": "content_filter",
+            "innererror": { "code": "ResponsibleAIPolicyViolation" } } });
+        let routed = json!({ "error": { "message": "Provider returned error", "code": 400,
+            "metadata": { "raw": azure.to_string(), "provider_name": "Azure" } } });
+        let flagged = json!({ "error": { "code": 403, "message": "flagged",
+            "metadata": { "reasons": ["violence"], "flagged_input": "..." } } });
+        let prompt = json!({ "error": { "code": "invalid_prompt", "type": "invalid_request_error",
+            "message": "Invalid prompt: your prompt was flagged as potentially violating our usage policy." } });
+        let anthropic = json!({ "type": "error", "error": { "type": "invalid_request_error",
+            "message": "Output blocked by content filtering policy" } });
+        let google = json!({ "error": { "code": 400, "status": "INVALID_ARGUMENT", "message": "blocked",
+            "details": [{ "@type": "type.googleapis.com/google.rpc.ErrorInfo", "reason": "PROHIBITED_CONTENT" }] } });
+        let choice =
+            json!({ "choices": [{ "finish_reason": "error", "error": { "code": "content_policy_violation" } }] });
+        for body in [azure, routed, flagged, prompt, anthropic, google, choice] {
+            assert_eq!(answer(&body).map(|answer| answer.ending), Some(Ending::Refused), "{body}");
+        }
+    }
+
+    #[test]
+    fn other_errors_are_none() {
+        let long = "This model's maximum context length is 8192 tokens";
+        for body in [
+            Value::Null,
+            json!([]),
+            json!({ "error": "content_filter" }),
+            json!({ "error": { "code": 400, "message": "temperature" } }),
+            json!({ "error": { "code": "context_length_exceeded", "type": "invalid_request_error", "message": long } }),
+            json!({ "error": { "code": "invalid_prompt", "message": "Invalid prompt: no message" } }),
+            json!({ "error": { "message": "Provider returned error", "metadata": { "raw": "{\"error\": {}}" } } }),
+            json!({ "error": { "message": "Provider returned error", "metadata": { "raw": "no JSON" } } }),
+        ] {
+            assert_eq!(answer(&body), None, "{body}");
+        }
+    }
+}

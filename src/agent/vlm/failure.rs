@@ -1,0 +1,155 @@
+//! Why there is no answer: the kinds of failure, and what each status and broken connection counts as.
+
+use std::time::{Duration, SystemTime};
+
+use reqwest::StatusCode;
+use reqwest::header::{HeaderMap, RETRY_AFTER};
+use serde_json::Value;
+
+use crate::agent::Status;
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Failure {
+    /// What it counts as.
+    pub kind: FailureKind,
+    /// What happened, without any key.
+    pub detail: String,
+    /// How long the provider asks to wait.
+    pub after: Option<Duration>,
+}
+
+/// The kinds of failure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureKind {
+    /// Too many requests.
+    RateLimited,
+    /// The provider failed, the connection broke, or what came is no answer.
+    Server,
+    /// Nothing whole came in time.
+    Timeout,
+    /// The provider rejects this request, and will again; it may take others.
+    Rejected,
+    /// The provider takes no request with this key, from this account, or for this model.
+    Denied,
+}
+
+impl FailureKind {
+    /// The status of a step that ends in this failure.
+    pub const fn status(self) -> Status {
+        match self {
+            Self::RateLimited => Status::RateLimited,
+            Self::Server | Self::Rejected | Self::Denied => Status::ServerError,
+            Self::Timeout => Status::Timeout,
+        }
+    }
+
+    /// Whether another attempt may do better.
+    pub const fn may_pass(self) -> bool {
+        matches!(self, Self::RateLimited | Self::Server | Self::Timeout)
+    }
+}
+
+/// What came is no answer.
+pub(super) fn server(detail: String) -> Failure {
+    Failure { kind: FailureKind::Server, detail, after: None }
+}
+
+pub(super) fn shortened(text: &str) -> String {
+    const LONGEST: usize = 300;
+    let line = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &line[..end]),
+        None => line,
+    }
+}
+
+/// A failure below HTTP. The address is left out: it may be a private one.
+pub(super) fn broken(error: reqwest::Error) -> Failure {
+    let kind = if error.is_timeout() { FailureKind::Timeout } else { FailureKind::Server };
+    let error = error.without_url();
+    let mut detail = error.to_string();
+    let mut cause = std::error::Error::source(&error);
+    while let Some(inner) = cause {
+        let words = inner.to_string();
+        if !detail.contains(&words) {
+            detail = format!("{detail}: {words}");
+        }
+        cause = inner.source();
+    }
+    Failure { kind, detail, after: None }
+}
+
+/// A status that is not success.
+pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
+    let kind = match status {
+        StatusCode::TOO_MANY_REQUESTS if is_out_of_credit(body) => FailureKind::Denied,
+        StatusCode::TOO_MANY_REQUESTS => FailureKind::RateLimited,
+        StatusCode::REQUEST_TIMEOUT | StatusCode::GATEWAY_TIMEOUT => FailureKind::Timeout,
+        status if status.is_server_error() => FailureKind::Server,
+        StatusCode::CONFLICT | StatusCode::TOO_EARLY => FailureKind::Server,
+        StatusCode::UNAUTHORIZED | StatusCode::PAYMENT_REQUIRED => FailureKind::Denied,
+        StatusCode::FORBIDDEN | StatusCode::NOT_FOUND => FailureKind::Denied,
+        _ => FailureKind::Rejected,
+    };
+    let detail = match shortened(body) {
+        said if said.is_empty() => format!("HTTP {status}"),
+        said => format!("HTTP {status}: {said}"),
+    };
+    Failure { kind, detail, after }
+}
+
+/// Whether too many requests means that there is no money left, which waiting does not mend.
+fn is_out_of_credit(body: &str) -> bool {
+    const CODE: &str = "insufficient_quota";
+    let error = serde_json::from_str::<Value>(body).map(|mut body| body["error"].take()).unwrap_or_default();
+    error["code"] == CODE || error["type"] == CODE
+}
+
+/// The wait that a provider asks for: seconds, whole or not, or a date. A date that is over asks for none, what is
+/// neither asks for nothing, and what no duration can hold asks for the longest.
+pub(super) fn retry_after(headers: &HeaderMap) -> Option<Duration> {
+    let value = headers.get(RETRY_AFTER)?.to_str().ok()?.trim();
+    if let Ok(seconds) = value.parse::<f64>() {
+        let is_wait = seconds >= 0.0;
+        return is_wait.then(|| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
+    }
+    let date = httpdate::parse_http_date(value).ok()?;
+    Some(date.duration_since(SystemTime::now()).unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use reqwest::StatusCode;
+    use reqwest::header::{HeaderMap, HeaderValue, RETRY_AFTER};
+
+    use super::{FailureKind, failed, retry_after};
+
+    #[test]
+    fn the_wait_asked_for_is_read_or_left() {
+        let asked = |value: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(RETRY_AFTER, HeaderValue::from_static(value));
+            retry_after(&headers)
+        };
+        assert_eq!(asked(" 7 "), Some(Duration::from_secs(7)));
+        assert_eq!(asked("0.25"), Some(Duration::from_millis(250)));
+        assert_eq!(asked("Sun, 06 Nov 1994 08:49:37 GMT"), Some(Duration::ZERO));
+        assert!(asked("Fri, 31 Dec 9999 23:59:59 GMT").is_some_and(|wait| wait > Duration::from_hours(24)));
+        assert_eq!(asked("99999999999999999999999999"), Some(Duration::MAX));
+        for nothing in ["-1", "NaN", "soon", ""] {
+            assert_eq!(asked(nothing), None, "{nothing:?}");
+        }
+        assert_eq!(retry_after(&HeaderMap::new()), None);
+    }
+
+    #[test]
+    fn no_money_left_is_not_too_many_requests() {
+        let kind = |body| failed(StatusCode::TOO_MANY_REQUESTS, None, body).kind;
+        assert_eq!(kind(r#"{"error": {"code": "insufficient_quota"}}"#), FailureKind::Denied);
+        assert_eq!(kind(r#"{"error": {"code": "rate_limit_exceeded"}}"#), FailureKind::RateLimited);
+        assert_eq!(kind("slow down"), FailureKind::RateLimited);
+    }
+}

@@ -1,0 +1,124 @@
+//! The new files of a folder, written beside the old ones.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::path::{Component, Path, PathBuf};
+
+use tempfile::TempDir;
+
+use super::super::error::without_name;
+use super::super::leftover;
+use super::super::place::{folder_of, prefix_for, sync_folder};
+
+/// A file in a folder without an index that lists what the next attempt replaces or removes.
+pub(super) const NOTE: &str = ".mirrorstats-unfinished";
+
+/// The files of a folder that are replaced together. All paths are inside the folder.
+pub struct FolderFiles<'a> {
+    /// The new files and their content.
+    pub new: &'a [(&'a Path, &'a [u8])],
+    /// One of the new files: who finds it may rely on the others.
+    pub index: &'a Path,
+    /// What of the folder at this path is to be replaced or removed. Everything else in it stays.
+    pub old: &'a dyn Fn(&Path) -> Vec<PathBuf>,
+}
+
+/// Why the files of a folder cannot be replaced.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}", path.display())]
+pub struct FolderError {
+    /// Where.
+    pub path: PathBuf,
+    /// Why.
+    pub source: io::Error,
+}
+
+impl FolderError {
+    pub(super) fn at(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self { path, source: without_name(source) }
+    }
+}
+
+/// A temporary folder, locked for as long as it is open and removed when dropped.
+pub(super) struct Stage {
+    folder: TempDir,
+    _lock: Option<File>,
+}
+
+impl Stage {
+    /// One that may take the place of `out`.
+    pub(super) fn beside(out: &Path) -> io::Result<Self> {
+        Self::create(folder_of(out), out)
+    }
+
+    /// One in `parent`, named after `target`.
+    pub(super) fn create(parent: &Path, target: &Path) -> io::Result<Self> {
+        loop {
+            let mut builder = tempfile::Builder::new();
+            let prefix = prefix_for(target);
+            builder.prefix(&prefix);
+            #[cfg(unix)]
+            {
+                use std::os::unix::fs::PermissionsExt as _;
+                // The process's umask takes away from these, as with any other folder.
+                builder.permissions(fs::Permissions::from_mode(0o777));
+            }
+            step();
+            let folder = builder.tempdir_in(parent)?;
+            let lock = File::open(folder.path()).ok();
+            if lock.as_ref().is_none_or(|lock| leftover::lock(lock, folder.path())) {
+                return Ok(Self { folder, _lock: lock });
+            }
+        }
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Leaves the folder where it is.
+    pub(super) fn keep(self) {
+        let _ = self.folder.keep();
+    }
+
+    /// Writes the new files, on the disk when this returns; `out` is for errors.
+    pub(super) fn write(&self, files: &FolderFiles<'_>, out: &Path) -> Result<(), FolderError> {
+        for (path, bytes) in files.new {
+            write_synced(&self.path().join(path), bytes).map_err(FolderError::at(&out.join(path)))?;
+        }
+        sync_folders(self.path(), files).map_err(FolderError::at(out))
+    }
+}
+
+fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    step();
+    fs::create_dir_all(folder_of(path))?;
+    let mut file = File::create(path)?;
+    step();
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+/// Synchronises every folder that a new file is in.
+pub(super) fn sync_folders(root: &Path, files: &FolderFiles<'_>) -> io::Result<()> {
+    let folders: BTreeSet<_> = files.new.iter().flat_map(|(path, _)| path.ancestors().skip(1)).collect();
+    folders.into_iter().try_for_each(|inside| sync_folder(&root.join(inside)))
+}
+
+/// What of the folder at `root` goes or is replaced; no path leads out of it. That is also what an attempt in place may
+/// have left, and its note.
+pub(super) fn old_files(root: &Path, files: &FolderFiles<'_>) -> BTreeSet<PathBuf> {
+    let is_inside = |path: &PathBuf| path.components().all(|part| matches!(part, Component::Normal(_)));
+    let noted = fs::read_to_string(root.join(NOTE)).unwrap_or_default();
+    let noted = noted.split('\0').filter(|path| !path.is_empty()).map(PathBuf::from);
+    let old = (files.old)(root).into_iter().chain(noted).filter(is_inside);
+    old.chain([PathBuf::from(NOTE)]).collect()
+}
+
+/// A place where the tests end the process.
+#[cfg(not(test))]
+pub(super) fn step() {}
+#[cfg(test)]
+pub(super) use super::tests::step;

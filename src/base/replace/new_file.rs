@@ -1,0 +1,160 @@
+//! One file replaced by another.
+
+use std::ffi::OsStr;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use tempfile::NamedTempFile;
+
+use super::error::without_name;
+use super::leftover;
+use super::place::{folder_of, is_stream, prefix_for, sync_folder};
+
+/// The new content of a file. It is at its target after [`commit`](Self::commit), and gone if dropped before.
+#[derive(Debug)]
+pub struct NewFile {
+    file: NamedTempFile,
+    target: PathBuf,
+    /// Whether the target is to be written into, not to be replaced.
+    is_stream: bool,
+}
+
+impl NewFile {
+    /// Begins the new content of `target`, whose folder must exist. What killed processes left of earlier attempts at
+    /// this target is removed.
+    ///
+    /// # Errors
+    /// When `target` is a folder, or its folder is not there or not writable. No error names the temporary file.
+    pub fn create(target: &Path) -> io::Result<Self> {
+        Self::create_in(folder_of(target), target)
+    }
+
+    /// As [`create`](Self::create), with the temporary file in `scratch`, a folder of the same file system.
+    ///
+    /// # Errors
+    /// As [`create`](Self::create), of the folder `scratch`.
+    pub fn create_in(scratch: &Path, target: &Path) -> io::Result<Self> {
+        if target.is_dir() {
+            return Err(io::ErrorKind::IsADirectory.into());
+        }
+        let is_stream = is_stream(target);
+        let temporary = if is_stream { std::env::temp_dir() } else { scratch.to_owned() };
+        let prefix = prefix_for(target);
+        leftover::remove(&temporary, &prefix);
+        let file = locked_file(&temporary, &prefix).map_err(without_name)?;
+        Ok(Self { file, target: target.to_owned(), is_stream })
+    }
+
+    /// Where the content is until it is committed.
+    pub fn temporary_path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// The open file.
+    pub fn as_file(&self) -> &File {
+        self.file.as_file()
+    }
+
+    /// The open file.
+    pub fn as_file_mut(&mut self) -> &mut File {
+        self.file.as_file_mut()
+    }
+
+    /// Replaces the target. Afterwards not even a loss of power brings the old content back.
+    ///
+    /// # Errors
+    /// When the disk is full or the name cannot be taken; the target is as it was then. An error of synchronising the
+    /// folder, at the very end, leaves the new content at the target.
+    pub fn commit(self) -> io::Result<()> {
+        if self.is_stream {
+            return self.copy_into_target();
+        }
+        self.file.as_file().sync_all()?;
+        let target = self.rename()?;
+        sync_folder(folder_of(&target))
+    }
+
+    /// Replaces the target without waiting for the disk: a loss of power within the next seconds may leave an empty
+    /// file. For what is made again in no time.
+    ///
+    /// # Errors
+    /// As [`commit`](Self::commit).
+    pub fn commit_unsynced(self) -> io::Result<()> {
+        if self.is_stream { self.copy_into_target() } else { self.rename().map(drop) }
+    }
+
+    fn rename(self) -> io::Result<PathBuf> {
+        self.file.persist(&self.target).map_err(|error| without_name(error.error))?;
+        Ok(self.target)
+    }
+
+    fn copy_into_target(mut self) -> io::Result<()> {
+        // A standard stream may be a file that others have written to: what is there stays.
+        let mut target = OpenOptions::new().append(true).open(&self.target)?;
+        let content = self.file.as_file_mut();
+        content.seek(SeekFrom::Start(0))?;
+        io::copy(content, &mut target).map(drop)
+    }
+}
+
+impl Write for NewFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.as_file_mut().write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.as_file_mut().flush()
+    }
+}
+
+impl Read for NewFile {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.as_file_mut().read(bytes)
+    }
+}
+
+impl Seek for NewFile {
+    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
+        self.as_file_mut().seek(to)
+    }
+}
+
+/// Replaces the file at `target` by one of these bytes.
+///
+/// # Errors
+/// As [`NewFile::create`] and [`NewFile::commit`].
+pub fn replace(target: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = NewFile::create(target)?;
+    file.write_all(bytes)?;
+    file.commit()
+}
+
+/// Replaces the file at `target` by the complete `file`, which has the name `temporary` in the same folder: for content
+/// that is useful under a name of its own before it is complete.
+///
+/// # Errors
+/// As [`NewFile::commit`].
+pub fn commit_named(file: &File, temporary: &Path, target: &Path) -> io::Result<()> {
+    file.sync_all()?;
+    fs::rename(temporary, target)?;
+    sync_folder(folder_of(target))
+}
+
+/// A temporary file with the permissions of an ordinary new one, locked for as long as it is open.
+fn locked_file(folder: &Path, prefix: &OsStr) -> io::Result<NamedTempFile> {
+    loop {
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(prefix);
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            // The process's umask takes away from these, as with any other file.
+            builder.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let file = builder.tempfile_in(folder)?;
+        if leftover::lock(file.as_file(), file.path()) {
+            return Ok(file);
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! Where files go, what they are called until they are complete, and whether they can be replaced at all.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io;
+use std::path::Path;
+
+/// Every temporary name begins with this; those who look for data pass over names that begin with a dot.
+const PREFIX: &str = ".mirrorstats-";
+/// The longest part of the target's name in a temporary name, bytes: file systems allow 255 in all.
+const LONGEST_NAME: usize = 200;
+
+/// The folder that a file is in, or will be.
+pub fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Waits until the names in a folder are on the disk.
+///
+/// # Errors
+/// When the disk fails. A folder that cannot be opened for reading, and a file system that synchronises no folders, is
+/// no error.
+pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
+    if cfg!(not(unix)) {
+        return Ok(());
+    }
+    let synced = File::open(folder).and_then(|folder| folder.sync_all());
+    synced.or_else(|error| match error.kind() {
+        io::ErrorKind::PermissionDenied | io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported => Ok(()),
+        _ => Err(error),
+    })
+}
+
+/// Whether bytes can only be written into `target`: it exists and is no regular file, or names an open file of the
+/// process, which may be any.
+pub(super) fn is_stream(target: &Path) -> bool {
+    let names_open_file = cfg!(unix)
+        && (["/dev/stdout", "/dev/stderr"].iter().any(|name| target == Path::new(name))
+            || folder_of(target) == Path::new("/dev/fd")
+            || (target.starts_with("/proc") && folder_of(target).ends_with("fd")));
+    fs::metadata(target).is_ok_and(|metadata| names_open_file || !metadata.is_file())
+}
+
+/// What the temporary names for a target begin with; six random characters follow.
+pub(super) fn prefix_for(target: &Path) -> OsString {
+    let name = target.file_name().unwrap_or_default();
+    let mut prefix = OsString::from(PREFIX);
+    if name.len() <= LONGEST_NAME {
+        prefix.push(name);
+    } else {
+        prefix.push(name.to_string_lossy().chars().take(LONGEST_NAME / 4).collect::<String>());
+    }
+    prefix.push(".");
+    prefix
+}

@@ -1,0 +1,53 @@
+//! The names that an expression mentions.
+
+use super::syntax::{Expr, ExprKind, parse};
+
+/// The columns, `let`s and metrics that an expression mentions itself, each once, in the order of the text; none where
+/// the text is no expression.
+pub fn mentioned(expression: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    if let Ok(expr) = parse(expression) {
+        add(&expr, &mut found);
+    }
+    found
+}
+
+fn add(expr: &Expr, found: &mut Vec<String>) {
+    if let ExprKind::Name(name) = &expr.kind
+        && !found.contains(name)
+    {
+        found.push(name.clone());
+    }
+    parts(expr).into_iter().for_each(|part| add(part, found));
+}
+
+/// The expressions that one is made of, in the order of the text.
+fn parts(expr: &Expr) -> Vec<&Expr> {
+    match &expr.kind {
+        ExprKind::Name(_) | ExprKind::Literal(_) => Vec::new(),
+        ExprKind::Not(x) | ExprKind::Negate(x) => vec![x],
+        ExprKind::IsNull { operand, .. } | ExprKind::IsTruth { operand, .. } => vec![operand],
+        ExprKind::Binary(_, x, y) | ExprKind::Distinct { left: x, right: y, .. } => vec![x, y],
+        ExprKind::Between { operand, low, high, .. } => vec![operand, low, high],
+        ExprKind::InList { operand, list, .. } => std::iter::once(operand.as_ref()).chain(list).collect(),
+        ExprKind::Case { operand, branches, otherwise } => {
+            let branches = branches.iter().flat_map(|(when, then)| [when, then]);
+            operand.as_deref().into_iter().chain(branches).chain(otherwise.as_deref()).collect()
+        }
+        ExprKind::Call { arguments, .. } => arguments.iter().collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mentioned;
+
+    #[test]
+    fn names_come_once_and_in_order_from_every_construct() {
+        let text = "not (a = 1 or b is null) and c is not true and d between e and -f and g in (a, h) \
+                    and case i when j then k else l end = m and any(n is distinct from o) and 'p' = coalesce(\"q r\", 1)";
+        let expected = ["a", "b", "c", "d", "e", "f", "g", "h", "i", "j", "k", "l", "m", "n", "o", "q r"];
+        assert_eq!(mentioned(text), expected);
+        assert_eq!(mentioned("a ="), Vec::<String>::new());
+    }
+}

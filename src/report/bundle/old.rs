@@ -1,0 +1,61 @@
+//! Which files of a folder are those of an older report.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+
+use crate::report::figures::FigureName;
+
+/// The name of the manifest, which is the last file to be there.
+pub(super) const MANIFEST: &str = "manifest.json";
+
+/// As much of a manifest as is needed; a manifest of other versions may have more.
+#[derive(Deserialize)]
+struct Listed {
+    /// Not there in reports of versions that did not list them.
+    outputs: Option<Vec<ListedOutput>>,
+    /// Only to tell the manifest of a report from another file of that name.
+    #[serde(rename = "schema_version")]
+    _schema_version: u32,
+}
+
+#[derive(Deserialize)]
+struct ListedOutput {
+    path: PathBuf,
+}
+
+/// The files of the report in a folder, by path inside it, the manifest among them; none where there is no manifest of a
+/// report.
+pub(super) fn files(folder: &Path) -> Vec<PathBuf> {
+    let manifest = fs::read(folder.join(MANIFEST)).ok();
+    let Some(Ok(manifest)) = manifest.map(|text| serde_json::from_slice::<Listed>(&text)) else { return Vec::new() };
+    let mut files = match manifest.outputs {
+        Some(outputs) => outputs.into_iter().map(|output| output.path).collect(),
+        None => by_name(folder),
+    };
+    files.push(MANIFEST.into());
+    files
+}
+
+/// The files that an older report could have, by their names: the files without a choice of name, every figure in every
+/// format, and every table that is there in all three formats.
+fn by_name(folder: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<PathBuf> = ["cells.csv", "episodes.parquet", "report.html"].map(PathBuf::from).into();
+    for figure in FigureName::ALL {
+        files.extend(["svg", "png", "pdf"].map(|ending| format!("figures/{figure}.{ending}").into()));
+    }
+    for name in table_names(folder) {
+        files.extend(["tex", "md", "csv"].map(|ending| format!("tables/{name}.{ending}").into()));
+    }
+    files.retain(|file| folder.join(file).is_file());
+    files
+}
+
+/// The names of the tables in a folder.
+fn table_names(folder: &Path) -> Vec<String> {
+    let tables = folder.join("tables");
+    let entries = fs::read_dir(&tables).into_iter().flatten().flatten();
+    let names = entries.filter_map(|entry| entry.file_name().to_str()?.strip_suffix(".tex").map(str::to_owned));
+    names.filter(|name| ["md", "csv"].iter().all(|ending| tables.join(format!("{name}.{ending}")).is_file())).collect()
+}

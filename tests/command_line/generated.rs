@@ -1,0 +1,109 @@
+//! The traces of benchmarks (`examples/generate`): both orders keep the rules of traces and hold the same episodes.
+
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::path::Path;
+
+use arrow::array::AsArray as _;
+use arrow::compute::cast;
+use arrow::datatypes::DataType;
+use mirrorstats::trace::schema::COLUMNS;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+
+use crate::generation::{self, Files, Order, Study};
+use crate::{contents, run};
+
+const STEPS: u64 = 10_000;
+const FILES: usize = 3;
+
+/// Writes a study into the folder `name` below `at`.
+fn generate(at: &Path, name: &str, study: &Study, order: Order) {
+    generation::write(study, order, &Files { folder: at.join(name), count: FILES, threads: 2 }).unwrap();
+}
+
+/// The models of a file in the order of its steps, each once per change, and the number of steps.
+fn models(path: &Path) -> (Vec<String>, usize) {
+    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
+    let (mut models, mut steps) = (Vec::new(), 0);
+    for batch in reader.with_batch_size(1024).build().unwrap() {
+        let batch = batch.unwrap();
+        let column = cast(batch.column_by_name("model").unwrap(), &DataType::Utf8).unwrap();
+        models.extend(column.as_string::<i32>().iter().flatten().map(str::to_owned));
+        models.dedup();
+        steps += batch.num_rows();
+    }
+    (models, steps)
+}
+
+#[test]
+fn generated_traces_of_both_orders_keep_every_rule_and_score_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut scores = BTreeSet::new();
+    for (name, order, optional) in
+        [("study", Order::Study, false), ("shuffled", Order::Shuffled, false), ("optional", Order::Shuffled, true)]
+    {
+        let study = Study::new(7, STEPS, optional);
+        generate(at, name, &study, order);
+        assert_eq!(contents(&at.join(name)).len(), FILES);
+        let validated = run(at, &["validate", name, "--json"]).done();
+        let validated: serde_json::Value = serde_json::from_str(&validated).unwrap();
+        assert_eq!(validated["findings"], serde_json::json!([]), "{name}");
+        let info: serde_json::Value = serde_json::from_str(&run(at, &["info", name, "--json"]).done()).unwrap();
+        assert_eq!((info["steps"].as_u64(), info["episodes"].as_u64()), (Some(STEPS), Some(study.episodes())));
+        let required = COLUMNS.iter().filter(|column| column.required).count();
+        let columns = info["columns"].as_array().unwrap().len();
+        assert_eq!(columns, if optional { required + 16 } else { required }, "{name}");
+        scores.insert(run(at, &["score", name]).done());
+    }
+    assert_eq!(scores.len(), 1, "the order, or an optional column, changes a score");
+}
+
+#[test]
+fn generated_traces_depend_on_the_seed_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, seed) in [("first", 7), ("again", 7), ("other", 8)] {
+        generate(at, name, &Study::new(seed, STEPS, false), Order::Shuffled);
+    }
+    assert_eq!(contents(&at.join("first")), contents(&at.join("again")));
+    assert_ne!(run(at, &["score", "first"]).done(), run(at, &["score", "other"]).done());
+    assert_ne!(Order::Shuffled.numbers(7, 1000), Order::Shuffled.numbers(8, 1000));
+}
+
+#[test]
+fn the_shuffled_order_has_every_model_in_every_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // More than 735 episodes, so that every model is there.
+    let study = Study::new(7, 60_000, false);
+    for (name, order) in [("study", Order::Study), ("shuffled", Order::Shuffled)] {
+        generate(at, name, &study, order);
+        for file in 0..FILES {
+            let (models, steps) = models(&at.join(format!("{name}/steps-{file:03}.parquet")));
+            // A file ends with an episode, at most 99 steps past its share.
+            assert!(
+                steps.abs_diff(usize::try_from(study.steps).unwrap() / FILES) < 100,
+                "{name} {file}: {steps} steps"
+            );
+            let distinct = models.iter().collect::<BTreeSet<_>>().len();
+            match order {
+                // 105 episodes of a model follow each other.
+                Order::Study => assert!(models.len() == distinct && distinct <= 4, "{file}: {models:?}"),
+                Order::Shuffled => assert!(models.len() > 90 && distinct == 8, "{file}: {models:?}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn an_order_has_every_episode_once() {
+    for order in [Order::Study, Order::Shuffled] {
+        for episodes in [1, 2, 1000] {
+            let mut numbers = order.numbers(0, episodes);
+            numbers.sort_unstable();
+            assert!(numbers.iter().copied().eq(0..episodes), "{order:?} of {episodes}");
+        }
+    }
+    assert!(Order::Study.numbers(0, 1000).is_sorted() && !Order::Shuffled.numbers(0, 1000).is_sorted());
+}

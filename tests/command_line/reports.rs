@@ -1,0 +1,191 @@
+//! The folder of a report over an older one: the old one whole or the new one whole, and nothing of others is touched.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use mirrorstats::base::hash;
+use serde_json::{Value, json};
+
+use super::{contents, run, two_files};
+
+type Contents = BTreeMap<String, Vec<u8>>;
+
+/// The files of others.
+const FOREIGN: [(&str, &str); 4] =
+    [("notes.txt", "mine"), ("own/deep/b.txt", "mine"), ("tables/own.tex", "mine"), ("figures/own.svg", "mine")];
+
+fn put_foreign(out: &Path) {
+    for (path, text) in FOREIGN {
+        fs::create_dir_all(out.join(path).parent().unwrap()).unwrap();
+        fs::write(out.join(path), text).unwrap();
+    }
+    fs::create_dir(out.join("empty")).unwrap();
+}
+
+fn with_foreign(mut report: Contents) -> Contents {
+    report.extend(FOREIGN.map(|(path, text)| (path.to_owned(), text.as_bytes().to_vec())));
+    report
+}
+
+/// What a report in a folder of its own holds.
+fn fresh(folder: &Path, words: &[&str]) -> Contents {
+    run(folder, &[&["report"], words, &["--out", "fresh"]].concat()).done();
+    let found = contents(&folder.join("fresh"));
+    fs::remove_dir_all(folder.join("fresh")).unwrap();
+    found
+}
+
+const LARGE: [&str; 1] = ["a.parquet"];
+const SMALL: [&str; 3] = ["b.parquet", "--no-figures", "--metrics=TSA"];
+
+/// That the manifest lists every file of a report with its hash and size, in order, and nothing else.
+fn check_outputs(report: &Contents) {
+    let manifest: Value = serde_json::from_slice(&report["manifest.json"]).unwrap();
+    let files = report.iter().filter(|(path, _)| *path != "manifest.json");
+    let expected: Vec<Value> = files
+        .map(|(path, bytes)| json!({ "path": path, "sha256": hash::of_bytes(bytes), "bytes": bytes.len() }))
+        .collect();
+    assert_eq!(manifest["outputs"], json!(expected));
+}
+
+#[test]
+fn a_manifest_lists_what_was_written() {
+    let folder = two_files();
+    for words in [&LARGE[..], &SMALL] {
+        check_outputs(&fresh(folder.path(), words));
+    }
+    let answer = run(folder.path(), &["report", "a.parquet", "--json", "--out", "r"]).done();
+    let answer: Value = serde_json::from_str(&answer).unwrap();
+    let manifest: Value = serde_json::from_slice(&fs::read(folder.path().join("r/manifest.json")).unwrap()).unwrap();
+    assert_eq!(answer["manifest"], manifest);
+    assert_eq!(answer["files"].as_array().unwrap().len(), manifest["outputs"].as_array().unwrap().len() + 1);
+}
+
+#[test]
+fn nothing_of_an_older_report_stays_and_all_else_does() {
+    let folder = two_files();
+    let (large, small) = (fresh(folder.path(), &LARGE), fresh(folder.path(), &SMALL));
+    assert!(large.contains_key("report.html") && large.contains_key("figures/spider.svg"));
+    for is_link in [false, true] {
+        let out = folder.path().join("out");
+        fs::create_dir(folder.path().join("there")).unwrap();
+        if is_link {
+            symlink("there", &out).unwrap()
+        } else {
+            fs::rename(folder.path().join("there"), &out).unwrap()
+        }
+        put_foreign(&out);
+        for (words, expected) in [(&LARGE[..], &large), (&SMALL, &small), (&LARGE, &large)] {
+            run(folder.path(), &[&["report", "--out", "out"], words].concat()).done();
+            assert!(contents(&out) == with_foreign(expected.clone()), "{words:?}: {:#?}", contents(&out).keys());
+            assert!(out.join("empty").is_dir());
+        }
+        assert_eq!(fs::symlink_metadata(&out).unwrap().is_symlink(), is_link);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), if is_link { 4 } else { 3 });
+        if is_link { fs::remove_file(&out).unwrap() } else { fs::remove_dir_all(&out).unwrap() }
+    }
+}
+
+#[test]
+fn a_folder_of_figures_goes_with_the_last_of_them() {
+    let folder = two_files();
+    for words in [&LARGE[..], &SMALL] {
+        run(folder.path(), &[&["report", "--out", "out"], words].concat()).done();
+    }
+    assert!(!folder.path().join("out/figures").exists());
+}
+
+#[test]
+fn a_report_whose_manifest_lists_no_outputs_is_known_by_its_names() {
+    let folder = two_files();
+    let out = folder.path().join("out");
+    put_foreign(&out);
+    run(folder.path(), &[&["report", "--out", "out"], &LARGE[..]].concat()).done();
+    let mut manifest: Value = serde_json::from_slice(&fs::read(out.join("manifest.json")).unwrap()).unwrap();
+    manifest.as_object_mut().unwrap().remove("outputs").unwrap();
+    fs::write(out.join("manifest.json"), manifest.to_string()).unwrap();
+    run(folder.path(), &[&["report", "--out", "out"], &SMALL[..]].concat()).done();
+    assert!(contents(&out) == with_foreign(fresh(folder.path(), &SMALL)), "{:#?}", contents(&out).keys());
+}
+
+#[test]
+fn a_manifest_of_something_else_lists_nothing_to_remove() {
+    let folder = two_files();
+    let out = folder.path().join("out");
+    put_foreign(&out);
+    for manifest in [r#"{"outputs": [{"path": "notes.txt"}]}"#, "no JSON"] {
+        fs::write(out.join("manifest.json"), manifest).unwrap();
+        run(folder.path(), &[&["report", "--out", "out"], &SMALL[..]].concat()).done();
+        assert!(contents(&out) == with_foreign(fresh(folder.path(), &SMALL)), "{manifest}");
+    }
+    let text = fs::read_to_string(out.join("manifest.json")).unwrap();
+    let outside = text.replacen("\"cells.csv\"", "\"../a.parquet\"", 1);
+    assert_ne!(text, outside);
+    fs::write(out.join("manifest.json"), outside).unwrap();
+    run(folder.path(), &[&["report", "--out", "out"], &SMALL[..]].concat()).done();
+    assert!(folder.path().join("a.parquet").is_file());
+}
+
+/// A report that is killed after a while; whether it was done before.
+fn killed_after(folder: &Path, words: &[&str], pause: Duration) -> bool {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
+    command.current_dir(folder).args(["report", "--out", "out"]).args(words);
+    let mut child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    std::thread::sleep(pause);
+    drop(child.kill());
+    child.wait().unwrap().success()
+}
+
+/// Pauses spread over the last half of a run, in an order that looks random and is always the same.
+fn pauses(whole: Duration, count: u32) -> impl Iterator<Item = Duration> {
+    (0..count).map(move |at| whole / 2 + whole * (at * 37 % count) / (2 * count))
+}
+
+/// Kills reports over an older one at many moments; `is_right` judges every folder that is left.
+fn kill_often(folder: &Path, is_right: impl Fn(&Contents) -> bool) {
+    let begin = Instant::now();
+    run(folder, &[&["report", "--out", "out"], &SMALL[..]].concat()).done();
+    let whole = begin.elapsed();
+    for (at, pause) in pauses(whole, 40).enumerate() {
+        let words = if at % 2 == 0 { ["a.parquet", "--no-figures", "--metrics=MCR"] } else { SMALL };
+        killed_after(folder, &words, pause);
+        let found = contents(&folder.join("out")).into_iter();
+        let found = found.filter(|(path, _)| !path.starts_with(".mirrorstats-")).collect();
+        assert!(is_right(&found), "killed after {pause:?}: {:#?}", found.keys());
+    }
+    run(folder, &[&["report", "--out", "out"], &SMALL[..]].concat()).done();
+    let names: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    let left = names.iter().filter(|name| name.to_string_lossy().starts_with(".mirrorstats-")).count();
+    assert_eq!(left, 0, "{names:?}");
+}
+
+#[test]
+fn a_killed_report_leaves_the_old_one_or_the_new_one() {
+    let folder = two_files();
+    let other = fresh(folder.path(), &["a.parquet", "--no-figures", "--metrics=MCR"]);
+    let small = fresh(folder.path(), &SMALL);
+    put_foreign(&folder.path().join("out"));
+    let reports = [with_foreign(small), with_foreign(other)];
+    kill_often(folder.path(), |found| reports.contains(found));
+}
+
+#[test]
+fn a_killed_report_in_a_linked_folder_leaves_one_or_no_manifest() {
+    let folder = two_files();
+    let other = fresh(folder.path(), &["a.parquet", "--no-figures", "--metrics=MCR"]);
+    let small = fresh(folder.path(), &SMALL);
+    fs::create_dir(folder.path().join("there")).unwrap();
+    symlink("there", folder.path().join("out")).unwrap();
+    put_foreign(&folder.path().join("out"));
+    let reports = [with_foreign(small), with_foreign(other)];
+    kill_often(folder.path(), |found| {
+        let foreign = FOREIGN.iter().all(|(path, text)| found.get(*path).is_some_and(|found| found == text.as_bytes()));
+        foreign && (!found.contains_key("manifest.json") || reports.contains(found))
+    });
+    let found = contents(&folder.path().join("out"));
+    assert!(found == reports[0], "{:#?}", found.keys());
+}

@@ -9,9 +9,10 @@ use arrow::array::{ArrayRef, BooleanArray, DictionaryArray, Int64Array, RecordBa
 use arrow::datatypes::Int32Type;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::score::engine::{Batch, Engine};
-use mirrorstats::score::rows::{RowSorter, Rows};
-use mirrorstats::score::run::schema_columns;
+use mirrorstats::score::builder::TableBuilder;
+use mirrorstats::score::evaluate::Batch;
+use mirrorstats::score::physical::PhysicalPlan;
+use mirrorstats::score::score_traces::schema_columns;
 use mirrorstats::score::segments::Segments;
 use mirrorstats::score::table::Header;
 use mirrorstats::trace::scan::Texts;
@@ -104,8 +105,9 @@ fn kernels(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("kernels");
     group.throughput(Throughput::Elements(STEPS as u64));
     let mut bench = |name: &str, definitions: &Definitions| {
-        let engine = Engine::new(&definitions.plan);
-        group.bench_function(name, |bencher| bencher.iter(|| engine.score(black_box(&sample.batch())).unwrap()));
+        let plan = PhysicalPlan::of(&[&definitions.plan]);
+        let score = || plan.evaluate(black_box(&sample.batch())).unwrap().scores(&plan.scores()[0]).unwrap();
+        group.bench_function(name, |bencher| bencher.iter(score));
     };
     for (name, expression) in EXPRESSIONS {
         bench(name, &definitions(expression));
@@ -114,23 +116,20 @@ fn kernels(criterion: &mut Criterion) {
     group.finish();
 }
 
-fn rows(criterion: &mut Criterion) {
+fn table(criterion: &mut Criterion) {
     let sample = Sample::new();
     let definitions = Definitions::load("paper", &schema_columns()).unwrap();
-    let scores = Engine::new(&definitions.plan).score(&sample.batch()).unwrap();
-    let rows = |scores| Rows::of(&sample.episodes, scores, &[], 0, usize::MAX).unwrap().0;
-    let mut group = criterion.benchmark_group("rows");
-    group.throughput(Throughput::Elements(scores.kept.len() as u64));
-    group.bench_function("as bytes", |bencher| bencher.iter(|| rows(black_box(&scores))));
-    let rows = rows(&scores);
+    let plan = PhysicalPlan::of(&[&definitions.plan]);
+    let scores = plan.evaluate(&sample.batch()).unwrap().scores(&plan.scores()[0]).unwrap();
     let metrics = definitions.plan.outputs.iter().map(|output| output.name.clone()).collect();
     let header = Header { catalog: definitions.catalog.clone(), labels: Vec::new(), metrics };
-    group.bench_function("sorted and read back", |bencher| {
+    let mut group = criterion.benchmark_group("table");
+    group.throughput(Throughput::Elements(sample.episodes.num_rows() as u64));
+    group.bench_function("gathered and ordered", |bencher| {
         bencher.iter(|| {
-            let mut sorter = RowSorter::new(header.clone());
-            sorter.add(black_box(&rows)).unwrap();
-            let mut rows = sorter.finish().unwrap();
-            while rows.next_row().unwrap().is_some() {}
+            let mut builder = TableBuilder::new(header.clone());
+            builder.extend(black_box(&sample.episodes), &scores.metrics);
+            builder.finish()
         });
     });
     group.finish();
@@ -140,5 +139,5 @@ fn quick() -> Criterion {
     Criterion::default().sample_size(20).without_plots()
 }
 
-criterion_group! { name = all; config = quick(); targets = kernels, rows }
+criterion_group! { name = all; config = quick(); targets = kernels, table }
 criterion_main!(all);

@@ -9,7 +9,7 @@
 //! ```text
 //!          trace ──────► score ───────► cells ───────► report
 //!        (steps of      (one row        (exact         (tables, statistics,
-//!         episodes)      an episode)     moments)       the folder)
+//!         episodes)      per episode)    moments)       the folder)
 //!                          ▲
 //!                       metric
 //!                 (definitions, checked)
@@ -27,7 +27,7 @@
 //! | [`report`] | styles, tables, statistics for people, the folder of a report |
 //! | [`engine`] | other engines for the SQL lowering: Polars, Spark |
 //! | [`cells`] | grouping, exact moments, intervals, tests |
-//! | [`score`] | the plan evaluated over Arrow batches; the episode table |
+//! | [`score`] | logical plan to physical plan to kernels over Arrow batches; the episode table |
 //! | [`metric`] | definition files: TOML, SQL expressions, types, plans |
 //! | [`trace`] | what an episode is: schema, writer, reader, validation |
 //! | [`base`] | exact numbers to text, hashes, near names, files that are replaced |
@@ -40,6 +40,19 @@
 //!   threads, on the order of files, or on how rows are divided among them.
 //! - Missing is never zero: it is an [`Option`] until the last renderer.
 //! - Output is a function of traces and definitions: no clock, no absolute path, no unordered iteration.
+//!
+//! # The way of one number
+//!
+//! A score is stored eight times between the page of a trace and a printed cell, always in columns:
+//!
+//! 1. a page: dictionary keys or bits, as runs and packed values (`trace::pages`)
+//! 2. a key per row (one byte), a value per run, or bits (`trace::column`)
+//! 3. a vector per step of the physical plan: truth values as bits ([`score::physical`], [`score::evaluate`])
+//! 4. a value per episode: the vector of an aggregate or of a metric
+//! 5. a column of the episode table, sorted once by a permutation ([`score::builder`], [`score::table`])
+//! 6. exact moments of a cell ([`cells::moments`])
+//! 7. a decimal, rounded once ([`base::number`])
+//! 8. text ([`report`])
 //!
 //! # The main job
 //!

@@ -66,10 +66,7 @@ fn table(rows: &[Row]) -> EpisodeTable {
         run,
         episode_id: format!("{experiment}/{model}/{seed}/{run}/{at}"),
     };
-    let column = |name: &str, value: fn(&Row) -> Option<i64>| MetricColumn {
-        name: name.into(),
-        values: rows.iter().map(value).collect(),
-    };
+    let column = |name: &str, value: fn(&Row) -> Option<i64>| MetricColumn::new(name, rows.iter().map(value));
     EpisodeTable {
         catalog: catalog(),
         keys: rows.iter().enumerate().map(key).collect(),
@@ -87,12 +84,12 @@ fn table(rows: &[Row]) -> EpisodeTable {
 fn cells(table: &EpisodeTable) -> Cells {
     let mut groups: std::collections::BTreeMap<Vec<KeyValue>, Group> = std::collections::BTreeMap::new();
     for (row, key) in table.keys.iter().enumerate() {
-        let key = vec![KeyValue::Text(key.experiment.clone()), KeyValue::Text(key.model.clone())];
+        let key = vec![KeyValue::Text(key.experiment.to_owned()), KeyValue::Text(key.model.to_owned())];
         let moments = vec![Moments::default(); table.metrics.len()];
         let group = groups.entry(key.clone()).or_insert(Group { key, episodes: 0, moments });
         group.episodes += 1;
         for (moments, column) in group.moments.iter_mut().zip(&table.metrics) {
-            *moments = column.values[row].map_or(*moments, |value| moments.with(value).unwrap());
+            *moments = column.get(row).map_or(*moments, |value| moments.with(value).unwrap());
         }
     }
     Cells {
@@ -267,7 +264,7 @@ fn unfinished_episodes_are_censored_and_models_share_a_horizon() {
 #[test]
 fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
     let table = table(&block("E1", "a", 10, 9));
-    let lost: BTreeSet<String> = table.keys[18..].iter().map(|key| key.episode_id.clone()).collect();
+    let lost: BTreeSet<String> = table.keys.iter().skip(18).map(|key| key.episode_id.to_owned()).collect();
     let options = Options { lost: Some(lost), ..Options::default() };
     let found = Statistics::of(&table, &cells(&table), &options).unwrap();
     let row = &found.losses.rows[0];

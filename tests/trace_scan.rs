@@ -115,6 +115,7 @@ fn projection() -> Projection {
         steps: names(&["action", "mirror_px", "mirror_visible", "t"]),
         constants: names(&["body_color"]),
         experiments: None,
+        ..Projection::default()
     }
 }
 

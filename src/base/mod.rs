@@ -1,8 +1,7 @@
-//! What every room stands on: exact numbers and their text, hashes, near names, sorted runs, repeats, bits, files replaced.
+//! What every room stands on: exact numbers and their text, hashes, near names, bits, files replaced.
 //!
 //! Rule: nothing here knows an episode, a metric or a file format.
 
-pub mod beside;
 pub mod bits;
 pub mod estimate;
 pub mod frame;
@@ -11,7 +10,5 @@ pub mod near;
 pub mod number;
 pub mod palette;
 pub mod ratio;
-pub mod repeats;
 pub mod replace;
-pub mod runs;
 pub mod visible;

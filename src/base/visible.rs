@@ -45,13 +45,6 @@ pub fn visible_lines(text: &str) -> String {
     text.lines().map(visible).collect::<Vec<_>>().join("\n")
 }
 
-/// Whether [`visible`] spells a character that stands alone.
-pub fn acts(c: char) -> bool {
-    let mut buffer = [0; 4];
-    let text: &str = c.encode_utf8(&mut buffer);
-    visible(text) != text
-}
-
 #[cfg(test)]
 mod tests {
     use super::{visible, visible_lines};

@@ -14,7 +14,7 @@ use super::group::{GroupError, group};
 use super::moments::Moments;
 use crate::metric::catalog::{Catalog, Kind};
 use crate::score::evidence::Evidence;
-use crate::score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+use crate::score::table::{EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
 
 /// A value of the scoring before, and the one after.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -206,9 +206,9 @@ impl CellChange {
     }
 }
 
-impl From<&EpisodeKey> for EpisodeName {
-    fn from(key: &EpisodeKey) -> Self {
-        let EpisodeKey { experiment, model, seed, run, episode_id } = key.clone();
+impl From<KeyRef<'_>> for EpisodeName {
+    fn from(key: KeyRef<'_>) -> Self {
+        let EpisodeKey { experiment, model, seed, run, episode_id } = key.to_owned();
         Self { episode_id, model, experiment, seed, run }
     }
 }
@@ -257,7 +257,7 @@ fn rewritten(before: &EpisodeTable, after: &EpisodeTable) -> Vec<Rewritten> {
 }
 
 /// The row of each episode.
-type Rows<'a> = BTreeMap<&'a EpisodeKey, usize>;
+type Rows<'a> = BTreeMap<KeyRef<'a>, usize>;
 
 fn rows(table: &EpisodeTable) -> Rows<'_> {
     table.keys.iter().zip(0..).collect()
@@ -281,7 +281,7 @@ fn flips(before: &EpisodeTable, after: &EpisodeTable, rows: &Pair<Rows>) -> Vec<
         let Some(old) = column(before, &new.name) else { continue };
         for (key, &row) in &rows.after {
             let Some(&old_row) = rows.before.get(key) else { continue };
-            let value = Pair { before: old.values[old_row], after: new.values[row] };
+            let value = Pair { before: old.get(old_row), after: new.get(row) };
             if value.before != value.after {
                 let (metric, episode) = (new.name.clone(), EpisodeName::from(*key));
                 found.push(Flip { metric, episode, value, timesteps: Pair { before: None, after: None } });
@@ -366,7 +366,7 @@ mod tests {
     use super::{Changes, Evidence};
     use crate::metric::definitions::Definitions;
     use crate::score::evidence::MetricEvidence;
-    use crate::score::run::schema_columns;
+    use crate::score::score_traces::schema_columns;
     use crate::score::table::{EpisodeKey, EpisodeTable, MetricColumn};
 
     const RATE: &str = "[metric.R]\nvalue = \"length() > 2\"";
@@ -382,7 +382,7 @@ mod tests {
         };
         let keys = (first..).take(values.len()).map(key).collect();
         let catalog = Definitions::from_toml("d", definitions, &schema_columns()).unwrap().catalog;
-        let metrics = vec![MetricColumn { name: "R".into(), values: values.to_vec() }];
+        let metrics = vec![MetricColumn::new("R", values.iter().copied())];
         EpisodeTable { catalog, keys, labels: vec![], metrics }
     }
 
@@ -453,9 +453,11 @@ mod tests {
             let changes = changes(&old, &new);
             for flip in &changes.flips {
                 let row = old.keys.iter().position(|key| key.episode_id == flip.episode.episode_id).unwrap();
-                prop_assert_eq!(old.metrics[0].values[row], flip.value.before);
+                let mut values: Vec<Option<i64>> = old.metrics[0].iter().collect();
+                prop_assert_eq!(values[row], flip.value.before);
                 prop_assert_ne!(flip.value.before, flip.value.after);
-                old.metrics[0].values[row] = flip.value.after;
+                values[row] = flip.value.after;
+                old.metrics[0] = MetricColumn::new("R", values);
             }
             prop_assert_eq!(&old.metrics, &new.metrics);
             prop_assert_eq!(changes.is_empty(), before == after);

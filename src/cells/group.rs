@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::cell::{Cells, Group, KeyValue};
 use super::moments::{MomentOverflow, Moments};
 use crate::base::near::nearest;
-use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn};
+use crate::score::table::{EpisodeTable, KeyRef, LabelColumn};
 
 /// The key columns of every episode table.
 pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episode_id"];
@@ -73,7 +73,7 @@ pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
         });
         group.episodes += 1;
         for (moments, metric) in group.moments.iter_mut().zip(&table.metrics) {
-            if let Some(value) = metric.values[row] {
+            if let Some(value) = metric.get(row) {
                 *moments = moments
                     .with(value)
                     .map_err(|source| GroupError::Overflow { metric: metric.name.clone(), source })?;
@@ -94,7 +94,7 @@ pub fn column_values(table: &EpisodeTable, name: &str) -> Option<BTreeSet<KeyVal
         return Some((0..table.len()).map(|row| column.value(table, row)).collect());
     }
     let metric = table.metrics.iter().find(|metric| metric.name == name)?;
-    Some(metric.values.iter().map(|value| value.map_or(KeyValue::Missing, KeyValue::Int)).collect())
+    Some(metric.iter().map(|value| value.map_or(KeyValue::Missing, KeyValue::Int)).collect())
 }
 
 /// For each episode of `table` the position of its group among those of [`group`].
@@ -112,18 +112,18 @@ pub fn membership(table: &EpisodeTable, by: &[String]) -> Result<Vec<usize>, Gro
 
 /// A column to group by, found in the table.
 enum KeyColumn<'a> {
-    Key(fn(&EpisodeKey) -> KeyValue),
+    Key(fn(KeyRef<'_>) -> KeyValue),
     Label { column: &'a LabelColumn, is_integer: bool },
 }
 
 impl KeyColumn<'_> {
     fn value(&self, table: &EpisodeTable, row: usize) -> KeyValue {
         match self {
-            Self::Key(of) => of(&table.keys[row]),
-            Self::Label { column, is_integer } => match &column.values[row] {
+            Self::Key(of) => of(table.keys.get(row)),
+            Self::Label { column, is_integer } => match column.values.get(row) {
                 None => KeyValue::Missing,
                 Some(text) if *is_integer => canonical_integer(text).map_or(KeyValue::Missing, KeyValue::Int),
-                Some(text) => KeyValue::Text(text.clone()),
+                Some(text) => KeyValue::Text(text.to_owned()),
             },
         }
     }
@@ -154,11 +154,11 @@ fn known_columns(table: &EpisodeTable) -> Vec<&str> {
 
 fn column<'a>(table: &'a EpisodeTable, name: &str) -> Option<KeyColumn<'a>> {
     Some(match name {
-        "experiment" => KeyColumn::Key(|key| KeyValue::Text(key.experiment.clone())),
-        "model" => KeyColumn::Key(|key| KeyValue::Text(key.model.clone())),
+        "experiment" => KeyColumn::Key(|key| KeyValue::Text(key.experiment.to_owned())),
+        "model" => KeyColumn::Key(|key| KeyValue::Text(key.model.to_owned())),
         "seed" => KeyColumn::Key(|key| KeyValue::Int(key.seed.into())),
         "run" => KeyColumn::Key(|key| KeyValue::Int(key.run.into())),
-        "episode_id" => KeyColumn::Key(|key| KeyValue::Text(key.episode_id.clone())),
+        "episode_id" => KeyColumn::Key(|key| KeyValue::Text(key.episode_id.to_owned())),
         _ => {
             let column = table.labels.iter().find(|label| label.name == name)?;
             let is_integer = column.values.iter().flatten().all(|text| canonical_integer(text).is_some());
@@ -206,9 +206,9 @@ mod tests {
             keys: rows.iter().enumerate().map(key).collect(),
             labels: vec![LabelColumn {
                 name: "distractors".to_owned(),
-                values: rows.iter().map(|row| row.3.map(str::to_owned)).collect(),
+                values: rows.iter().map(|row| row.3).collect(),
             }],
-            metrics: vec![MetricColumn { name: "X".to_owned(), values: rows.iter().map(|row| row.4).collect() }],
+            metrics: vec![MetricColumn::new("X", rows.iter().map(|row| row.4))],
         }
     }
 

@@ -23,6 +23,7 @@ pub mod origin;
 pub mod overflow;
 mod pattern;
 pub mod plan;
+mod print;
 pub mod restore;
 pub mod shape;
 pub mod sql;

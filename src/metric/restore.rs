@@ -91,7 +91,7 @@ mod tests {
     use super::super::definitions::Definitions;
     use super::super::file::built_in_names;
     use super::RestoreError;
-    use crate::score::run::schema_columns;
+    use crate::score::score_traces::schema_columns;
 
     fn columns() -> Columns {
         schema_columns()

@@ -14,7 +14,7 @@
 //!
 //! Where nothing holds, nothing decided: the list is empty.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
 use std::num::NonZeroUsize;
 
@@ -23,10 +23,12 @@ use arrow::datatypes::Int32Type;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::engine::{Batch, Engine, EngineError, Evaluated};
-use super::run::{ScoreError, projection};
+use super::error::EngineError;
+use super::evaluate::{Batch, Evaluated};
+use super::physical::{PhysicalPlan, StepId};
+use super::score_traces::{ScoreError, failed, projection};
 use super::segments::Segments;
-use super::values::truths;
+use super::vectors::{Vector, truths};
 use crate::base::near::nearest;
 use crate::base::visible::visible;
 use crate::metric::columns::Type;
@@ -100,8 +102,8 @@ pub fn explain(
     episode_id: &str,
     threads: NonZeroUsize,
 ) -> Result<Evidence, EvidenceError> {
-    let engine = engine(definitions);
-    let projection = projection(traces, definitions, &engine, &[])?;
+    let reader = Reader::of(definitions);
+    let projection = projection(traces, &[definitions], &reader.plan, &[])?;
     let (mut found, mut names) = (None, Vec::new());
     let summary = traces.scan(
         &projection,
@@ -109,9 +111,8 @@ pub fn explain(
         |batch| -> Result<_, ScoreError> {
             let ids = episode_ids(&batch);
             let position = ids.iter().position(|id| id == episode_id);
-            let evidence = position.map(|at| of_episode(&engine, definitions, &batch, at, episode_id));
-            let file = || traces.files()[batch.origin.file].name().to_owned();
-            let evidence = evidence.transpose().map_err(|source| ScoreError::Engine { file: file(), source })?;
+            let evidence = position.map(|at| reader.episode(&batch, at, episode_id));
+            let evidence = evidence.transpose().map_err(|source| failed(traces, &batch, source))?;
             Ok((evidence, ids))
         },
         |(evidence, ids)| {
@@ -137,8 +138,8 @@ pub fn explain_each(
     wanted: &BTreeSet<String>,
     threads: NonZeroUsize,
 ) -> Result<BTreeMap<String, Evidence>, ScoreError> {
-    let engine = engine(definitions);
-    let projection = projection(traces, definitions, &engine, &[])?;
+    let reader = Reader::of(definitions);
+    let projection = projection(traces, &[definitions], &reader.plan, &[])?;
     let mut found = BTreeMap::new();
     traces.scan(
         &projection,
@@ -146,9 +147,8 @@ pub fn explain_each(
         |batch| -> Result<Vec<Evidence>, ScoreError> {
             let ids = episode_ids(&batch);
             let wanted = ids.iter().enumerate().filter(|(_, id)| wanted.contains(*id));
-            let explained = wanted.map(|(at, id)| of_episode(&engine, definitions, &batch, at, id));
-            let file = || traces.files()[batch.origin.file].name().to_owned();
-            explained.collect::<Result<_, _>>().map_err(|source| ScoreError::Engine { file: file(), source })
+            let explained = wanted.map(|(at, id)| reader.episode(&batch, at, id));
+            explained.collect::<Result<_, _>>().map_err(|source| failed(traces, &batch, source))
         },
         |explained| {
             found.extend(explained.into_iter().map(|evidence| (evidence.episode_id.clone(), evidence)));
@@ -158,10 +158,35 @@ pub fn explain_each(
     Ok(found)
 }
 
-/// What computes the metrics asked for, and keeps the values that they build on.
-fn engine(definitions: &Definitions) -> Engine<'_> {
-    let plan = &definitions.plan;
-    Engine::for_nodes(plan, plan.needed_by(plan.outputs.iter().map(|output| output.node)))
+/// What computes the metrics asked for and every value that they build on.
+struct Reader<'a> {
+    definitions: &'a Definitions,
+    plan: PhysicalPlan,
+    /// The steps of those values.
+    steps: HashMap<NodeId, StepId>,
+}
+
+impl<'a> Reader<'a> {
+    fn of(definitions: &'a Definitions) -> Self {
+        let logical = &definitions.plan;
+        let nodes = logical.needed_by(logical.outputs.iter().map(|output| output.node));
+        let mut plan = PhysicalPlan::default();
+        let steps = nodes.iter().copied().zip(plan.add_nodes(logical, nodes.iter().copied())).collect();
+        Self { definitions, plan, steps }
+    }
+
+    fn episode(&self, batch: &EpisodeBatch, episode: usize, episode_id: &str) -> Result<Evidence, EngineError> {
+        let (start, end) = (batch.offsets[episode], batch.offsets[episode + 1]);
+        let offsets = [0, end - start];
+        let segments = Segments::new(&offsets);
+        let (steps, episodes) = (batch.steps.slice(start, end - start), batch.episodes.slice(episode, 1));
+        let texts: Vec<_> = batch.texts.iter().map(|texts| texts.slice(start, end - start)).collect();
+        let values = self.plan.evaluate(&Batch { segments, steps: &steps, texts: &texts, episodes: &episodes })?;
+        let reading = Reading { reader: self, values, segments };
+        let outputs = self.definitions.plan.outputs.iter();
+        let metrics = outputs.map(|output| reading.metric(&output.name, output.node)).collect();
+        Ok(Evidence { episode_id: episode_id.to_owned(), length: segments.lengths().value(0), metrics })
+    }
 }
 
 fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
@@ -172,39 +197,29 @@ fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
     (0..column.len()).map(text).collect()
 }
 
-fn of_episode(
-    engine: &Engine,
-    definitions: &Definitions,
-    batch: &EpisodeBatch,
-    episode: usize,
-    episode_id: &str,
-) -> Result<Evidence, EngineError> {
-    let (start, end) = (batch.offsets[episode], batch.offsets[episode + 1]);
-    let offsets = [0, end - start];
-    let segments = Segments::new(&offsets);
-    let (steps, episodes) = (batch.steps.slice(start, end - start), batch.episodes.slice(episode, 1));
-    let texts: Vec<_> = batch.texts.iter().map(|texts| texts.slice(start, end - start)).collect();
-    let values = engine.evaluate(&Batch { segments, steps: &steps, texts: &texts, episodes: &episodes })?;
-    let reading = Reading { definitions, values, segments };
-    let metrics = definitions.plan.outputs.iter().map(|output| reading.metric(&output.name, output.node)).collect();
-    Ok(Evidence { episode_id: episode_id.to_owned(), length: segments.lengths().value(0), metrics })
-}
-
 /// The values of one episode, read for what decided them.
 struct Reading<'a> {
-    definitions: &'a Definitions,
+    reader: &'a Reader<'a>,
     values: Evaluated,
     segments: Segments<'a>,
 }
 
 impl Reading<'_> {
     fn plan(&self) -> &Plan {
-        &self.definitions.plan
+        &self.reader.definitions.plan
+    }
+
+    fn of(&self, node: NodeId) -> &Vector {
+        self.values.of(self.reader.steps[&node])
+    }
+
+    fn ty(&self, node: NodeId) -> Type {
+        self.plan().node(node).ty
     }
 
     fn metric(&self, name: &str, node: NodeId) -> MetricEvidence {
-        let values = self.values.of(node);
-        let value = values.array().is_valid(0).then(|| match values.ty() {
+        let values = self.of(node);
+        let value = values.array().is_valid(0).then(|| match self.ty(node) {
             Type::Bool => i64::from(values.bools().value(0)),
             _ => values.ints().value(0),
         });
@@ -219,7 +234,7 @@ impl Reading<'_> {
         match &self.plan().node(node).op {
             Op::Case { branches, otherwise: None } if branches.len() == 1 => {
                 let (when, _) = branches[0];
-                if truths(self.values.of(when).bools()).value(0) { node } else { when }
+                if truths(self.of(when).bools()).value(0) { node } else { when }
             }
             _ => node,
         }
@@ -228,11 +243,11 @@ impl Reading<'_> {
     fn fact(&self, id: NodeId) -> Option<Fact> {
         let timesteps = match &self.plan().node(id).op {
             Op::Aggregate(aggregate, operand) => self.deciding(*aggregate, *operand, id),
-            Op::At(_, moment) => self.moment(self.values.of(*moment).ints()).into_iter().collect(),
+            Op::At(_, moment) => self.moment(self.of(*moment).ints()).into_iter().collect(),
             _ => return None,
         };
         let expression = self.plan().sources.get(&id).cloned().unwrap_or_default();
-        Some(Fact { name: self.definitions.name_of(id), expression, value: self.text(id), timesteps })
+        Some(Fact { name: self.reader.definitions.name_of(id), expression, value: self.text(id), timesteps })
     }
 
     fn moment(&self, moments: &Int64Array) -> Option<i64> {
@@ -241,7 +256,7 @@ impl Reading<'_> {
     }
 
     fn deciding(&self, aggregate: Aggregate, operand: NodeId, result: NodeId) -> Vec<i64> {
-        let (values, result) = (self.values.of(operand), self.values.of(result));
+        let (values, result) = (self.of(operand), self.of(result));
         let rows = 0..values.array().len();
         match aggregate {
             Aggregate::First | Aggregate::Last => self.moment(result.ints()).into_iter().collect(),
@@ -256,7 +271,7 @@ impl Reading<'_> {
                 rows.filter(counts).map(as_t).collect()
             }
             Aggregate::Min | Aggregate::Max => {
-                let equal = |row| match values.ty() {
+                let equal = |row| match self.ty(operand) {
                     Type::Float => values.floats().value(row).to_bits() == result.floats().value(0).to_bits(),
                     _ => values.ints().value(row) == result.ints().value(0),
                 };
@@ -266,8 +281,8 @@ impl Reading<'_> {
     }
 
     fn text(&self, id: NodeId) -> Option<String> {
-        let values = self.values.of(id);
-        values.array().is_valid(0).then(|| match values.ty() {
+        let values = self.of(id);
+        values.array().is_valid(0).then(|| match self.ty(id) {
             Type::Bool => values.bools().value(0).to_string(),
             Type::Int => values.ints().value(0).to_string(),
             Type::Float => values.floats().value(0).to_string(),

@@ -1,22 +1,24 @@
-//! A checked plan over Arrow batches: one row an episode.
+//! A checked plan over Arrow batches: one row per episode.
 //!
 //! ```text
-//! run.rs ──► engine.rs ──► segments.rs, values.rs        rows.rs ──► table.rs, format/
-//! (one scan)  (a node, a    (kernels)                    (sorted in   (in memory, or as Parquet,
-//!              column)                                    bounded      CSV, JSON lines)
-//!                                                         memory)
+//! metric::plan ──► physical/ ──► evaluate.rs ──► builder.rs ──► table.rs, format/
+//! (logical plan)   (kernels      (one batch,     (columns,       (in memory, or as Parquet,
+//!                   chosen)       vectors)        one order)      CSV, JSON lines)
 //! ```
 //!
-//! Rule: pure. No file is opened here, no clock read, no thread started in a kernel.
+//! `score_traces.rs` is the one scan that feeds it. Rule: pure. No file is opened here, no clock read, no thread started.
 
-pub mod engine;
+pub mod builder;
+mod elementwise;
+pub mod error;
+pub mod evaluate;
 pub mod evidence;
 pub mod format;
-mod row_bytes;
-pub mod rows;
-pub mod run;
+mod order;
+pub mod physical;
+pub mod score_traces;
 pub mod segments;
 pub mod select;
 pub mod table;
 pub mod timeline;
-mod values;
+mod vectors;

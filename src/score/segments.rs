@@ -11,7 +11,7 @@ use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::Int64Type;
 use arrow::error::ArrowError;
 
-use super::values::{nulls_of, truths};
+use super::vectors::{nulls_of, truths};
 use crate::base::bits::{self, Bits};
 use crate::metric::plan::{Aggregate, Comparison};
 
@@ -45,6 +45,11 @@ impl<'a> Segments<'a> {
     /// The first row and the length of each episode.
     pub(super) fn each(self) -> impl Iterator<Item = (usize, usize)> + use<'a> {
         self.offsets.windows(2).map(|pair| (pair[0], pair[1] - pair[0]))
+    }
+
+    /// The length T of one episode.
+    pub(super) fn length(self, episode: usize) -> i64 {
+        as_t(self.offsets[episode + 1] - self.offsets[episode])
     }
 
     /// The lengths T; never null.
@@ -102,14 +107,14 @@ impl<'a> Segments<'a> {
     }
 
     /// All rows of each episode.
-    pub(super) fn whole(self) -> Vec<Stretch> {
-        self.each().map(|(start, length)| (start, 0..length)).collect()
+    pub(super) fn whole(self) -> impl Iterator<Item = Stretch> + use<'a> {
+        self.each().map(|(start, length)| (start, 0..length))
     }
 
     /// The rows of each episode that lie in all these windows, which compare the timestep with a moment of the
     /// episode by anything but `NotEqual`; none where a moment is null.
-    pub(super) fn within(self, windows: &[(Comparison, Int64Array)]) -> Vec<Stretch> {
-        let mut stretches = self.whole();
+    pub(super) fn within(self, windows: &[(Comparison, &Int64Array)]) -> Vec<Stretch> {
+        let mut stretches: Vec<Stretch> = self.whole().collect();
         for (comparison, moments) in windows {
             let nulls = moments.nulls();
             let each = stretches.iter_mut().zip(self.offsets.windows(2)).zip(moments.values()).enumerate();
@@ -127,10 +132,14 @@ impl<'a> Segments<'a> {
     ///
     /// First, last and count give a number of steps or a timestep, anything else whether the predicate holds at some
     /// row.
-    pub(super) fn aggregate(aggregate: Aggregate, predicate: &BooleanArray, stretches: &[Stretch]) -> ArrayRef {
+    pub(super) fn search(
+        aggregate: Aggregate,
+        predicate: &BooleanArray,
+        stretches: impl Iterator<Item = Stretch>,
+    ) -> ArrayRef {
         let truths = truths(predicate);
         let (data, offset) = (truths.values(), truths.offset());
-        let rows = stretches.iter().map(|(start, rows)| (offset + start + rows.start, rows.len(), rows.start + 1));
+        let rows = stretches.map(|(start, rows)| (offset + start + rows.start, rows.len(), rows.start + 1));
         match aggregate {
             Aggregate::First => {
                 let first = rows.map(|(start, length, t)| bits::first(data, start, length).map(|at| as_t(t + at)));
@@ -164,19 +173,15 @@ impl<'a> Segments<'a> {
     }
 
     /// The values of each episode that are not null, folded; null where there is none.
-    ///
-    /// # Errors
-    /// What `fold` gives.
-    pub(super) fn fold<T: ArrowPrimitiveType, E>(
+    pub(super) fn fold<T: ArrowPrimitiveType>(
         self,
         values: &PrimitiveArray<T>,
-        fold: impl Fn(T::Native, T::Native) -> Result<T::Native, E>,
-    ) -> Result<PrimitiveArray<T>, E> {
+        fold: impl Fn(T::Native, T::Native) -> T::Native,
+    ) -> PrimitiveArray<T> {
         let numbers = values.values();
         let folded = self.each().map(|(start, length)| {
-            let mut valid = (start..start + length).filter(|&row| values.is_valid(row)).map(|row| numbers[row]);
-            let Some(first) = valid.next() else { return Ok(None) };
-            valid.try_fold(first, &fold).map(Some)
+            let valid = (start..start + length).filter(|&row| values.is_valid(row)).map(|row| numbers[row]);
+            valid.reduce(&fold)
         });
         folded.collect()
     }

@@ -9,9 +9,11 @@ use arrow::array::{ArrayRef, DictionaryArray, Int64Array, RecordBatch, RecordBat
 use arrow::datatypes::{Field, Int32Type, Schema};
 use arrow::error::ArrowError;
 
-use super::engine::{Batch, Engine, EngineError};
+use super::error::EngineError;
+use super::evaluate::Batch;
+use super::physical::PhysicalPlan;
 use super::segments::Segments;
-use super::table::{EpisodeTable, LabelColumn, MetricColumn};
+use super::table::EpisodeTable;
 use crate::base::near::nearest;
 use crate::metric::columns::{Column, Columns, Level, Type};
 use crate::metric::definitions::{Definitions, UnknownMetric};
@@ -75,8 +77,10 @@ fn filtered(table: EpisodeTable, condition: &str) -> Result<EpisodeTable, Select
         &RecordBatchOptions::new().with_row_count(Some(table.len())),
     )?;
     let batch = Batch { segments: Segments::new(&offsets), steps: &steps, texts: &[], episodes: &episodes };
-    let kept = Engine::new(&definitions.plan).score(&batch)?.kept;
-    Ok(only(table, &kept))
+    let plan = PhysicalPlan::of(&[&definitions.plan]);
+    let kept = plan.evaluate(&batch)?.scores(&plan.scores()[0])?.kept;
+    let kept: Vec<usize> = kept.iter().flat_map(|kept| kept.values().set_indices()).collect();
+    Ok(table.taken(&kept))
 }
 
 fn columns(table: &EpisodeTable) -> Columns {
@@ -94,46 +98,17 @@ fn rows(table: &EpisodeTable) -> Result<RecordBatch, ArrowError> {
     let text =
         |values: Vec<Option<&str>>| Arc::new(values.into_iter().collect::<DictionaryArray<Int32Type>>()) as ArrayRef;
     let int = |values: Vec<Option<i64>>| Arc::new(Int64Array::from(values)) as ArrayRef;
-    let keys = &table.keys;
+    let keys = || table.keys.iter();
     let mut columns = vec![
-        ("episode_id", text(keys.iter().map(|key| Some(key.episode_id.as_str())).collect())),
-        ("model", text(keys.iter().map(|key| Some(key.model.as_str())).collect())),
-        ("experiment", text(keys.iter().map(|key| Some(key.experiment.as_str())).collect())),
-        ("seed", int(keys.iter().map(|key| Some(key.seed.into())).collect())),
-        ("run", int(keys.iter().map(|key| Some(key.run.into())).collect())),
+        ("episode_id", text(keys().map(|key| Some(key.episode_id)).collect())),
+        ("model", text(keys().map(|key| Some(key.model)).collect())),
+        ("experiment", text(keys().map(|key| Some(key.experiment)).collect())),
+        ("seed", int(keys().map(|key| Some(key.seed.into())).collect())),
+        ("run", int(keys().map(|key| Some(key.run.into())).collect())),
     ];
-    columns.extend(
-        table
-            .labels
-            .iter()
-            .map(|LabelColumn { name, values }| (name.as_str(), text(values.iter().map(Option::as_deref).collect()))),
-    );
-    columns.extend(table.metrics.iter().map(|MetricColumn { name, values }| (name.as_str(), int(values.clone()))));
+    columns.extend(table.labels.iter().map(|label| (label.name.as_str(), text(label.values.iter().collect()))));
+    columns.extend(table.metrics.iter().map(|metric| (metric.name.as_str(), int(metric.iter().collect()))));
     let fields: Vec<Field> =
         columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), true)).collect();
     RecordBatch::try_new(Arc::new(Schema::new(fields)), columns.into_iter().map(|(_, array)| array).collect())
-}
-
-/// The rows at these positions.
-fn only(table: EpisodeTable, kept: &[usize]) -> EpisodeTable {
-    EpisodeTable {
-        catalog: table.catalog,
-        keys: kept.iter().map(|&row| table.keys[row].clone()).collect(),
-        labels: table
-            .labels
-            .into_iter()
-            .map(|label| LabelColumn {
-                name: label.name,
-                values: kept.iter().map(|&row| label.values[row].clone()).collect(),
-            })
-            .collect(),
-        metrics: table
-            .metrics
-            .into_iter()
-            .map(|metric| MetricColumn {
-                name: metric.name,
-                values: kept.iter().map(|&row| metric.values[row]).collect(),
-            })
-            .collect(),
-    }
 }

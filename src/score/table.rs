@@ -1,7 +1,14 @@
-//! The episode table: one row an episode, its keys and one integer a metric.
+//! The episode table: one row per episode, its keys and one integer per metric, in Arrow columns.
 
 use std::collections::HashSet;
 
+use arrow::array::{
+    Array, ArrayRef, AsArray as _, BooleanArray, Int32Array, Int64Array, LargeStringArray, UInt32Array,
+};
+use arrow::compute::take;
+use arrow::datatypes::Int64Type;
+
+use super::builder::TableBuilder;
 use crate::metric::catalog::Catalog;
 
 /// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
@@ -9,12 +16,22 @@ use crate::metric::catalog::Catalog;
 pub struct EpisodeTable {
     /// The definitions that gave the values.
     pub catalog: Catalog,
-    /// The keys, a row an episode.
-    pub keys: Vec<EpisodeKey>,
+    /// The keys, one row per episode.
+    pub keys: EpisodeKeys,
     /// Further columns that are constant in an episode (`body_color`, ...), where they were asked for.
     pub labels: Vec<LabelColumn>,
     /// The metrics in the order of the catalog, or of the selection made.
     pub metrics: Vec<MetricColumn>,
+}
+
+/// The key columns of a table.
+#[derive(Clone, Debug)]
+pub struct EpisodeKeys {
+    pub(super) experiment: TextColumn,
+    pub(super) model: TextColumn,
+    pub(super) seed: Int32Array,
+    pub(super) run: Int32Array,
+    pub(super) episode_id: TextColumn,
 }
 
 /// What names an episode. The derived order is the order of the table.
@@ -32,36 +49,43 @@ pub struct EpisodeKey {
     pub episode_id: String,
 }
 
-/// A further key column: text, `None` where the trace has null.
+/// An [`EpisodeKey`] in a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[expect(missing_docs, reason = "the fields are those of `EpisodeKey`")]
+pub struct KeyRef<'a> {
+    pub experiment: &'a str,
+    pub model: &'a str,
+    pub seed: i32,
+    pub run: i32,
+    pub episode_id: &'a str,
+}
+
+/// A column of text: a code per row, null where there is no text, and the text of each code.
+#[derive(Clone, Debug)]
+pub struct TextColumn {
+    pub(super) codes: UInt32Array,
+    pub(super) texts: LargeStringArray,
+}
+
+/// A further key column: text, null where the trace has null.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LabelColumn {
     /// The column's name in the trace.
     pub name: String,
-    /// A value an episode.
-    pub values: Vec<Option<String>>,
+    /// A value per episode.
+    pub values: TextColumn,
 }
 
-/// The values of one metric.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// The values of one metric, null where it is undefined.
+#[derive(Clone, Debug)]
 pub struct MetricColumn {
     /// The metric's name in the catalog.
     pub name: String,
-    /// A value an episode; `None` where the metric is undefined.
-    pub values: Vec<Option<i64>>,
+    /// Truth values, for 0 and 1, or 64-bit integers; one per episode.
+    pub(super) values: ArrayRef,
 }
 
-/// One row of the table, on its way into it or out of it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct EpisodeRow {
-    /// What names the episode.
-    pub key: EpisodeKey,
-    /// A value for each of [`Header::labels`].
-    pub labels: Vec<Option<String>>,
-    /// A value for each of [`Header::metrics`]; `None` where the metric is undefined.
-    pub metrics: Vec<Option<i64>>,
-}
-
-/// What stands above the rows.
+/// The names of a table's columns.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// The definitions that gave the values.
@@ -87,29 +111,7 @@ pub enum JoinError {
 }
 
 impl EpisodeTable {
-    /// A table without a row.
-    pub fn empty(header: Header) -> Self {
-        let Header { catalog, labels, metrics } = header;
-        Self {
-            catalog,
-            keys: Vec::new(),
-            labels: labels.into_iter().map(|name| LabelColumn { name, values: Vec::new() }).collect(),
-            metrics: metrics.into_iter().map(|name| MetricColumn { name, values: Vec::new() }).collect(),
-        }
-    }
-
-    /// Adds a row, which must not come before the last one.
-    pub fn push(&mut self, row: EpisodeRow) {
-        self.keys.push(row.key);
-        for (column, value) in self.labels.iter_mut().zip(row.labels) {
-            column.values.push(value);
-        }
-        for (column, value) in self.metrics.iter_mut().zip(row.metrics) {
-            column.values.push(value);
-        }
-    }
-
-    /// What stands above the rows.
+    /// The names of the columns.
     pub fn header(&self) -> Header {
         Header {
             catalog: self.catalog.clone(),
@@ -118,76 +120,233 @@ impl EpisodeTable {
         }
     }
 
-    /// The rows, in order.
-    pub fn rows(&self) -> impl Iterator<Item = EpisodeRow> {
-        self.keys.iter().enumerate().map(|(row, key)| EpisodeRow {
-            key: key.clone(),
-            labels: self.labels.iter().map(|label| label.values[row].clone()).collect(),
-            metrics: self.metrics.iter().map(|metric| metric.values[row]).collect(),
-        })
-    }
-
     /// The number of episodes.
     pub fn len(&self) -> usize {
         self.keys.len()
     }
 
-    /// The rows of two tables.
+    /// Whether there is no episode.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The rows of two tables, in the order of their keys.
     ///
     /// # Errors
     /// When they differ in their definitions or columns, or have an episode in common.
-    pub fn joined(mut self, other: Self) -> Result<Self, JoinError> {
+    pub fn joined(self, other: &Self) -> Result<Self, JoinError> {
         if self.catalog.hash != other.catalog.hash {
-            return Err(JoinError::Definitions(self.catalog.name, other.catalog.name));
+            return Err(JoinError::Definitions(self.catalog.name, other.catalog.name.clone()));
         }
         let columns = |table: &Self| {
-            let labels = table.labels.iter().map(|label| label.name.clone());
-            labels.chain(table.metrics.iter().map(|metric| metric.name.clone())).collect::<Vec<_>>()
+            let Header { labels, metrics, .. } = table.header();
+            labels.into_iter().chain(metrics).collect::<Vec<_>>()
         };
-        if columns(&self) != columns(&other) {
-            return Err(JoinError::Columns(columns(&self).join(", "), columns(&other).join(", ")));
+        if columns(&self) != columns(other) {
+            return Err(JoinError::Columns(columns(&self).join(", "), columns(other).join(", ")));
         }
-        let ids: HashSet<&str> = self.keys.iter().map(|key| key.episode_id.as_str()).collect();
-        if let Some(twice) = other.keys.iter().find(|key| ids.contains(key.episode_id.as_str())) {
-            return Err(JoinError::Episode(twice.episode_id.clone()));
+        let ids: HashSet<&str> = self.keys.iter().map(|key| key.episode_id).collect();
+        if let Some(twice) = other.keys.iter().find(|key| ids.contains(key.episode_id)) {
+            return Err(JoinError::Episode(twice.episode_id.to_owned()));
         }
-        self.keys.extend(other.keys);
-        for (column, more) in self.labels.iter_mut().zip(other.labels) {
-            column.values.extend(more.values);
+        let mut builder = TableBuilder::new(self.header());
+        for table in [&self, other] {
+            (0..table.len()).for_each(|row| builder.push_row(table, row));
         }
-        for (column, more) in self.metrics.iter_mut().zip(other.metrics) {
-            column.values.extend(more.values);
-        }
-        Ok(self.sorted())
+        Ok(builder.finish())
     }
 
-    /// The same rows in the order of their keys.
+    /// The rows at these positions, in this order.
     #[must_use]
-    pub fn sorted(self) -> Self {
-        if self.keys.is_sorted() {
-            return self;
-        }
-        let mut order: Vec<usize> = (0..self.keys.len()).collect();
-        order.sort_unstable_by(|&a, &b| self.keys[a].cmp(&self.keys[b]));
-        let mut keys: Vec<Option<EpisodeKey>> = self.keys.into_iter().map(Some).collect();
-        let moved = |mut column: LabelColumn| {
-            column.values = order.iter().map(|&row| column.values[row].take()).collect();
-            column
-        };
-        let copied = |mut column: MetricColumn| {
-            column.values = order.iter().map(|&row| column.values[row]).collect();
-            column
-        };
+    pub fn taken(&self, rows: &[usize]) -> Self {
+        let rows: UInt32Array = rows.iter().map(|row| narrow(*row)).collect::<Vec<_>>().into();
+        let label = |label: &LabelColumn| LabelColumn { name: label.name.clone(), values: label.values.taken(&rows) };
         Self {
-            catalog: self.catalog,
-            labels: self.labels.into_iter().map(moved).collect(),
-            metrics: self.metrics.into_iter().map(copied).collect(),
-            keys: order.iter().filter_map(|&row| keys[row].take()).collect(),
+            catalog: self.catalog.clone(),
+            keys: self.keys.taken(&rows),
+            labels: self.labels.iter().map(label).collect(),
+            metrics: self.metrics.iter().map(|metric| metric.taken(&rows)).collect(),
         }
+    }
+}
+
+/// A row as Arrow's selections take it.
+pub(super) fn narrow(row: usize) -> u32 {
+    u32::try_from(row).expect("2^32 episodes do not fit into memory")
+}
+
+impl EpisodeKeys {
+    /// The number of episodes.
+    pub fn len(&self) -> usize {
+        self.seed.len()
     }
 
     /// Whether there is no episode.
     pub fn is_empty(&self) -> bool {
-        self.keys.is_empty()
+        self.len() == 0
+    }
+
+    /// The key of a row.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn get(&self, row: usize) -> KeyRef<'_> {
+        KeyRef {
+            experiment: self.experiment.get(row).unwrap_or_default(),
+            model: self.model.get(row).unwrap_or_default(),
+            seed: self.seed.value(row),
+            run: self.run.value(row),
+            episode_id: self.episode_id.get(row).unwrap_or_default(),
+        }
+    }
+
+    /// The keys, in order.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = KeyRef<'_>> + Clone {
+        (0..self.len()).map(|row| self.get(row))
+    }
+
+    /// The row of a key, where the keys ascend.
+    pub fn position(&self, key: KeyRef<'_>) -> Option<usize> {
+        let (mut low, mut high) = (0, self.len());
+        while low < high {
+            let middle = low + (high - low) / 2;
+            if self.get(middle) < key { low = middle + 1 } else { high = middle }
+        }
+        (low < self.len() && self.get(low) == key).then_some(low)
+    }
+
+    pub(super) fn taken(&self, rows: &UInt32Array) -> Self {
+        let ints = |column: &Int32Array| taken(column, rows).as_primitive().clone();
+        Self {
+            experiment: self.experiment.taken(rows),
+            model: self.model.taken(rows),
+            seed: ints(&self.seed),
+            run: ints(&self.run),
+            episode_id: self.episode_id.taken(rows),
+        }
+    }
+}
+
+pub(super) fn taken(column: &dyn Array, rows: &UInt32Array) -> ArrayRef {
+    take(column, rows, None).expect("the rows are those of the column")
+}
+
+impl PartialEq for EpisodeKeys {
+    fn eq(&self, other: &Self) -> bool {
+        self.iter().eq(other.iter())
+    }
+}
+
+impl KeyRef<'_> {
+    /// The same key on its own.
+    pub fn to_owned(&self) -> EpisodeKey {
+        EpisodeKey {
+            experiment: self.experiment.to_owned(),
+            model: self.model.to_owned(),
+            seed: self.seed,
+            run: self.run,
+            episode_id: self.episode_id.to_owned(),
+        }
+    }
+}
+
+impl EpisodeKey {
+    /// The same key, borrowed.
+    pub fn as_ref(&self) -> KeyRef<'_> {
+        let Self { experiment, model, seed, run, episode_id } = self;
+        KeyRef { experiment, model, seed: *seed, run: *run, episode_id }
+    }
+}
+
+impl TextColumn {
+    /// The number of rows.
+    pub fn len(&self) -> usize {
+        self.codes.len()
+    }
+
+    /// Whether there is no row.
+    pub fn is_empty(&self) -> bool {
+        self.codes.is_empty()
+    }
+
+    /// The text of a row; `None` for null.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn get(&self, row: usize) -> Option<&str> {
+        self.codes.is_valid(row).then(|| self.texts.value(self.codes.value(row) as usize))
+    }
+
+    /// The texts of all rows.
+    pub fn iter(&self) -> impl Iterator<Item = Option<&str>> {
+        (0..self.len()).map(|row| self.get(row))
+    }
+
+    pub(super) fn taken(&self, rows: &UInt32Array) -> Self {
+        Self { codes: taken(&self.codes, rows).as_primitive().clone(), texts: self.texts.clone() }
+    }
+}
+
+impl PartialEq for TextColumn {
+    fn eq(&self, other: &Self) -> bool {
+        self.iter().eq(other.iter())
+    }
+}
+
+impl MetricColumn {
+    /// A column of these values.
+    pub fn new(name: impl Into<String>, values: impl IntoIterator<Item = Option<i64>>) -> Self {
+        let values: Int64Array = values.into_iter().collect();
+        Self { name: name.into(), values: std::sync::Arc::new(values) }
+    }
+
+    /// The value of a row; `None` where the metric is undefined.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn get(&self, row: usize) -> Option<i64> {
+        if self.values.is_null(row) {
+            return None;
+        }
+        Some(match self.bools() {
+            Some(bools) => bools.value(row).into(),
+            None => self.values.as_primitive::<Int64Type>().value(row),
+        })
+    }
+
+    /// The values of all rows.
+    pub fn iter(&self) -> impl ExactSizeIterator<Item = Option<i64>> + Clone {
+        (0..self.values.len()).map(|row| self.get(row))
+    }
+
+    fn bools(&self) -> Option<&BooleanArray> {
+        self.values.as_boolean_opt()
+    }
+
+    pub(super) fn taken(&self, rows: &UInt32Array) -> Self {
+        Self { name: self.name.clone(), values: taken(&self.values, rows) }
+    }
+}
+
+impl PartialEq for MetricColumn {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name && self.iter().eq(other.iter())
+    }
+}
+
+impl FromIterator<EpisodeKey> for EpisodeKeys {
+    /// Keys in the order in which they come.
+    fn from_iter<I: IntoIterator<Item = EpisodeKey>>(keys: I) -> Self {
+        let mut columns = super::builder::KeyBuilder::default();
+        keys.into_iter().for_each(|key| columns.push(key.as_ref()));
+        columns.finish()
+    }
+}
+
+impl<T: AsRef<str>> FromIterator<Option<T>> for TextColumn {
+    fn from_iter<I: IntoIterator<Item = Option<T>>>(texts: I) -> Self {
+        let mut column = super::builder::TextBuilder::default();
+        texts.into_iter().for_each(|text| column.push(text.as_ref().map(AsRef::as_ref)));
+        column.finish()
     }
 }

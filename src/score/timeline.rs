@@ -8,15 +8,15 @@ use std::ops::RangeInclusive;
 
 use arrow::array::Array;
 
-use super::engine::{Engine, Evaluated};
-use super::rows::keys;
-use super::run::{ScoreError, projection, view};
+use super::evaluate::Evaluated;
+use super::physical::{PhysicalPlan, StepId};
+use super::score_traces::{ScoreError, failed, projection, view};
 use super::segments::Segments;
-use super::table::EpisodeKey;
-use super::values::truths;
+use super::table::{EpisodeKey, EpisodeKeys};
+use super::vectors::truths;
 use crate::metric::columns::{Level, Type};
 use crate::metric::definitions::Definitions;
-use crate::metric::plan::NodeId;
+use crate::metric::plan::{NodeId, Plan};
 use crate::trace::open::TraceSet;
 use crate::trace::scan::EpisodeBatch;
 
@@ -39,16 +39,16 @@ pub struct Timeline {
     pub answered: bool,
 }
 
-/// The nodes of a plan that timelines are read from.
-struct Moments {
-    visible: NodeId,
-    sight: NodeId,
-    claim: NodeId,
-    done: NodeId,
-    answered: NodeId,
+/// What timelines are read from.
+struct Moments<T> {
+    visible: T,
+    sight: T,
+    claim: T,
+    done: T,
+    answered: T,
 }
 
-impl Moments {
+impl Moments<NodeId> {
     /// `None` where the definitions do not name them all, with the types and levels they have in the paper's.
     fn of(definitions: &Definitions) -> Option<Self> {
         Some(Self {
@@ -60,8 +60,15 @@ impl Moments {
         })
     }
 
-    fn nodes(&self) -> [NodeId; 5] {
-        [self.visible, self.sight, self.claim, self.done, self.answered]
+    fn steps(&self, plan: &mut PhysicalPlan, logical: &Plan) -> Moments<StepId> {
+        let mut step = |node: NodeId| plan.add_nodes(logical, [node])[0];
+        Moments {
+            visible: step(self.visible),
+            sight: step(self.sight),
+            claim: step(self.claim),
+            done: step(self.done),
+            answered: step(self.answered),
+        }
     }
 }
 
@@ -76,24 +83,29 @@ fn answered_node(definitions: &Definitions) -> Option<NodeId> {
     named(definitions, "answered", Type::Bool, Level::Episode)
 }
 
-/// The timelines of all episodes that the definitions' filter keeps, in the order of their keys.
-///
-/// `None` where the definitions do not name the moments.
-///
-/// # Errors
-/// As [`score`](super::run::score).
-pub fn timelines(
-    traces: &TraceSet,
-    definitions: &Definitions,
-    threads: NonZeroUsize,
-) -> Result<Option<Vec<Timeline>>, ScoreError> {
-    let Some(moments) = Moments::of(definitions) else { return Ok(None) };
-    let mut found = Vec::new();
-    let of_episode =
-        |values: &Evaluated, segments: Segments<'_>, episode, key| timeline(values, &moments, segments, episode, key);
-    each_episode(traces, definitions, &moments.nodes(), threads, of_episode, |timeline| found.push(timeline))?;
-    found.sort_by(|a, b| a.key.cmp(&b.key));
-    Ok(Some(found))
+/// Reads timelines from the vectors of a plan.
+pub(super) struct TimelineReader {
+    moments: Moments<StepId>,
+    filter: Option<StepId>,
+}
+
+impl TimelineReader {
+    /// Adds what timelines are read from to a plan; `None` where the definitions do not name it.
+    pub(super) fn of(plan: &mut PhysicalPlan, definitions: &Definitions) -> Option<Self> {
+        let logical = &definitions.plan;
+        let moments = Moments::of(definitions)?.steps(plan, logical);
+        Some(Self { moments, filter: plan.add_nodes(logical, logical.filter).pop() })
+    }
+
+    /// The timelines of the episodes of a batch that the filter keeps.
+    pub(super) fn timelines(&self, values: &Evaluated, batch: &EpisodeBatch) -> Vec<Timeline> {
+        let keys = EpisodeKeys::of_batch(&batch.episodes);
+        let kept = self.filter.map(|step| truths(values.of(step).bools()));
+        let episodes = (0..keys.len()).filter(|episode| kept.as_ref().is_none_or(|kept| kept.value(*episode)));
+        let segments = Segments::new(&batch.offsets);
+        let timeline = |episode| self.moments.timeline(values, segments, episode, keys.get(episode).to_owned());
+        episodes.map(timeline).collect()
+    }
 }
 
 /// For each of `episodes`, which ascend, whether its decision committed to a colour; `false` for those that the traces
@@ -102,74 +114,84 @@ pub fn timelines(
 /// `None` where the definitions do not name `answered`.
 ///
 /// # Errors
-/// As [`score`](super::run::score).
+/// As [`score`](super::score_traces::score).
 pub fn answered(
     traces: &TraceSet,
     definitions: &Definitions,
-    episodes: &[EpisodeKey],
+    episodes: &EpisodeKeys,
     threads: NonZeroUsize,
 ) -> Result<Option<Vec<bool>>, ScoreError> {
     let Some(node) = answered_node(definitions) else { return Ok(None) };
-    let mut answered = vec![false; episodes.len()];
-    let place = |values: &Evaluated, _: Segments<'_>, episode: usize, key: EpisodeKey| {
-        let committed = truths(values.of(node).bools()).value(episode);
-        committed.then(|| episodes.binary_search(&key).ok()).flatten()
+    let (mut plan, logical) = (PhysicalPlan::default(), &definitions.plan);
+    let answered = plan.add_nodes(logical, [node])[0];
+    let filter = plan.add_nodes(logical, logical.filter).pop();
+    let projection = projection(traces, &[definitions], &plan, &[])?;
+    let mut found = vec![false; episodes.len()];
+    let work = |batch: EpisodeBatch| -> Result<Vec<usize>, ScoreError> {
+        let values = plan.evaluate(&view(&batch)).map_err(|source| failed(traces, &batch, source))?;
+        let holds = |step: StepId| truths(values.of(step).bools());
+        let committed = filter.map_or_else(|| holds(answered), |filter| &holds(answered) & &holds(filter));
+        let keys = EpisodeKeys::of_batch(&batch.episodes);
+        Ok(committed.set_indices().filter_map(|episode| episodes.position(keys.get(episode))).collect())
     };
-    each_episode(traces, definitions, &[node], threads, place, |place| {
-        if let Some(place) = place {
-            answered[place] = true;
-        }
-    })?;
-    Ok(Some(answered))
-}
-
-/// Evaluates these nodes in one scan and gives `receive` what `of_episode` makes of each episode that the filter keeps.
-fn each_episode<T: Send>(
-    traces: &TraceSet,
-    definitions: &Definitions,
-    nodes: &[NodeId],
-    threads: NonZeroUsize,
-    of_episode: impl Fn(&Evaluated, Segments<'_>, usize, EpisodeKey) -> T + Sync,
-    mut receive: impl FnMut(T),
-) -> Result<(), ScoreError> {
-    let filter = definitions.plan.filter;
-    let engine = Engine::for_nodes(&definitions.plan, nodes.iter().copied().chain(filter));
-    let projection = projection(traces, definitions, &engine, &[])?;
-    let work = |batch: EpisodeBatch| -> Result<Vec<T>, ScoreError> {
-        let file = || traces.files()[batch.origin.file].name().to_owned();
-        let segments = Segments::new(&batch.offsets);
-        let values = engine.evaluate(&view(&batch)).map_err(|source| ScoreError::Engine { file: file(), source })?;
-        let keys = keys(&batch.episodes, 0..segments.len());
-        let kept = |episode: usize| filter.is_none_or(|node| truths(values.of(node).bools()).value(episode));
-        let episodes = keys.into_iter().enumerate().filter(|(episode, _)| kept(*episode));
-        Ok(episodes.map(|(episode, key)| of_episode(&values, segments, episode, key)).collect())
-    };
-    traces.scan(&projection, threads, work, |part| {
-        part.into_iter().for_each(&mut receive);
+    traces.scan(&projection, threads, work, |rows| {
+        rows.into_iter().for_each(|row| found[row] = true);
         Ok(())
     })?;
-    Ok(())
+    Ok(Some(found))
 }
 
-fn timeline(
-    values: &Evaluated,
-    moments: &Moments,
-    segments: Segments<'_>,
-    episode: usize,
-    key: EpisodeKey,
-) -> Timeline {
-    let moment = |node: NodeId| {
-        let ints = values.of(node).ints();
-        ints.is_valid(episode).then(|| as_step(ints.value(episode)))
-    };
-    Timeline {
-        key,
-        length: as_step(segments.lengths().value(episode)),
-        visible: runs(&segments.timesteps(episode, values.of(moments.visible).bools())),
-        first_sight: moment(moments.sight),
-        claim: moment(moments.claim),
-        decision: moment(moments.done),
-        answered: truths(values.of(moments.answered).bools()).value(episode),
+/// Timelines in the order of their keys.
+pub(super) fn in_key_order(mut timelines: Vec<Timeline>) -> Vec<Timeline> {
+    timelines.sort_by(|a, b| a.key.cmp(&b.key));
+    timelines
+}
+
+/// The timelines of all episodes that the definitions' filter keeps, in the order of their keys.
+///
+/// `None` where the definitions do not name the moments.
+///
+/// # Errors
+/// As [`score`](super::score_traces::score).
+pub fn timelines(
+    traces: &TraceSet,
+    definitions: &Definitions,
+    threads: NonZeroUsize,
+) -> Result<Option<Vec<Timeline>>, ScoreError> {
+    let mut plan = PhysicalPlan::default();
+    let Some(reader) = TimelineReader::of(&mut plan, definitions) else { return Ok(None) };
+    let projection = projection(traces, &[definitions], &plan, &[])?;
+    let mut found = Vec::new();
+    traces.scan(
+        &projection,
+        threads,
+        |batch| -> Result<Vec<Timeline>, ScoreError> {
+            let values = plan.evaluate(&view(&batch)).map_err(|source| failed(traces, &batch, source))?;
+            Ok(reader.timelines(&values, &batch))
+        },
+        |part| {
+            found.extend(part);
+            Ok(())
+        },
+    )?;
+    Ok(Some(in_key_order(found)))
+}
+
+impl Moments<StepId> {
+    fn timeline(&self, values: &Evaluated, segments: Segments<'_>, episode: usize, key: EpisodeKey) -> Timeline {
+        let moment = |step: StepId| {
+            let ints = values.of(step).ints();
+            ints.is_valid(episode).then(|| as_step(ints.value(episode)))
+        };
+        Timeline {
+            key,
+            length: as_step(segments.length(episode)),
+            visible: runs(&segments.timesteps(episode, values.of(self.visible).bools())),
+            first_sight: moment(self.sight),
+            claim: moment(self.claim),
+            decision: moment(self.done),
+            answered: truths(values.of(self.answered).bools()).value(episode),
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use crate::base::replace::check_target;
 use crate::engine::spark::source::{Sources, is_uri};
 use crate::engine::spark::{self, Cluster, Job, SparkError, Written};
 use crate::metric::definitions::Definitions;
-use crate::score::run::check_label;
+use crate::score::score_traces::check_label;
 use crate::score::table::EpisodeTable;
 use crate::trace::open::TraceSet;
 
@@ -60,7 +60,7 @@ impl SparkJob {
     /// # Errors
     /// Every fault of the definitions.
     pub(crate) fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
-        let definitions = question.bind_to(&crate::score::run::schema_columns())?;
+        let definitions = question.bind_to(&crate::score::score_traces::schema_columns())?;
         let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
         Ok(Self { sources, definitions, labels, cluster, read })
     }

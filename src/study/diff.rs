@@ -18,7 +18,7 @@ use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::report::order::TableOrder;
 use crate::report::style::Style;
 use crate::score::evidence;
-use crate::score::run::{self, ScoreError};
+use crate::score::score_traces::{self, Outputs, ScoreError};
 use crate::score::table::EpisodeTable;
 use crate::trace::inputs::{self, Input};
 use crate::trace::open::TraceSet;
@@ -162,7 +162,7 @@ impl Side {
     ) -> Result<(Vec<String>, Option<EpisodeTable>), StudyError> {
         match self {
             Self::Definitions(name) => {
-                let columns = traces.map_or_else(run::schema_columns, run::trace_columns);
+                let columns = traces.map_or_else(score_traces::schema_columns, score_traces::trace_columns);
                 let definitions = Definitions::load(name, &columns)?;
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
@@ -173,27 +173,20 @@ impl Side {
         }
     }
 
-    /// The episodes under the metrics `common`, and what scored them now.
-    fn score(
+    /// What scores it under the metrics `common`; `None` for scores.
+    fn bind(
         &self,
-        read: Option<EpisodeTable>,
         common: &[String],
         traces: Option<&TraceSet>,
         request: &DiffRequest,
-    ) -> Result<(EpisodeTable, Option<Definitions>), StudyError> {
-        match (self, read, traces) {
-            (_, Some(mut table), _) => {
-                table.metrics.retain(|metric| common.contains(&metric.name));
-                Ok((table, None))
-            }
-            (Self::Definitions(_), None, Some(traces)) => {
+    ) -> Result<Option<Definitions>, StudyError> {
+        match (self, traces) {
+            (Self::Scores(_), _) => Ok(None),
+            (Self::Definitions(name), None) => Err(StudyError::NoTraces { name: name.clone() }),
+            (Self::Definitions(_), Some(traces)) => {
                 let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
-                let definitions = question.bind(traces)?;
-                let table = run::score(traces, &definitions, &question.labels(), request.threads)?;
-                Ok((table, Some(definitions)))
+                question.bind(traces).map(Some)
             }
-            (Self::Definitions(name), None, None) => Err(StudyError::NoTraces { name: name.clone() }),
-            (Self::Scores(_), None, _) => Err(StudyError::NoScores),
         }
     }
 }
@@ -208,11 +201,19 @@ impl Pair {
         let [before, after] =
             [old_metrics, new_metrics].map(|names| names.into_iter().filter(wanted).collect::<Vec<String>>());
         let common: Vec<String> = after.iter().filter(|name| before.contains(name)).cloned().collect();
-        let scored = |side: &Side, read, metrics| {
-            let (table, definitions) = side.score(read, &common, traces, request)?;
-            Ok::<_, StudyError>(Scored { table, metrics, definitions })
+        let of_common = |table: Option<EpisodeTable>| {
+            table.map(|mut table| {
+                table.metrics.retain(|metric| common.contains(&metric.name));
+                table
+            })
         };
-        Ok(Self { before: scored(old, old_table, before)?, after: scored(new, new_table, after)? })
+        let definitions = [old.bind(&common, traces, request)?, new.bind(&common, traces, request)?];
+        let tables = score_sides(&definitions, [of_common(old_table), of_common(new_table)], traces, request)?;
+        let ([old_definitions, new_definitions], [old_table, new_table]) = (definitions, tables);
+        Ok(Self {
+            before: Scored { table: old_table, metrics: before, definitions: old_definitions },
+            after: Scored { table: new_table, metrics: after, definitions: new_definitions },
+        })
     }
 
     /// What changed between the sides, its metrics those asked for.
@@ -263,13 +264,37 @@ impl Scored {
     /// These metrics of what scored it, read back from what its scores carry if they were not computed now.
     fn definitions(&self, traces: &TraceSet, metrics: &[String]) -> Result<Definitions, ScoreError> {
         match &self.definitions {
-            None => run::restored(traces, &self.table.catalog, metrics),
+            None => score_traces::restored(traces, &self.table.catalog, metrics),
             Some(definitions) => {
                 let mut definitions = definitions.clone();
                 definitions.select(metrics)?;
                 Ok(definitions)
             }
         }
+    }
+}
+
+/// The tables of both sides: those that were read, and in one scan those that definitions give.
+fn score_sides(
+    definitions: &[Option<Definitions>; 2],
+    read: [Option<EpisodeTable>; 2],
+    traces: Option<&TraceSet>,
+    request: &DiffRequest,
+) -> Result<[EpisodeTable; 2], StudyError> {
+    let labels = Question { by: request.by.clone(), ..Question::default() }.labels();
+    let outputs = Outputs { labels: &labels, timelines: false };
+    match (definitions, read, traces) {
+        ([None, None], [Some(old), Some(new)], _) => Ok([old, new]),
+        ([Some(old), Some(new)], _, Some(traces)) => {
+            Ok(score_traces::score_each(traces, [old, new], outputs, request.threads)?.tables)
+        }
+        ([Some(old), None], [_, Some(new)], Some(traces)) => {
+            Ok([score_traces::score(traces, old, &labels, request.threads)?, new])
+        }
+        ([None, Some(new)], [Some(old), _], Some(traces)) => {
+            Ok([old, score_traces::score(traces, new, &labels, request.threads)?])
+        }
+        _ => Err(StudyError::NoScores),
     }
 }
 

@@ -14,7 +14,7 @@ use crate::cells::cell::KeyValue;
 use crate::cells::group::{KEY_COLUMNS, column_values};
 use crate::metric::definitions::Definitions;
 use crate::metric::names::mentioned;
-use crate::score::run;
+use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
 
 /// Values of a column that are listed.
@@ -57,12 +57,13 @@ impl Study {
             Source::Scores(files) => return scores::read(files, &whole),
             Source::Traces(traces) => traces,
         };
-        let is_label = |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && run::check_label(traces, name).is_ok();
+        let is_label =
+            |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && score_traces::check_label(traces, name).is_ok();
         let labels: Vec<String> = names.iter().filter(is_label).cloned().collect();
-        let known = Definitions::load(whole.definitions_name(), &run::trace_columns(traces))?.catalog.metric;
+        let known = Definitions::load(whole.definitions_name(), &score_traces::trace_columns(traces))?.catalog.metric;
         let metrics = names.iter().filter(|name| known.contains_key(*name)).cloned().collect();
         let question = Question { metrics: Some(metrics), ..whole };
-        Ok(run::score(traces, &question.bind(traces)?, &labels, self.threads)?)
+        Ok(score_traces::score(traces, &question.bind(traces)?, &labels, self.threads)?)
     }
 }
 

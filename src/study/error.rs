@@ -19,7 +19,7 @@ use crate::report::published::PublishedError;
 use crate::report::style::StyleError;
 use crate::score::evidence::EvidenceError;
 use crate::score::format::FormatError;
-use crate::score::run::ScoreError;
+use crate::score::score_traces::ScoreError;
 use crate::score::select::SelectError;
 use crate::trace::finding::TraceError;
 

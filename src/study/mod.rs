@@ -37,7 +37,7 @@ use crate::report::published;
 use crate::report::statistics::{Options, Statistics};
 use crate::report::style::Style;
 use crate::score::evidence::{self, Evidence};
-use crate::score::run;
+use crate::score::score_traces;
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
 
@@ -51,6 +51,7 @@ pub use provenance::ProvenanceError;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
 pub use scan::{Outputs, Results};
+pub use scores::write as write_scores;
 
 use inputs::Stamp;
 
@@ -101,8 +102,8 @@ impl Question {
 
     /// The definitions asked for, with every column that they read in every trace.
     pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
-        let definitions = self.bind_to(&run::trace_columns(traces))?;
-        run::check_columns(traces, &definitions)?;
+        let definitions = self.bind_to(&score_traces::trace_columns(traces))?;
+        score_traces::check_columns(traces, &definitions)?;
         Ok(definitions)
     }
 
@@ -124,7 +125,7 @@ impl Question {
 /// # Errors
 /// Every fault of the definitions.
 pub fn known_experiments(definitions: &str) -> Result<Option<Vec<String>>, StudyError> {
-    let catalog = Definitions::load(definitions, &run::schema_columns())?.catalog;
+    let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
     Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
 }
 
@@ -208,7 +209,7 @@ impl Study {
     /// checked with the scan, when it is known which metrics are wanted.
     fn checked(self) -> Result<Self, StudyError> {
         if let Source::Traces(traces) = &self.source {
-            self.question.bind_to(&run::trace_columns(traces))?;
+            self.question.bind_to(&score_traces::trace_columns(traces))?;
         }
         Ok(self)
     }

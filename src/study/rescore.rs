@@ -14,7 +14,7 @@ use super::{Question, Study, provenance};
 use crate::report::bundle::Manifest;
 use crate::report::order::TableOrder;
 use crate::report::style::Style;
-use crate::score::format::{self, Surroundings};
+use crate::score::format::{self, Partition};
 use crate::score::table::EpisodeTable;
 
 /// What to make again, and what to change.
@@ -94,7 +94,7 @@ impl RescoreRequest {
     fn scores_before(&self, manifest: &Manifest) -> Result<EpisodeTable, String> {
         let path = self.report.join("episodes.parquet");
         let file = File::open(&path).map_err(|error| format!("{}: {error}", path.display()))?;
-        let table = format::read_parquet(file, &Surroundings::default())
+        let table = format::read_parquet(file, &Partition::default())
             .map_err(|error| format!("{}: {error}", path.display()))?;
         if table.catalog.hash == manifest.definitions.hash {
             return Ok(table);

@@ -1,7 +1,6 @@
 //! The one pass over the inputs, and everything that it gives.
 
 use std::collections::BTreeSet;
-use std::io::Write;
 use std::thread;
 
 use super::error::StudyError;
@@ -12,10 +11,9 @@ use crate::metric::definitions::Definitions;
 use crate::report::bundle;
 use crate::report::figures::e5_outcomes::Outcomes;
 use crate::report::figures::{FigureName, gaze};
-use crate::score::format::{self, Format};
-use crate::score::run::{self, ScoreError};
+use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
-use crate::score::timeline::{self, Timeline};
+use crate::score::timeline::Timeline;
 use crate::trace::open::TraceSet;
 
 /// What a scan gives beside the episode table.
@@ -36,6 +34,11 @@ impl Outputs {
     pub fn of_figures(names: &[FigureName]) -> Self {
         let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
         Self { timelines, outcomes, ..Self::default() }
+    }
+
+    /// Whether anything beside the scores needs the steps.
+    const fn needs_steps(self) -> bool {
+        self.timelines || self.outcomes || self.losses
     }
 }
 
@@ -74,95 +77,84 @@ impl Study {
         Ok(Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? })
     }
 
-    /// Writes the episode table and returns its number of rows; the memory that it takes does not grow with the number of episodes where the native engine
-    /// scores traces.
-    ///
-    /// # Errors
-    /// As [`Study::scan`]; whatever writing gives. What was written before an error is not the whole table.
-    pub fn write_scores(&self, format: Format, out: impl Write + Send) -> Result<usize, StudyError> {
-        let written = match (&self.source, &self.backend) {
-            (Source::Traces(traces), Backend::Native) => self.stream(traces, format, out),
-            _ => {
-                let table = self.table()?;
-                format::write(&table, format, out)?;
-                Ok(table.len())
+    fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
+        let mut results = match (&self.source, &self.backend) {
+            (Source::Scores(files), Backend::Native) => Results::of(scores::read(files, &self.question)?),
+            (Source::Traces(traces), Backend::Native) => self.scan_traces(traces, outputs)?,
+            (source, _) => {
+                let scored = Results::of(self.scored_elsewhere()?);
+                // The other engine computes scores alone; what else is asked for comes from a scan.
+                match source {
+                    Source::Traces(traces) if outputs.needs_steps() => {
+                        Results { episodes: scored.episodes, ..self.scan_traces(traces, outputs)? }
+                    }
+                    _ => scored,
+                }
             }
         };
-        self.check_unchanged()?;
-        written
-    }
-
-    fn stream(&self, traces: &TraceSet, format: Format, out: impl Write + Send) -> Result<usize, StudyError> {
-        let mut rows = run::rows(traces, &self.question.bind(traces)?, &self.question.labels(), self.threads)?;
-        let (header, mut count) = (rows.header().clone(), 0);
-        format::write_rows(header, format, out, |write| {
-            while let Some(row) = rows.next_row().map_err(ScoreError::Spill)? {
-                write(row)?;
-                count += 1;
-            }
-            Ok::<_, StudyError>(())
-        })?;
-        Ok(count)
-    }
-
-    fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
-        let episodes = self.table()?;
-        let mut results = Results { episodes, timelines: None, outcomes: None, lost: None, inputs: Vec::new() };
-        if let Source::Traces(traces) = &self.source {
-            self.add_timelines(traces, outputs, &mut results)?;
-            if outputs.losses {
-                results.lost = self.lost(traces)?;
-            }
-        }
+        results.select(outputs);
         Ok(results)
     }
 
-    /// Adds timelines of as many episodes as a figure shows, and how open questions ended.
-    fn add_timelines(&self, traces: &TraceSet, outputs: Outputs, results: &mut Results) -> Result<(), StudyError> {
-        let episodes = &results.episodes;
-        let shows_each = outputs.timelines && episodes.len() <= gaze::MOST_EPISODES;
-        let shows_ends = outputs.outcomes && Outcomes::are_there(episodes);
-        if !shows_each && !shows_ends {
-            return Ok(());
-        }
-        // Neither needs a metric, and so no column that only a metric left out would read.
-        let definitions = self.question.bind(traces)?;
-        let timelines = if shows_each { timeline::timelines(traces, &definitions, self.threads)? } else { None };
-        let answered = match &timelines {
-            Some(timelines) => Some(timelines.iter().map(|timeline| timeline.answered).collect()),
-            None if shows_ends => timeline::answered(traces, &definitions, &episodes.keys, self.threads)?,
-            None => None,
-        };
-        results.outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&results.episodes, &answered));
-        results.timelines = timelines;
-        Ok(())
-    }
-
-    fn table(&self) -> Result<EpisodeTable, StudyError> {
+    /// Scores, timelines and losses in one pass over the traces.
+    fn scan_traces(&self, traces: &TraceSet, outputs: Outputs) -> Result<Results, StudyError> {
         let labels = self.question.labels();
-        match (&self.source, &self.backend) {
-            (Source::Scores(files), Backend::Native) => scores::read(files, &self.question),
-            (Source::Traces(traces), Backend::Native) => {
-                Ok(run::score(traces, &self.question.bind(traces)?, &labels, self.threads)?)
+        let definitions = self.question.bind(traces)?;
+        let wanted = score_traces::Outputs { labels: &labels, timelines: outputs.timelines || outputs.outcomes };
+        let lost = if outputs.losses { lost_episodes(traces)? } else { None };
+        let (episodes, lost, timelines) = match &lost {
+            None => {
+                let scored = score_traces::score_each(traces, [&definitions], wanted, self.threads)?;
+                let [episodes] = scored.tables;
+                (episodes, None, scored.timelines)
             }
-            (source, Backend::Polars) => backend::polars(source.traces()?, &self.question, self.threads),
-            (_, Backend::Spark(cluster)) => backend::SparkJob::of_study(self, cluster.clone())?.score(),
-        }
+            Some(lost) => {
+                let scored = score_traces::score_each(traces, [&definitions, lost], wanted, self.threads)?;
+                let [episodes, lost] = scored.tables;
+                (episodes, Some(lost.keys.iter().map(|key| key.episode_id.to_owned()).collect()), scored.timelines)
+            }
+        };
+        Ok(Results { timelines, lost, ..Results::of(episodes) })
     }
 
-    /// The episodes that the infrastructure ended: without `done`, their last reply lost.
-    fn lost(&self, traces: &TraceSet) -> Result<Option<BTreeSet<String>>, StudyError> {
-        if traces.column("reply_status").is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some())
-        {
-            return Ok(None);
+    fn scored_elsewhere(&self) -> Result<EpisodeTable, StudyError> {
+        match &self.backend {
+            Backend::Spark(cluster) => backend::SparkJob::of_study(self, cluster.clone())?.score(),
+            Backend::Native | Backend::Polars => backend::polars(self.source.traces()?, &self.question, self.threads),
         }
-        let columns = run::trace_columns(traces);
-        let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
-        let ended =
-            format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
-        let nothing = Definitions::from_toml("losses", "", &columns)?;
-        let definitions = nothing.filtered("losses", &ended, &columns)?;
-        let table = run::score(traces, &definitions, &[], self.threads)?;
-        Ok(Some(table.keys.into_iter().map(|key| key.episode_id).collect()))
+    }
+}
+
+/// What the infrastructure ended: episodes without `done`, their last reply lost. `None` where the traces do not record
+/// it.
+fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
+    let status = traces.column("reply_status");
+    if status.is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some()) {
+        return Ok(None);
+    }
+    let columns = score_traces::trace_columns(traces);
+    let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
+    let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
+    // No metric and every experiment: the filter alone is asked for.
+    let nothing = Definitions::from_toml("losses", "open = true", &columns)?;
+    Ok(Some(nothing.filtered("losses", &ended, &columns)?))
+}
+
+impl Results {
+    /// The episode table alone.
+    fn of(episodes: EpisodeTable) -> Self {
+        Self { episodes, timelines: None, outcomes: None, lost: None, inputs: Vec::new() }
+    }
+
+    /// Keeps what is asked for: how open questions ended, and timelines of as many episodes as a figure shows.
+    fn select(&mut self, outputs: Outputs) {
+        if outputs.outcomes && Outcomes::are_there(&self.episodes) {
+            let answered =
+                self.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
+            self.outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&self.episodes, &answered));
+        }
+        if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
+            self.timelines = None;
+        }
     }
 }

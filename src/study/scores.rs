@@ -1,15 +1,18 @@
-//! Files of scores in the place of traces: read, put together, filtered.
+//! Files of scores: read in the place of traces, put together and filtered; and written.
 
 use std::fs::File;
+use std::io::Write;
+use std::num::NonZeroUsize;
 
 use super::Question;
 use super::error::StudyError;
 use super::inputs::ScoreFile;
 use crate::metric::definitions::Definitions;
-use crate::score::format::{self, Format, Surroundings};
-use crate::score::run;
+use crate::score::format::{self, Format, Partition};
+use crate::score::score_traces;
 use crate::score::select::select;
 use crate::score::table::EpisodeTable;
+use crate::trace::in_order::in_order;
 use crate::trace::inputs;
 
 /// The episodes of some files as one table, filtered as the question asks.
@@ -22,7 +25,7 @@ pub(super) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTa
         let table = read_one(file, question)?;
         whole = Some(match whole {
             None => table,
-            Some(whole) => whole.joined(table).map_err(|error| StudyError::file(&file.input.name, error))?,
+            Some(whole) => whole.joined(&table).map_err(|error| StudyError::file(&file.input.name, error))?,
         });
     }
     let table = whole.ok_or(StudyError::NoScores)?;
@@ -32,14 +35,14 @@ pub(super) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTa
 fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, StudyError> {
     let failed = |error| StudyError::file(&file.input.name, error);
     let bytes = File::open(&file.input.path).map_err(|error| StudyError::file(&file.input.name, error))?;
-    let named = || Definitions::load(question.definitions_name(), &run::schema_columns());
+    let named = || Definitions::load(question.definitions_name(), &score_traces::schema_columns());
     if file.format != Format::Parquet {
         return format::read_text(file.format, &named()?.catalog, bytes).map_err(failed);
     }
     let named = if file.carries_definitions { None } else { Some(named()?.catalog) };
     let folders = inputs::folder_values(&file.input.path);
-    let surroundings = Surroundings { folders: &folders, definitions: named.as_ref() };
-    let table = format::read_parquet(bytes, &surroundings).map_err(failed)?;
+    let partition = Partition { folders: &folders, definitions: named.as_ref() };
+    let table = format::read_parquet(bytes, &partition).map_err(failed)?;
     match &question.definitions {
         Some(name) => under(name, file, table),
         None => Ok(table),
@@ -48,7 +51,7 @@ fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, Study
 
 /// Scores keep the definitions that they were computed with: others cannot be asked of them.
 fn under(name: &str, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTable, StudyError> {
-    let wanted = Definitions::load(name, &run::schema_columns())?.catalog;
+    let wanted = Definitions::load(name, &score_traces::schema_columns())?.catalog;
     if wanted.hash == table.catalog.hash {
         return Ok(table);
     }
@@ -60,4 +63,23 @@ fn under(name: &str, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTab
         found: table.catalog.name.clone(),
         found_hash: short(&table.catalog.hash),
     })
+}
+
+/// Writes a table; Parquet is encoded by `threads` threads.
+///
+/// # Errors
+/// Whatever writing gives.
+pub fn write(
+    table: &EpisodeTable,
+    format: Format,
+    out: impl Write + Send,
+    threads: NonZeroUsize,
+) -> Result<(), StudyError> {
+    if format != Format::Parquet {
+        return Ok(format::write(table, format, out)?);
+    }
+    let (encoder, mut writer) = format::parquet::encoder(table, out)?;
+    let jobs: Vec<_> = encoder.jobs().collect();
+    in_order(threads, &jobs, |job| encoder.encode(*job), |column| writer.append(column?))?;
+    Ok(writer.finish()?)
 }

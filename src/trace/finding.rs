@@ -425,9 +425,6 @@ pub enum TraceError {
         /// What the files have.
         found: String,
     },
-    /// What does not fit into memory could not be put away.
-    #[error("cannot check the ids in a temporary file; is there space where temporary files are (TMPDIR)?")]
-    Spill(#[source] io::Error),
     /// Columns could not be put together in memory.
     #[error("cannot hold the rows in memory; report this as a fault of mirrorstats")]
     Memory(#[source] ArrowError),

@@ -1,7 +1,7 @@
-//! Whether each episode has an id of its own, in bounded memory.
+//! Whether each episode has an id of its own.
 //!
-//! Rule: exact. Of each episode its id's hash is kept, beyond a fixed number of them in a temporary file
-//! ([`crate::base::repeats`]). Where two hashes are equal, the traces are read again and the ids themselves compared.
+//! Rule: exact. Eight bytes are kept per episode: the hash of its id. Where two hashes are equal, the traces are read
+//! again and the ids themselves compared.
 
 use std::collections::{HashMap, HashSet};
 use std::hash::{DefaultHasher, Hasher};
@@ -12,7 +12,6 @@ use super::layout::Layout;
 use super::open::TraceFile;
 use super::pass::{Episodes, Event, pass};
 use super::rules::Located;
-use crate::base::repeats::Repeats;
 
 /// The hashes of the ids of the episodes that begin at a row up to `last`; an episode without an id has none.
 pub(super) fn hashes(episodes: &Episodes, last: usize) -> Vec<u64> {
@@ -30,11 +29,7 @@ fn hash(id: &str) -> u64 {
 
 /// The ids of the episodes met so far, as their hashes.
 #[derive(Default)]
-pub(super) struct Prints {
-    hashes: Repeats,
-    /// How many there are.
-    count: u64,
-}
+pub(super) struct Prints(Vec<u64>);
 
 /// What ends the search for the first repeated id.
 enum End {
@@ -52,9 +47,8 @@ impl From<TraceError> for End {
 
 impl Prints {
     /// Takes note of episodes.
-    pub(super) fn add(&mut self, hashes: &[u64]) -> Result<(), TraceError> {
-        self.count += hashes.len() as u64;
-        self.hashes.add(hashes).map_err(TraceError::Spill)
+    pub(super) fn add(&mut self, hashes: &[u64]) {
+        self.0.extend_from_slice(hashes);
     }
 
     /// The first episode by file and row whose id an episode before it has, if there is one among those met.
@@ -63,10 +57,34 @@ impl Prints {
         files: &[TraceFile],
         layout: &Layout,
     ) -> Result<Option<Box<Finding>>, TraceError> {
-        let alike = self.hashes.finish().map_err(TraceError::Spill)?;
+        let alike = repeated_numbers(&self.0);
         // Equal hashes nearly always are equal ids.
-        if alike.is_empty() { Ok(None) } else { first_equal(files, layout, &alike, self.count) }
+        if alike.is_empty() { Ok(None) } else { first_equal(files, layout, &alike, self.0.len()) }
     }
+}
+
+/// The numbers that are there more than once.
+fn repeated_numbers(numbers: &[u64]) -> HashSet<u64> {
+    // A bit stands for all numbers with the same beginning. With 32 times as many bits as numbers, few share theirs with
+    // another one, and only those need to be sorted.
+    let bits = (numbers.len() * 32).next_power_of_two().max(64);
+    let place = |number: u64| {
+        let bit = usize::try_from(number >> (u64::BITS - bits.ilog2())).expect("there are as many bits as this says");
+        (bit / 64, 1_u64 << (bit % 64))
+    };
+    let (mut once, mut twice) = (vec![0; bits / 64], vec![0; bits / 64]);
+    for number in numbers {
+        let (word, bit) = place(*number);
+        twice[word] |= once[word] & bit;
+        once[word] |= bit;
+    }
+    let shares = |number: &u64| {
+        let (word, bit) = place(*number);
+        twice[word] & bit != 0
+    };
+    let mut shared: Vec<u64> = numbers.iter().copied().filter(shares).collect();
+    shared.sort_unstable();
+    shared.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
 }
 
 /// Reads the first `count` episodes again, in the order of the files, and compares the ids whose hash is one of these.
@@ -74,7 +92,7 @@ fn first_equal(
     files: &[TraceFile],
     layout: &Layout,
     alike: &HashSet<u64>,
-    count: u64,
+    count: usize,
 ) -> Result<Option<Box<Finding>>, TraceError> {
     let (mut ids, mut left) = (Ids::default(), count);
     let name = |file: usize| files[file].name().to_owned();
@@ -156,9 +174,26 @@ pub(super) fn starts(episodes: &Episodes) -> Vec<Start> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
     use super::*;
     use crate::trace::inputs::resolve;
     use crate::trace::open::TraceSet;
+
+    proptest! {
+        #[test]
+        fn numbers_that_come_twice_are_found(
+            numbers in vec((0..4_u64, 0..4_u64).prop_map(|(high, low)| high << 62 | high << 55 | low), 0..40),
+        ) {
+            let mut times: BTreeMap<u64, usize> = BTreeMap::new();
+            numbers.iter().for_each(|number| *times.entry(*number).or_default() += 1);
+            times.retain(|_, times| *times > 1);
+            prop_assert_eq!(repeated_numbers(&numbers), times.into_keys().collect::<HashSet<u64>>());
+        }
+    }
 
     #[test]
     fn equal_hashes_of_different_ids_are_no_repetition() {

@@ -1,17 +1,18 @@
 //! What traces hold: episodes, steps, who and what, which cells of the grid are filled, and the files themselves.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::num::NonZeroUsize;
 
+use arrow::array::{AsArray as _, DictionaryArray};
+use arrow::datatypes::{Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::column::text_at;
 use super::finding::TraceError;
+use super::in_order::in_order;
 use super::open::{TraceFile, TraceSet};
 use super::replies::{REPLY_STATUS, ReplyCounts};
-use super::rules::int_at;
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{self, Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
 use crate::base::hash;
@@ -113,7 +114,7 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let summary = set.scan(
         &Projection { unchecked: statuses, ..Projection::default() },
         threads,
-        |batch| Ok::<_, TraceError>((keys(&batch), ReplyCounts::of_batch(&batch))),
+        |batch| Ok::<_, TraceError>((Keys::of(&batch), ReplyCounts::of_batch(&batch))),
         |(keys, counts)| {
             tally.add(keys);
             if let Some(replies) = &mut replies {
@@ -122,68 +123,124 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
             Ok(())
         },
     )?;
-    let files = set.files().iter().zip(&tally.files).map(|(file, episodes)| about(file, *episodes));
+    let mut files = Vec::with_capacity(set.files().len());
+    let counted: Vec<(&TraceFile, u64)> = set.files().iter().zip(tally.files.iter().copied()).collect();
+    in_order(
+        threads,
+        &counted,
+        |(file, episodes)| about(file, *episodes),
+        |about| {
+            files.push(about?);
+            Ok::<_, TraceError>(())
+        },
+    )?;
+    let cells = tally.cells();
+    let pairs: BTreeSet<SeedRun> = cells.values().flat_map(|pairs| pairs.keys()).copied().collect();
+    let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
+    let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
     Ok(Info {
         episodes: summary.episodes,
         steps: summary.steps,
-        coverage: tally.coverage(),
+        coverage: coverage(&cells, &pairs, &experiments, &models),
         replies,
         columns: columns(set),
-        files: files.collect::<Result<_, _>>()?,
-        seeds: tally.pairs.iter().map(|pair| pair.seed).collect::<BTreeSet<_>>().into_iter().collect(),
-        runs: tally.pairs.iter().map(|pair| pair.run).collect::<BTreeSet<_>>().into_iter().collect(),
-        models: tally.models.into_iter().collect(),
-        experiments: tally.experiments.into_iter().collect(),
+        files,
+        seeds: pairs.iter().map(|pair| pair.seed).collect::<BTreeSet<_>>().into_iter().collect(),
+        runs: pairs.iter().map(|pair| pair.run).collect::<BTreeSet<_>>().into_iter().collect(),
+        models: models.into_iter().collect(),
+        experiments: experiments.into_iter().collect(),
     })
 }
 
-/// The file, and experiment, model and seed with run of each episode.
-fn keys(batch: &EpisodeBatch) -> (usize, Vec<(String, String, SeedRun)>) {
-    let column = |name| batch.episodes.column_by_name(name).expect("a scan delivers the columns of an episode");
-    let [experiments, models, seeds, runs] = ["experiment", "model", "seed", "run"].map(column);
-    let text = |column, row| text_at(column, row).unwrap_or_default().to_owned();
-    let int = |column, row| int_at(column, row).unwrap_or_default();
-    let key = |row| {
-        let pair = SeedRun { seed: int(seeds, row), run: int(runs, row) };
-        (text(experiments, row), text(models, row), pair)
-    };
-    (batch.origin.file, (0..batch.episodes.num_rows()).map(key).collect())
+/// The episodes of a batch: experiments and models by their place among the distinct ones.
+struct Keys {
+    file: usize,
+    /// Each experiment with each model that it has here.
+    cells: Vec<(String, String)>,
+    /// The cell, seed and run of each episode.
+    episodes: Vec<(usize, SeedRun)>,
+}
+
+impl Keys {
+    fn of(batch: &EpisodeBatch) -> Self {
+        let column = |name| batch.episodes.column_by_name(name).expect("a scan delivers the columns of an episode");
+        let [experiments, models] = ["experiment", "model"].map(|name| column(name).as_dictionary::<Int32Type>());
+        let [seeds, runs] = ["seed", "run"].map(|name| column(name).as_primitive::<Int64Type>().values());
+        let text = |column: &DictionaryArray<Int32Type>, row| {
+            let key = column.key(row);
+            key.map_or_else(String::new, |key| column.values().as_string::<i32>().value(key).to_owned())
+        };
+        let (mut cells, mut known) = (Vec::new(), HashMap::new());
+        let episode = |row: usize| {
+            let cell = *known.entry((experiments.key(row), models.key(row))).or_insert_with(|| {
+                cells.push((text(experiments, row), text(models, row)));
+                cells.len() - 1
+            });
+            (cell, SeedRun { seed: seeds[row], run: runs[row] })
+        };
+        let episodes = (0..batch.episodes.num_rows()).map(episode).collect();
+        Self { file: batch.origin.file, cells, episodes }
+    }
 }
 
 #[derive(Default)]
 struct Tally {
     files: Vec<u64>,
-    models: BTreeSet<String>,
-    experiments: BTreeSet<String>,
-    pairs: BTreeSet<SeedRun>,
-    cells: BTreeMap<(String, String), BTreeMap<SeedRun, u64>>,
+    /// The place of each experiment with each model.
+    places: HashMap<(String, String), usize>,
+    /// The seed and run of each episode there.
+    episodes: Vec<Vec<SeedRun>>,
 }
 
+/// How often each experiment with each model has each seed and run.
+type Cells = BTreeMap<(String, String), BTreeMap<SeedRun, u64>>;
+
 impl Tally {
-    fn add(&mut self, (file, keys): (usize, Vec<(String, String, SeedRun)>)) {
-        self.files[file] += keys.len() as u64;
-        for (experiment, model, pair) in keys {
-            self.models.insert(model.clone());
-            self.experiments.insert(experiment.clone());
-            self.pairs.insert(pair);
-            *self.cells.entry((experiment, model)).or_default().entry(pair).or_default() += 1;
+    fn add(&mut self, Keys { file, cells, episodes }: Keys) {
+        self.files[file] += episodes.len() as u64;
+        let places: Vec<usize> = cells.into_iter().map(|cell| self.place(cell)).collect();
+        for (cell, pair) in episodes {
+            self.episodes[places[cell]].push(pair);
         }
     }
 
-    fn coverage(&self) -> Vec<Cell> {
-        let none = BTreeMap::new();
-        let cell = |experiment: &String, model: &String| {
-            let have = self.cells.get(&(experiment.clone(), model.clone())).unwrap_or(&none);
-            Cell {
-                experiment: experiment.clone(),
-                model: model.clone(),
-                episodes: have.values().sum(),
-                missing: self.pairs.iter().filter(|pair| !have.contains_key(pair)).copied().collect(),
-                repeated: have.iter().filter(|(_, count)| **count > 1).map(|(pair, _)| *pair).collect(),
-            }
-        };
-        self.experiments.iter().flat_map(|e| self.models.iter().map(move |m| cell(e, m))).collect()
+    fn place(&mut self, cell: (String, String)) -> usize {
+        *self.places.entry(cell).or_insert_with(|| {
+            self.episodes.push(Vec::new());
+            self.episodes.len() - 1
+        })
     }
+
+    fn cells(self) -> Cells {
+        let Self { places, mut episodes, .. } = self;
+        let mut counted = |place: usize| {
+            let mut pairs = std::mem::take(&mut episodes[place]);
+            pairs.sort_unstable();
+            let same = pairs.chunk_by(|a, b| a == b);
+            same.map(|same| (same[0], same.len() as u64)).collect()
+        };
+        places.into_iter().map(|(cell, place)| (cell, counted(place))).collect()
+    }
+}
+
+fn coverage(
+    cells: &Cells,
+    pairs: &BTreeSet<SeedRun>,
+    experiments: &BTreeSet<String>,
+    models: &BTreeSet<String>,
+) -> Vec<Cell> {
+    let none = BTreeMap::new();
+    let cell = |experiment: &String, model: &String| {
+        let have = cells.get(&(experiment.clone(), model.clone())).unwrap_or(&none);
+        Cell {
+            experiment: experiment.clone(),
+            model: model.clone(),
+            episodes: have.values().sum(),
+            missing: pairs.iter().filter(|pair| !have.contains_key(pair)).copied().collect(),
+            repeated: have.iter().filter(|(_, count)| **count > 1).map(|(pair, _)| *pair).collect(),
+        }
+    };
+    experiments.iter().flat_map(|e| models.iter().map(move |m| cell(e, m))).collect()
 }
 
 fn columns(set: &TraceSet) -> Vec<ColumnInfo> {

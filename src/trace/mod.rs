@@ -15,6 +15,7 @@ mod footer;
 pub(crate) mod footer_shape;
 mod ids;
 pub mod import;
+pub mod in_order;
 pub mod info;
 pub mod inputs;
 mod layout;

@@ -281,7 +281,8 @@ fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColum
         .map_err(corrupt)?
         .map_err(|error| corrupt(plain(&error)))?;
     let roots = descriptor.root_schema().get_fields();
-    let nested: Vec<Finding> = roots.iter().filter(|root| root.is_group()).map(|root| is_nested(file, root.name())).collect();
+    let nested: Vec<Finding> =
+        roots.iter().filter(|root| root.is_group()).map(|root| is_nested(file, root.name())).collect();
     if !nested.is_empty() {
         return Err(nested);
     }

@@ -342,11 +342,6 @@ fn valid(values: &Int64Array, row: usize) -> Option<i64> {
     values.is_valid(row).then(|| values.value(row))
 }
 
-/// The integer at a row of an integer column; `None` for null.
-pub(super) fn int_at(column: &ArrayRef, row: usize) -> Option<i64> {
-    valid(column.as_primitive::<Int64Type>(), row)
-}
-
 /// The smallest and largest value, counting also what stands in the place of nulls.
 fn extent<'a>(values: impl IntoIterator<Item = &'a i64>) -> (i64, i64) {
     values.into_iter().fold((i64::MAX, i64::MIN), |(min, max), value| (min.min(*value), max.max(*value)))

@@ -144,7 +144,7 @@ impl TraceSet {
                 Event::Whole(checked) => checked,
                 Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
             };
-            prints.add(&checked.ids)?;
+            prints.add(&checked.ids);
             spellings.add(checked.colors);
             summary.episodes += checked.count as u64;
             summary.steps += checked.steps as u64;

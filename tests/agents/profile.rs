@@ -41,8 +41,8 @@ impl Profiles {
     pub fn of(table: &EpisodeTable) -> Self {
         let mut profiles: BTreeMap<_, BTreeMap<String, Sum>> = BTreeMap::new();
         for metric in &table.metrics {
-            for (key, value) in table.keys.iter().zip(&metric.values) {
-                let profile = profiles.entry((key.experiment.clone(), key.model.clone())).or_default();
+            for (key, value) in table.keys.iter().zip(metric.iter()) {
+                let profile = profiles.entry((key.experiment.to_owned(), key.model.to_owned())).or_default();
                 let sum = profile.entry(metric.name.clone()).or_default();
                 sum.total += value.unwrap_or(0);
                 sum.count += i64::from(value.is_some());

@@ -9,7 +9,7 @@ use mirrorstats::agent::scripted::Scripted;
 use mirrorstats::record::plan::Key;
 use mirrorstats::record::play::{Broken, Onlooker, Seen, Stage, head, play, task};
 use mirrorstats::record::run::Shares;
-use mirrorstats::score::run::{self, Request};
+use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::score::table::EpisodeTable;
 use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::sim::eye::Eye;
@@ -78,6 +78,6 @@ pub fn score(episodes: &[Episode]) -> EpisodeTable {
     }
     writer.finish().unwrap();
     let traces = TraceSet::open(&[Input::new(&path)]).unwrap();
-    let definitions = run::definitions(&traces, &Request::of("paper")).unwrap();
-    run::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()
+    let definitions = score_traces::definitions(&traces, &Request::of("paper")).unwrap();
+    score_traces::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()
 }

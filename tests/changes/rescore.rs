@@ -131,7 +131,7 @@ fn a_folder_that_is_no_report_is_refused() {
         ("\"schema_version\": 1", "\"schema_version\": 99", "newer than 1"),
         ("\"path\": \"a.parquet\"", "\"path\": \"/etc/a.parquet\"", "leads out of its folder"),
         ("\"path\": \"a.parquet\"", "\"path\": \"../a.parquet\"", "leads out of its folder"),
-        ("\"inputs\"", "\"outputs\"", "missing field `inputs`"),
+        ("\"inputs\"", "\"sources\"", "missing field `inputs`"),
         ("{", "", "manifest.json"),
     ] {
         assert!(manifest.contains(from));

@@ -2,10 +2,10 @@
 
 mod colors;
 mod extended;
+mod filters;
 mod generated;
 #[path = "../../examples/generate/generation/mod.rs"]
 mod generation;
-mod filters;
 mod help;
 mod hostile;
 mod options;

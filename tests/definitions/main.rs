@@ -8,7 +8,7 @@ use std::path::Path;
 
 use mirrorstats::metric::definitions::Definitions;
 use mirrorstats::metric::file::FileError;
-use mirrorstats::score::run::schema_columns;
+use mirrorstats::score::score_traces::schema_columns;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;

@@ -8,8 +8,8 @@ use mirrorstats::engine::polars::score;
 use mirrorstats::metric::columns::{Column, Level, Type};
 use mirrorstats::metric::definitions::Definitions;
 use mirrorstats::metric::sql::{self, Dialect};
-use mirrorstats::score::engine::EngineError;
-use mirrorstats::score::run::{self, ScoreError};
+use mirrorstats::score::error::EngineError;
+use mirrorstats::score::score_traces::{self, ScoreError};
 use mirrorstats::score::table::{EpisodeKey, EpisodeTable};
 use mirrorstats::trace::open::TraceSet;
 use proptest::prelude::*;
@@ -31,12 +31,12 @@ enum Answer {
 }
 
 fn values(table: &EpisodeTable) -> Answer {
-    let row = |row: usize| table.metrics.iter().map(|metric| metric.values[row]).collect();
-    Answer::Values(table.keys.iter().enumerate().map(|(at, key)| (key.clone(), row(at))).collect())
+    let row = |row: usize| table.metrics.iter().map(|metric| metric.get(row)).collect();
+    Answer::Values(table.keys.iter().enumerate().map(|(at, key)| (key.to_owned(), row(at))).collect())
 }
 
 fn native(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String> {
-    match run::score(traces, definitions, &[], NonZeroUsize::MIN) {
+    match score_traces::score(traces, definitions, &[], NonZeroUsize::MIN) {
         Ok(table) => Ok(values(&table)),
         Err(ScoreError::Engine { source: EngineError::Overflow { .. }, .. }) => Ok(Answer::Overflow),
         Err(ScoreError::Engine { source: EngineError::NotARate { .. }, .. }) => Ok(Answer::NotARate),
@@ -57,7 +57,7 @@ fn polars(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String
 
 /// The definitions over these traces; a column that no file has is null all the same.
 fn load(traces: &TraceSet, text: &str) -> Definitions {
-    let mut columns = run::trace_columns(traces);
+    let mut columns = score_traces::trace_columns(traces);
     for (name, ty) in [
         ("points", Type::Int),
         ("n4", Type::Int),

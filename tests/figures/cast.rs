@@ -9,7 +9,7 @@ use mirrorstats::cells::moments::Moments;
 use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
 use mirrorstats::report::figures::Input;
 use mirrorstats::report::figures::e5_outcomes::{OutcomeRow, Outcomes};
-use mirrorstats::score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+use mirrorstats::score::table::{EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
 use mirrorstats::score::timeline::Timeline;
 
 const METRICS: [&str; 7] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "TSA-C"];
@@ -181,23 +181,23 @@ fn episodes(cells: &Cells) -> EpisodeTable {
             finished.push(is_finished.then_some(1));
         }
     }
-    let column = |name: &str, values| MetricColumn { name: name.to_owned(), values };
+    let column = |name: &str, values: Vec<Option<i64>>| MetricColumn::new(name, values);
     EpisodeTable {
         catalog: cells.catalog.clone(),
-        keys,
+        keys: keys.into_iter().collect(),
         labels: Vec::new(),
         metrics: vec![column("TTD", ttd), column("TSA-C", finished)],
     }
 }
 
 fn timelines(episodes: &EpisodeTable) -> Vec<Timeline> {
-    let timeline = |((key, ttd), finished): ((&EpisodeKey, &Option<i64>), &Option<i64>)| {
+    let timeline = |((key, ttd), finished): ((KeyRef<'_>, Option<i64>), Option<i64>)| {
         let length = u32::try_from(ttd.unwrap_or(1)).unwrap();
         let sight = (key.experiment != "E2").then_some(1 + length / 5).filter(|&step| step <= length);
         let run = |from: u32, to: u32| (from <= to.min(length)).then_some(from..=to.min(length));
         let visible = sight.into_iter().flat_map(|s| [run(s, s + 3), run(s + 8, s + 9 + length / 4)]).flatten();
         Timeline {
-            key: key.clone(),
+            key: key.to_owned(),
             length,
             visible: visible.collect(),
             first_sight: sight,
@@ -206,7 +206,7 @@ fn timelines(episodes: &EpisodeTable) -> Vec<Timeline> {
             answered: finished.is_some(),
         }
     };
-    let [ttd, finished] = [0, 1].map(|at| &episodes.metrics[at].values);
+    let [ttd, finished] = [0, 1].map(|at| episodes.metrics[at].iter());
     episodes.keys.iter().zip(ttd).zip(finished).map(timeline).collect()
 }
 

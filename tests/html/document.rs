@@ -77,10 +77,7 @@ fn every_cell_carries_the_numbers_of_cells_csv() {
 #[test]
 fn tables_and_episodes_of_two_reports_do_not_mix() {
     let mut report = Report::bare();
-    let mut fewer = PAPER.clone();
-    fewer.keys.truncate(839);
-    fewer.metrics.iter_mut().for_each(|metric| metric.values.truncate(839));
-    fewer.labels.iter_mut().for_each(|label| label.values.truncate(839));
+    let fewer = PAPER.taken(&(0..839).collect::<Vec<_>>());
     let other = Report::of(fewer.clone(), &["experiment", "seed"], "default");
     report.episodes = fewer;
     assert!(matches!(report.render(), Err(HtmlError::OtherEpisodes)));
@@ -95,10 +92,7 @@ fn any_grouping_and_no_episode_at_all_make_a_page() {
         let report = Report::of(PAPER.clone(), by, "default");
         assert_eq!(report.render().unwrap().matches("<tr data-group=").count(), rows(&report), "{by:?}");
     }
-    let mut none = PAPER.clone();
-    none.keys.clear();
-    none.metrics.iter_mut().for_each(|metric| metric.values.clear());
-    none.labels.iter_mut().for_each(|label| label.values.clear());
+    let none = PAPER.taken(&[]);
     assert!(Report::of(none, &["experiment", "model"], "default").render().unwrap().contains("0 episodes of 0 models"));
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use mirrorstats::score::table::MetricColumn;
 use serde_json::json;
 
 use crate::browser::Browser;
@@ -14,9 +15,9 @@ const ROWS: &str = "[...document.querySelectorAll('#episodes tbody tr')] \
 /// What the episode table has for a cell.
 fn expected(report: &Report, experiment: &str, model: &str, metric: &str) -> BTreeSet<String> {
     let column = report.episodes.metrics.iter().find(|column| column.name == metric).unwrap();
-    let keys = report.episodes.keys.iter().zip(&column.values);
+    let keys = report.episodes.keys.iter().zip(column.iter());
     let of_cell = keys.filter(|(key, _)| key.experiment == experiment && key.model == model);
-    let row = |value: &Option<i64>| value.map_or("--".to_owned(), |value| value.to_string());
+    let row = |value: Option<i64>| value.map_or("--".to_owned(), |value| value.to_string());
     of_cell.map(|(key, value)| format!("{},{},{},{}", key.episode_id, key.seed, key.run, row(value))).collect()
 }
 
@@ -61,8 +62,8 @@ fn episodes_sort_by_value() {
 fn integers_that_javascript_would_round_stay_exact() {
     let mut episodes = PAPER.clone();
     let ttd = episodes.metrics.iter_mut().find(|column| column.name == "TTD").unwrap();
-    ttd.values[0] = Some(i64::MAX);
-    let key = episodes.keys[0].clone();
+    *ttd = MetricColumn::new("TTD", std::iter::once(Some(i64::MAX)).chain(ttd.iter().skip(1)).collect::<Vec<_>>());
+    let key = episodes.keys.get(0).to_owned();
     let report = Report::of(episodes, &["experiment", "model"], "default");
     let Some(mut browser) = Browser::open("large integers", &report.render().unwrap()) else { return };
     browser.click(&format!(

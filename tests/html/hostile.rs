@@ -1,6 +1,7 @@
 //! Names that would like to be markup, script or an order of letters.
 
-use mirrorstats::score::table::EpisodeTable;
+use mirrorstats::score::builder::TableBuilder;
+use mirrorstats::score::table::{EpisodeTable, KeyRef};
 
 use crate::browser::Browser;
 use crate::document::tags;
@@ -19,16 +20,18 @@ const HOSTILE: [&str; 8] = [
 
 /// The bundled episodes of eight models under these names, and ids to match.
 fn renamed(names: [&str; 8]) -> EpisodeTable {
-    let mut episodes = PAPER.clone();
-    let mut models: Vec<String> = episodes.keys.iter().map(|key| key.model.clone()).collect();
+    let mut models: Vec<&str> = PAPER.keys.iter().map(|key| key.model).collect();
     models.sort_unstable();
     models.dedup();
-    for key in &mut episodes.keys {
+    let mut episodes = TableBuilder::new(PAPER.header());
+    for (row, key) in PAPER.keys.iter().enumerate() {
         let at = models.binary_search(&key.model).unwrap();
-        key.model = format!("{at}{}", names[at]);
-        key.episode_id = format!("{}{}", key.episode_id, names[at]);
+        let (model, episode_id) = (format!("{at}{}", names[at]), format!("{}{}", key.episode_id, names[at]));
+        let key = KeyRef { model: &model, episode_id: &episode_id, ..key };
+        let labels = PAPER.labels.iter().map(|label| label.values.get(row));
+        episodes.push(key, labels, PAPER.metrics.iter().map(|metric| metric.get(row)));
     }
-    episodes.sorted()
+    episodes.finish()
 }
 
 fn page(names: [&str; 8]) -> String {

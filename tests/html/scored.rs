@@ -13,7 +13,7 @@ use mirrorstats::report::layout;
 use mirrorstats::report::statistics::{Options, Statistics};
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::Table;
-use mirrorstats::score::run::{self, Request};
+use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::score::table::EpisodeTable;
 use mirrorstats::trace::{inputs, open::TraceSet};
 
@@ -21,8 +21,8 @@ use mirrorstats::trace::{inputs, open::TraceSet};
 pub static PAPER: LazyLock<EpisodeTable> = LazyLock::new(|| {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper").to_owned();
     let traces = TraceSet::open(&inputs::resolve(&[folder], std::io::empty()).unwrap()).unwrap();
-    let definitions = run::definitions(&traces, &Request::of("paper")).unwrap();
-    run::score(&traces, &definitions, &["body_color".to_owned()], NonZeroUsize::MIN).unwrap()
+    let definitions = score_traces::definitions(&traces, &Request::of("paper")).unwrap();
+    score_traces::score(&traces, &definitions, &["body_color".to_owned()], NonZeroUsize::MIN).unwrap()
 });
 
 /// The page of the whole report of the bundled traces.

@@ -17,7 +17,7 @@ use mirrorstats::report::layout;
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::{Table, Value};
 use mirrorstats::report::value;
-use mirrorstats::score::run::schema_columns;
+use mirrorstats::score::score_traces::schema_columns;
 
 /// Episodes behind every published cell.
 pub const EPISODES: u64 = 21;

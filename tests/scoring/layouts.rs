@@ -11,7 +11,7 @@ use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::DataType;
 use assert_cmd::Command;
 use mirrorstats::score::format::{self, Format};
-use mirrorstats::score::run::{self, Request};
+use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::trace::episode::Episode;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
@@ -112,9 +112,9 @@ fn write_as(layout: Layout, rows: &RecordBatch, path: &Path) {
 fn scores(paths: &[PathBuf], threads: usize) -> Vec<Vec<u8>> {
     let traces = open(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>());
     let request = Request { condition: Some("seed <> 2 or TSA = 0".into()), ..Request::of("paper") };
-    let definitions = run::definitions(&traces, &request).unwrap();
+    let definitions = score_traces::definitions(&traces, &request).unwrap();
     let labels = ["body_color".to_owned(), "distractors".to_owned()];
-    let table = run::score(&traces, &definitions, &labels, NonZeroUsize::new(threads).unwrap()).unwrap();
+    let table = score_traces::score(&traces, &definitions, &labels, NonZeroUsize::new(threads).unwrap()).unwrap();
     let bytes = |format| {
         let mut bytes = Vec::new();
         format::write(&table, format, &mut bytes).unwrap();
@@ -177,6 +177,13 @@ fn report(folder: &TempDir, out: &str, arguments: &[&str]) -> BTreeMap<PathBuf, 
         if path.ends_with("manifest.json") {
             let mut manifest: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
             assert!(manifest.as_object_mut().unwrap().remove("inputs").is_some());
+            // The page lists the inputs too.
+            for output in manifest["outputs"].as_array_mut().unwrap() {
+                if output["path"] == "report.html" {
+                    assert!(output.as_object_mut().unwrap().remove("sha256").is_some());
+                    assert!(output.as_object_mut().unwrap().remove("bytes").is_some());
+                }
+            }
             bytes = manifest.to_string().into_bytes();
         }
         found.insert(path.strip_prefix(&out).unwrap().to_owned(), bytes);

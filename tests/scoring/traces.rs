@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 
 use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::score::run;
+use mirrorstats::score::score_traces;
 use mirrorstats::score::table::EpisodeTable;
 use mirrorstats::trace::episode::Episode;
 use mirrorstats::trace::inputs::Input;
@@ -33,17 +33,17 @@ fn score_with(episodes: &[Episode], load: impl FnOnce(&TraceSet) -> Definitions)
     write(&path, episodes);
     let traces = open(&[&path]);
     let definitions = load(&traces);
-    run::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()
+    score_traces::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()
 }
 
 /// Scores episodes under the paper's definitions.
 pub fn score_paper(episodes: &[Episode]) -> EpisodeTable {
-    score_with(episodes, |traces| run::definitions(traces, &run::Request::of("paper")).unwrap())
+    score_with(episodes, |traces| score_traces::definitions(traces, &score_traces::Request::of("paper")).unwrap())
 }
 
 /// Scores episodes under definitions given as text.
 pub fn score_toml(episodes: &[Episode], toml: &str) -> EpisodeTable {
-    score_with(episodes, |traces| match Definitions::from_toml("test", toml, &run::trace_columns(traces)) {
+    score_with(episodes, |traces| match Definitions::from_toml("test", toml, &score_traces::trace_columns(traces)) {
         Ok(definitions) => definitions,
         Err(faults) => panic!("{faults}"),
     })
@@ -52,5 +52,5 @@ pub fn score_toml(episodes: &[Episode], toml: &str) -> EpisodeTable {
 /// The values of one episode, metric by metric.
 pub fn values(table: &EpisodeTable, episode_id: &str) -> Vec<Option<i64>> {
     let row = table.keys.iter().position(|key| key.episode_id == episode_id).expect("the episode was scored");
-    table.metrics.iter().map(|metric| metric.values[row]).collect()
+    table.metrics.iter().map(|metric| metric.get(row)).collect()
 }

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use mirrorstats::score::format::{self, Format};
-use mirrorstats::score::run::{self, Request};
+use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::trace::finding::{Code, Finding, TraceError};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::merge;
@@ -24,8 +24,9 @@ fn fixture(name: &str) -> Vec<u8> {
 /// The episode table of a file as CSV, if it can be read.
 fn scores(path: &Path) -> Result<Vec<u8>, String> {
     let traces = TraceSet::open(&[Input::new(path)]).map_err(|error| error.to_string())?;
-    let definitions = run::definitions(&traces, &Request::of("paper")).map_err(|error| error.to_string())?;
-    let table = run::score(&traces, &definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())?;
+    let definitions = score_traces::definitions(&traces, &Request::of("paper")).map_err(|error| error.to_string())?;
+    let table =
+        score_traces::score(&traces, &definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())?;
     let mut bytes = Vec::new();
     format::write(&table, Format::Csv, &mut bytes).unwrap();
     Ok(bytes)

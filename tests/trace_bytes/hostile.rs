@@ -222,7 +222,8 @@ fn a_trace_with_a_nested_column_is_refused() {
         let named = rows.schema().fields().iter().map(|field| field.name().clone()).collect::<Vec<_>>();
         let mut columns: Vec<_> = named.into_iter().zip(rows.columns().iter().cloned()).collect();
         columns.push(("extra".to_owned(), nested));
-        let rows = RecordBatch::try_from_iter_with_nullable(columns.into_iter().map(|(name, column)| (name, column, true)));
+        let rows =
+            RecordBatch::try_from_iter_with_nullable(columns.into_iter().map(|(name, column)| (name, column, true)));
         let rows = rows.unwrap();
         let mut writer = ArrowWriter::try_new(Vec::new(), rows.schema(), None).unwrap();
         writer.write(&rows).unwrap();

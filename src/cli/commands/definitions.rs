@@ -12,7 +12,7 @@ use crate::base::visible::visible;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::FaultRecord;
 use crate::metric::file::{FileError, built_in, built_in_names};
-use crate::score::run;
+use crate::score::score_traces;
 use crate::study::StudyError;
 use crate::trace::inputs;
 use crate::trace::open::TraceSet;
@@ -89,10 +89,10 @@ impl DefinitionsArgs {
 
 fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> {
     let columns = if traces.is_empty() {
-        run::schema_columns()
+        score_traces::schema_columns()
     } else {
         let inputs = inputs::resolve(traces, io::stdin().lock()).map_err(Failure::input)?;
-        run::trace_columns(&TraceSet::open(&inputs).map_err(Failure::input)?)
+        score_traces::trace_columns(&TraceSet::open(&inputs).map_err(Failure::input)?)
     };
     match Definitions::load(file, &columns) {
         Ok(definitions) if json => {
@@ -124,7 +124,7 @@ fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> 
 }
 
 fn explain(metric: &str, definitions: &str, json: bool) -> Result<Outcome, Failure> {
-    let definitions = Definitions::load(definitions, &run::schema_columns()).map_err(StudyError::from)?;
+    let definitions = Definitions::load(definitions, &score_traces::schema_columns()).map_err(StudyError::from)?;
     if let Some(explanation) = definitions.explain(metric) {
         return output::print(&explanation, json);
     }

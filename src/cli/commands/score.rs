@@ -7,8 +7,9 @@ use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, spark};
-use crate::score::format::{self, Format};
-use crate::study::{SparkJob, StudyError, are_uris};
+use crate::score::format::Format;
+use crate::score::table::EpisodeTable;
+use crate::study::{SparkJob, are_uris, write_scores};
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -54,8 +55,9 @@ impl ScoreArgs {
         if let Some(episode) = &self.explain {
             return output::print(&study.explain(episode)?, self.json);
         }
-        let rows = self.deliver(format, |format, out| study.write_scores(format, out))?;
-        if let Some(words) = study.empty_filter(rows)? {
+        let table = study.score()?.episodes;
+        self.deliver(&table, format)?;
+        if let Some(words) = study.empty_filter(table.len())? {
             output::note(&words);
         }
         Ok(Outcome::Done)
@@ -77,8 +79,7 @@ impl ScoreArgs {
         let format = self.output.as_deref().map(format_of).transpose()?;
         let job = self.spark_job()?;
         self.check_target(job.read().to_vec())?;
-        let table = job.score()?;
-        self.deliver(format, |format, out| Ok(format::write(&table, format, out)?))?;
+        self.deliver(&job.score()?, format)?;
         Ok(Outcome::Done)
     }
 
@@ -97,15 +98,14 @@ impl ScoreArgs {
     }
 
     /// Writes the table to where it was asked for.
-    fn deliver<T>(
-        &self,
-        format: Option<Format>,
-        write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<T, StudyError>,
-    ) -> Result<T, Failure> {
+    fn deliver(&self, table: &EpisodeTable, format: Option<Format>) -> Result<(), Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
+        let threads = self.traces.threads.count();
         match &self.output {
-            Some(path) => output::write_file_with(path, |file| Ok(write(format, &mut BufWriter::new(file))?)),
-            None => Ok(write(format, &mut BufWriter::new(io::stdout()))?),
+            Some(path) => {
+                output::write_file_with(path, |file| Ok(write_scores(table, format, BufWriter::new(file), threads)?))
+            }
+            None => Ok(write_scores(table, format, BufWriter::new(io::stdout()), threads)?),
         }
     }
 }

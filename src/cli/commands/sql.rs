@@ -5,7 +5,7 @@ use std::io::{self, Write as _};
 use super::super::args::ScoringArgs;
 use super::super::outcome::{Failure, Outcome};
 use crate::metric::sql::{self, Dialect};
-use crate::score::run::schema_columns;
+use crate::score::score_traces::schema_columns;
 
 /// Print the SQL statement that computes the episode table from a table `steps`
 #[derive(Clone, Debug, clap::Args)]

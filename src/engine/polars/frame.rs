@@ -5,7 +5,7 @@ use std::fs;
 use polars::prelude::{DataType, Expr, LazyFrame, NULL, PlRefPath, ScanArgsParquet, UnionArgs, col, concat, lit};
 
 use super::run::PolarsError;
-use crate::score::run::ScoreError;
+use crate::score::score_traces::ScoreError;
 use crate::trace::open::{TraceFile, TraceSet};
 use crate::trace::schema::{self, Kind, Stored};
 use crate::trace::verify::verify_pages;

@@ -6,7 +6,7 @@ use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsError as Inner};
 use polars::sql::SQLContext;
 
 use crate::metric::sql::LoweringError;
-use crate::score::run::ScoreError;
+use crate::score::score_traces::ScoreError;
 use crate::trace::contain::contained_on_all_threads;
 
 /// What keeps Polars from answering.

@@ -13,13 +13,14 @@ use crate::metric::definitions::Definitions;
 use crate::metric::overflow::may_overflow;
 use crate::metric::plan::NodeId;
 use crate::metric::sql::{self, Dialect};
-use crate::score::run::unscored;
-use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use crate::score::builder::TableBuilder;
+use crate::score::score_traces::unscored;
+use crate::score::table::{EpisodeKey, EpisodeTable, Header, MetricColumn};
 use crate::trace::open::TraceSet;
 use crate::trace::scan::EPISODE_COLUMNS;
 use crate::trace::schema;
 
-/// The table that [`score::run::score`](crate::score::run::score) gives, computed by Polars.
+/// The table that [`score::score_traces::score`](crate::score::score_traces::score) gives, computed by Polars.
 ///
 /// The native reader checks the traces first, so that damaged ones are refused with the same words. Threads are for
 /// that check alone: Polars has its own.
@@ -37,9 +38,9 @@ pub fn score(
     let steps = frame::steps(traces, &columns(traces, definitions))?;
     check_overflow(traces, definitions, &steps)?;
     let rows = answer(&steps, &statement)?;
-    let table = EpisodeTable { metrics: metrics(definitions, &rows)?, ..labelled(episodes, keys(&rows)?) };
-    check_rates(definitions, &table)?;
-    Ok(table.sorted())
+    let metrics = metrics(definitions, &rows)?;
+    check_rates(definitions, &metrics)?;
+    Ok(table(&episodes, &keys(&rows)?, &metrics))
 }
 
 /// The columns that the statement reads.
@@ -123,28 +124,29 @@ fn keys(rows: &DataFrame) -> Result<Vec<EpisodeKey>, PolarsError> {
 fn metrics(definitions: &Definitions, rows: &DataFrame) -> Result<Vec<MetricColumn>, PolarsError> {
     let one = |name: &String| {
         let values = ints(rows, &Dialect::Polars.output_alias(name))?;
-        Ok(MetricColumn { name: name.clone(), values })
+        Ok(MetricColumn::new(name, values))
     };
     definitions.plan.outputs.iter().map(|output| one(&output.name)).collect()
 }
 
-/// The keys with the labels that the native reader has seen; no metric yet.
-fn labelled(episodes: EpisodeTable, keys: Vec<EpisodeKey>) -> EpisodeTable {
+/// The table of these keys and metrics, with the labels that the native reader has seen.
+fn table(episodes: &EpisodeTable, keys: &[EpisodeKey], metrics: &[MetricColumn]) -> EpisodeTable {
     let known: HashMap<&str, usize> =
-        episodes.keys.iter().enumerate().map(|(row, key)| (key.episode_id.as_str(), row)).collect();
-    let rows: Vec<Option<usize>> = keys.iter().map(|key| known.get(key.episode_id.as_str()).copied()).collect();
-    let label = |column: &LabelColumn| LabelColumn {
-        name: column.name.clone(),
-        values: rows.iter().map(|row| row.and_then(|row| column.values[row].clone())).collect(),
-    };
-    let labels = episodes.labels.iter().map(label).collect();
-    EpisodeTable { catalog: episodes.catalog, keys, labels, metrics: Vec::new() }
+        episodes.keys.iter().enumerate().map(|(row, key)| (key.episode_id, row)).collect();
+    let metric_names = metrics.iter().map(|metric| metric.name.clone()).collect();
+    let mut builder = TableBuilder::new(Header { metrics: metric_names, ..episodes.header() });
+    for (row, key) in keys.iter().enumerate() {
+        let seen = known.get(key.episode_id.as_str()).copied();
+        let labels = episodes.labels.iter().map(|label| label.values.get(seen?));
+        builder.push(key.as_ref(), labels, metrics.iter().map(|metric| metric.get(row)));
+    }
+    builder.finish()
 }
 
-fn check_rates(definitions: &Definitions, table: &EpisodeTable) -> Result<(), PolarsError> {
-    for (output, column) in definitions.plan.outputs.iter().zip(&table.metrics) {
-        let strange = column.values.iter().flatten().find(|value| !matches!(value, 0 | 1));
-        if let Some(&value) = strange.filter(|_| output.kind == Kind::Rate) {
+fn check_rates(definitions: &Definitions, metrics: &[MetricColumn]) -> Result<(), PolarsError> {
+    for (output, column) in definitions.plan.outputs.iter().zip(metrics) {
+        let strange = column.iter().flatten().find(|value| !matches!(value, 0 | 1));
+        if let Some(value) = strange.filter(|_| output.kind == Kind::Rate) {
             return Err(PolarsError::NotARate { metric: output.name.clone(), value });
         }
     }

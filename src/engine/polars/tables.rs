@@ -8,7 +8,7 @@ use crate::cells::cell::{Cells, KeyValue};
 use crate::cells::interval::{Interval, student_t, wilson};
 use crate::cells::moments::Moments;
 use crate::metric::catalog::{Kind, Metric};
-use crate::score::table::{EpisodeKey, EpisodeTable};
+use crate::score::table::{EpisodeTable, KeyRef, MetricColumn};
 use crate::trace::open::TraceSet;
 
 /// The confidence of the intervals of `cells`.
@@ -36,20 +36,20 @@ pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
 /// # Errors
 /// What Polars says of the columns.
 pub fn episodes(table: &EpisodeTable) -> Result<LazyFrame, PolarsError> {
-    let text = |name: &str, of: fn(&EpisodeKey) -> &str| {
+    let text = |name: &str, of: fn(KeyRef<'_>) -> &str| {
         Column::new(name.into(), table.keys.iter().map(of).collect::<Vec<_>>())
     };
-    let int = |name: &str, of: fn(&EpisodeKey) -> i32| {
-        Column::new(name.into(), table.keys.iter().map(of).collect::<Vec<_>>())
-    };
+    let int =
+        |name: &str, of: fn(KeyRef<'_>) -> i32| Column::new(name.into(), table.keys.iter().map(of).collect::<Vec<_>>());
     let mut columns = vec![
-        text("episode_id", |key| &key.episode_id),
-        text("model", |key| &key.model),
-        text("experiment", |key| &key.experiment),
+        text("episode_id", |key| key.episode_id),
+        text("model", |key| key.model),
+        text("experiment", |key| key.experiment),
         int("seed", |key| key.seed),
         int("run", |key| key.run),
     ];
-    columns.extend(table.metrics.iter().map(|metric| Column::new(metric.name.as_str().into(), &metric.values)));
+    let values = |metric: &MetricColumn| metric.iter().collect::<Vec<Option<i64>>>();
+    columns.extend(table.metrics.iter().map(|metric| Column::new(metric.name.as_str().into(), values(metric))));
     Ok(DataFrame::new(table.len(), columns)?.lazy())
 }
 

@@ -8,7 +8,8 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{Job, SparkError, cause, check, request, source};
-use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use crate::score::builder::TableBuilder;
+use crate::score::table::{EpisodeKey, EpisodeTable, Header};
 use crate::trace::colors;
 use crate::trace::finding::{Code, Finding};
 
@@ -105,36 +106,44 @@ pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkErro
     let fault = |words: String| SparkError::Answer { words };
     let file = File::open(path).map_err(|error| fault(error.to_string()))?;
     let outputs = &job.definitions.plan.outputs;
-    let mut table = EpisodeTable {
+    let header = Header {
         catalog: job.definitions.catalog.clone(),
-        keys: Vec::new(),
-        labels: job.labels.iter().map(|name| LabelColumn { name: name.clone(), values: Vec::new() }).collect(),
-        metrics: outputs.iter().map(|output| MetricColumn { name: output.name.clone(), values: Vec::new() }).collect(),
+        labels: job.labels.to_vec(),
+        metrics: outputs.iter().map(|output| output.name.clone()).collect(),
     };
+    let mut builder = TableBuilder::new(header);
     for line in BufReader::new(file).lines() {
         let line = line.map_err(|error| fault(error.to_string()))?;
         let row: Vec<Value> = serde_json::from_str(&line).map_err(|error| fault(error.to_string()))?;
-        append(&mut table, row).ok_or_else(|| fault(format!("an episode that is none: {line}")))?;
+        append(&mut builder, row).ok_or_else(|| fault(format!("an episode that is none: {line}")))?;
     }
-    Ok(table.sorted())
+    Ok(builder.finish())
 }
 
-fn append(table: &mut EpisodeTable, row: Vec<Value>) -> Option<()> {
+fn append(table: &mut TableBuilder, row: Vec<Value>) -> Option<()> {
     let mut cells = row.into_iter();
     let [episode_id, model, experiment] = [text(cells.next()?)?, text(cells.next()?)?, text(cells.next()?)?];
     let mut number = || i32::try_from(cells.next()?.as_i64()?).ok();
     let (seed, run) = (number()?, number()?);
-    table.keys.push(EpisodeKey { experiment: experiment?, model: model?, seed, run, episode_id: episode_id? });
-    for metric in &mut table.metrics {
-        metric.values.push(match cells.next()? {
-            Value::Null => None,
-            value => Some(value.as_i64()?),
-        });
+    let key = EpisodeKey { experiment: experiment?, model: model?, seed, run, episode_id: episode_id? };
+    let (metrics, labels) = (table.header().metrics.len(), table.header().labels.len());
+    let metrics: Vec<Option<i64>> = cells.by_ref().take(metrics).map(integer).collect::<Option<_>>()?;
+    let labels: Vec<Option<String>> = cells.by_ref().take(labels).map(text).collect::<Option<_>>()?;
+    let complete = metrics.len() == table.header().metrics.len() && labels.len() == table.header().labels.len();
+    if !complete || cells.next().is_some() {
+        return None;
     }
-    for label in &mut table.labels {
-        label.values.push(text(cells.next()?)?);
+    table.push(key.as_ref(), labels.iter().map(Option::as_deref), metrics);
+    Some(())
+}
+
+/// An integer or null; nothing for any other value.
+#[expect(clippy::option_option, reason = "null is an undefined metric, and not the same as a value that is no integer")]
+fn integer(value: Value) -> Option<Option<i64>> {
+    match value {
+        Value::Null => Some(None),
+        value => Some(Some(value.as_i64()?)),
     }
-    cells.next().is_none().then_some(())
 }
 
 /// A text or null; nothing for any other value.
@@ -153,7 +162,7 @@ mod tests {
     use crate::engine::spark::Job;
     use crate::engine::spark::source::Sources;
     use crate::metric::definitions::Definitions;
-    use crate::score::run::schema_columns;
+    use crate::score::score_traces::schema_columns;
     use crate::trace::finding::Code;
 
     #[test]

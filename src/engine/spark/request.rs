@@ -158,7 +158,7 @@ mod tests {
     use crate::engine::spark::Job;
     use crate::engine::spark::source::Sources;
     use crate::metric::definitions::Definitions;
-    use crate::score::run::schema_columns;
+    use crate::score::score_traces::schema_columns;
 
     /// The tables that a statement names; MySQL's grammar has Spark's quotes, escapes and division.
     fn tables(statement: &str) -> Vec<String> {

@@ -64,8 +64,8 @@ fn endings(episodes: &EpisodeTable) -> Result<BTreeMap<(&str, &str), Vec<Duratio
     let [ttd, finished] = ["TTD", "TSA-C"].map(|name| column(episodes, name));
     let (ttd, finished) = (ttd?, finished?);
     let mut endings: BTreeMap<(&str, &str), Vec<Duration>> = BTreeMap::new();
-    for ((key, step), finished) in episodes.keys.iter().zip(&ttd.values).zip(&finished.values) {
-        let group = endings.entry((&key.experiment, &key.model)).or_default();
+    for ((key, step), finished) in episodes.keys.iter().zip(ttd.iter()).zip(finished.iter()) {
+        let group = endings.entry((key.experiment, key.model)).or_default();
         let end = if finished.is_some() { End::Finished } else { End::Unfinished };
         group.extend(step.map(|steps| Duration { steps, end }));
     }

@@ -54,10 +54,10 @@ impl Outcomes {
         let experiment = open_experiment(episodes)?;
         let success = episodes.metrics.iter().find(|metric| metric.name == SUCCESS)?;
         let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
-        let all = episodes.keys.iter().zip(&success.values).zip(answered);
+        let all = episodes.keys.iter().zip(success.iter()).zip(answered);
         for ((key, value), answered) in all.filter(|((key, _), _)| key.experiment == experiment) {
-            let empty = || OutcomeRow { model: key.model.clone(), correct: 0, wrong: 0, uncommitted: 0 };
-            let row = rows.entry(&key.model).or_insert_with(empty);
+            let empty = || OutcomeRow { model: key.model.to_owned(), correct: 0, wrong: 0, uncommitted: 0 };
+            let row = rows.entry(key.model).or_insert_with(empty);
             match (value, answered) {
                 (Some(1), _) => row.correct += 1,
                 (_, true) => row.wrong += 1,

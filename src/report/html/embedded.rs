@@ -69,20 +69,20 @@ pub(super) fn json(
         metrics: metrics.iter().map(|metric| (metric.name(), metric)).collect(),
         groups: cells.groups.iter().map(|group| label(&group.key)).collect(),
         episodes: Episodes {
-            id: episodes.keys.iter().map(|key| visible(&key.episode_id)).collect(),
+            id: episodes.keys.iter().map(|key| visible(key.episode_id)).collect(),
             seed: episodes.keys.iter().map(|key| key.seed).collect(),
             run: episodes.keys.iter().map(|key| key.run).collect(),
             group: membership(episodes, &cells.by)?,
-            values: episodes.metrics.iter().map(|column| (visible(&column.name), integers(&column.values))).collect(),
+            values: episodes
+                .metrics
+                .iter()
+                .map(|column| (visible(&column.name), column.iter().map(|value| value.map(Integer)).collect()))
+                .collect(),
         },
     };
     let json =
         serde_json::to_string(&embedded).expect("strings, integers and maps with names as keys have a JSON text");
     Ok(inert(&json))
-}
-
-fn integers(values: &[Option<i64>]) -> Vec<Option<Integer>> {
-    values.iter().map(|value| value.map(Integer)).collect()
 }
 
 /// Markup characters of JSON stand in strings alone, where an escape means the same.

@@ -21,7 +21,7 @@ use crate::report::layout::heading;
 use crate::report::order::row_key;
 use crate::report::statistics::{Statistics, text};
 use crate::report::table::{Row, RowGroup, Table};
-use crate::score::table::{EpisodeKey, EpisodeTable};
+use crate::score::table::{EpisodeTable, KeyRef};
 
 /// Everything that a report puts into its page.
 #[derive(Debug, Serialize)]
@@ -138,11 +138,11 @@ impl Content {
 
 impl Counts {
     fn of(episodes: &EpisodeTable) -> Self {
-        let distinct = |of: fn(&EpisodeKey) -> &String| episodes.keys.iter().map(of).collect::<BTreeSet<_>>().len();
+        let distinct = |of: fn(KeyRef<'_>) -> &str| episodes.keys.iter().map(of).collect::<BTreeSet<_>>().len();
         Self {
             episodes: episodes.len(),
-            models: distinct(|key| &key.model),
-            experiments: distinct(|key| &key.experiment),
+            models: distinct(|key| key.model),
+            experiments: distinct(|key| key.experiment),
         }
     }
 }

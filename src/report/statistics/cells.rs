@@ -121,7 +121,7 @@ impl Intervals {
 }
 
 fn values(study: &Study, metric: &str, rows: &[usize]) -> Vec<i64> {
-    study.column(metric).map_or_else(Vec::new, |column| rows.iter().filter_map(|&row| column.values[row]).collect())
+    study.column(metric).map_or_else(Vec::new, |column| rows.iter().filter_map(|&row| column.get(row)).collect())
 }
 
 /// The rows of the table by the text of their key; a column that the table lacks is empty everywhere.
@@ -134,16 +134,16 @@ fn rows_by_group(table: &EpisodeTable, by: &[String]) -> BTreeMap<Vec<String>, V
 }
 
 fn key_text(table: &EpisodeTable, name: &str, row: usize) -> String {
-    let key = &table.keys[row];
+    let key = table.keys.get(row);
     match name {
-        "experiment" => key.experiment.clone(),
-        "model" => key.model.clone(),
+        "experiment" => key.experiment.to_owned(),
+        "model" => key.model.to_owned(),
         "seed" => key.seed.to_string(),
         "run" => key.run.to_string(),
-        "episode_id" => key.episode_id.clone(),
+        "episode_id" => key.episode_id.to_owned(),
         label => {
             let column = table.labels.iter().find(|column| column.name == label);
-            column.and_then(|column| column.values[row].clone()).unwrap_or_default()
+            column.and_then(|column| column.values.get(row)).unwrap_or_default().to_owned()
         }
     }
 }

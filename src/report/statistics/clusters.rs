@@ -63,7 +63,7 @@ impl ClusterRow {
 fn by_seed(table: &EpisodeTable, block: &Block, column: &MetricColumn) -> Vec<Moments> {
     let mut seeds: BTreeMap<i32, Vec<Option<i64>>> = BTreeMap::new();
     for &row in &block.rows {
-        seeds.entry(table.keys[row].seed).or_default().push(column.values[row]);
+        seeds.entry(table.keys.get(row).seed).or_default().push(column.get(row));
     }
     let of_seed = |values| moments(values).expect("a part of a block that was summed whole");
     seeds.into_values().map(of_seed).filter(|moments| moments.n > 0).collect()

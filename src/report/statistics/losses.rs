@@ -41,7 +41,7 @@ impl Losses {
 }
 
 fn of_block(study: &Study, block: &Block, lost: &BTreeSet<String>, confidence: f64) -> Vec<LossRow> {
-    let fate = |row: usize| if lost.contains(&study.table.keys[row].episode_id) { Fate::Lost } else { Fate::Kept };
+    let fate = |row: usize| if lost.contains(study.table.keys.get(row).episode_id) { Fate::Lost } else { Fate::Kept };
     let row = |metric: &str, lossy| LossRow {
         experiment: block.experiment.to_owned(),
         model: block.model.to_owned(),
@@ -51,7 +51,7 @@ fn of_block(study: &Study, block: &Block, lost: &BTreeSet<String>, confidence: f
     study
         .rates()
         .filter_map(|column| {
-            let episodes = block.rows.iter().map(|&at| (column.values[at], fate(at)));
+            let episodes = block.rows.iter().map(|&at| (column.get(at), fate(at)));
             bounds(episodes, confidence).map(|lossy| row(&column.name, lossy))
         })
         .filter(|row| row.lossy.lost > 0)

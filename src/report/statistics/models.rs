@@ -135,7 +135,7 @@ impl PairTest {
         let places: BTreeSet<Place> = first.places.keys().chain(second.places.keys()).copied().collect();
         for place in places {
             match (first.only(place), second.only(place)) {
-                (Some(a), Some(b)) => match (column.values[a], column.values[b]) {
+                (Some(a), Some(b)) => match (column.get(a), column.get(b)) {
                     (Some(a), Some(b)) => pairs = pairs.with(a == 1, b == 1),
                     _ => undefined += 1,
                 },

@@ -33,8 +33,8 @@ impl<'a> Study<'a> {
     pub fn of(table: &'a EpisodeTable) -> Result<Self, MomentOverflow> {
         let mut rows: BTreeMap<(usize, &str), BTreeMap<&str, Vec<usize>>> = BTreeMap::new();
         for (row, key) in table.keys.iter().enumerate() {
-            let rank = table.catalog.experiment_rank(&key.experiment);
-            rows.entry((rank, &key.experiment)).or_default().entry(&key.model).or_default().push(row);
+            let rank = table.catalog.experiment_rank(key.experiment);
+            rows.entry((rank, key.experiment)).or_default().entry(key.model).or_default().push(row);
         }
         let mut experiments = Vec::with_capacity(rows.len());
         for ((_, name), models) in rows {
@@ -80,7 +80,7 @@ impl<'a> Block<'a> {
         rows: Vec<usize>,
     ) -> Result<Self, MomentOverflow> {
         let of_column = |column: &'a MetricColumn| {
-            let values = rows.iter().map(|&row| column.values[row]);
+            let values = rows.iter().map(|&row| column.get(row));
             moments(values).map(|moments| (column.name.as_str(), moments))
         };
         let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
@@ -96,7 +96,7 @@ impl<'a> Block<'a> {
     pub fn places(&self, table: &EpisodeTable) -> BTreeMap<Place, Vec<usize>> {
         let mut places: BTreeMap<Place, Vec<usize>> = BTreeMap::new();
         for &row in &self.rows {
-            let key = &table.keys[row];
+            let key = table.keys.get(row);
             places.entry((key.seed, key.run)).or_default().push(row);
         }
         places

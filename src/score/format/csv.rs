@@ -4,42 +4,34 @@ use std::io::{Read, Write};
 
 use super::FormatError;
 use crate::metric::catalog::Catalog;
-use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
+use crate::score::builder::TableBuilder;
+use crate::score::table::{EpisodeTable, Header, KeyRef};
 
 /// The key columns, in the order of the file.
 pub(super) const KEYS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
 
 /// Writes a table as comma-separated values.
-pub(super) struct Writer<W: Write>(csv::Writer<W>);
-
-impl<W: Write> Writer<W> {
-    pub(super) fn new(header: &Header, out: W) -> Result<Self, FormatError> {
-        let mut writer = csv::Writer::from_writer(out);
-        let columns = header.labels.iter().chain(&header.metrics).map(String::as_str);
-        writer.write_record(KEYS.into_iter().chain(columns)).map_err(io)?;
-        Ok(Self(writer))
+pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatError> {
+    let mut writer = csv::Writer::from_writer(out);
+    let header = table.header();
+    let columns = header.labels.iter().chain(&header.metrics).map(String::as_str);
+    writer.write_record(KEYS.into_iter().chain(columns)).map_err(io)?;
+    for (row, key) in table.keys.iter().enumerate() {
+        for text in [key.episode_id, key.model, key.experiment] {
+            writer.write_field(text).map_err(io)?;
+        }
+        for number in [key.seed, key.run] {
+            writer.write_field(number.to_string()).map_err(io)?;
+        }
+        for label in &table.labels {
+            writer.write_field(label.values.get(row).unwrap_or_default()).map_err(io)?;
+        }
+        for metric in &table.metrics {
+            writer.write_field(metric.get(row).map_or_else(String::new, |value| value.to_string())).map_err(io)?;
+        }
+        writer.write_record(None::<&[u8]>).map_err(io)?;
     }
-
-    pub(super) fn write(&mut self, row: &EpisodeRow) -> Result<(), FormatError> {
-        let EpisodeKey { experiment, model, seed, run, episode_id } = &row.key;
-        for key in [episode_id, model, experiment] {
-            self.0.write_field(key).map_err(io)?;
-        }
-        for key in [seed, run] {
-            self.0.write_field(key.to_string()).map_err(io)?;
-        }
-        for label in &row.labels {
-            self.0.write_field(label.as_deref().unwrap_or_default()).map_err(io)?;
-        }
-        for metric in &row.metrics {
-            self.0.write_field(metric.map_or_else(String::new, |value| value.to_string())).map_err(io)?;
-        }
-        self.0.write_record(None::<&[u8]>).map_err(io)
-    }
-
-    pub(super) fn finish(mut self) -> Result<(), FormatError> {
-        Ok(self.0.flush()?)
-    }
+    Ok(writer.flush()?)
 }
 
 /// The system's own error: `csv` wraps it in another of a kind that says nothing, such as whether a pipe is closed.
@@ -93,32 +85,28 @@ pub(super) fn assemble(
     let label_names: Vec<&String> =
         header.iter().filter(|name| !is_metric(name) && !KEYS.contains(&name.as_str())).collect();
     let column = |name: &String| header.iter().position(|column| column == name).unwrap_or_default();
-    let mut table = EpisodeTable {
+    let header = Header {
         catalog: catalog.clone(),
-        keys: Vec::with_capacity(rows.len()),
-        labels: label_names.iter().map(|name| LabelColumn { name: (*name).clone(), values: Vec::new() }).collect(),
-        metrics: metric_names.iter().map(|name| MetricColumn { name: (*name).clone(), values: Vec::new() }).collect(),
+        labels: label_names.iter().map(|name| (*name).clone()).collect(),
+        metrics: metric_names.iter().map(|name| (*name).clone()).collect(),
     };
+    let mut builder = TableBuilder::new(header);
     for (at, row) in rows.into_iter().enumerate() {
         let line = first_line + at;
-        let cell = |position: usize| row.get(position).cloned().flatten().filter(|cell| !cell.is_empty());
+        let cell = |position: usize| row.get(position)?.as_deref().filter(|cell| !cell.is_empty());
         let [episode_id, model, experiment, seed, run] = positions;
-        table.keys.push(EpisodeKey {
+        let key = KeyRef {
             experiment: required(cell(experiment), line, "experiment")?,
             model: required(cell(model), line, "model")?,
-            seed: integer(&required(cell(seed), line, "seed")?, line, "seed")?,
-            run: integer(&required(cell(run), line, "run")?, line, "run")?,
+            seed: integer(required(cell(seed), line, "seed")?, line, "seed")?,
+            run: integer(required(cell(run), line, "run")?, line, "run")?,
             episode_id: required(cell(episode_id), line, "episode_id")?,
-        });
-        for label in &mut table.labels {
-            label.values.push(cell(column(&label.name)));
-        }
-        for metric in &mut table.metrics {
-            let value = cell(column(&metric.name)).map(|text| integer(&text, line, &metric.name)).transpose()?;
-            metric.values.push(value);
-        }
+        };
+        let value = |name: &&String| cell(column(name)).map(|text| integer(text, line, name)).transpose();
+        let metrics: Vec<Option<i64>> = metric_names.iter().map(value).collect::<Result<_, _>>()?;
+        builder.push(key, label_names.iter().map(|name| cell(column(name))), metrics);
     }
-    Ok(table.sorted())
+    Ok(builder.finish())
 }
 
 /// Each column has a name of its own.
@@ -133,7 +121,7 @@ pub(super) fn check_unique(names: &[&str]) -> Result<(), FormatError> {
     }
 }
 
-fn required(cell: Option<String>, line: usize, column: &str) -> Result<String, FormatError> {
+fn required<'a>(cell: Option<&'a str>, line: usize, column: &str) -> Result<&'a str, FormatError> {
     cell.ok_or_else(|| FormatError::Value {
         line,
         column: column.to_owned(),

@@ -1,4 +1,4 @@
-//! The episode table as JSON lines: an object an episode, keys in the order of the columns.
+//! The episode table as JSON lines: one object per episode, keys in the order of the columns.
 
 use std::io::{BufRead as _, BufReader, Read, Write};
 
@@ -6,40 +6,27 @@ use serde_json::{Map, Value};
 
 use super::{FormatError, csv};
 use crate::metric::catalog::Catalog;
-use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header};
+use crate::score::table::EpisodeTable;
 
 /// Writes a table as JSON lines.
-pub(super) struct Writer<W> {
-    header: Header,
-    out: W,
-}
-
-impl<W: Write> Writer<W> {
-    pub(super) fn new(header: Header, out: W) -> Self {
-        Self { header, out }
-    }
-
-    pub(super) fn write(&mut self, row: &EpisodeRow) -> Result<(), FormatError> {
-        let EpisodeKey { experiment, model, seed, run, episode_id } = &row.key;
+pub(super) fn write(table: &EpisodeTable, mut out: impl Write) -> Result<(), FormatError> {
+    for (row, key) in table.keys.iter().enumerate() {
         let mut object = Map::new();
-        object.insert("episode_id".into(), episode_id.as_str().into());
-        object.insert("model".into(), model.as_str().into());
-        object.insert("experiment".into(), experiment.as_str().into());
-        object.insert("seed".into(), (*seed).into());
-        object.insert("run".into(), (*run).into());
-        for (name, label) in self.header.labels.iter().zip(&row.labels) {
-            object.insert(name.clone(), label.as_deref().map_or(Value::Null, Value::from));
+        object.insert("episode_id".into(), key.episode_id.into());
+        object.insert("model".into(), key.model.into());
+        object.insert("experiment".into(), key.experiment.into());
+        object.insert("seed".into(), key.seed.into());
+        object.insert("run".into(), key.run.into());
+        for label in &table.labels {
+            object.insert(label.name.clone(), label.values.get(row).map_or(Value::Null, Value::from));
         }
-        for (name, metric) in self.header.metrics.iter().zip(&row.metrics) {
-            object.insert(name.clone(), metric.map_or(Value::Null, Value::from));
+        for metric in &table.metrics {
+            object.insert(metric.name.clone(), metric.get(row).map_or(Value::Null, Value::from));
         }
-        serde_json::to_writer(&mut self.out, &object).map_err(std::io::Error::from)?;
-        Ok(self.out.write_all(b"\n")?)
+        serde_json::to_writer(&mut out, &object).map_err(std::io::Error::from)?;
+        out.write_all(b"\n")?;
     }
-
-    pub(super) fn finish(mut self) -> Result<(), FormatError> {
-        Ok(self.out.flush()?)
-    }
+    Ok(out.flush()?)
 }
 
 pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {

@@ -8,8 +8,8 @@
 mod csv;
 mod footer;
 mod jsonl;
-mod parquet;
-mod surroundings;
+pub mod parquet;
+mod partition;
 
 use std::collections::HashSet;
 use std::io::{self, Read, Write};
@@ -17,11 +17,11 @@ use std::io::{self, Read, Write};
 use ::parquet::errors::ParquetError;
 use ::parquet::file::reader::ChunkReader;
 
-use super::table::{EpisodeRow, EpisodeTable, Header};
+use super::table::EpisodeTable;
 use crate::metric::catalog::{Catalog, Kind};
 
 pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
-pub use self::surroundings::Surroundings;
+pub use self::partition::Partition;
 
 /// A format of episode tables.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,9 +58,6 @@ pub enum FormatError {
     /// Bytes could not be written or read.
     #[error("cannot write or read the scores")]
     Io(#[from] std::io::Error),
-    /// There is no thread for the encoder.
-    #[error("cannot start a thread to encode the scores; close other programs or raise the limit of processes")]
-    Thread(#[source] std::io::Error),
     /// The Parquet library's own words.
     #[error("not a readable Parquet file of scores: {0}")]
     Parquet(#[from] ::parquet::errors::ParquetError),
@@ -130,36 +127,19 @@ impl FormatError {
 
 /// Writes a table.
 ///
+/// Parquet can be encoded by several threads: see [`parquet::Encoder`].
+///
 /// # Errors
 /// Whatever writing gives.
 pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Result<(), FormatError> {
-    write_rows(table.header(), format, out, |write| table.rows().try_for_each(|row| write(&row)))
-}
-
-/// Writes a table row by row: memory does not grow with it.
-///
-/// `rows` gives each row, in order, to the function that it is called with.
-///
-/// # Errors
-/// Whatever writing or `rows` gives.
-pub fn write_rows<E: From<FormatError>>(
-    header: Header,
-    format: Format,
-    out: impl Write + Send,
-    rows: impl FnOnce(&mut dyn FnMut(&EpisodeRow) -> Result<(), FormatError>) -> Result<(), E>,
-) -> Result<(), E> {
     match format {
-        Format::Parquet => parquet::write(&header, out, rows),
-        Format::Csv => {
-            let mut writer = csv::Writer::new(&header, out)?;
-            rows(&mut |row| writer.write(row))?;
-            Ok(writer.finish()?)
+        Format::Parquet => {
+            let (encoder, mut writer) = parquet::encoder(table, out)?;
+            encoder.jobs().try_for_each(|job| writer.append(encoder.encode(job)?))?;
+            writer.finish()
         }
-        Format::JsonLines => {
-            let mut writer = jsonl::Writer::new(header, out);
-            rows(&mut |row| writer.write(row))?;
-            Ok(writer.finish()?)
-        }
+        Format::Csv => csv::write(table, out),
+        Format::JsonLines => jsonl::write(table, out),
     }
 }
 
@@ -174,21 +154,18 @@ pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<
     })
 }
 
-/// Reads a table and the definitions that it carries, or those of its surroundings.
+/// Reads a table and the definitions that it carries, or those of its partition.
 ///
 /// # Errors
 /// A file that is not Parquet, or not one of scores; scores that its definitions cannot have given.
-pub fn read_parquet(
-    input: impl ChunkReader + 'static,
-    surroundings: &Surroundings<'_>,
-) -> Result<EpisodeTable, FormatError> {
-    checked(parquet::read(input, surroundings)?)
+pub fn read_parquet(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+    checked(parquet::read(input, partition)?)
 }
 
 /// A table as scoring gives it: each episode once, of a known experiment, rates 0 and 1.
 fn checked(table: EpisodeTable) -> Result<EpisodeTable, FormatError> {
     let fault = |row: usize, column: &str, expected: &str, found: &str| FormatError::Episode {
-        episode: table.keys[row].episode_id.clone(),
+        episode: table.keys.get(row).episode_id.to_owned(),
         column: column.to_owned(),
         expected: expected.to_owned(),
         found: found.to_owned(),
@@ -196,19 +173,19 @@ fn checked(table: EpisodeTable) -> Result<EpisodeTable, FormatError> {
     let experiments = &table.catalog.experiment;
     let mut seen = HashSet::new();
     for (row, key) in table.keys.iter().enumerate() {
-        if !seen.insert(key.episode_id.as_str()) {
+        if !seen.insert(key.episode_id) {
             return Err(fault(row, "episode_id", "each episode once", "a second row of it"));
         }
-        if !table.catalog.open && !experiments.contains_key(&key.experiment) {
+        if !table.catalog.open && !experiments.contains_key(key.experiment) {
             let known = experiments.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
             return Err(fault(row, "experiment", &format!("one of {known}"), &format!("`{}`", key.experiment)));
         }
     }
     for metric in &table.metrics {
         let is_rate = table.catalog.metric.get(&metric.name).is_some_and(|known| known.kind == Kind::Rate);
-        let strange = |value: &Option<i64>| is_rate && !matches!(value, None | Some(0 | 1));
-        if let Some(row) = metric.values.iter().position(strange) {
-            let found = metric.values[row].map_or_else(String::new, |value| value.to_string());
+        let strange = |value: Option<i64>| is_rate && !matches!(value, None | Some(0 | 1));
+        if let Some(row) = metric.iter().position(strange) {
+            let found = metric.get(row).map_or_else(String::new, |value| value.to_string());
             return Err(fault(row, &metric.name, "0 or 1, or nothing where it is undefined", &found));
         }
     }

@@ -1,14 +1,10 @@
 //! The episode table as Parquet, the definitions in its footer.
 
 use std::io::Write;
-use std::iter;
 use std::ops::Range;
-use std::sync::Arc;
-use std::sync::mpsc::{self, Receiver, SyncSender};
+use std::sync::{Arc, Mutex, PoisonError};
 
-use arrow::array::{
-    Array, ArrayBuilder as _, ArrayRef, AsArray as _, Int32Builder, Int64Array, RecordBatch, StringBuilder,
-};
+use arrow::array::{Array, ArrayRef, AsArray as _, Int32Array, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
@@ -24,10 +20,10 @@ use parquet::file::writer::SerializedFileWriter;
 use super::FormatError;
 use super::csv::{KEYS, check_unique};
 use super::footer;
-use super::surroundings::Surroundings;
-use crate::base::beside::beside;
-use crate::score::table::{EpisodeKey, EpisodeRow, EpisodeTable, Header, LabelColumn, MetricColumn};
-use crate::score::values::nulls_of;
+use super::partition::Partition;
+use crate::metric::catalog::Catalog;
+use crate::score::builder::TableBuilder;
+use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use crate::trace::contain::contained;
 use crate::trace::footer_shape;
 
@@ -69,113 +65,153 @@ fn metadata(file: &impl ChunkReader) -> Option<ParquetMetaData> {
 const ROW_GROUP_ROWS: usize = 64 * 1024;
 /// Rows that are gathered before they are encoded.
 const GATHERED_ROWS: usize = 4 * 1024;
-/// Bytes of texts that are gathered at most, one row more or less: a column holds 2 GiB.
+/// Bytes of a column's texts that are gathered at most, one row more or less: an array holds 2 GiB.
 const GATHERED_TEXT: usize = 256 << 20;
 
-/// Batches that wait for an encoder.
-const WAITING: usize = 2;
+/// A column of a row group, to be encoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Job {
+    group: usize,
+    column: usize,
+}
 
-/// The columns that one encoder takes; another one takes those behind them. Each has about half of the work.
-const TEXTS: Range<usize> = 0..3;
+/// Encodes a table: its jobs may be done on any threads.
+pub struct Encoder<'a> {
+    table: &'a EpisodeTable,
+    schema: Arc<Schema>,
+    factory: ArrowRowGroupWriterFactory,
+    /// The column writers of each row group that are not taken yet; none before the first one is.
+    groups: Vec<Mutex<Vec<Option<ArrowColumnWriter>>>>,
+}
 
-/// Writes a table as Parquet: rows are gathered here and encoded on threads of their own.
+/// Takes what was encoded, in the order of the jobs.
+pub struct Writer<W: Write + Send> {
+    file: SerializedFileWriter<W>,
+    columns: usize,
+    /// The columns so far of the row group under way.
+    group: Vec<ArrowColumnChunk>,
+}
+
+/// What encodes a table, and what takes it.
 ///
-/// `rows` gives each row to the function that it is called with.
-pub(super) fn write<E: From<FormatError>>(
-    header: &Header,
-    out: impl Write + Send,
-    rows: impl FnOnce(&mut dyn FnMut(&EpisodeRow) -> Result<(), FormatError>) -> Result<(), E>,
-) -> Result<(), E> {
-    let schema = Arc::new(schema(header));
-    let properties = properties(header)?;
-    let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties)).map_err(FormatError::from)?;
-    let feed = |give: SyncSender<RecordBatch>| {
-        let mut gathered = Gathered::new(header);
-        // What ended the encoder is learnt when it is done.
-        let send = |gathered: &mut Gathered| {
-            let batch = RecordBatch::try_new(Arc::clone(&schema), gathered.take());
-            let batch = batch.map_err(|error| FormatError::Parquet(ParquetError::ArrowError(error.to_string())))?;
-            Ok::<_, FormatError>(give.send(batch).is_ok())
-        };
-        let mut over = false;
-        rows(&mut |row| {
-            if !over {
-                gathered.add(row);
-                over = gathered.is_full() && !send(&mut gathered)?;
-            }
-            Ok(())
-        })?;
-        send(&mut gathered).map(drop).map_err(E::from)
-    };
-    let (given, written) =
-        beside("parquet", WAITING, |batches| encode(parquet, &batches), feed).map_err(FormatError::Thread)?;
-    given?;
-    written?.close().map_err(FormatError::from)?;
-    Ok(())
+/// # Errors
+/// Whatever writing gives.
+pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder<'_>, Writer<W>), FormatError> {
+    let header = table.header();
+    let schema = Arc::new(schema(&header));
+    let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties(&header)?))?;
+    let (file, factory) = parquet.into_serialized_writer()?;
+    let writer = Writer { file, columns: schema.fields().len(), group: Vec::new() };
+    let groups = (0..table.len().div_ceil(ROW_GROUP_ROWS)).map(|_| Mutex::default()).collect();
+    Ok((Encoder { table, schema, factory, groups }, writer))
 }
 
-/// Encodes batches until there are no more; what comes back is to be closed, unless a row was lost.
-fn encode<W: Write + Send>(
-    parquet: ArrowWriter<W>,
-    batches: &Receiver<RecordBatch>,
-) -> Result<SerializedFileWriter<W>, FormatError> {
-    let (mut file, factory) = parquet.into_serialized_writer()?;
-    let others = TEXTS.end..file.schema_descr().num_columns();
-    let (give, numbers) = mpsc::channel();
-    let factory = &factory;
-    let encode_numbers = move |batches: Receiver<RecordBatch>| {
-        let gone = |_| ParquetError::General("nobody takes the encoded columns".into());
-        encode_columns(factory, &others, batches, |chunks| give.send(chunks).map_err(gone))
-    };
-    let encode_texts = |pass_on: SyncSender<RecordBatch>| {
-        let mut pass_on = Some(pass_on);
-        // The other encoder is told at once when there are no more: its last columns are waited for here.
-        let batches = iter::from_fn(|| {
-            let batch = batches.recv().ok();
-            pass_on = pass_on.take().filter(|next| batch.clone().is_some_and(|batch| next.send(batch).is_ok()));
-            batch
-        });
-        encode_columns(factory, &TEXTS, batches, |texts| {
-            // Why there are none, the other encoder knows.
-            let Ok(numbers) = numbers.recv() else { return Ok(()) };
-            let mut group = file.next_row_group()?;
-            texts.into_iter().chain(numbers).try_for_each(|chunk| chunk.append_to_row_group(&mut group))?;
-            group.close().map(drop)
-        })
-    };
-    let (texts, numbers) = beside("parquet", WAITING, encode_numbers, encode_texts).map_err(FormatError::Thread)?;
-    texts?;
-    numbers?;
-    Ok(file)
-}
+impl Encoder<'_> {
+    /// All jobs, in the order in which a writer takes them.
+    pub fn jobs(&self) -> impl Iterator<Item = Job> + use<> {
+        let columns = self.schema.fields().len();
+        (0..self.groups.len()).flat_map(move |group| (0..columns).map(move |column| Job { group, column }))
+    }
 
-/// Encodes some columns of batches and gives `done` their chunks, row group by row group.
-fn encode_columns(
-    factory: &ArrowRowGroupWriterFactory,
-    columns: &Range<usize>,
-    batches: impl IntoIterator<Item = RecordBatch>,
-    mut done: impl FnMut(Vec<ArrowColumnChunk>) -> Result<(), ParquetError>,
-) -> Result<(), ParquetError> {
-    let mut batches = batches.into_iter().filter(|batch| batch.num_rows() > 0).peekable();
-    for group in 0.. {
-        if batches.peek().is_none() {
-            break;
-        }
-        let mut writers: Vec<_> = factory.create_column_writers(group)?.drain(columns.clone()).collect();
-        let mut rows = 0;
-        while rows < ROW_GROUP_ROWS
-            && let Some(batch) = batches.next()
-        {
-            for (writer, at) in writers.iter_mut().zip(columns.clone()) {
-                for leaf in compute_leaves(batch.schema_ref().field(at), batch.column(at))? {
+    /// Encodes one column of one row group.
+    ///
+    /// # Errors
+    /// Whatever the Parquet library says; a job that was done before.
+    pub fn encode(&self, job: Job) -> Result<ArrowColumnChunk, FormatError> {
+        let mut writer = self.writer(job)?;
+        let field = self.schema.field(job.column);
+        let start = job.group * ROW_GROUP_ROWS;
+        let end = self.table.len().min(start + ROW_GROUP_ROWS);
+        for first in (start..end).step_by(GATHERED_ROWS) {
+            let mut rows = first..end.min(first + GATHERED_ROWS);
+            while !rows.is_empty() {
+                let some = rows.start..self.until(job.column, &rows);
+                rows.start = some.end;
+                for leaf in compute_leaves(field, &self.values(job.column, some)?)? {
                     writer.write(&leaf)?;
                 }
             }
-            rows += batch.num_rows();
         }
-        done(writers.into_iter().map(ArrowColumnWriter::close).collect::<Result<_, _>>()?)?;
+        Ok(writer.close()?)
     }
-    Ok(())
+
+    /// Writers come a row group at a time, and each is costly.
+    fn writer(&self, job: Job) -> Result<ArrowColumnWriter, ParquetError> {
+        let mut writers = self.groups[job.group].lock().unwrap_or_else(PoisonError::into_inner);
+        if writers.is_empty() {
+            *writers = self.factory.create_column_writers(job.group)?.into_iter().map(Some).collect();
+        }
+        writers[job.column].take().ok_or_else(|| ParquetError::General("the column is encoded already".into()))
+    }
+
+    /// The end of as many of these rows as may be gathered: a dictionary holds a text once, and an array each time.
+    fn until(&self, column: usize, rows: &Range<usize>) -> usize {
+        let Some(texts) = self.texts(column) else { return rows.end };
+        let mut bytes = 0;
+        let full = |row: &usize| {
+            bytes += texts.get(*row).map_or(0, str::len);
+            bytes >= GATHERED_TEXT
+        };
+        rows.clone().find(full).map_or(rows.end, |row| row + 1)
+    }
+
+    /// A column of text of the schema.
+    fn texts(&self, column: usize) -> Option<&TextColumn> {
+        let EpisodeTable { keys, labels, .. } = self.table;
+        match column {
+            0 => Some(&keys.episode_id),
+            1 => Some(&keys.model),
+            2 => Some(&keys.experiment),
+            other => labels.get(other.checked_sub(KEYS.len())?).map(|label| &label.values),
+        }
+    }
+
+    /// Some values of a column of the schema.
+    fn values(&self, column: usize, rows: Range<usize>) -> Result<ArrayRef, FormatError> {
+        if let Some(texts) = self.texts(column) {
+            return Ok(texts_of(texts, rows));
+        }
+        let EpisodeTable { keys, labels, metrics, .. } = self.table;
+        let number = |numbers: &Int32Array| Arc::new(numbers.slice(rows.start, rows.len())) as ArrayRef;
+        Ok(match column {
+            3 => number(&keys.seed),
+            4 => number(&keys.run),
+            other => {
+                let metric = &metrics[other - KEYS.len() - labels.len()];
+                cast(&metric.values.slice(rows.start, rows.len()), &DataType::Int64)
+                    .map_err(|error| ParquetError::ArrowError(error.to_string()))?
+            }
+        })
+    }
+}
+
+fn texts_of(column: &TextColumn, rows: Range<usize>) -> ArrayRef {
+    Arc::new(rows.map(|row| column.get(row)).collect::<StringArray>())
+}
+
+impl<W: Write + Send> Writer<W> {
+    /// Takes the next column.
+    ///
+    /// # Errors
+    /// Whatever writing gives.
+    pub fn append(&mut self, column: ArrowColumnChunk) -> Result<(), FormatError> {
+        self.group.push(column);
+        if self.group.len() == self.columns {
+            let mut group = self.file.next_row_group()?;
+            self.group.drain(..).try_for_each(|column| column.append_to_row_group(&mut group))?;
+            group.close()?;
+        }
+        Ok(())
+    }
+
+    /// Writes the footer.
+    ///
+    /// # Errors
+    /// Whatever writing gives.
+    pub fn finish(self) -> Result<(), FormatError> {
+        self.file.close()?;
+        Ok(())
+    }
 }
 
 fn properties(header: &Header) -> Result<WriterProperties, FormatError> {
@@ -211,156 +247,70 @@ fn schema(header: &Header) -> Schema {
     Schema::new(keys.chain(labels).chain(metrics).collect::<Vec<_>>())
 }
 
-/// Rows as columns that grow.
-struct Gathered {
-    texts: [StringBuilder; 3],
-    seed: Int32Builder,
-    run: Int32Builder,
-    labels: Vec<StringBuilder>,
-    metrics: Vec<Numbers>,
-    text_bytes: usize,
-}
-
-/// Integers of which some are not there.
-#[derive(Default)]
-struct Numbers {
-    values: Vec<i64>,
-    valid: Vec<bool>,
-}
-
-impl Numbers {
-    fn add(&mut self, number: Option<i64>) {
-        self.values.push(number.unwrap_or_default());
-        self.valid.push(number.is_some());
-    }
-
-    /// All of them; room is made for as many.
-    fn take(&mut self) -> Int64Array {
-        let count = self.values.len();
-        let values = std::mem::replace(&mut self.values, Vec::with_capacity(count));
-        let numbers = Int64Array::new(values.into(), nulls_of(&self.valid));
-        self.valid.clear();
-        numbers
-    }
-}
-
-impl Gathered {
-    fn new(header: &Header) -> Self {
-        Self {
-            texts: Default::default(),
-            seed: Int32Builder::new(),
-            run: Int32Builder::new(),
-            labels: header.labels.iter().map(|_| StringBuilder::new()).collect(),
-            metrics: header.metrics.iter().map(|_| Numbers::default()).collect(),
-            text_bytes: 0,
-        }
-    }
-
-    fn is_full(&self) -> bool {
-        self.seed.len() == GATHERED_ROWS || self.text_bytes >= GATHERED_TEXT
-    }
-
-    fn add(&mut self, row: &EpisodeRow) {
-        let EpisodeKey { experiment, model, seed, run, episode_id } = &row.key;
-        for (column, text) in self.texts.iter_mut().zip([episode_id, model, experiment]) {
-            column.append_value(text);
-            self.text_bytes += text.len();
-        }
-        self.seed.append_value(*seed);
-        self.run.append_value(*run);
-        for (column, label) in self.labels.iter_mut().zip(&row.labels) {
-            column.append_option(label.as_deref());
-            self.text_bytes += label.as_ref().map_or(0, String::len);
-        }
-        for (column, metric) in self.metrics.iter_mut().zip(&row.metrics) {
-            column.add(*metric);
-        }
-    }
-
-    /// The columns in the order of the schema; none is left behind.
-    fn take(&mut self) -> Vec<ArrayRef> {
-        self.text_bytes = 0;
-        let mut columns: Vec<ArrayRef> = Vec::new();
-        columns.extend(self.texts.iter_mut().map(taken));
-        columns.extend([&mut self.seed, &mut self.run].map(|column| Arc::new(column.finish()) as ArrayRef));
-        columns.extend(self.labels.iter_mut().map(taken));
-        columns.extend(self.metrics.iter_mut().map(|column| Arc::new(column.take()) as ArrayRef));
-        columns
-    }
-}
-
-/// All texts of a column; room is made for as many.
-fn taken(column: &mut StringBuilder) -> ArrayRef {
-    let texts = column.finish();
-    *column = StringBuilder::with_capacity(texts.len(), texts.value_data().len());
-    Arc::new(texts)
-}
-
-pub(super) fn read(
-    input: impl ChunkReader + 'static,
-    surroundings: &Surroundings<'_>,
-) -> Result<EpisodeTable, FormatError> {
-    contained(|| decode(input, surroundings))
+pub(super) fn read(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+    contained(|| decode(input, partition))
         .unwrap_or_else(|panic| Err(FormatError::Parquet(ParquetError::General(panic))))
 }
 
-fn decode(input: impl ChunkReader + 'static, surroundings: &Surroundings<'_>) -> Result<EpisodeTable, FormatError> {
-    footer_shape::check_file(&input).map_err(ParquetError::General)?;
+fn decode(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
-    let catalog = match (footer::value(builder.metadata().file_metadata(), DEFINITIONS_KEY), surroundings.definitions) {
+    let catalog = match (footer::value(builder.metadata().file_metadata(), DEFINITIONS_KEY), partition.definitions) {
         (Some(text), _) => serde_json::from_str(&text).map_err(|error| FormatError::Definitions(error.to_string()))?,
         (None, Some(named)) => named.clone(),
         (None, None) => return Err(FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`"))),
     };
     let names: Vec<&str> = builder.schema().fields().iter().map(|field| field.name().as_str()).collect();
     check_unique(&names)?;
-    let mut table = EpisodeTable { catalog, keys: Vec::new(), labels: Vec::new(), metrics: Vec::new() };
     // A part without rows has its columns all the same.
-    let none = surroundings.complete(&RecordBatch::new_empty(builder.schema().clone()), &table.catalog)?;
+    let none = partition.complete(&RecordBatch::new_empty(builder.schema().clone()), &catalog)?;
+    let mut table = TableBuilder::new(header_of(&none, catalog));
     append(&mut table, &none)?;
     for batch in builder.build()? {
         let batch = batch.map_err(|error| FormatError::Parquet(error.into()))?;
-        let batch = surroundings.complete(&batch, &table.catalog)?;
+        let batch = partition.complete(&batch, &table.header().catalog)?;
         append(&mut table, &batch)?;
     }
-    Ok(table.sorted())
+    Ok(table.finish())
 }
 
-fn append(table: &mut EpisodeTable, batch: &RecordBatch) -> Result<(), FormatError> {
-    let [ids, models, experiments] = [texts(batch, KEYS[0])?, texts(batch, KEYS[1])?, texts(batch, KEYS[2])?];
-    let [seeds, runs] = [ints(batch, KEYS[3])?, ints(batch, KEYS[4])?];
-    for row in 0..batch.num_rows() {
-        let text = |values: &[Option<String>], column| values[row].clone().ok_or_else(|| null(column));
-        let number = |values: &[Option<i64>], column| {
-            values[row].and_then(|value| i32::try_from(value).ok()).ok_or_else(|| null(column))
-        };
-        table.keys.push(EpisodeKey {
-            experiment: text(&experiments, KEYS[2])?,
-            model: text(&models, KEYS[1])?,
-            seed: number(&seeds, KEYS[3])?,
-            run: number(&runs, KEYS[4])?,
-            episode_id: text(&ids, KEYS[0])?,
-        });
-    }
+/// The labels and metrics among the columns of a batch.
+fn header_of(batch: &RecordBatch, catalog: Catalog) -> Header {
     let schema = batch.schema();
     let others = schema.fields().iter().map(|field| field.name()).filter(|name| !KEYS.contains(&name.as_str()));
-    for name in others {
-        if table.catalog.metric.contains_key(name) {
-            let values = ints(batch, name)?;
-            match table.metrics.iter_mut().find(|metric| metric.name == *name) {
-                Some(metric) => metric.values.extend(values),
-                None => table.metrics.push(MetricColumn { name: name.clone(), values }),
-            }
-        } else {
-            let values = texts(batch, name)?;
-            match table.labels.iter_mut().find(|label| label.name == *name) {
-                Some(label) => label.values.extend(values),
-                None => table.labels.push(LabelColumn { name: name.clone(), values }),
-            }
-        }
+    let (metrics, labels) = others.cloned().partition(|name| catalog.metric.contains_key(name));
+    Header { catalog, labels, metrics }
+}
+
+fn append(table: &mut TableBuilder, batch: &RecordBatch) -> Result<(), FormatError> {
+    let [ids, models, experiments] = [texts(batch, KEYS[0])?, texts(batch, KEYS[1])?, texts(batch, KEYS[2])?];
+    let [seeds, runs] = [ints(batch, KEYS[3])?, ints(batch, KEYS[4])?];
+    let Header { labels, metrics, .. } = table.header();
+    let metrics: Vec<_> = metrics.iter().map(|name| ints(batch, name)).collect::<Result<_, _>>()?;
+    let labels: Vec<_> = labels.iter().map(|name| texts(batch, name)).collect::<Result<_, _>>()?;
+    for row in 0..batch.num_rows() {
+        let number = |values: &Int64Array, column| {
+            int_at(values, row).and_then(|value| i32::try_from(value).ok()).ok_or_else(|| null(column))
+        };
+        let key = KeyRef {
+            experiment: text_at(&experiments, row).ok_or_else(|| null(KEYS[2]))?,
+            model: text_at(&models, row).ok_or_else(|| null(KEYS[1]))?,
+            seed: number(&seeds, KEYS[3])?,
+            run: number(&runs, KEYS[4])?,
+            episode_id: text_at(&ids, row).ok_or_else(|| null(KEYS[0]))?,
+        };
+        let labels = labels.iter().map(|label| text_at(label, row));
+        table.push(key, labels, metrics.iter().map(|metric| int_at(metric, row)));
     }
     Ok(())
+}
+
+fn text_at(texts: &StringArray, row: usize) -> Option<&str> {
+    texts.is_valid(row).then(|| texts.value(row))
+}
+
+fn int_at(ints: &Int64Array, row: usize) -> Option<i64> {
+    ints.is_valid(row).then(|| ints.value(row))
 }
 
 fn null(column: &str) -> FormatError {
@@ -388,14 +338,14 @@ fn is_whole(column: &ArrayRef) -> bool {
     column.as_primitive_opt::<Float64Type>().is_some_and(|floats| floats.iter().flatten().all(whole))
 }
 
-fn texts(batch: &RecordBatch, name: &str) -> Result<Vec<Option<String>>, FormatError> {
+fn texts(batch: &RecordBatch, name: &str) -> Result<StringArray, FormatError> {
     let column = column(batch, name, &DataType::Utf8, "text")?;
-    Ok(column.as_string::<i32>().iter().map(|text| text.map(str::to_owned)).collect())
+    Ok(column.as_string::<i32>().clone())
 }
 
-fn ints(batch: &RecordBatch, name: &str) -> Result<Vec<Option<i64>>, FormatError> {
+fn ints(batch: &RecordBatch, name: &str) -> Result<Int64Array, FormatError> {
     let column = column(batch, name, &DataType::Int64, "integers")?;
-    Ok(column.as_primitive::<Int64Type>().iter().collect())
+    Ok(column.as_primitive::<Int64Type>().clone())
 }
 
 #[cfg(test)]
@@ -408,15 +358,13 @@ mod tests {
     use super::*;
     use crate::metric::definitions::Definitions;
     use crate::score::format::{self, Format};
-    use crate::score::run::schema_columns;
+    use crate::score::score_traces::schema_columns;
+    use crate::score::table::{EpisodeKey, MetricColumn};
 
     /// More rows than a row group has.
     fn table() -> EpisodeTable {
         let rows = 0..ROW_GROUP_ROWS + GATHERED_ROWS + 5;
-        let metric = |name: &str, of: &dyn Fn(usize) -> Option<i64>| MetricColumn {
-            name: name.to_owned(),
-            values: rows.clone().map(of).collect(),
-        };
+        let metric = |name: &str, of: &dyn Fn(usize) -> Option<i64>| MetricColumn::new(name, rows.clone().map(of));
         let small = |row: usize| i64::try_from(row % 7).unwrap();
         EpisodeTable {
             catalog: Definitions::load("paper", &schema_columns()).unwrap().catalog,
@@ -446,8 +394,8 @@ mod tests {
         let groups = ParquetMetaDataReader::new().parse_and_finish(&bytes).unwrap();
         let rows: Vec<i64> = groups.row_groups().iter().map(RowGroupMetaData::num_rows).collect();
         assert_eq!(rows, [ROW_GROUP_ROWS, GATHERED_ROWS + 5].map(|rows| i64::try_from(rows).unwrap()));
-        let surroundings = Surroundings { folders: &[], definitions: None };
-        assert_eq!(read(bytes, &surroundings).unwrap(), table());
+        let partition = Partition { folders: &[], definitions: None };
+        assert_eq!(read(bytes, &partition).unwrap(), table());
     }
 
     /// Takes so many bytes.

@@ -2,7 +2,6 @@
 
 use crate::base::near::nearest;
 use crate::base::palette::Color;
-use crate::base::visible::acts;
 
 /// Words that some columns hold in place of a colour.
 pub(crate) const WORDS: [&str; 2] = ["none", "unknown"];
@@ -19,9 +18,15 @@ pub(super) fn is_well_spelled(name: &str) -> bool {
 
 /// A name in lower case, with single spaces between its words and no character that does not show.
 pub(crate) fn normal(name: &str) -> String {
-    let shown: String = name.chars().filter(|c| c.is_whitespace() || !acts(*c)).collect();
+    let shown: String = name.chars().filter(|c| c.is_whitespace() || !hides(*c)).collect();
     let words: Vec<&str> = shown.split_whitespace().collect();
     words.join(" ").to_lowercase()
+}
+
+/// Whether a character does not show, as [`STRAY`] lists them for engines that match patterns.
+fn hides(c: char) -> bool {
+    let is_mark = matches!(c, '\u{ad}' | '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}');
+    c.is_control() || is_mark || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{e0000}'..='\u{e007f}')
 }
 
 /// The normal form without white space: the same for all spellings of a name.

@@ -309,13 +309,7 @@ impl Stored {
                     count -= same;
                 }
                 Span::Packed(packed) => {
-                    let mut outcome = Ok(());
-                    packed.each(|value| {
-                        if let Err(unfit) = runs.add(value.cast_signed(), 1) {
-                            outcome = Err(unfit);
-                        }
-                    });
-                    outcome?;
+                    packed.blocks(|values| runs.add_each(values))?;
                     count -= packed.count;
                 }
             }
@@ -356,6 +350,12 @@ impl Stretches {
             }
         }
         Ok(())
+    }
+
+    /// Adds a row of each key.
+    fn add_each(&mut self, keys: &[i32]) -> Result<(), Unfit> {
+        // Mostly the keys are those of two episodes, or of one.
+        keys.chunk_by(|a, b| a == b).try_for_each(|same| self.add(same[0], same.len()))
     }
 }
 

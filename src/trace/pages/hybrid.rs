@@ -2,6 +2,8 @@
 //!
 //! Source: the Parquet format's "Run Length Encoding / Bit-Packing Hybrid (RLE = 3)".
 
+use std::convert::Infallible;
+
 use bytes::Bytes;
 
 use super::Unfit;
@@ -195,15 +197,22 @@ impl Number for i32 {
 impl Packed<'_> {
     /// Gives each number to `take`.
     pub(super) fn each(&self, mut take: impl FnMut(u32)) {
+        let Ok(()) = self.blocks(|some| {
+            some.iter().for_each(|number| take(number.cast_unsigned()));
+            Ok::<_, Infallible>(())
+        });
+    }
+
+    /// Gives all numbers to `take`, some at a time.
+    pub(super) fn blocks<E>(&self, mut take: impl FnMut(&[i32]) -> Result<(), E>) -> Result<(), E> {
         let mut numbers = [0_i32; 64];
         for first in (0..self.count).step_by(numbers.len()) {
             let count = numbers.len().min(self.count - first);
             let some = &mut numbers[..count];
             Self { bit: self.bit + first * self.width, ..*self }.unpack(some);
-            for number in some {
-                take(number.cast_unsigned());
-            }
+            take(some)?;
         }
+        Ok(())
     }
 
     fn unpack<N: Number>(&self, out: &mut [N]) {
@@ -276,7 +285,7 @@ mod tests {
 
     /// What some runs decode to, read `most` at a time.
     fn read<N: Number + Into<i64>>(data: &[u8], width: u8, count: usize, most: usize) -> Vec<i64> {
-        let mut hybrid = Hybrid::new(Bytes::copy_from_slice(data), width).ok().unwrap();
+        let mut hybrid = Hybrid::new(Bytes::copy_from_slice(data), width, count).ok().unwrap();
         let mut found: Vec<N> = Vec::new();
         while found.len() < count {
             hybrid.append(most.min(count - found.len()), &mut found).ok().unwrap();
@@ -313,13 +322,13 @@ mod tests {
                 prop_assert_eq!(read::<u8>(&data, width, values.len(), most), expected);
             } else {
                 let mut narrow: Vec<u8> = Vec::new();
-                prop_assert!(Hybrid::new(data.into(), width).ok().unwrap().append(1, &mut narrow).is_err());
+                prop_assert!(Hybrid::new(data.into(), width, values.len()).ok().unwrap().append(1, &mut narrow).is_err());
             }
         }
 
         #[test]
         fn any_bytes_give_numbers_or_an_error(data in vec(any::<u8>(), 0..40), width in 0..=40_u8) {
-            let Ok(mut hybrid) = Hybrid::new(Bytes::from(data), width) else { return Ok(()) };
+            let Ok(mut hybrid) = Hybrid::new(Bytes::from(data), width, 50_000) else { return Ok(()) };
             for _ in 0..50 {
                 let Ok(span) = hybrid.span(1000) else { break };
                 if let Span::Packed(packed) = span {

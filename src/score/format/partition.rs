@@ -1,4 +1,5 @@
-//! What a file of scores does not say itself: its folders, or whoever reads it.
+//! What a file of scores does not hold itself: columns in the names of its folders (Hive partitions), and definitions
+//! that the reader names.
 
 use std::sync::Arc;
 
@@ -10,16 +11,16 @@ use super::csv::KEYS;
 use crate::metric::catalog::Catalog;
 use crate::metric::sql::Dialect;
 
-/// Where a file of scores lies.
+/// What completes a file of scores.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Surroundings<'a> {
+pub struct Partition<'a> {
     /// Columns that stand in the names of its folders, as Spark divides a table; `None` for null. The file's own win.
     pub folders: &'a [(String, Option<String>)],
     /// The definitions of scores that carry none.
     pub definitions: Option<&'a Catalog>,
 }
 
-impl Surroundings<'_> {
+impl Partition<'_> {
     /// The batch with the keys and metrics that its folders name, and with the names of the catalog for metrics that the
     /// portable SQL had to spell otherwise, or whose case an engine has folded.
     pub(super) fn complete(&self, batch: &RecordBatch, catalog: &Catalog) -> Result<RecordBatch, FormatError> {

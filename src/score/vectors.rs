@@ -1,97 +1,85 @@
-//! Columns of values while a plan is evaluated, and the texts of a batch as small integers.
+//! Vectors: what a step of the physical plan gives for one batch, and the texts of a batch as small integers.
 
-use std::collections::{HashMap, HashSet};
-use std::sync::{Arc, OnceLock};
+use std::collections::HashMap;
+use std::rc::Rc;
+use std::sync::Arc;
 
 use arrow::array::{
-    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, Datum, DictionaryArray, Float64Array, Int32Array,
+    Array, ArrayRef, ArrowPrimitiveType, AsArray as _, BooleanArray, DictionaryArray, Float64Array, Int32Array,
     Int64Array, PrimitiveArray, StringArray, UInt8Array, UInt32Array,
 };
 use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::{ArrowNativeType, Float64Type, Int32Type, Int64Type, UInt32Type};
 
-use super::segments::Segments;
+use super::segments::{Segments, Stretch};
 use crate::base::bits;
 use crate::metric::columns::Type;
 use crate::metric::plan::Constant;
 use crate::trace::scan::Texts;
 
-/// The values of one node: one a step, one an episode, or a single one that stands for all.
+/// What one step gives. The physical plan knows which form it is.
 #[derive(Clone, Debug)]
-pub(super) struct Values {
-    held: Held,
-    ty: Type,
-    single: bool,
-}
-
-#[derive(Clone, Debug)]
-enum Held {
+pub(super) enum Vector {
+    /// Truth values, integers, floats, or the symbols of texts ([`Symbols`]): one per timestep, per episode, or one
+    /// that stands for all.
     Array(ArrayRef),
     /// A column of texts as the trace holds it.
-    Coded(Arc<Coded>),
+    Keyed(Arc<Keyed>),
+    /// Some rows of each episode.
+    Rows(Rc<Vec<Stretch>>),
 }
 
-impl Datum for Values {
-    fn get(&self) -> (&dyn Array, bool) {
-        (self.array(), self.single)
+impl<A: Array + 'static> From<A> for Vector {
+    fn from(array: A) -> Self {
+        Self::Array(Arc::new(array))
     }
 }
 
-impl Values {
-    /// One value a step or an episode. Text is an array of symbols ([`Symbols`]).
-    pub(super) fn new(array: impl Array + 'static, ty: Type) -> Self {
-        Self { held: Held::Array(Arc::new(array)), ty, single: false }
-    }
-
-    /// The same, shared.
-    pub(super) fn shared(array: ArrayRef, ty: Type) -> Self {
-        Self { held: Held::Array(array), ty, single: false }
-    }
-
+impl Vector {
     /// A constant: one value that stands for all.
     pub(super) fn constant(constant: &Constant, ty: Type, symbols: &mut Symbols) -> Self {
-        let array: ArrayRef = match (constant, ty) {
-            (Constant::Bool(value), _) => Arc::new(BooleanArray::from(vec![*value])),
-            (Constant::Int(value), _) => Arc::new(Int64Array::from(vec![*value])),
-            (Constant::Float(bits), _) => Arc::new(Float64Array::from(vec![canonical(f64::from_bits(*bits))])),
-            (Constant::Text(text), _) => Arc::new(UInt32Array::from(vec![symbols.intern(text)])),
-            (Constant::Null, Type::Bool) => Arc::new(BooleanArray::from(vec![None])),
-            (Constant::Null, Type::Int) => Arc::new(Int64Array::from(vec![None])),
-            (Constant::Null, Type::Float) => Arc::new(Float64Array::from(vec![None])),
-            (Constant::Null, Type::Text) => Arc::new(UInt32Array::from(vec![None])),
-        };
-        Self { held: Held::Array(array), ty, single: true }
-    }
-
-    /// The type of the values.
-    pub(super) fn ty(&self) -> Type {
-        self.ty
+        match (constant, ty) {
+            (Constant::Bool(value), _) => BooleanArray::from(vec![*value]).into(),
+            (Constant::Int(value), _) => Int64Array::from(vec![*value]).into(),
+            (Constant::Float(bits), _) => Float64Array::from(vec![canonical(f64::from_bits(*bits))]).into(),
+            (Constant::Text(text), _) => UInt32Array::from(vec![symbols.intern(text)]).into(),
+            (Constant::Null, Type::Bool) => BooleanArray::from(vec![None]).into(),
+            (Constant::Null, Type::Int) => Int64Array::from(vec![None]).into(),
+            (Constant::Null, Type::Float) => Float64Array::from(vec![None]).into(),
+            (Constant::Null, Type::Text) => UInt32Array::from(vec![None]).into(),
+        }
     }
 
     /// The values themselves.
     pub(super) fn array(&self) -> &ArrayRef {
-        match &self.held {
-            Held::Array(array) => array,
-            Held::Coded(coded) => coded.array(),
+        match self {
+            Self::Array(array) => array,
+            Self::Keyed(_) | Self::Rows(_) => unreachable!("the physical plan takes the symbols of keys"),
         }
     }
 
-    /// A column of texts as keys, where that is how it is held.
-    pub(super) fn coded(&self) -> Option<&Coded> {
-        match &self.held {
-            Held::Array(_) => None,
-            Held::Coded(coded) => Some(coded),
+    /// A column of texts as keys.
+    pub(super) fn keyed(&self) -> &Keyed {
+        match self {
+            Self::Keyed(keyed) => keyed,
+            Self::Array(_) | Self::Rows(_) => unreachable!("the physical plan takes keys from columns alone"),
+        }
+    }
+
+    /// Rows of each episode.
+    pub(super) fn rows(&self) -> &[Stretch] {
+        match self {
+            Self::Rows(rows) => rows,
+            Self::Array(_) | Self::Keyed(_) => unreachable!("the physical plan searches within rows alone"),
         }
     }
 
     /// An array that is null where the values are.
     pub(super) fn validity(&self) -> &dyn Array {
-        self.coded().map_or_else(|| self.array().as_ref(), |coded| coded.keys.array())
-    }
-
-    /// Whether one value stands for all.
-    pub(super) fn is_single(&self) -> bool {
-        self.single
+        match self {
+            Self::Keyed(keyed) => keyed.keys.array(),
+            _ => self.array().as_ref(),
+        }
     }
 
     /// The values as truth values; the binder has checked the type.
@@ -115,14 +103,12 @@ impl Values {
     }
 }
 
-/// A column of texts: a key a row, and what each key stands for.
+/// A column of texts: a key per row, and what each key stands for.
 #[derive(Debug)]
-pub(super) struct Coded {
+pub(super) struct Keyed {
     keys: Keys,
     /// The symbol of each key; no two are the same.
     symbols: Vec<u32>,
-    /// The symbols of the rows, once they are asked for.
-    array: OnceLock<ArrayRef>,
 }
 
 /// The keys of rows: bytes, where that is enough.
@@ -141,24 +127,13 @@ impl Keys {
     }
 }
 
-impl Coded {
-    fn values(keys: Keys, symbols: Vec<u32>) -> Values {
-        let coded = Self { keys, symbols, array: OnceLock::new() };
-        Values { held: Held::Coded(Arc::new(coded)), ty: Type::Text, single: false }
-    }
-
-    /// The number of rows.
-    pub(super) fn len(&self) -> usize {
-        self.keys.array().len()
-    }
-
-    fn array(&self) -> &ArrayRef {
-        self.array.get_or_init(|| {
-            Arc::new(match &self.keys {
-                Keys::Narrow(keys) => self.symbols_of(keys),
-                Keys::Wide(keys) => self.symbols_of(keys),
-            })
-        })
+impl Keyed {
+    /// The symbols of all rows.
+    pub(super) fn symbols(&self) -> UInt32Array {
+        match &self.keys {
+            Keys::Narrow(keys) => self.symbols_of(keys),
+            Keys::Wide(keys) => self.symbols_of(keys),
+        }
     }
 
     /// The symbols at a timestep of each episode.
@@ -190,6 +165,14 @@ impl Coded {
             if equal { bits } else { !&bits },
             NullBuffer::union(self.keys.array().nulls(), nulls.as_ref()),
         )
+    }
+
+    /// Where the texts are equal to one text, or where they are not; null where one of them is.
+    pub(super) fn compare_with(&self, text: &UInt32Array, equal: bool) -> BooleanArray {
+        if text.is_null(0) {
+            return BooleanArray::new_null(self.keys.array().len());
+        }
+        self.test(|symbol| (symbol == text.value(0)) == equal)
     }
 
     /// The rows whose symbol fulfils `test`, null where the text is null.
@@ -278,27 +261,35 @@ impl Symbols {
     }
 
     /// A column of texts with keys of a byte.
-    pub(super) fn of_texts(&mut self, texts: &Texts) -> Values {
-        self.of_keys(Keys::Narrow(texts.keys.clone()), &texts.texts)
+    pub(super) fn of_texts(&mut self, texts: &Texts) -> Vector {
+        Vector::Keyed(Arc::new(self.of_keys(Keys::Narrow(texts.keys.clone()), &texts.texts)))
     }
 
     /// A column of texts.
-    pub(super) fn of_column(&mut self, column: &DictionaryArray<Int32Type>) -> Values {
-        self.of_keys(Keys::Wide(column.keys().clone()), column.values().as_string())
+    pub(super) fn of_column(&mut self, column: &DictionaryArray<Int32Type>) -> Vector {
+        Vector::Keyed(Arc::new(self.of_keys(Keys::Wide(column.keys().clone()), column.values().as_string())))
     }
 
-    fn of_keys(&mut self, keys: Keys, texts: &StringArray) -> Values {
-        let symbols: Vec<Option<u32>> = texts.iter().map(|text| text.map(|text| self.intern(text))).collect();
-        let mut known = HashSet::new();
-        if symbols.iter().all(|symbol| symbol.is_some_and(|symbol| known.insert(symbol))) {
-            return Coded::values(keys, symbols.into_iter().flatten().collect());
-        }
-        let symbol = |key: Option<usize>| symbols[key?];
-        let symbols: UInt32Array = match &keys {
-            Keys::Narrow(keys) => keys.iter().map(|key| symbol(key.map(ArrowNativeType::as_usize))).collect(),
-            Keys::Wide(keys) => keys.iter().map(|key| symbol(key.map(ArrowNativeType::as_usize))).collect(),
+    /// One key per text: a dictionary may hold a text under two keys, and keys without a text.
+    fn of_keys(&mut self, keys: Keys, texts: &StringArray) -> Keyed {
+        let (mut symbols, mut places) = (Vec::new(), HashMap::new());
+        let mut key = |text: &str| {
+            let symbol = self.intern(text);
+            *places.entry(symbol).or_insert_with(|| {
+                symbols.push(symbol);
+                symbols.len() - 1
+            })
         };
-        Values::new(symbols, Type::Text)
+        let known: Vec<Option<usize>> = texts.iter().map(|text| text.map(&mut key)).collect();
+        if symbols.len() == known.len() {
+            return Keyed { keys, symbols };
+        }
+        let key = |key: Option<usize>| known.get(key?).copied()?.and_then(i32::from_usize);
+        let keys: Int32Array = match &keys {
+            Keys::Narrow(keys) => keys.iter().map(|old| key(old.map(ArrowNativeType::as_usize))).collect(),
+            Keys::Wide(keys) => keys.iter().map(|old| key(old.map(ArrowNativeType::as_usize))).collect(),
+        };
+        Keyed { keys: Keys::Wide(keys), symbols }
     }
 }
 
@@ -323,11 +314,11 @@ mod tests {
     use proptest::option;
     use proptest::prelude::*;
 
-    use super::{Coded, Symbols, Texts, Values};
+    use super::{Symbols, Texts, Vector};
     use crate::score::segments::Segments;
 
     /// The same column in both forms.
-    fn both(symbols: &mut Symbols, known: &[&str], keys: &[Option<u8>]) -> [Values; 2] {
+    fn both(symbols: &mut Symbols, known: &[&str], keys: &[Option<u8>]) -> [Vector; 2] {
         let texts = StringArray::from(known.to_vec());
         let wide: Int32Array = keys.iter().map(|key| key.map(i32::from)).collect();
         let wide = DictionaryArray::<Int32Type>::new(wide, std::sync::Arc::new(texts.clone()));
@@ -360,7 +351,7 @@ mod tests {
             let expected: Vec<_> = rows.map(|(asked, key)| Some((text(key)? == asked?) == equal)).collect();
             let blue = symbols.intern("blue");
             let is_blue: Vec<_> = keys.iter().map(|key| text(*key).map(|text| (text == "blue") == equal)).collect();
-            for column in columns.iter().map(|column| column.coded().unwrap()) {
+            for column in columns.iter().map(Vector::keyed) {
                 prop_assert_eq!(&truths(&column.compare(Segments::new(&offsets), &asked, equal)), &expected);
                 prop_assert_eq!(&truths(&column.test(|symbol| (symbol == blue) == equal)), &is_blue);
             }
@@ -371,9 +362,11 @@ mod tests {
     fn texts_under_two_keys_are_one_text() {
         let mut symbols = Symbols::default();
         for column in both(&mut symbols, &["red", "blue", "red"], &[Some(0), None, Some(1), Some(2)]) {
-            assert!(column.coded().map(Coded::len).is_none());
-            let found = column.symbols();
+            let found = column.keyed().symbols();
             assert!(found.value(0) == found.value(3) && found.value(0) != found.value(2) && found.is_null(1));
+            let red = symbols.intern("red");
+            let is_red = column.keyed().test(|symbol| symbol == red);
+            assert_eq!(truths(&is_red), [Some(true), None, Some(false), Some(true)]);
         }
     }
 }

@@ -1,12 +1,17 @@
 //! From traces to the episode table: the columns that the plan needs, one scan, one sorted table.
 
-use std::io;
 use std::num::NonZeroUsize;
 
-use super::engine::{Batch, Engine, EngineError, Scores};
-use super::rows::{Parts, RowSorter, RowTooLarge, SortedRows};
+use arrow::array::RecordBatch;
+use arrow::compute::filter_record_batch;
+
+use super::builder::TableBuilder;
+use super::error::EngineError;
+use super::evaluate::{Batch, BatchScores};
+use super::physical::PhysicalPlan;
 use super::segments::Segments;
 use super::table::{EpisodeTable, Header};
+use super::timeline::{Timeline, TimelineReader, in_key_order};
 use crate::base::near::nearest;
 use crate::metric::catalog::Catalog;
 use crate::metric::columns::{Column, Columns, Level, Type};
@@ -77,12 +82,6 @@ pub enum ScoreError {
         /// What to do.
         help: String,
     },
-    /// Rows that do not fit into memory could not be put away.
-    #[error("cannot sort the scores in a temporary file; is there space where temporary files are (TMPDIR)?")]
-    Spill(#[source] io::Error),
-    /// Names and labels that are too long to be sorted.
-    #[error(transparent)]
-    RowTooLarge(#[from] RowTooLarge),
     /// A number could not be computed.
     #[error("{file}: {source}")]
     Engine {
@@ -179,6 +178,25 @@ fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     found.missing_from.map(|file| (format!("`{file}` has no such column"), absent()))
 }
 
+/// What a scan gives besides the metrics.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Outputs<'a> {
+    /// Further key columns: columns that are constant in an episode.
+    pub labels: &'a [String],
+    /// Whether the timelines of the first definitions are wanted.
+    pub timelines: bool,
+}
+
+/// What one scan gives.
+#[derive(Clone, Debug)]
+pub struct Scored<const N: usize> {
+    /// A table per definitions, each with the episodes that its own filter keeps.
+    pub tables: [EpisodeTable; N],
+    /// The timelines of the first definitions, in the order of their keys; `None` where they were not asked for, or the
+    /// definitions do not name their moments.
+    pub timelines: Option<Vec<Timeline>>,
+}
+
 /// Scores all episodes of some traces.
 ///
 /// The table is the same for any number of threads, any order of files and any division into row groups.
@@ -191,28 +209,41 @@ pub fn score(
     labels: &[String],
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, ScoreError> {
-    table(rows(traces, definitions, labels, threads)?)
+    let Scored { tables: [table], .. } =
+        score_each(traces, [definitions], Outputs { labels, timelines: false }, threads)?;
+    Ok(table)
 }
 
-/// Scores all episodes of some traces and gives the rows of the table one by one: memory does not grow with them.
+/// Scores all episodes of some traces under several definitions, in one scan and one plan: what they share is computed
+/// once.
 ///
 /// # Errors
-/// As [`score`].
-pub fn rows(
+/// As [`score`]; an episode of an experiment that one of the definitions does not know is a fault.
+pub fn score_each<const N: usize>(
     traces: &TraceSet,
-    definitions: &Definitions,
-    labels: &[String],
+    definitions: [&Definitions; N],
+    outputs: Outputs<'_>,
     threads: NonZeroUsize,
-) -> Result<SortedRows, ScoreError> {
-    let engine = Engine::new(&definitions.plan);
-    let projection = projection(traces, definitions, &engine, labels)?;
-    let outputs = definitions.plan.outputs.iter();
-    let header = Header {
+) -> Result<Scored<N>, ScoreError> {
+    let mut plan = PhysicalPlan::of(&definitions.map(|definitions| &definitions.plan));
+    let first = definitions.first().filter(|_| outputs.timelines);
+    let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
+    let projection = projection(traces, &definitions, &plan, outputs.labels)?;
+    let headers = definitions.map(|definitions| Header {
         catalog: definitions.catalog.clone(),
-        labels: labels.to_vec(),
-        metrics: outputs.map(|output| output.name.clone()).collect(),
+        labels: outputs.labels.to_vec(),
+        metrics: definitions.plan.outputs.iter().map(|output| output.name.clone()).collect(),
+    });
+    let mut found = timelines.as_ref().map(|_| Vec::new());
+    let read = |batch: &EpisodeBatch| {
+        let values = plan.evaluate(&view(batch))?;
+        let scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
+        Ok((scores, timelines.as_ref().map(|reader| reader.timelines(&values, batch))))
     };
-    sorted(traces, &projection, header, threads, |batch| engine.score(&view(batch)))
+    let tables = collect(traces, &projection, headers, threads, read, |part| {
+        found.iter_mut().zip(part).for_each(|(found, part)| found.extend(part));
+    })?;
+    Ok(Scored { tables, timelines: found.map(in_key_order) })
 }
 
 /// The episodes of some traces without a metric: keys and labels, the traces checked as [`score`] checks them.
@@ -227,48 +258,53 @@ pub fn unscored(
     labels: &[String],
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, ScoreError> {
-    let projection = projection(traces, definitions, &Engine::new(&definitions.plan), labels)?;
+    let projection = projection(traces, &[definitions], &PhysicalPlan::of(&[&definitions.plan]), labels)?;
     let header = Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics: Vec::new() };
-    let all = |batch: &EpisodeBatch| Ok(Scores { kept: (0..batch.episodes.num_rows()).collect(), metrics: Vec::new() });
-    table(sorted(traces, &projection, header, threads, all)?)
+    let nothing = |_: &EpisodeBatch| Ok((vec![BatchScores { kept: None, metrics: Vec::new() }], ()));
+    let [table] = collect(traces, &projection, [header], threads, nothing, |()| {})?;
+    Ok(table)
 }
 
-/// The rows that `score` gives for each batch, in the order of the table.
-fn sorted(
+/// The tables of what `score` gives for each batch; what else it gives goes to `other`, in the order of the files.
+fn collect<T: Send, const N: usize>(
     traces: &TraceSet,
     projection: &Projection,
-    header: Header,
+    headers: [Header; N],
     threads: NonZeroUsize,
-    score: impl Fn(&EpisodeBatch) -> Result<Scores, EngineError> + Sync,
-) -> Result<SortedRows, ScoreError> {
-    let labels = header.labels.clone();
-    let mut sorter = RowSorter::new(header);
+    score: impl Fn(&EpisodeBatch) -> Result<(Vec<BatchScores>, T), EngineError> + Sync,
+    mut other: impl FnMut(T),
+) -> Result<[EpisodeTable; N], ScoreError> {
+    let mut builders = headers.map(TableBuilder::new);
     traces.scan(
         projection,
         threads,
-        |batch| -> Result<Parts, ScoreError> {
-            let scores = score(&batch).map_err(|source| ScoreError::Engine {
-                file: traces.files()[batch.origin.file].name().to_owned(),
-                source,
-            })?;
-            Ok(Parts::of(batch.episodes, scores, &labels)?)
+        |batch| -> Result<_, ScoreError> {
+            let (scores, more) = score(&batch).map_err(|source| failed(traces, &batch, source))?;
+            let parts = scores.into_iter().map(|scores| (kept(&batch.episodes, &scores), scores.metrics));
+            Ok((parts.collect::<Vec<_>>(), more))
         },
-        |parts| {
-            for rows in parts {
-                sorter.add(&rows?).map_err(ScoreError::Spill)?;
+        |(parts, more)| {
+            for (builder, (episodes, metrics)) in builders.iter_mut().zip(parts) {
+                builder.extend(&episodes, &metrics);
             }
+            other(more);
             Ok(())
         },
     )?;
-    sorter.finish().map_err(ScoreError::Spill)
+    Ok(builders.map(TableBuilder::finish))
 }
 
-fn table(mut rows: SortedRows) -> Result<EpisodeTable, ScoreError> {
-    let mut table = EpisodeTable::empty(rows.header().clone());
-    while let Some(row) = rows.next_row().map_err(ScoreError::Spill)? {
-        table.push(row.clone());
+/// The episodes that a filter keeps.
+fn kept(episodes: &RecordBatch, scores: &BatchScores) -> RecordBatch {
+    match &scores.kept {
+        Some(kept) => filter_record_batch(episodes, kept).expect("a filter has a value for each episode"),
+        None => episodes.clone(),
     }
-    Ok(table)
+}
+
+/// An error with the file of its batch.
+pub(super) fn failed(traces: &TraceSet, batch: &EpisodeBatch, source: EngineError) -> ScoreError {
+    ScoreError::Engine { file: traces.files()[batch.origin.file].name().to_owned(), source }
 }
 
 /// A batch as the engine takes it.
@@ -284,11 +320,11 @@ pub(super) fn view(batch: &EpisodeBatch) -> Batch<'_> {
 /// The columns to read.
 pub(super) fn projection(
     traces: &TraceSet,
-    definitions: &Definitions,
-    engine: &Engine,
+    definitions: &[&Definitions],
+    plan: &PhysicalPlan,
     labels: &[String],
 ) -> Result<Projection, ScoreError> {
-    let (steps, mut constants) = engine.columns();
+    let (steps, mut constants) = plan.columns();
     for label in labels {
         check_label(traces, label)?;
         constants.push(label.clone());
@@ -299,9 +335,17 @@ pub(super) fn projection(
         seen.push(name.clone());
         new
     });
-    let known = &definitions.catalog;
-    let experiments = (!known.open).then(|| known.experiment.keys().cloned().collect());
-    Ok(Projection { steps, constants, experiments, ..Projection::default() })
+    Ok(Projection { steps, constants, experiments: experiments(definitions), ..Projection::default() })
+}
+
+/// The experiments that all definitions know; any if `None`.
+fn experiments(definitions: &[&Definitions]) -> Option<Vec<String>> {
+    let closed = definitions.iter().map(|definitions| &definitions.catalog).filter(|catalog| !catalog.open);
+    let known = closed.map(|catalog| catalog.experiment.keys().cloned().collect::<Vec<_>>());
+    known.reduce(|mut all, some| {
+        all.retain(|name| some.contains(name));
+        all
+    })
 }
 
 /// Refuses a column to group by that is not constant in an episode, or not in every trace.
@@ -323,4 +367,30 @@ pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
         (None, None) => "its value changes from step to step".to_owned(),
     };
     Err(ScoreError::Label { name: label.to_owned(), known, help })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::score::timeline::timelines;
+    use crate::trace::inputs;
+
+    #[test]
+    fn one_scan_gives_what_several_give() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper").to_owned();
+        let traces = TraceSet::open(&inputs::resolve(&[folder], std::io::empty()).unwrap()).unwrap();
+        let condition = Some("seed = 1".to_owned());
+        let seed = definitions(&traces, &Request { condition, ..Request::of("paper") }).unwrap();
+        let metrics = Some(vec!["TSA".to_owned(), "MGD".to_owned()]);
+        let some = definitions(&traces, &Request { metrics, ..Request::of("paper") }).unwrap();
+        let threads = NonZeroUsize::new(2).unwrap();
+        let outputs = Outputs { labels: &["body_color".to_owned()], timelines: true };
+        let found = score_each(&traces, [&seed, &some], outputs, threads).unwrap();
+        for (table, definitions) in found.tables.iter().zip([&seed, &some]) {
+            assert_eq!(*table, score(&traces, definitions, outputs.labels, threads).unwrap());
+        }
+        assert_eq!(found.tables.map(|table| table.len()), [280, 840]);
+        assert_eq!(found.timelines, timelines(&traces, &seed, threads).unwrap());
+        assert_eq!(found.timelines.unwrap().len(), 280);
+    }
 }

@@ -25,6 +25,7 @@ use mirrorstats::agent::vlm::{OnOutage, Vlm};
 use mirrorstats::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
 use mirrorstats::record::metadata;
 use mirrorstats::record::plan::{Key, Plan, Shard};
+use mirrorstats::record::queue::Held;
 use mirrorstats::record::run::{Progress, Recording, Settings, Shares, Spent};
 use mirrorstats::record::store::Store;
 use mirrorstats::sim::Experiment;
@@ -165,6 +166,8 @@ impl Progress for Quiet {
     fn lost(&self, id: &str, reason: &str) {
         eprintln!("lost {id}: {reason}");
     }
+
+    fn waiting(&self, _: &str, _: Held) {}
 }
 
 /// Steps a second of a recording, and where its time went.

@@ -18,7 +18,9 @@ fn add(expr: &Expr, found: &mut Vec<String>) {
     {
         found.push(name.clone());
     }
-    parts(expr).into_iter().for_each(|part| add(part, found));
+    for part in parts(expr) {
+        add(part, found);
+    }
 }
 
 /// The expressions that one is made of, in the order of the text.

@@ -11,7 +11,7 @@ pub(super) fn order(keys: &EpisodeKeys) -> Option<Vec<u32>> {
     let rows = Rows::of(keys);
     let order = match rows.bits {
         ..=64 => sorted::<u64>(&rows),
-        ..=128 => sorted::<u128>(&rows),
+        65..=128 => sorted::<u128>(&rows),
         _ => compared(keys),
     };
     (!order.is_sorted()).then_some(order)

@@ -47,7 +47,7 @@ pub fn select(
     condition: Option<&str>,
 ) -> Result<EpisodeTable, SelectError> {
     let mut table = match condition {
-        Some(condition) => filtered(table, condition)?,
+        Some(condition) => filtered(&table, condition)?,
         None => table,
     };
     if let Some(names) = metrics {
@@ -61,8 +61,8 @@ pub fn select(
     Ok(table)
 }
 
-fn filtered(table: EpisodeTable, condition: &str) -> Result<EpisodeTable, SelectError> {
-    let columns = columns(&table);
+fn filtered(table: &EpisodeTable, condition: &str) -> Result<EpisodeTable, SelectError> {
+    let columns = columns(table);
     let none = match Definitions::from_toml("scores", "", &columns) {
         Ok(none) => none,
         Err(FileError::Faults(faults)) => return Err(faults.into()),
@@ -70,7 +70,7 @@ fn filtered(table: EpisodeTable, condition: &str) -> Result<EpisodeTable, Select
     };
     let definitions = none.filtered("--where", condition, &columns)?;
     let offsets: Vec<usize> = (0..=table.len()).collect();
-    let episodes = rows(&table)?;
+    let episodes = rows(table)?;
     let steps = RecordBatch::try_new_with_options(
         Arc::new(Schema::empty()),
         vec![],

@@ -135,7 +135,9 @@ pub fn answered(
         Ok(committed.set_indices().filter_map(|episode| episodes.position(keys.get(episode))).collect())
     };
     traces.scan(&projection, threads, work, |rows| {
-        rows.into_iter().for_each(|row| found[row] = true);
+        for row in rows {
+            found[row] = true;
+        }
         Ok(())
     })?;
     Ok(Some(found))

@@ -78,11 +78,11 @@ fn repeated_numbers(numbers: &[u64]) -> HashSet<u64> {
         twice[word] |= once[word] & bit;
         once[word] |= bit;
     }
-    let shares = |number: &u64| {
+    let comes_twice = |number: &u64| {
         let (word, bit) = place(*number);
         twice[word] & bit != 0
     };
-    let mut shared: Vec<u64> = numbers.iter().copied().filter(shares).collect();
+    let mut shared: Vec<u64> = numbers.iter().copied().filter(comes_twice).collect();
     shared.sort_unstable();
     shared.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
 }
@@ -189,7 +189,9 @@ mod tests {
             numbers in vec((0..4_u64, 0..4_u64).prop_map(|(high, low)| high << 62 | high << 55 | low), 0..40),
         ) {
             let mut times: BTreeMap<u64, usize> = BTreeMap::new();
-            numbers.iter().for_each(|number| *times.entry(*number).or_default() += 1);
+            for number in &numbers {
+                *times.entry(*number).or_default() += 1;
+            }
             times.retain(|_, times| *times > 1);
             prop_assert_eq!(repeated_numbers(&numbers), times.into_keys().collect::<HashSet<u64>>());
         }

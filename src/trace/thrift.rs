@@ -249,7 +249,7 @@ mod tests {
         let map = [&huge[..], &[0x77], &[0; 20]].concat();
         assert_eq!(Compact::new(&map).skip(Wire::Map), Err(Fault::Ends));
         assert_eq!(Compact::new(&huge).skip(Wire::Binary), Err(Fault::Ends));
-        let deep = [0x19; 100_000];
+        let deep = vec![0x19; 100_000];
         assert!(Compact::new(&deep).skip(Wire::List).is_err());
     }
 

@@ -293,8 +293,8 @@ fn what_a_footer_declares_is_all_there_is() {
 
 /// A file whose dictionary of the column has `Red`, which no row has: what two files have in common that differ in the
 /// row with `Red` alone.
-fn with_unused_entry(folder: &Path, colors: [Colors; 2]) -> Vec<u8> {
-    let [one, other] = colors.map(|colors| {
+fn with_unused_entry(folder: &Path, colors: &[Colors; 2]) -> Vec<u8> {
+    let [one, other] = (*colors).map(|colors| {
         let path = folder.join("part.parquet");
         write(&path, colors, None);
         fs::read(&path).unwrap()
@@ -325,7 +325,7 @@ fn an_entry_of_a_dictionary_that_no_row_has_is_not_refused() {
         ("self_color", [1, 2].map(|row| Colors { claims: cells(row), ..plain })),
         ("selected_cube", [1, 2].map(|row| Colors { cubes: cells(row), ..plain })),
     ] {
-        let bytes = with_unused_entry(at, colors);
+        let bytes = with_unused_entry(at, &colors);
         assert!(bytes.windows(3).any(|text| text == b"Red"), "{column}: the entry is gone");
         fs::write(at.join("unused.parquet"), bytes).unwrap();
         assert_eq!(findings(at, &["unused.parquet"]), (0, Vec::new()), "{column}");

@@ -74,9 +74,9 @@ fn nothing_of_an_older_report_stays_and_all_else_does() {
         let out = folder.path().join("out");
         fs::create_dir(folder.path().join("there")).unwrap();
         if is_link {
-            symlink("there", &out).unwrap()
+            symlink("there", &out).unwrap();
         } else {
-            fs::rename(folder.path().join("there"), &out).unwrap()
+            fs::rename(folder.path().join("there"), &out).unwrap();
         }
         put_foreign(&out);
         for (words, expected) in [(&LARGE[..], &large), (&SMALL, &small), (&LARGE, &large)] {

@@ -101,7 +101,7 @@ fn a_color_that_is_none() {
         check(json!({ key: "Dark  Teal" }), expected, "the text `Dark  Teal`", "did you mean `dark teal`?");
     }
     let check = |key: &str, text: &str, expected, help| {
-        check(json!({ key: text }), expected, &format!("the text `{text}`"), help)
+        check(json!({ key: text }), expected, &format!("the text `{text}`"), help);
     };
     check("body_color", "unknown", body, "give the true colour of the body");
     check("self_color", "None", claim, "`unknown`, or null where the reply gave none");

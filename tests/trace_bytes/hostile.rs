@@ -159,7 +159,7 @@ fn counts_that_no_bytes_hold_are_refused() {
     });
     refused("values", &values, "corrupt-data");
     for rows in [most, 1 << 40, i64::MAX, -1] {
-        let bytes = rebuild(&whole, |_, bytes| bytes.to_vec(), |footer| with_rows(footer, rows));
+        let bytes = rebuild(&whole, |_, bytes| bytes.to_vec(), |footer| with_rows(&footer, rows));
         refused(&format!("{rows} rows"), &bytes, "corrupt-footer");
     }
 }
@@ -178,7 +178,7 @@ fn runs_of_two_thousand_million_rows_are_refused() {
         }
         [Header { values: most, ..header(&body, 8) }.bytes(&[]), body.clone()].concat()
     };
-    refused("everywhere", &rebuild(&whole, all, |footer| with_rows(footer, most)), "corrupt-footer");
+    refused("everywhere", &rebuild(&whole, all, |footer| with_rows(&footer, most)), "corrupt-footer");
     // Where the footer has the 18 rows that there are.
     let one = with_page(&whole, false, |_, _| [header(&body, 8).bytes(&[]), body.clone()].concat());
     refused("in a page of 18", &one, "corrupt-data");

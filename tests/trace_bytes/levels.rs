@@ -198,7 +198,7 @@ fn counts_of_the_footer_that_its_pages_do_not_keep_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for form in FORMS {
         let whole = file(folder.path(), form);
-        let with = |rows: i64| rebuild(&whole, |_, bytes| bytes.to_vec(), |footer| with_rows(footer, rows));
+        let with = |rows: i64| rebuild(&whole, |_, bytes| bytes.to_vec(), |footer| with_rows(&footer, rows));
         assert_eq!(read(folder.path(), &with(18)), Some(18), "{form:?}");
         for rows in [0, 1, 17, 19, 1 << 20, 1 << 40, i64::MAX, -1, i64::MIN] {
             assert_eq!(read(folder.path(), &with(rows)), None, "{form:?}: {rows} rows");

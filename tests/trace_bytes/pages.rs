@@ -111,7 +111,7 @@ pub fn rebuild(
 }
 
 /// The footer with another number of rows in every row group and column.
-pub fn with_rows(metadata: ParquetMetaData, rows: i64) -> ParquetMetaData {
+pub fn with_rows(metadata: &ParquetMetaData, rows: i64) -> ParquetMetaData {
     let about = metadata.file_metadata();
     let groups = metadata.row_groups().iter().map(|group| {
         let chunks = group.columns().iter().map(|chunk| chunk.clone().into_builder().set_num_values(rows).build());

@@ -178,10 +178,10 @@ fn one_request_that_is_too_long_costs_one_episode() {
     assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&answer["recorded"], answer["lost"].as_array().unwrap().len()), (&19.into(), 1));
-    let list = fs::read_to_string(folder.path().join("runs/lost.jsonl")).unwrap();
-    let lost: Value = serde_json::from_str(list.trim()).unwrap();
+    let listed = fs::read_to_string(folder.path().join("runs/lost.jsonl")).unwrap();
+    let lost: Value = serde_json::from_str(listed.trim()).unwrap();
     assert_eq!((&lost["episode_id"], &lost["step"]), (&"E1/own/s1/r2".into(), &2.into()));
-    assert!(lost["reason"].as_str().unwrap().contains(TOO_LONG) && !list.contains(KEY), "{list}");
+    assert!(lost["reason"].as_str().unwrap().contains(TOO_LONG) && !listed.contains(KEY), "{listed}");
 
     let output = folder.record(&server, "own", TWENTY).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));

@@ -88,8 +88,9 @@ pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
         StatusCode::REQUEST_TIMEOUT | StatusCode::GATEWAY_TIMEOUT => FailureKind::Timeout,
         status if status.is_server_error() => FailureKind::Server,
         StatusCode::CONFLICT | StatusCode::TOO_EARLY => FailureKind::Server,
-        StatusCode::UNAUTHORIZED | StatusCode::PAYMENT_REQUIRED => FailureKind::Denied,
-        StatusCode::FORBIDDEN | StatusCode::NOT_FOUND => FailureKind::Denied,
+        StatusCode::UNAUTHORIZED | StatusCode::PAYMENT_REQUIRED | StatusCode::FORBIDDEN | StatusCode::NOT_FOUND => {
+            FailureKind::Denied
+        }
         _ => FailureKind::Rejected,
     };
     let detail = match shortened(body) {

@@ -189,9 +189,10 @@ impl<'a> Lowering<'a> {
 
     fn matches(&mut self, x: NodeId, pattern: &str, at: Option<StepId>) -> Kernel {
         let texts = self.node(x, at);
-        match self.gives_keys(texts) {
-            true => Kernel::KeysMatch(texts, pattern.to_owned()),
-            false => Kernel::SymbolsMatch(texts, pattern.to_owned()),
+        if self.gives_keys(texts) {
+            Kernel::KeysMatch(texts, pattern.to_owned())
+        } else {
+            Kernel::SymbolsMatch(texts, pattern.to_owned())
         }
     }
 
@@ -205,12 +206,11 @@ impl<'a> Lowering<'a> {
     ) -> Kernel {
         let branches =
             branches.iter().map(|(when, then)| (self.full(*when, shape, at), self.plain(*then, at))).collect();
-        let otherwise = match otherwise {
-            Some(id) => self.full(id, shape, at),
-            None => {
-                let null = self.physical.push(Kernel::Constant(Constant::Null), ty, Shape::One);
-                self.physical.push(Kernel::Repeat(null), ty, shape)
-            }
+        let otherwise = if let Some(id) = otherwise {
+            self.full(id, shape, at)
+        } else {
+            let null = self.physical.push(Kernel::Constant(Constant::Null), ty, Shape::One);
+            self.physical.push(Kernel::Repeat(null), ty, shape)
         };
         Kernel::Case { branches, otherwise }
     }

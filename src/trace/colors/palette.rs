@@ -40,7 +40,7 @@ impl Declared {
         // A recording that is no JSON object declares nothing.
         let recording = recording.and_then(|text| serde_json::from_str::<Recording>(text).ok());
         let Some(Recording { palette, scene_version }) = recording else { return Ok(Self::default()) };
-        let palette = palette.map(|palette| Palette::read(file, palette)).transpose()?;
+        let palette = palette.map(|palette| Palette::read(file, &palette)).transpose()?;
         Ok(Self { palette, is_of_world: scene_version.is_some() })
     }
 
@@ -59,12 +59,12 @@ impl Palette {
         Self(names)
     }
 
-    fn read(file: &str, palette: Value) -> Result<Self, Box<Finding>> {
+    fn read(file: &str, palette: &Value) -> Result<Self, Box<Finding>> {
         let names: Option<Vec<String>> = serde_json::from_value(palette.clone()).ok();
         let is_color = |name: &String| !name.is_empty() && !WORDS.contains(&name.as_str()) && is_well_spelled(name);
         match names.filter(|names| !names.is_empty() && names.iter().all(is_color)) {
             Some(names) => Ok(Self(names)),
-            None => Err(Box::new(invalid(file, &palette))),
+            None => Err(Box::new(invalid(file, palette))),
         }
     }
 

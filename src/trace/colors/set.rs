@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::num::NonZeroUsize;
 
 use arrow::array::{Array as _, AsArray as _, StringArray};
-use arrow::datatypes::{ArrowNativeType as _, Int32Type};
+use arrow::datatypes::{ArrowNativeType, Int32Type};
 use indexmap::IndexSet;
 
 use super::super::column::Column;
@@ -15,6 +15,7 @@ use super::super::finding::{Code, Finding, TraceError};
 use super::super::layout::{Layout, T};
 use super::super::open::TraceFile;
 use super::super::pass::{Episodes, Event, pass};
+use super::palette::Palette;
 use super::spelling::{WORDS, did_you_mean, most_like, spelling_key};
 use super::{ColorColumn, column};
 use crate::base::palette::Color;
@@ -76,7 +77,7 @@ fn distinct(column: &Column) -> Vec<(&str, usize, u64)> {
     match column {
         Column::Flat(values) => {
             let values = values.as_dictionary::<Int32Type>();
-            let keys = values.keys().iter().map(|key| key.map(|key| key.as_usize()));
+            let keys = values.keys().iter().map(|key| key.map(ArrowNativeType::as_usize));
             counted(values.values().as_string(), keys.enumerate().map(|(row, key)| (row, key, 1)))
         }
         Column::Keys(keyed) => {
@@ -117,7 +118,7 @@ impl Tally {
     /// Nothing is seen yet; the palettes of the files are known.
     pub(in super::super) fn new(files: &[TraceFile]) -> Self {
         let mut declared: BTreeSet<String> = Color::ALL.into_iter().map(|color| color.name().to_owned()).collect();
-        declared.extend(files.iter().filter_map(TraceFile::palette).flat_map(|palette| palette.names()).cloned());
+        declared.extend(files.iter().filter_map(TraceFile::palette).flat_map(Palette::names).cloned());
         Self { declared, ..Self::default() }
     }
 
@@ -131,12 +132,12 @@ impl Tally {
             if files[file].colors().has(&sighting.name) {
                 continue;
             }
-            match self.places.get(&(sighting.column.name, sighting.name.clone())) {
-                Some(place) => self.met[*place].1.rows += sighting.rows,
-                None => {
-                    self.places.insert((sighting.column.name, sighting.name.clone()), self.met.len());
-                    self.met.push((file, sighting));
-                }
+            let key = (sighting.column.name, sighting.name.clone());
+            if let Some(place) = self.places.get(&key) {
+                self.met[*place].1.rows += sighting.rows;
+            } else {
+                self.places.insert(key, self.met.len());
+                self.met.push((file, sighting));
             }
         }
     }
@@ -211,7 +212,7 @@ pub(in super::super) struct Spellings(BTreeSet<String>);
 impl Spellings {
     /// The names that the palettes of the files declare.
     pub(in super::super) fn new(files: &[TraceFile]) -> Self {
-        Self(files.iter().filter_map(TraceFile::palette).flat_map(|palette| palette.names()).cloned().collect())
+        Self(files.iter().filter_map(TraceFile::palette).flat_map(Palette::names).cloned().collect())
     }
 
     /// Adds names.

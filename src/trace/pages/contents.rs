@@ -50,10 +50,10 @@ impl Contents {
             Page::DataPage { buf, num_values, encoding, def_level_encoding, .. } => {
                 let declared = Declared { rows: *num_values as usize, nulls: None };
                 match (self.optional, def_level_encoding) {
-                    (false, _) => self.data(&declared, None, buf.clone(), *encoding),
+                    (false, _) => self.data(&declared, None, buf, *encoding),
                     (true, Encoding::RLE) => {
                         let (levels, values) = prefixed(buf).map_err(|Unfit| levels("fewer bytes"))?;
-                        self.data(&declared, Some(levels), values, *encoding)
+                        self.data(&declared, Some(levels), &values, *encoding)
                     }
                     // One bit a level, which can say nothing but 0 and 1.
                     (true, _) => Ok(()),
@@ -73,12 +73,18 @@ impl Contents {
                 if !self.optional {
                     no_levels(levels.clone(), declared.rows)?;
                 }
-                self.data(&declared, self.optional.then_some(levels), buf.slice(end..), *encoding)
+                self.data(&declared, self.optional.then_some(levels), &buf.slice(end..), *encoding)
             }
         }
     }
 
-    fn data(&self, declared: &Declared, stored: Option<Bytes>, values: Bytes, encoding: Encoding) -> Result<(), Fault> {
+    fn data(
+        &self,
+        declared: &Declared,
+        stored: Option<Bytes>,
+        values: &Bytes,
+        encoding: Encoding,
+    ) -> Result<(), Fault> {
         let count = match stored {
             Some(stored) => ones(stored, declared.rows).map_err(|Unfit| levels("others"))?,
             None => declared.rows,
@@ -90,21 +96,21 @@ impl Contents {
         }
         match (encoding, self.physical) {
             (Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY, _) => self.dictionary(values, count),
-            (Encoding::PLAIN, _) => self.plain(&values, count),
+            (Encoding::PLAIN, _) => self.plain(values, count),
             (Encoding::RLE, Physical::BOOLEAN) => {
-                let sound = prefixed(&values).and_then(|(truths, _)| ones(truths, count));
+                let sound = prefixed(values).and_then(|(truths, _)| ones(truths, count));
                 sound.map(drop).map_err(|Unfit| ("a truth value for each row", "others".into()))
             }
-            (Encoding::BYTE_STREAM_SPLIT, _) => fixed(&values, count, self.width),
+            (Encoding::BYTE_STREAM_SPLIT, _) => fixed(values, count, self.width),
             (Encoding::DELTA_BINARY_PACKED | Encoding::DELTA_LENGTH_BYTE_ARRAY | Encoding::DELTA_BYTE_ARRAY, _) => {
-                delta(&values, count)
+                delta(values, count)
             }
             _ => Ok(()),
         }
     }
 
     /// Keys of so many values.
-    fn dictionary(&self, values: Bytes, count: usize) -> Result<(), Fault> {
+    fn dictionary(&self, values: &Bytes, count: usize) -> Result<(), Fault> {
         let fault = |found: &str| ("keys within the dictionary, one for each value", found.to_owned());
         let keys = self.keys.ok_or_else(|| fault("no dictionary"))?;
         if values.is_empty() && count == 0 {

@@ -99,7 +99,7 @@ impl Header {
                 (8, 3) => self.newer.rows = size(compact.int(field)?)?,
                 (8, 5 | 6) => self.newer.levels += size(compact.int(field)?)?,
                 (8, 7) if matches!(field.wire, Wire::True | Wire::False) => {
-                    self.newer.plain = field.wire == Wire::False
+                    self.newer.plain = field.wire == Wire::False;
                 }
                 (8, 7) => return Err(Fault::Invalid("a field of another type")),
                 (5, 2..=4) | (7, 2) | (8, 4) => drop(compact.int(field)?),

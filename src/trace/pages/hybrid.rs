@@ -198,7 +198,9 @@ impl Packed<'_> {
     /// Gives each number to `take`.
     pub(super) fn each(&self, mut take: impl FnMut(u32)) {
         let Ok(()) = self.blocks(|some| {
-            some.iter().for_each(|number| take(number.cast_unsigned()));
+            for number in some {
+                take(number.cast_unsigned());
+            }
             Ok::<_, Infallible>(())
         });
     }

@@ -64,14 +64,11 @@ pub(super) fn verify(store: &Store, place: Place<'_>, slot: &FaultSlot) -> Resul
 
 /// The finding about a column that could not be decoded: the fault of its page, or else what the decoder said.
 pub(super) fn damaged(file: &str, slot: &FaultSlot, error: &str) -> Finding {
-    match slot.get() {
-        Some(PageFault { row_group, column, offset, expected, found }) => {
-            let expected = format!("{expected} in the page at byte {offset}");
-            Finding::new(Code::CorruptData, file, expected, found).in_row_group(*row_group).in_column(column)
-        }
-        None => {
-            let found = error.split_whitespace().collect::<Vec<_>>().join(" ");
-            Finding::new(Code::CorruptData, file, "data that decodes", found)
-        }
+    if let Some(PageFault { row_group, column, offset, expected, found }) = slot.get() {
+        let expected = format!("{expected} in the page at byte {offset}");
+        Finding::new(Code::CorruptData, file, expected, found).in_row_group(*row_group).in_column(column)
+    } else {
+        let found = error.split_whitespace().collect::<Vec<_>>().join(" ");
+        Finding::new(Code::CorruptData, file, "data that decodes", found)
     }
 }

@@ -63,8 +63,8 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
 
 fn is_refusal(error: &Value) -> bool {
     let details = error["details"].as_array().map(Vec::as_slice).unwrap_or_default();
-    let named = [&error["code"], &error["type"], &error["status"], &error["innererror"]["code"]];
-    let mut names = named.into_iter().chain(details.iter().map(|detail| &detail["reason"])).filter_map(Value::as_str);
+    let codes = [&error["code"], &error["type"], &error["status"], &error["innererror"]["code"]];
+    let mut names = codes.into_iter().chain(details.iter().map(|detail| &detail["reason"])).filter_map(Value::as_str);
     let message = error["message"].as_str().unwrap_or_default().to_lowercase();
     names.any(|name| NAMES.contains(&name.to_lowercase().as_str()))
         || WORDS.iter().any(|words| message.contains(words))

@@ -45,7 +45,9 @@ pub fn note(words: &str) {
 
 /// Says what an answer lacks or leaves open.
 pub fn notes(notes: &[String]) {
-    notes.iter().for_each(|words| note(words));
+    for words in notes {
+        note(words);
+    }
 }
 
 /// Says how a command went on standard error. With standard error closed there is nobody to tell, and the work goes on.

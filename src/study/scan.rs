@@ -18,6 +18,7 @@ use crate::trace::open::TraceSet;
 
 /// What a scan gives beside the episode table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "each output is asked for by itself")]
 pub struct Outputs {
     /// When each agent looked, claimed and decided: for the figure `gaze`.
     pub timelines: bool,

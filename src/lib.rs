@@ -18,6 +18,7 @@
 //! | room | what it knows |
 //! |---|---|
 //! | [`cli`] | what was typed, standard output, exit codes |
+//! | [`study`] | inputs, definitions and a filter, opened once and scanned once; every answer is a function of it |
 //! | `record` | runs episodes: a world, an agent; a trace and a log (feature `sim`) |
 //! | [`replay`] | a recorded episode again: re-simulated, as frames, as a film strip |
 //! | [`agent`] | who decides the next action: scripted, a model behind a provider, a program |
@@ -56,59 +57,123 @@
 //! # The main job
 //!
 //! ```
-//! use std::num::NonZeroUsize;
+//! use mirrorstats::{ReportOptions, Study, StudyError};
 //!
-//! use mirrorstats::cells::group::group;
-//! use mirrorstats::report::{layout, style::Style, tables::markdown};
-//! use mirrorstats::score::score_traces::{self, Request};
-//! use mirrorstats::trace::{inputs, open::TraceSet};
-//!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let files = inputs::resolve(&["fixtures/paper".to_owned()], std::io::empty())?;
-//! let traces = TraceSet::open(&files)?;
-//! let definitions = score_traces::definitions(&traces, &Request::of("paper"))?;
-//! let episodes = score_traces::score(&traces, &definitions, &[], NonZeroUsize::MIN)?;
-//! assert_eq!(episodes.len(), 840);
-//!
-//! let cells = group(&episodes, &["experiment".to_owned(), "model".to_owned()])?;
-//! let tables = layout::tables(&cells, &Style::load("paper")?)?;
-//! assert!(markdown::render(&tables[0]).contains("Claude Sonnet 4.6"));
+//! # fn main() -> Result<(), StudyError> {
+//! let study = Study::open(["fixtures/paper"])?.definitions("paper")?;
+//! assert_eq!(study.score()?.episodes.len(), 840);
+//! let report = study.report(&ReportOptions { style: "paper".into(), figures: false })?;
+//! assert!(report.markdown("main").is_some_and(|table| table.contains("Claude Sonnet 4.6")));
 //! # Ok(())
 //! # }
 //! ```
 //!
 //! # Your own metric
 //!
-//! ```
-//! use mirrorstats::metric::definitions::Definitions;
-//! use mirrorstats::score::score_traces::schema_columns;
+//! A definition file may include another one. `TURNS` counts the turns before the decision:
 //!
-//! let definitions = Definitions::from_toml(
-//!     "mine",
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let file = folder.path().join("mine.toml");
+//! # let mine = file.to_str().expect("a path in UTF-8");
+//! std::fs::write(
+//!     mine,
 //!     r#"
 //!     include = ["paper"]
 //!     [metric.TURNS]
 //!     title = "Turns before the decision"
 //!     value = "count(action in ('turn_left', 'turn_right') and t < finish)"
 //!     "#,
-//!     &schema_columns(),
-//! )
-//! .unwrap();
-//! assert!(definitions.explain("TURNS").unwrap().words.starts_with("the number of steps where"));
+//! )?;
+//! let scores = mirrorstats::Study::open(["fixtures/paper"])?.definitions(mine)?.metrics(["TURNS"])?.score()?;
+//! assert_eq!(scores.episodes.metrics[0].name, "TURNS");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Cells as Arrow
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let study = mirrorstats::Study::open(["fixtures/paper"])?.metrics(["TSA", "TTD"])?.by(["experiment"]);
+//! let batch = mirrorstats::record_batch(&study.cells()?)?;
+//! assert_eq!((batch.num_rows(), batch.schema().field(0).name().as_str()), (5 * 2, "experiment"));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # The folder of a report
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let folder = tempfile::tempdir()?;
+//! # let out = folder.path().join("report");
+//! let study = mirrorstats::Study::open(["fixtures/paper"])?.filter("experiment = 'E1'")?;
+//! let options = mirrorstats::ReportOptions { figures: false, ..Default::default() };
+//! let files = study.report(&options)?.write(&out)?;
+//! assert!(files.contains(&"tables/main.tex".to_owned()));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # What another definition changes
+//!
+//! ```
+//! use mirrorstats::{DiffRequest, Side, diff};
+//!
+//! # fn main() -> Result<(), mirrorstats::StudyError> {
+//! let traces = mirrorstats::resolve(&["fixtures/paper".to_owned()], std::io::empty())?;
+//! let (old, new) = (Side::of("paper")?, Side::of("extended")?);
+//! let found = diff(&old, &new, &traces, &DiffRequest::default())?;
+//! assert!(found.changes.flips.is_empty(), "the extended definitions add metrics and change none");
+//! # Ok(())
+//! # }
 //! ```
 
+#[doc(hidden)]
 pub mod agent;
+#[doc(hidden)]
 pub mod base;
+#[doc(hidden)]
 pub mod cells;
+#[doc(hidden)]
 pub mod cli;
+#[doc(hidden)]
 pub mod engine;
+#[doc(hidden)]
 pub mod log;
+#[doc(hidden)]
 pub mod metric;
 #[cfg(feature = "sim")]
+#[doc(hidden)]
 pub mod record;
+#[doc(hidden)]
 pub mod replay;
+#[doc(hidden)]
 pub mod report;
+#[doc(hidden)]
 pub mod score;
 #[cfg(feature = "sim")]
+#[doc(hidden)]
 pub mod sim;
+#[doc(hidden)]
+pub mod study;
+#[doc(hidden)]
 pub mod trace;
+
+// The library. What is reachable besides is for this project's own tests and examples, and may change at any time.
+pub use cells::cell::{Cells, Group, KeyValue};
+pub use cells::changes::{CellChange, Changes, Flip};
+pub use cells::columns::record_batch;
+pub use cells::moments::Moments;
+pub use report::bundle::Manifest;
+pub use report::figures::{Figure, FigureFormat, FigureName};
+pub use report::statistics::{Options as StatisticsOptions, Statistics};
+pub use report::table::Table;
+pub use score::evidence::Evidence;
+pub use score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+pub use study::{
+    Backend, Diff, DiffRequest, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side, Study,
+    StudyError, diff, resolve,
+};

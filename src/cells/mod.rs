@@ -7,6 +7,7 @@ pub mod cell;
 pub mod chance;
 pub mod changes;
 pub mod clustered;
+pub mod columns;
 pub mod contrast;
 pub mod detectable;
 pub mod group;

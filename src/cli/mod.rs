@@ -5,8 +5,6 @@
 
 pub mod args;
 pub mod commands;
-pub mod drawing;
-mod empty_filter;
 #[cfg(feature = "sim")]
 pub mod exec;
 #[cfg(feature = "sim")]
@@ -14,14 +12,11 @@ pub mod forecast;
 mod listing;
 pub mod outcome;
 pub mod output;
-pub mod page;
-pub mod provenance;
 #[cfg(feature = "polars")]
 pub mod querying;
 #[cfg(feature = "sim")]
 pub mod recording;
 pub mod scoring;
-pub mod sides;
 pub mod spark;
 mod terminal;
 #[cfg(feature = "sim")]

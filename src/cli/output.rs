@@ -7,14 +7,13 @@
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, Write as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
 use super::outcome::{Failure, Outcome};
 use crate::base::replace::{self, NewFile};
 use crate::base::visible::visible_lines;
-use crate::trace::inputs::Input;
 
 /// Prints an answer, as text for people or as JSON for programs.
 ///
@@ -44,6 +43,13 @@ pub fn note(words: &str) {
     say(&format!("note: {words}"));
 }
 
+/// Says what an answer lacks or leaves open.
+pub fn notes(notes: &[String]) {
+    for words in notes {
+        note(words);
+    }
+}
+
 /// Says how a command went on standard error. With standard error closed there is nobody to tell, and the work goes on.
 pub fn say(words: &str) {
     let _ = writeln!(io::stderr(), "{}", visible_lines(words));
@@ -61,13 +67,14 @@ pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
 ///
 /// # Errors
 /// When the folder is not there or not writable, or the disk is full; the error names the file. What `write` gives.
-pub fn write_file_with(path: &Path, write: impl FnOnce(&mut File) -> Result<(), Failure>) -> Result<(), Failure> {
+pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T, Failure>) -> Result<T, Failure> {
     let mut file = create(path)?;
-    write(file.as_file_mut()).map_err(|failure| match failure {
+    let written = write(file.as_file_mut()).map_err(|failure| match failure {
         Failure::Output(error) => unwritable(path, error),
         other => other,
     })?;
-    commit_unsynced(file, path)
+    commit_unsynced(file, path)?;
+    Ok(written)
 }
 
 /// Begins the new content of a file.
@@ -92,12 +99,6 @@ pub fn commit_unsynced(file: NewFile, path: &Path) -> Result<(), Failure> {
 /// When the disk is full or the name cannot be taken; the error names the file.
 pub fn commit(file: NewFile, path: &Path) -> Result<(), Failure> {
     file.commit().map_err(|error| unwritable(path, error))
-}
-
-/// The files that a command reads: traces or scores, and what of `named` (definitions, a style) is no built-in name.
-pub fn files_read(inputs: &[Input], named: &[Option<&str>]) -> Vec<PathBuf> {
-    let named = named.iter().flatten().map(PathBuf::from);
-    inputs.iter().map(|input| input.path.clone()).chain(named).collect()
 }
 
 /// Refuses an output that is one of the files which the command reads.

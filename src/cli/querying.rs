@@ -9,7 +9,7 @@ use polars::prelude::LazyFrame;
 use super::commands::query::{AnswerFormat, QueryArgs};
 use super::listing::listing;
 use super::outcome::{Failure, Outcome};
-use super::{empty_filter, output, scoring, terminal};
+use super::{output, terminal};
 use crate::base::visible::visible;
 use crate::cells::group::{DEFAULT_BY, group};
 use crate::engine::polars::answer::{self, Excerpt, Format, QueryError};
@@ -18,6 +18,7 @@ use crate::engine::polars::statement::{self, Checked, Table};
 use crate::engine::polars::tables;
 use crate::metric::fault::Faults;
 use crate::report::tables::fit::fitted;
+use crate::study::StudyError;
 
 /// What stands for null in a table.
 const NULL: &str = "NULL";
@@ -51,11 +52,11 @@ pub fn run(args: &QueryArgs) -> Result<Outcome, Failure> {
 }
 
 fn faults(faults: &Faults) -> Failure {
-    Failure::Faults(faults.render(scoring::colored()))
+    Failure::of_faults(faults)
 }
 
 fn failed(error: PolarsError) -> Failure {
-    scoring::polars_failure(error)
+    StudyError::from(error).into()
 }
 
 /// The format asked for; `None` for a table.
@@ -88,18 +89,19 @@ fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
 
 /// The tables that the query names; the others are not computed.
 fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Failure> {
-    let inputs = scoring::resolve(&args.traces)?;
+    let study = args.traces.study(&args.scoring, &DEFAULT_BY.map(str::to_owned))?;
     if let Some(path) = &args.output {
-        output::check_target(path, output::files_read(&inputs, &[args.scoring.definitions.as_deref()]))?;
+        output::check_target(path, study.files_read(None))?;
     }
     let mut loaded = Vec::new();
     if query.tables.contains(&Table::Steps) {
-        let traces = scoring::open_steps(&inputs)?;
-        loaded.push((Table::Steps, tables::steps(&traces).map_err(failed)?));
+        loaded.push((Table::Steps, tables::steps(study.traces()?).map_err(failed)?));
     }
     if query.tables.contains(&Table::Episodes) || query.tables.contains(&Table::Cells) {
-        let scores = scoring::table(&inputs, &args.scoring, &[], args.traces.threads.count())?;
-        empty_filter::note(scores.len(), &inputs, &args.scoring, args.traces.threads.count())?;
+        let scores = study.score()?.episodes;
+        if let Some(words) = study.empty_filter(scores.len())? {
+            output::note(&words);
+        }
         loaded.push((Table::Episodes, tables::episodes(&scores).map_err(failed)?));
         if query.tables.contains(&Table::Cells) {
             let by = DEFAULT_BY.map(str::to_owned);

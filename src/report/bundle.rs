@@ -160,7 +160,6 @@ impl Manifest {
     }
 
     /// The text of `manifest.json`.
-    #[expect(clippy::missing_panics_doc, reason = "strings, integers and lists always have a JSON text")]
     pub fn json(&self) -> String {
         let json = serde_json::to_string_pretty(self).expect("a manifest holds only strings, integers and lists");
         json + "\n"

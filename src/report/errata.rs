@@ -92,7 +92,6 @@ pub enum ErrataError {
 
 impl Errata {
     /// The slips of the paper.
-    #[expect(clippy::missing_panics_doc, reason = "the file is part of the program, and a test reads it")]
     pub fn of_paper() -> Self {
         toml::from_str(PAPER).expect("the built-in errata are well-formed: a test reads them")
     }

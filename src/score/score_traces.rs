@@ -151,7 +151,10 @@ pub fn restored(traces: &TraceSet, catalog: &Catalog, metrics: &[String]) -> Res
 }
 
 /// Every column that is read must be in every file, with one type.
-fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(), ScoreError> {
+///
+/// # Errors
+/// [`ScoreError::Column`].
+pub fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(), ScoreError> {
     let plan = &definitions.plan;
     let outputs = plan.outputs.iter().map(|output| (output.name.as_str(), output.node));
     for (wanted_by, node) in outputs.chain(plan.filter.map(|node| ("--where", node))) {

@@ -3,15 +3,12 @@
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
-use crate::cells::group::{DEFAULT_BY, group};
+use crate::cells::group::DEFAULT_BY;
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{scoring, terminal};
-use crate::report::comparison::{Comparison, choose, compare};
+use crate::cli::terminal;
+use crate::report::comparison::Comparison;
 use crate::report::errata::Errata;
-use crate::report::layout;
-use crate::report::published;
-use crate::report::style::Style;
 use crate::report::tables::side_by_side;
 
 /// The style that printed the published tables.
@@ -49,18 +46,10 @@ impl CompareArgs {
     /// # Errors
     /// For files and definitions that are not as they must be.
     pub fn run(self) -> Result<Outcome, Failure> {
-        // The small files first: a slip in them should not cost a pass over the traces.
-        let published = published::read(&self.published).map_err(Failure::input)?;
-        let style = Style::load(&self.style).map_err(Failure::input)?;
         let errata = self.errata()?;
-        let by = DEFAULT_BY.map(str::to_owned);
-        let inputs = scoring::resolve(&self.traces)?;
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
-        let episodes = scoring::table(&inputs, &scoring, &[], self.traces.threads.count())?;
-        let cells = group(&episodes, &by).map_err(Failure::input)?;
-        let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
-        let table = choose(&tables, &published, self.table.as_deref(), &style).map_err(Failure::input)?;
-        let comparison = compare(table, &published, &errata);
+        let study = self.traces.study(&scoring, &DEFAULT_BY.map(str::to_owned))?;
+        let comparison = study.compare(&self.published, &self.style, self.table.as_deref(), &errata)?;
         print(&comparison, self.json)?;
         Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }

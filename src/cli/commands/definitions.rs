@@ -6,14 +6,16 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::outcome::{Failure, Outcome};
-use super::super::{output, scoring};
+use super::super::output;
 use crate::base::near::nearest;
 use crate::base::visible::visible;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::FaultRecord;
 use crate::metric::file::{FileError, built_in, built_in_names};
 use crate::score::score_traces;
+use crate::study::StudyError;
 use crate::trace::inputs;
+use crate::trace::open::TraceSet;
 
 /// Check, explain and show metric definitions
 #[derive(Clone, Debug, clap::Args)]
@@ -90,7 +92,7 @@ fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> 
         score_traces::schema_columns()
     } else {
         let inputs = inputs::resolve(traces, io::stdin().lock()).map_err(Failure::input)?;
-        score_traces::trace_columns(&scoring::open(&inputs)?)
+        score_traces::trace_columns(&TraceSet::open(&inputs).map_err(Failure::input)?)
     };
     match Definitions::load(file, &columns) {
         Ok(definitions) if json => {
@@ -115,15 +117,14 @@ fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> 
         }
         Err(FileError::Faults(faults)) if json => {
             output::print_json(&CheckAnswer { ok: false, hash: None, metrics: vec![], faults: faults.records() })?;
-            Err(scoring::definition_failure(FileError::Faults(faults)))
+            Err(Failure::of_faults(&faults))
         }
-        Err(error) => Err(scoring::definition_failure(error)),
+        Err(error) => Err(StudyError::from(error).into()),
     }
 }
 
 fn explain(metric: &str, definitions: &str, json: bool) -> Result<Outcome, Failure> {
-    let definitions =
-        Definitions::load(definitions, &score_traces::schema_columns()).map_err(scoring::definition_failure)?;
+    let definitions = Definitions::load(definitions, &score_traces::schema_columns()).map_err(StudyError::from)?;
     if let Some(explanation) = definitions.explain(metric) {
         return output::print(&explanation, json);
     }

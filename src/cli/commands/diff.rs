@@ -2,15 +2,13 @@
 
 use std::io::{self, Write as _};
 
-use super::super::args::{ThreadArgs, TraceArgs};
+use super::super::args::ThreadArgs;
 use super::super::outcome::{Failure, Outcome};
-use super::super::sides::{self, Asked, Side};
-use super::super::{output, scoring, terminal};
+use super::super::{output, terminal};
 use crate::cells::changes::Changes;
 use crate::cells::group::DEFAULT_BY;
 use crate::report::changes::{self, Limit};
-use crate::report::order::TableOrder;
-use crate::report::style::Style;
+use crate::study::{DiffRequest, Side, diff, resolve};
 
 /// Tell which cells and episodes change between two sets of definitions, or of scores
 #[derive(Clone, Debug, clap::Args)]
@@ -56,31 +54,19 @@ impl DiffArgs {
     /// # Errors
     /// Whatever is wrong with the definitions, the scores or the traces.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let style = Style::load("default").map_err(Failure::input)?;
         let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
-        let inputs = scoring::resolve(&TraceArgs { traces: self.traces.clone(), threads: self.threads })?;
-        let traces = if inputs.is_empty() { None } else { Some(scoring::open_steps(&inputs)?) };
-        let asked = self.asked();
-        let sides = sides::pair(&old, &new, traces.as_ref(), &asked)?;
-        if sides.before.table.is_empty() && sides.after.table.is_empty() {
-            new.check_filter(&inputs, &asked)?;
-        }
-        let mut changes = sides::changes(&sides, &self.by)?;
-        TableOrder { catalog: &sides.after.table.catalog, style: &style }.sort(&mut changes);
-        if let Some(traces) = &traces {
-            for note in sides::explain(&mut changes, traces, &sides, asked.threads)? {
-                output::note(&note);
-            }
-        }
-        self.print(&changes)
+        let traces = resolve(&self.traces, io::stdin().lock())?;
+        let found = diff(&old, &new, &traces, &self.request())?;
+        output::notes(&found.notes);
+        self.print(&found.changes)
     }
 
-    fn asked(&self) -> Asked<'_> {
-        Asked {
-            metrics: self.metrics.as_deref(),
-            condition: self.condition.as_deref(),
-            by: &self.by,
-            text_definitions: self.definitions.as_deref(),
+    fn request(&self) -> DiffRequest {
+        DiffRequest {
+            metrics: self.metrics.clone(),
+            filter: self.condition.clone(),
+            by: self.by.clone(),
+            definitions_of_scores: self.definitions.clone(),
             threads: self.threads.count(),
         }
     }

@@ -149,7 +149,7 @@ impl FilmstripArgs {
 
     fn in_traces(&self, traces: &[String]) -> Result<Option<Reel>, Failure> {
         let files = inputs::resolve(traces, io::stdin()).map_err(Failure::input)?;
-        output::check_target(&self.out, output::files_read(&files, &[]))?;
+        output::check_target(&self.out, files.iter().map(|file| &file.path))?;
         let set = TraceSet::open(&files).map_err(Failure::input)?;
         for (input, file) in files.iter().zip(set.files()) {
             let rows = merge::read(&input.path).map_err(Failure::input)?;

@@ -11,7 +11,8 @@ use crate::base::replace;
 use crate::base::visible::visible;
 use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, scoring};
+use crate::cli::output;
+use crate::study::known_experiments;
 use crate::trace::import::{self, Text};
 use crate::trace::inputs::Input;
 use crate::trace::schema::Kind;
@@ -68,7 +69,7 @@ impl ImportArgs {
     /// # Errors
     /// Lines that are no steps, episodes that are not whole, a file that cannot be read or written.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let experiments = scoring::known_experiments(&self.definitions)?;
+        let experiments = known_experiments(&self.definitions)?;
         self.check_places()?;
         let mut texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
         let imported = import::import(&mut texts, &self.out, experiments.as_deref()).map_err(Failure::input)?;

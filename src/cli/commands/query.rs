@@ -52,7 +52,7 @@ impl QueryArgs {
     /// Always.
     #[cfg(not(feature = "polars"))]
     pub fn run(self) -> Result<Outcome, Failure> {
-        Err(super::super::scoring::without_polars("query"))
+        Err(crate::study::StudyError::WithoutPolars { what: "query" }.into())
     }
 
     /// Runs the query.

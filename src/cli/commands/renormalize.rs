@@ -15,7 +15,7 @@ use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{output, scoring, terminal};
+use crate::cli::{output, terminal};
 use crate::report::tables::fit::fitted;
 use crate::trace::finding::{Severity, TraceError};
 use crate::trace::inputs::Input;
@@ -97,7 +97,7 @@ impl RenormalizeArgs {
     /// # Errors
     /// Traces that break a rule or have no texts, an output that would be an input, whatever writing gives.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let inputs = scoring::resolve(&self.input)?;
+        let inputs = self.input.inputs()?;
         let places = self.places(&inputs)?;
         let old = inputs.iter().map(Old::open).collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
         self.check(&inputs)?;

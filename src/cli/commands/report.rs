@@ -9,17 +9,11 @@ use serde::Serialize;
 use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
-use super::super::page::{Asked, MOST_EPISODES, Made, figure_files};
-use super::super::{empty_filter, output, scoring};
-use crate::cells::group::{DEFAULT_BY, group};
-use crate::report::bundle::{self, Bundle, Manifest, Written};
-use crate::report::layout;
-use crate::report::style::{MAIN_TABLE, Style};
-use crate::report::table::Table;
+use super::super::output;
+use crate::cells::group::DEFAULT_BY;
+use crate::report::bundle::Manifest;
 use crate::report::tables::terminal;
-use crate::score::format;
-use crate::trace::inputs::Input;
-use crate::trace::schema::SCHEMA_VERSION;
+use crate::study::{Report, ReportOptions, WrittenReport};
 
 /// Compute the tables and figures of traces, print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
@@ -69,68 +63,24 @@ impl ReportArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions, the style or the folder.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let inputs = scoring::resolve(&self.traces)?;
-        let (made, files) = self.make(inputs)?;
+        let study = self.traces.study_on(&self.engine, &self.scoring, &self.by)?;
+        let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };
+        study.check_folder(&self.out, &options)?;
+        let report = study.report(&options)?;
+        output::notes(&report.notes);
+        let WrittenReport { files, manifest } = report.write(&self.out)?;
         if self.json {
-            let out = self.out.display().to_string();
-            let Made { episodes, manifest, .. } = made;
-            return output::print_json(&ReportAnswer { out, files, episodes: episodes.len(), manifest });
+            let (out, episodes) = (self.out.display().to_string(), report.results.episodes.len());
+            return output::print_json(&ReportAnswer { out, files, episodes, manifest });
         }
-        self.print(&made.tables, made.episodes.len())
+        self.print(&report)
     }
 
-    /// Makes the report of these files and writes its folder; returns what was made and the files written.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the traces, the definitions, the style or the folder.
-    pub fn make(&self, inputs: Vec<Input>) -> Result<(Made, Vec<String>), Failure> {
-        let read = output::files_read(&inputs, &[self.scoring.definitions.as_deref(), Some(&self.style)]);
-        bundle::check_old(&self.out, &read).map_err(Failure::input)?;
-        // Small files first: a slip in the style should not cost a pass over the traces.
-        let style = Style::load(&self.style).map_err(Failure::input)?;
-        let labels = scoring::labels(&self.by);
-        let threads = self.traces.threads.count();
-        let episodes = scoring::table_on(&self.engine, &inputs, &self.scoring, &labels, threads)?;
-        empty_filter::check(episodes.len(), &inputs, &self.scoring, threads)?;
-        let cells = group(&episodes, &self.by).map_err(Failure::input)?;
-        let tables = layout::tables(&cells, &style).map_err(Failure::input)?;
-        let condition = self.scoring.condition.clone();
-        let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, condition, scoring::provenance(&inputs)?);
-        let mut made = Made { inputs, episodes, cells, tables, manifest, style };
-        let written = self.write(&made, &read)?;
-        made.manifest = written.manifest;
-        let inside = |path: &PathBuf| path.strip_prefix(&self.out).unwrap_or(path).display().to_string();
-        Ok((made, written.files.iter().map(inside).collect()))
-    }
-
-    fn write(&self, made: &Made, read: &[PathBuf]) -> Result<Written, Failure> {
-        let mut others = Vec::new();
-        if !self.no_figures {
-            let asked = Asked { scoring: &self.scoring, threads: self.traces.threads.count() };
-            let drawings = asked.drawings(made)?;
-            for (name, reason) in &drawings.left_out {
-                output::note(&format!("no figure `{name}`: {reason}"));
-            }
-            others.extend(figure_files(&drawings)?);
-            match asked.page(made, &drawings)? {
-                Some(page) => others.push(page),
-                None => output::note(&format!("no report.html: it lists at most {MOST_EPISODES} episodes")),
-            }
+    fn print(&self, report: &Report) -> Result<Outcome, Failure> {
+        if let Some(table) = report.main_table() {
+            io::stdout().lock().write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
         }
-        let mut bytes = Vec::new();
-        format::write(&made.episodes, format::Format::Parquet, &mut bytes).map_err(Failure::input)?;
-        let Made { cells, tables, manifest, .. } = made;
-        let bundle = Bundle { cells, tables, episodes: &bytes, manifest, read, others: &others };
-        bundle::write(&self.out, &bundle).map_err(Failure::input)
-    }
-
-    fn print(&self, tables: &[Table], episodes: usize) -> Result<Outcome, Failure> {
-        let main = tables.iter().find(|table| table.name == MAIN_TABLE).or(tables.first());
-        let mut out = io::stdout().lock();
-        if let Some(table) = main {
-            out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
-        }
-        let episodes = counted(episodes as u64, "episode");
+        let episodes = counted(report.results.episodes.len() as u64, "episode");
         output::say(&format!("{episodes}; the report is in {}", self.out.display()));
         Ok(Outcome::Done)
     }

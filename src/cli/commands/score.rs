@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
 use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
-use super::super::{empty_filter, output, scoring, spark};
-use crate::score::evidence;
+use super::super::{output, spark};
 use crate::score::format::Format;
-use crate::trace::inputs::Input;
+use crate::score::table::EpisodeTable;
+use crate::study::{SparkJob, are_uris, write_scores};
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -41,7 +41,6 @@ impl ScoreArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions or the output.
     pub fn run(self) -> Result<Outcome, Failure> {
-        self.engine.check()?;
         if self.engine.engine == Engine::Spark {
             return self.run_on_spark();
         }
@@ -51,21 +50,16 @@ impl ScoreArgs {
         }
         // An output name of no known format should not cost a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let inputs = scoring::resolve(&self.traces)?;
-        self.check_target(&inputs)?;
-        let threads = self.traces.threads.count();
+        let study = self.traces.study_on(&self.engine, &self.scoring, &[])?;
+        self.check_target(study.files_read(None))?;
         if let Some(episode) = &self.explain {
-            let traces = scoring::open_steps(&inputs)?;
-            let definitions = scoring::definitions(&traces, &self.scoring)?;
-            let found = evidence::explain(&traces, &definitions, episode, threads).map_err(|error| match error {
-                evidence::EvidenceError::Score(error) => scoring::score_failure(error),
-                other @ evidence::EvidenceError::NoSuchEpisode { .. } => Failure::input(other),
-            })?;
-            return output::print(&found, self.json);
+            return output::print(&study.explain(episode)?, self.json);
         }
-        let table = scoring::table_on(&self.engine, &inputs, &self.scoring, &[], threads)?;
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out, threads))?;
-        empty_filter::note(table.len(), &inputs, &self.scoring, threads)?;
+        let table = study.score()?.episodes;
+        self.deliver(&table, format)?;
+        if let Some(words) = study.empty_filter(table.len())? {
+            output::note(&words);
+        }
         Ok(Outcome::Done)
     }
 
@@ -75,42 +69,44 @@ impl ScoreArgs {
                 "error: --explain looks into the steps, which Spark keeps to itself\n  help: leave --engine out";
             return Err(Failure::Rendered(words.to_owned()));
         }
-        let asked = || spark::Asked::of(&self.traces, &self.scoring, &self.engine);
         if let Some(folder) = self.output.as_deref().filter(|output| spark::is_folder(output)) {
             let name = folder.to_string_lossy();
-            let written = asked()?.write(&name)?;
+            let written = self.spark_job()?.write(&name)?;
             let episodes = counted(written.episodes, "episode");
             output::say(&format!("{episodes}; `mirrorstats report {name}` goes on from here"));
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let asked = asked()?;
-        if let Some(path) = &self.output {
-            output::check_target(path, asked.read())?;
-        }
-        let (table, threads) = (asked.score(&[])?, self.traces.threads.count());
-        self.deliver(format, |format, out| scoring::write_table(&table, format, out, threads))?;
+        let job = self.spark_job()?;
+        self.check_target(job.read().to_vec())?;
+        self.deliver(&job.score()?, format)?;
         Ok(Outcome::Done)
     }
 
-    /// That the output is no input.
-    fn check_target(&self, inputs: &[Input]) -> Result<(), Failure> {
-        let Some(path) = &self.output else { return Ok(()) };
-        output::check_target(path, output::files_read(inputs, &[self.scoring.definitions.as_deref()]))
+    /// That the output is no file which is read.
+    fn check_target(&self, read: Vec<PathBuf>) -> Result<(), Failure> {
+        self.output.as_ref().map_or(Ok(()), |path| output::check_target(path, read))
+    }
+
+    /// What Spark is to compute, of files of this machine or of URIs that it alone can read.
+    fn spark_job(&self) -> Result<SparkJob, Failure> {
+        let cluster = self.engine.cluster();
+        if are_uris(&self.traces.traces)? {
+            return Ok(SparkJob::of_uris(self.traces.traces.clone(), &self.scoring.question(&[]), cluster)?);
+        }
+        Ok(SparkJob::of_study(&self.traces.study(&self.scoring, &[])?, cluster)?)
     }
 
     /// Writes the table to where it was asked for.
-    fn deliver(
-        &self,
-        format: Option<Format>,
-        write: impl FnOnce(Format, &mut (dyn io::Write + Send)) -> Result<(), Failure>,
-    ) -> Result<(), Failure> {
+    fn deliver(&self, table: &EpisodeTable, format: Option<Format>) -> Result<(), Failure> {
         let format = format.unwrap_or(if self.json { Format::JsonLines } else { Format::Csv });
+        let threads = self.traces.threads.count();
         match &self.output {
-            Some(path) => output::write_file_with(path, |file| write(format, &mut BufWriter::new(file)))?,
-            None => write(format, &mut BufWriter::new(io::stdout()))?,
+            Some(path) => {
+                output::write_file_with(path, |file| Ok(write_scores(table, format, BufWriter::new(file), threads)?))
+            }
+            None => Ok(write_scores(table, format, BufWriter::new(io::stdout()), threads)?),
         }
-        Ok(())
     }
 }
 

@@ -4,8 +4,8 @@ use std::io::{self, Write as _};
 
 use super::super::args::ScoringArgs;
 use super::super::outcome::{Failure, Outcome};
-use super::super::scoring;
 use crate::metric::sql::{self, Dialect};
+use crate::score::score_traces::schema_columns;
 
 /// Print the SQL statement that computes the episode table from a table `steps`
 #[derive(Clone, Debug, clap::Args)]
@@ -45,7 +45,7 @@ impl SqlArgs {
     /// # Errors
     /// Faults of the definitions; a construct that the dialect cannot say.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let definitions = scoring::definitions_unopened(&self.scoring)?;
+        let definitions = self.scoring.question(&[]).bind_to(&schema_columns()).map_err(Failure::from)?;
         let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
         io::stdout().lock().write_all(statement.as_bytes())?;
         Ok(Outcome::Done)

@@ -1,16 +1,13 @@
 //! `mirrorstats stats`: what can be concluded at this n, and what cannot.
 
-use std::collections::BTreeSet;
 use std::io::Write as _;
 
 use crate::base::near::nearest;
-use crate::cells::cell::Cells;
-use crate::cells::group::{DEFAULT_BY, group};
+use crate::cells::group::DEFAULT_BY;
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::{empty_filter, scoring, terminal};
+use crate::cli::terminal;
 use crate::report::statistics::{Options, Statistics, text};
-use crate::score::table::EpisodeTable;
 
 /// The word that stands for every metric.
 const ALL: &str = "all";
@@ -59,41 +56,27 @@ impl StatsArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions or the options.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let inputs = scoring::resolve(&self.traces)?;
-        let threads = self.traces.threads.count();
-        let asked =
+        let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
-        let table = scoring::table(&inputs, &asked, &scoring::labels(&self.by), threads)?;
-        empty_filter::check(table.len(), &inputs, &asked, threads)?;
-        let cells = group(&table, &self.by).map_err(Failure::input)?;
-        let lost = scoring::lost(&inputs, threads)?;
-        self.print(&table, &cells, lost)
-    }
-
-    /// Prints the statistics of `table`; `cells` are its cells as grouped, `lost` the episodes that the
-    /// infrastructure ended, where the traces say.
-    ///
-    /// # Errors
-    /// For a metric that is not there or too large to square, and when standard output cannot be written.
-    pub fn print(
-        &self,
-        table: &EpisodeTable,
-        cells: &Cells,
-        lost: Option<BTreeSet<String>>,
-    ) -> Result<Outcome, Failure> {
-        let options = Options { confidence: self.confidence, horizon: self.horizon, lost };
-        let statistics = Statistics::of(table, cells, &options).map_err(Failure::input)?;
+        let study = self.traces.study(&scoring, &self.by)?;
+        let options = Options { confidence: self.confidence, horizon: self.horizon, lost: None };
+        let statistics = study.statistics(&options)?;
         let text = if self.json {
             serde_json::to_string_pretty(&statistics).map_err(Failure::input)? + "\n"
         } else {
-            text::render(&statistics, &self.chosen(table, &statistics)?, terminal::width())
+            text::render(&statistics, &self.chosen(&statistics)?, terminal::width())
         };
         std::io::stdout().lock().write_all(text.as_bytes())?;
         Ok(Outcome::Done)
     }
 
-    fn chosen(&self, table: &EpisodeTable, statistics: &Statistics) -> Result<Vec<String>, Failure> {
-        let known: Vec<&str> = table.metrics.iter().map(|column| column.name.as_str()).collect();
+    fn chosen(&self, statistics: &Statistics) -> Result<Vec<String>, Failure> {
+        let mut known: Vec<&str> = Vec::new();
+        for cell in &statistics.cells {
+            if !known.contains(&cell.metric.as_str()) {
+                known.push(&cell.metric);
+            }
+        }
         if self.metrics.is_empty() {
             return Ok(statistics.headline.clone());
         }

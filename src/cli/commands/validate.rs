@@ -6,7 +6,7 @@ use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::scoring;
+use crate::study::known_experiments;
 use crate::trace::finding::Severity;
 use crate::trace::inputs;
 use crate::trace::validate::{Validation, validate};
@@ -35,7 +35,7 @@ impl ValidateCommand {
     /// # Errors
     /// When an argument gives no file, for faults of the definitions, or when the output cannot be written.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let experiments = scoring::known_experiments(&self.definitions)?;
+        let experiments = known_experiments(&self.definitions)?;
         let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
         let report = validate(&inputs, experiments.as_deref(), self.input.threads.count()).map_err(Failure::input)?;
         let mut out = io::stdout().lock();

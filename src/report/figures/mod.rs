@@ -19,6 +19,7 @@ pub mod convert;
 mod decision_curve;
 mod dodge;
 mod font;
+mod format;
 mod frame;
 mod heatmap;
 mod ink;
@@ -39,6 +40,8 @@ mod slopes;
 mod spider;
 mod strip;
 mod tiles;
+
+pub use format::{EncodeError, FigureFormat, UnknownEnding};
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,0 +1,279 @@
+//! Why a study gives no answer.
+
+use std::error::Error;
+use std::io;
+
+use super::provenance::ProvenanceError;
+use crate::base::replace::TargetIsInput;
+use crate::cells::group::GroupError;
+use crate::cells::moments::MomentOverflow;
+use crate::engine::spark::SparkError;
+use crate::metric::definitions::UnknownMetric;
+use crate::metric::fault::Faults;
+use crate::metric::file::FileError;
+use crate::report::bundle::BundleError;
+use crate::report::comparison::ComparisonError;
+use crate::report::figures::{EncodeError, FigureError};
+use crate::report::html::HtmlError;
+use crate::report::published::PublishedError;
+use crate::report::style::StyleError;
+use crate::score::evidence::EvidenceError;
+use crate::score::format::FormatError;
+use crate::score::score_traces::ScoreError;
+use crate::score::select::SelectError;
+use crate::trace::finding::TraceError;
+
+/// Why a study gives no answer. Each message says what, where, expected, found, and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// A URI among files.
+    #[error(
+        "`{uri}`: expected files of this machine, found a URI, which Spark alone can read\n  \
+         help: `mirrorstats score --engine spark {uri} -o scores.parquet`, then give the scores"
+    )]
+    Uri {
+        /// As given.
+        uri: String,
+    },
+    /// Files of this machine and URIs at once.
+    #[error(
+        "expected files of this machine or URIs for Spark, found both\n  \
+         help: name the files as file:// URIs, or score the two apart"
+    )]
+    FilesAndUris,
+    /// Traces and scores at once.
+    #[error(
+        "expected traces or files of scores, found both: `{scores}` holds scores\n  \
+         help: score the traces first, or leave one kind out"
+    )]
+    Mixed {
+        /// The first file of scores.
+        scores: String,
+    },
+    /// Scores where steps are needed.
+    #[error(
+        "{scores}: expected traces, found scores, which have no steps\n  help: give the traces that they were computed from"
+    )]
+    NoSteps {
+        /// The file.
+        scores: String,
+    },
+    /// A file is not the one that was opened.
+    #[error(
+        "{name}: the file changed while it was read: the results would mix two versions of it\n  \
+         help: wait until nothing writes to it, then run the command again"
+    )]
+    Changed {
+        /// The file.
+        name: String,
+    },
+    /// Something is wrong with one file.
+    #[error("{name}: {source}")]
+    File {
+        /// The file.
+        name: String,
+        /// What.
+        source: Box<dyn Error + Send + Sync>,
+    },
+    /// No file at all.
+    #[error("expected at least one file of scores, found none\n  help: name traces or scores")]
+    NoScores,
+    /// Scores under other definitions than those asked for.
+    #[error(
+        "{file}: expected scores under `{wanted}` ({wanted_hash}), found scores under `{found}` ({found_hash})\n  \
+         help: score the traces again with --definitions {wanted}"
+    )]
+    OtherDefinitions {
+        /// The file.
+        file: String,
+        /// The definitions asked for.
+        wanted: String,
+        /// The first digits of their hash.
+        wanted_hash: String,
+        /// The definitions of the scores.
+        found: String,
+        /// The first digits of their hash.
+        found_hash: String,
+    },
+    /// Definitions to compare, and nothing to score with them.
+    #[error(
+        "`{name}` are definitions: expected traces to score with them, found none\n  \
+         help: name the traces after OLD and NEW"
+    )]
+    NoTraces {
+        /// The definitions.
+        name: String,
+    },
+    /// A side of a comparison that holds no scores.
+    #[error(
+        "{argument}: expected definitions, scores or a report's folder, found no scores in it\n  \
+         help: OLD and NEW come first, the traces after them"
+    )]
+    NoSide {
+        /// As given.
+        argument: String,
+    },
+    /// A filter that keeps no episode.
+    #[error("{words}\n  help: give a filter that holds for some of them, or none")]
+    EmptyFilter {
+        /// How many there are, and the values of the columns that the filter names.
+        words: String,
+    },
+    /// A report would be written over the one that it is made from.
+    #[error(
+        "{out}: expected a folder beside the report, found the report itself\n  \
+         help: the old report stays as it is; give another --out"
+    )]
+    OntoItself {
+        /// The folder.
+        out: String,
+    },
+    /// The style of a report is not what it was.
+    #[error(
+        "the style `{name}` changed since the report was made: expected sha256 {expected}, found {found}\n  \
+         help: name the style with --style"
+    )]
+    StyleChanged {
+        /// The style.
+        name: String,
+        /// Its hash in the manifest.
+        expected: String,
+        /// Its hash now.
+        found: String,
+    },
+    /// The style of a report was a file.
+    #[error(
+        "the report's style `{name}` (sha256 {expected}) was a file, and a manifest keeps no paths\n  \
+         help: name the style with --style"
+    )]
+    StyleGone {
+        /// The style.
+        name: String,
+        /// Its hash in the manifest.
+        expected: String,
+    },
+    /// This build lacks a feature.
+    #[error(
+        "`{what}` needs Polars, which this build has not\n  \
+         help: build with it: cargo build --release --features polars"
+    )]
+    WithoutPolars {
+        /// The option or the command.
+        what: &'static str,
+    },
+    /// The traces are not as they must be.
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    /// The traces cannot be scored.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
+    /// A definition file is not as it must be.
+    #[error(transparent)]
+    Definitions(#[from] FileError),
+    /// A filter is not as it must be.
+    #[error(transparent)]
+    Filter(#[from] Faults),
+    /// A metric that the definitions do not have.
+    #[error(transparent)]
+    Metric(#[from] UnknownMetric),
+    /// An episode cannot be explained.
+    #[error(transparent)]
+    Evidence(#[from] EvidenceError),
+    /// Scores cannot be written.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// Scores cannot be filtered.
+    #[error(transparent)]
+    Select(#[from] SelectError),
+    /// Episodes cannot be grouped.
+    #[error(transparent)]
+    Group(#[from] GroupError),
+    /// Sums of squares leave 128 bits.
+    #[error(transparent)]
+    Overflow(#[from] MomentOverflow),
+    /// A style is not as it must be.
+    #[error(transparent)]
+    Style(#[from] StyleError),
+    /// A published table is not as it must be.
+    #[error(transparent)]
+    Published(#[from] PublishedError),
+    /// A published table is not the one that the traces give.
+    #[error(transparent)]
+    Comparison(#[from] ComparisonError),
+    /// A figure cannot be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// A figure cannot be encoded.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// The page of a report cannot be made.
+    #[error(transparent)]
+    Page(#[from] HtmlError),
+    /// A report cannot be written.
+    #[error(transparent)]
+    Bundle(#[from] BundleError),
+    /// A report cannot be made again.
+    #[error(transparent)]
+    Provenance(#[from] ProvenanceError),
+    /// Spark gave no scores.
+    #[error(transparent)]
+    Spark(#[from] SparkError),
+    /// Polars gave no scores.
+    #[cfg(feature = "polars")]
+    #[error(transparent)]
+    Polars(#[from] crate::engine::polars::run::PolarsError),
+    /// An output is one of the files that are read.
+    #[error(transparent)]
+    Target(#[from] TargetIsInput),
+    /// The operating system refuses.
+    #[error(transparent)]
+    System(#[from] io::Error),
+}
+
+impl StudyError {
+    /// An error with the file that it is about.
+    pub(super) fn file(name: &str, source: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::File { name: name.to_owned(), source: source.into() }
+    }
+
+    /// The faults of definitions or of a filter, which have their own layout, with the source underlined.
+    pub fn faults(&self) -> Option<&Faults> {
+        match self {
+            Self::Filter(faults) | Self::Select(SelectError::Condition(faults)) => Some(faults),
+            Self::Definitions(error) => faults_of_file(error),
+            Self::Score(error) | Self::Evidence(EvidenceError::Score(error)) => faults_of_scoring(error),
+            #[cfg(feature = "polars")]
+            Self::Polars(crate::engine::polars::run::PolarsError::Score(error)) => faults_of_scoring(error),
+            _ => None,
+        }
+    }
+
+    /// The system's own error where writing the answer failed, such as a pipe whose reader is gone.
+    ///
+    /// # Errors
+    /// This error, if it is another one.
+    pub fn into_io(self) -> Result<io::Error, Self> {
+        match self {
+            Self::System(error) => Ok(error),
+            Self::Format(error) => error.into_io().map_err(Self::Format),
+            #[cfg(feature = "polars")]
+            Self::Polars(crate::engine::polars::run::PolarsError::ReaderGone) => Ok(io::ErrorKind::BrokenPipe.into()),
+            other => Err(other),
+        }
+    }
+}
+
+fn faults_of_scoring(error: &ScoreError) -> Option<&Faults> {
+    match error {
+        ScoreError::Condition(faults) => Some(faults),
+        ScoreError::Definitions(error) => faults_of_file(error),
+        _ => None,
+    }
+}
+
+fn faults_of_file(error: &FileError) -> Option<&Faults> {
+    match error {
+        FileError::Faults(faults) => Some(faults),
+        FileError::Unreadable { .. } => None,
+    }
+}

@@ -1,0 +1,26 @@
+//! What a report was made from: the inputs with their hashes, computed beside the scan.
+
+use std::fs::File;
+
+use super::error::StudyError;
+use crate::base::hash;
+use crate::report::bundle;
+use crate::trace::inputs::Input;
+
+/// The inputs as a manifest names them.
+///
+/// # Errors
+/// When a file cannot be read.
+pub(super) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::Input>, StudyError> {
+    inputs.iter().map(hash_of).collect()
+}
+
+fn hash_of(input: &Input) -> Result<bundle::Input, StudyError> {
+    let read = || {
+        let file = File::open(&input.path)?;
+        let bytes = file.metadata()?.len();
+        Ok::<_, std::io::Error>((hash::of_reader(file)?, bytes))
+    };
+    let (sha256, bytes) = read().map_err(|error| StudyError::file(&input.name, error))?;
+    Ok(bundle::Input::new(input.name.as_ref(), sha256, bytes))
+}

@@ -1,0 +1,306 @@
+//! A study: inputs, definitions and a filter, opened once and scanned once; every answer is a function of it.
+//!
+//! ```text
+//! Study::open ──► definitions, filter, metrics, by ──► scan ──► episodes, timelines, losses, input hashes
+//!                                                              │
+//!                            score, cells, report, figures, statistics, diff, rescore, compare
+//! ```
+//!
+//! Rule: each input is opened once, and its content must stay the same until the answer is complete; a file that changes
+//! in between is an error. Nothing here knows a command line: text for people comes from errors and from `report`.
+
+mod backend;
+mod diff;
+mod empty_filter;
+mod error;
+mod figure_inputs;
+mod input_hashes;
+mod inputs;
+mod provenance;
+mod report;
+mod rescore;
+mod scan;
+mod scores;
+
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use crate::cells::cell::Cells;
+use crate::cells::group::{DEFAULT_BY, KEY_COLUMNS, group};
+use crate::metric::columns::Columns;
+use crate::metric::definitions::Definitions;
+use crate::report::comparison::{Comparison, choose, compare};
+use crate::report::errata::Errata;
+use crate::report::figures::{Figure, FigureName};
+use crate::report::layout;
+use crate::report::published;
+use crate::report::statistics::{Options, Statistics};
+use crate::report::style::Style;
+use crate::score::evidence::{self, Evidence};
+use crate::score::score_traces;
+use crate::trace::inputs::Input;
+use crate::trace::open::TraceSet;
+
+pub use backend::Backend;
+pub(crate) use backend::{SparkJob, are_uris};
+pub use diff::{Diff, DiffRequest, Side, diff};
+pub use error::StudyError;
+pub use figure_inputs::{Drawings, FigureInputs};
+pub use inputs::{ScoreFile, Source, resolve};
+pub use provenance::ProvenanceError;
+pub use report::{Report, ReportOptions, WrittenReport};
+pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
+pub use scan::{Outputs, Results};
+pub use scores::write as write_scores;
+
+use inputs::Stamp;
+
+/// The definitions that are used where none are named.
+pub const DEFAULT_DEFINITIONS: &str = "paper";
+
+/// Inputs that are open, and the question that is put to them.
+#[derive(Debug)]
+pub struct Study {
+    inputs: Vec<Input>,
+    /// The state of each input before it was opened.
+    stamps: Vec<Stamp>,
+    source: Source,
+    question: Question,
+    backend: Backend,
+    threads: NonZeroUsize,
+}
+
+/// What is asked of the inputs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Question {
+    /// Definitions by name or path; the default ones, or those that scores carry, if absent.
+    pub definitions: Option<String>,
+    /// A condition on episodes in the language of definitions; all episodes if absent.
+    pub filter: Option<String>,
+    /// The metrics wanted, by name; all if absent.
+    pub metrics: Option<Vec<String>>,
+    /// The columns that cells are grouped by.
+    pub by: Vec<String>,
+}
+
+impl Default for Question {
+    fn default() -> Self {
+        Self { definitions: None, filter: None, metrics: None, by: DEFAULT_BY.map(str::to_owned).to_vec() }
+    }
+}
+
+impl Question {
+    /// The definition file asked for, or the default one.
+    pub(crate) fn definitions_name(&self) -> &str {
+        self.definitions.as_deref().unwrap_or(DEFAULT_DEFINITIONS)
+    }
+
+    /// The columns among those to group by that a score does not have by itself.
+    pub(crate) fn labels(&self) -> Vec<String> {
+        self.by.iter().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
+    }
+
+    /// The definitions asked for, with every column that they read in every trace.
+    pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
+        let definitions = self.bind_to(&score_traces::trace_columns(traces))?;
+        score_traces::check_columns(traces, &definitions)?;
+        Ok(definitions)
+    }
+
+    /// The definitions asked for over some columns.
+    pub(crate) fn bind_to(&self, columns: &Columns) -> Result<Definitions, StudyError> {
+        let mut definitions = Definitions::load(self.definitions_name(), columns)?;
+        if let Some(filter) = &self.filter {
+            definitions = definitions.filtered("--where", filter, columns)?;
+        }
+        if let Some(metrics) = &self.metrics {
+            definitions.select(metrics)?;
+        }
+        Ok(definitions)
+    }
+}
+
+/// The experiments that some definitions know; any if `None`.
+///
+/// # Errors
+/// Every fault of the definitions.
+pub fn known_experiments(definitions: &str) -> Result<Option<Vec<String>>, StudyError> {
+    let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
+    Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
+}
+
+impl Study {
+    /// Opens traces, files of scores or folders of either: paths, folders, globs.
+    ///
+    /// # Errors
+    /// An argument that names no file, the first fault of a footer, traces and scores mixed.
+    pub fn open<T: Into<String>>(arguments: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
+        let arguments: Vec<String> = arguments.into_iter().map(Into::into).collect();
+        Self::of(resolve(&arguments, std::io::empty())?)
+    }
+
+    /// Opens these files.
+    ///
+    /// # Errors
+    /// The first fault of a footer, traces and scores mixed, no file at all.
+    pub fn of(inputs: Vec<Input>) -> Result<Self, StudyError> {
+        let stamps = inputs.iter().map(Stamp::of).collect::<Result<_, _>>()?;
+        let source = Source::open(&inputs)?;
+        let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        Ok(Self { inputs, stamps, source, question: Question::default(), backend: Backend::Native, threads })
+    }
+
+    /// Asks for these definitions: `paper`, `extended`, or the path of a TOML file.
+    ///
+    /// # Errors
+    /// A file that cannot be read; every fault in it.
+    pub fn definitions(mut self, name: &str) -> Result<Self, StudyError> {
+        self.question.definitions = Some(name.to_owned());
+        self.checked()
+    }
+
+    /// Keeps the episodes where a condition in the language of definitions holds, such as `seed = 1 and TSA = 1`.
+    ///
+    /// # Errors
+    /// Every fault of the condition.
+    pub fn filter(mut self, condition: &str) -> Result<Self, StudyError> {
+        self.question.filter = Some(condition.to_owned());
+        self.checked()
+    }
+
+    /// Computes these metrics alone.
+    ///
+    /// # Errors
+    /// A metric that the definitions do not have.
+    pub fn metrics<T: Into<String>>(mut self, names: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
+        self.question.metrics = Some(names.into_iter().map(Into::into).collect());
+        self.checked()
+    }
+
+    /// Groups cells by these columns; experiment and model where this is not called. A column that no episode has is an
+    /// error of the scan.
+    #[must_use]
+    pub fn by<T: Into<String>>(mut self, columns: impl IntoIterator<Item = T>) -> Self {
+        self.question.by = columns.into_iter().map(Into::into).collect();
+        self
+    }
+
+    /// Uses so many threads; all cores where this is not called. Results do not depend on it.
+    #[must_use]
+    pub const fn threads(mut self, threads: NonZeroUsize) -> Self {
+        self.threads = threads;
+        self
+    }
+
+    /// Lets another engine compute the scores; the results are the same.
+    #[must_use]
+    pub fn backend(mut self, backend: Backend) -> Self {
+        self.backend = backend;
+        self
+    }
+
+    /// Puts a whole question at once.
+    pub(crate) fn asked(mut self, question: Question) -> Result<Self, StudyError> {
+        self.question = question;
+        self.checked()
+    }
+
+    /// Faults of a definition file or of a filter are found before any row is read. Whether the traces have the columns is
+    /// checked with the scan, when it is known which metrics are wanted.
+    fn checked(self) -> Result<Self, StudyError> {
+        if let Source::Traces(traces) = &self.source {
+            self.question.bind_to(&score_traces::trace_columns(traces))?;
+        }
+        Ok(self)
+    }
+
+    /// The traces, for an answer that only steps can give.
+    ///
+    /// # Errors
+    /// Scores, which have no steps.
+    pub fn traces(&self) -> Result<&TraceSet, StudyError> {
+        self.source.traces()
+    }
+
+    /// The episode table.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces or the scores; numbers beyond 64 bits.
+    pub fn score(&self) -> Result<Results, StudyError> {
+        self.scan(Outputs::default())
+    }
+
+    /// The cells: exact moments of every metric in every group.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; a column to group by that the episodes do not have.
+    pub fn cells(&self) -> Result<Cells, StudyError> {
+        Ok(group(&self.score()?.episodes, &self.question.by)?)
+    }
+
+    /// The statistics of the cells: intervals, tests, comparisons.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; sums of squares beyond 128 bits.
+    pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
+        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
+        self.check_filter(results.episodes.len())?;
+        let cells = group(&results.episodes, &self.question.by)?;
+        let options = Options { lost: results.lost, ..options.clone() };
+        Ok(Statistics::of(&results.episodes, &cells, &options)?)
+    }
+
+    /// One figure, with the models in the order of a style.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; inputs that lack what the figure needs.
+    pub fn figure(&self, name: FigureName, style: &str) -> Result<Figure, StudyError> {
+        let style = Style::load(style)?;
+        let results = self.scan(Outputs::of_figures(&[name]))?;
+        self.check_filter(results.episodes.len())?;
+        Ok(FigureInputs::of(&results, &style)?.draw(name)?)
+    }
+
+    /// The scores of one episode, and the timesteps that decided them.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; scores in the place of traces; no such episode.
+    pub fn explain(&self, episode_id: &str) -> Result<Evidence, StudyError> {
+        let traces = self.source.traces()?;
+        let definitions = self.question.bind(traces)?;
+        let found = evidence::explain(traces, &definitions, episode_id, self.threads);
+        self.check_unchanged()?;
+        Ok(found?)
+    }
+
+    /// A table of the study beside a published one, cell by cell. `table` names it; otherwise it is the first that has
+    /// all the published metrics.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the published table, the style or the inputs; no such table.
+    pub fn compare(
+        &self,
+        published: &Path,
+        style: &str,
+        table: Option<&str>,
+        errata: &Errata,
+    ) -> Result<Comparison, StudyError> {
+        // Small files first: a slip in them should not cost a pass over the traces.
+        let published = published::read(published)?;
+        let style = Style::load(style)?;
+        let tables = layout::tables(&self.cells()?, &style)?;
+        Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
+    }
+
+    /// The files that an answer is made from: inputs, definitions and, where there is one, a style. An output that is one of
+    /// them would replace what it is made from. Names of built-in definitions and styles are in it too.
+    pub fn files_read(&self, style: Option<&str>) -> Vec<PathBuf> {
+        let named = self.question.definitions.as_deref().into_iter().chain(style).map(PathBuf::from);
+        self.inputs.iter().map(|input| input.path.clone()).chain(named).collect()
+    }
+
+    /// Refuses inputs that are not what they were when they were opened.
+    fn check_unchanged(&self) -> Result<(), StudyError> {
+        self.stamps.iter().try_for_each(Stamp::check)
+    }
+}

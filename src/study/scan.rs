@@ -1,0 +1,161 @@
+//! The one pass over the inputs, and everything that it gives.
+
+use std::collections::BTreeSet;
+use std::thread;
+
+use super::error::StudyError;
+use super::inputs::Source;
+use super::{Backend, Study, backend, input_hashes, scores};
+use crate::cells::losses::INFRASTRUCTURE;
+use crate::metric::definitions::Definitions;
+use crate::report::bundle;
+use crate::report::figures::e5_outcomes::Outcomes;
+use crate::report::figures::{FigureName, gaze};
+use crate::score::score_traces;
+use crate::score::table::EpisodeTable;
+use crate::score::timeline::Timeline;
+use crate::trace::open::TraceSet;
+
+/// What a scan gives beside the episode table.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[expect(clippy::struct_excessive_bools, reason = "each output is asked for by itself")]
+pub struct Outputs {
+    /// When each agent looked, claimed and decided: for the figure `gaze`.
+    pub timelines: bool,
+    /// How open questions ended: for the figure `e5-outcomes`.
+    pub outcomes: bool,
+    /// The episodes that the infrastructure ended.
+    pub losses: bool,
+    /// The hashes of the inputs.
+    pub hashes: bool,
+}
+
+impl Outputs {
+    /// What figures of these names are drawn from.
+    pub fn of_figures(names: &[FigureName]) -> Self {
+        let (timelines, outcomes) = (names.contains(&FigureName::Gaze), names.contains(&FigureName::E5Outcomes));
+        Self { timelines, outcomes, ..Self::default() }
+    }
+
+    /// Whether anything beside the scores needs the steps.
+    const fn needs_steps(self) -> bool {
+        self.timelines || self.outcomes || self.losses
+    }
+}
+
+/// What a scan gave.
+#[derive(Debug)]
+pub struct Results {
+    /// One row per episode.
+    pub episodes: EpisodeTable,
+    /// One timeline per episode, in the order of the table. `None` where they were not asked for, for scores, for
+    /// definitions that do not name the moments, and for more episodes than `gaze` draws.
+    pub timelines: Option<Vec<Timeline>>,
+    /// How open questions ended. `None` where that was not asked for, and where there is no such question.
+    pub outcomes: Option<Outcomes>,
+    /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` where they were not
+    /// asked for, and where the inputs do not record it.
+    pub lost: Option<BTreeSet<String>>,
+    /// The inputs with their hashes; empty where they were not asked for.
+    pub inputs: Vec<bundle::Input>,
+}
+
+impl Study {
+    /// Reads the inputs once. A file that changed since it was opened is an error.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces or the scores; numbers beyond 64 bits; a file that changed in between.
+    pub fn scan(&self, outputs: Outputs) -> Result<Results, StudyError> {
+        let (results, inputs) = thread::scope(|scope| {
+            // Hashes read the same pages of the files; on their own thread they cost no time of the scan.
+            let hashing = outputs.hashes.then(|| scope.spawn(|| input_hashes::hashes(&self.inputs)));
+            let results = self.scan_rows(outputs);
+            let inputs = hashing.map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+            (results, inputs)
+        });
+        // A change explains whatever else went wrong.
+        self.check_unchanged()?;
+        Ok(Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? })
+    }
+
+    fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
+        let mut results = match (&self.source, &self.backend) {
+            (Source::Scores(files), Backend::Native) => Results::of(scores::read(files, &self.question)?),
+            (Source::Traces(traces), Backend::Native) => self.scan_traces(traces, outputs)?,
+            (source, _) => {
+                let scored = Results::of(self.scored_elsewhere()?);
+                // The other engine computes scores alone; what else is asked for comes from a scan.
+                match source {
+                    Source::Traces(traces) if outputs.needs_steps() => {
+                        Results { episodes: scored.episodes, ..self.scan_traces(traces, outputs)? }
+                    }
+                    _ => scored,
+                }
+            }
+        };
+        results.select(outputs);
+        Ok(results)
+    }
+
+    /// Scores, timelines and losses in one pass over the traces.
+    fn scan_traces(&self, traces: &TraceSet, outputs: Outputs) -> Result<Results, StudyError> {
+        let labels = self.question.labels();
+        let definitions = self.question.bind(traces)?;
+        let wanted = score_traces::Outputs { labels: &labels, timelines: outputs.timelines || outputs.outcomes };
+        let lost = if outputs.losses { lost_episodes(traces)? } else { None };
+        let (episodes, lost, timelines) = match &lost {
+            None => {
+                let scored = score_traces::score_each(traces, [&definitions], wanted, self.threads)?;
+                let [episodes] = scored.tables;
+                (episodes, None, scored.timelines)
+            }
+            Some(lost) => {
+                let scored = score_traces::score_each(traces, [&definitions, lost], wanted, self.threads)?;
+                let [episodes, lost] = scored.tables;
+                (episodes, Some(lost.keys.iter().map(|key| key.episode_id.to_owned()).collect()), scored.timelines)
+            }
+        };
+        Ok(Results { timelines, lost, ..Results::of(episodes) })
+    }
+
+    fn scored_elsewhere(&self) -> Result<EpisodeTable, StudyError> {
+        match &self.backend {
+            Backend::Spark(cluster) => backend::SparkJob::of_study(self, cluster.clone())?.score(),
+            Backend::Native | Backend::Polars => backend::polars(self.source.traces()?, &self.question, self.threads),
+        }
+    }
+}
+
+/// What the infrastructure ended: episodes without `done`, their last reply lost. `None` where the traces do not record
+/// it.
+fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
+    let status = traces.column("reply_status");
+    if status.is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some()) {
+        return Ok(None);
+    }
+    let columns = score_traces::trace_columns(traces);
+    let statuses: Vec<String> = INFRASTRUCTURE.iter().map(|status| format!("'{status}'")).collect();
+    let ended = format!("first(action = 'done') is null and at(reply_status, length()) in ({})", statuses.join(", "));
+    // No metric and every experiment: the filter alone is asked for.
+    let nothing = Definitions::from_toml("losses", "open = true", &columns)?;
+    Ok(Some(nothing.filtered("losses", &ended, &columns)?))
+}
+
+impl Results {
+    /// The episode table alone.
+    fn of(episodes: EpisodeTable) -> Self {
+        Self { episodes, timelines: None, outcomes: None, lost: None, inputs: Vec::new() }
+    }
+
+    /// Keeps what is asked for: how open questions ended, and timelines of as many episodes as a figure shows.
+    fn select(&mut self, outputs: Outputs) {
+        if outputs.outcomes && Outcomes::are_there(&self.episodes) {
+            let answered =
+                self.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
+            self.outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&self.episodes, &answered));
+        }
+        if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
+            self.timelines = None;
+        }
+    }
+}

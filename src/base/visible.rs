@@ -18,7 +18,7 @@ static ACTS_OR_HIDES: LazyLock<Regex> = LazyLock::new(|| {
         | [0-9\#*] \x{FE0F} \x{20E3}
         | JOINED (?: [\x{200C}\x{200D}] JOINED )+
         )
-        | [\p{Other} \p{Line_Separator} \p{Paragraph_Separator} \p{Default_Ignorable_Code_Point} [\p{Space_Separator}&&[^\x20]]]";
+        | [\p{Other} \p{Line_Separator} \p{Paragraph_Separator} \p{Default_Ignorable_Code_Point}]";
     let joined = r"[[\p{Arabic}\p{Syriac}\p{Devanagari}\p{Bengali}\p{Gurmukhi}\p{Gujarati}\p{Oriya}\p{Tamil}\p{Telugu}
         \p{Kannada}\p{Malayalam}\p{Sinhala}\p{Khmer}\p{Myanmar}\p{Mongolian}]&&[\p{Letter}\p{Mark}]]";
     Regex::new(&pattern.replace("JOINED", joined)).expect("the pattern is a constant")
@@ -27,7 +27,7 @@ static ACTS_OR_HIDES: LazyLock<Regex> = LazyLock::new(|| {
 /// `text` with every character that acts or hides spelled as `\u{1b}`.
 ///
 /// These are Unicode's categories Other (controls, bidirectional and other format characters, tags, private use,
-/// unassigned), Line and Paragraph Separator, every space but the ordinary one, and whatever else a font leaves out by default (fillers, variation
+/// unassigned), Line and Paragraph Separator, and whatever else a font leaves out by default (fillers, variation
 /// selectors). Emoji sequences and the joiners of scripts that are spelled with them stay. Lines become one line.
 pub fn visible(text: &str) -> String {
     if text.bytes().all(|byte| byte == b' ' || byte.is_ascii_graphic()) {
@@ -38,6 +38,16 @@ pub fn visible(text: &str) -> String {
         None => found[0].escape_unicode().to_string(),
     };
     ACTS_OR_HIDES.replace_all(text, spelled).into_owned()
+}
+
+/// As [`visible`], and every white space but the ordinary space is spelled, too: for values of which white space is the
+/// fault.
+pub fn exact(text: &str) -> String {
+    let mut shown = String::with_capacity(text.len());
+    for c in visible(text).chars() {
+        if c != ' ' && c.is_whitespace() { shown.extend(c.escape_unicode()) } else { shown.push(c) }
+    }
+    shown
 }
 
 /// Each line of `text` as [`visible`] shows it; for texts whose line breaks are the program's own.

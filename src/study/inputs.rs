@@ -3,7 +3,7 @@
 use std::fs::{File, Metadata};
 use std::io::{self, Read};
 use std::path::PathBuf;
-use std::time::SystemTime;
+use std::time::{Duration, UNIX_EPOCH};
 
 use super::error::StudyError;
 use crate::engine::spark::source::is_uri;
@@ -125,7 +125,7 @@ pub(super) struct Stamp {
 struct FileState {
     identity: (u64, u64),
     bytes: u64,
-    written: Option<SystemTime>,
+    written: Option<Duration>,
     changed: (i64, i64),
 }
 
@@ -138,7 +138,8 @@ impl FileState {
         };
         #[cfg(not(unix))]
         let (identity, changed) = ((0, 0), (0, 0));
-        Self { identity, bytes: metadata.len(), written: metadata.modified().ok(), changed }
+        let written = metadata.modified().ok().and_then(|time| time.duration_since(UNIX_EPOCH).ok());
+        Self { identity, bytes: metadata.len(), written, changed }
     }
 }
 

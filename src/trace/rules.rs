@@ -14,7 +14,7 @@ use super::open::TraceFile;
 use super::pass::Episodes;
 use super::schema::{Column, Kind};
 use crate::base::near::nearest;
-use crate::base::visible::visible;
+use crate::base::visible::exact;
 
 /// A finding and its row among the episodes'.
 pub(super) struct Located {
@@ -383,7 +383,7 @@ fn shown(values: &ArrayRef, row: usize) -> String {
         return "null".into();
     }
     if values.as_dictionary_opt::<Int32Type>().is_some() {
-        return format!("`{}`", visible(text_at(values, row).unwrap_or_default()));
+        return format!("`{}`", exact(text_at(values, row).unwrap_or_default()));
     }
     let any = values.as_any();
     let number = any.downcast_ref::<Int64Array>().map(|ints| ints.value(row).to_string());

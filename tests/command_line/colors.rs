@@ -106,7 +106,7 @@ const MISSPELLED: [(&str, &str, &str); 9] = [
     ("re d", "`re d`", "did you mean `red`?"),
     ("Dark  Teal", "`Dark  Teal`", "did you mean `dark teal`?"),
     ("dark\u{a0}teal", "`dark\\u{a0}teal`", "did you mean `dark teal`?"),
-    ("\u{200b}red\n", "`\\u{200b}red\\n`", "did you mean `red`?"),
+    ("\u{200b}red\n", "`\\u{200b}red\\u{a}`", "did you mean `red`?"),
 ];
 
 /// Words in a column where they mean nothing, and what the column takes instead.

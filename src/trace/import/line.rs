@@ -9,7 +9,7 @@ use std::fmt;
 use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::fault::Fault;
-use crate::base::visible::visible;
+use crate::base::visible::{exact, visible};
 
 /// A value of a step.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +43,7 @@ impl Value {
             Self::Text(text) if text.chars().count() > LONGEST => {
                 format!("the text `{}...`", visible(&text.chars().take(LONGEST).collect::<String>()))
             }
-            Self::Text(text) => format!("the text `{}`", visible(text)),
+            Self::Text(text) => format!("the text `{}`", exact(text)),
             Self::List => "a list".into(),
             Self::Object(_) => "an object".into(),
         }

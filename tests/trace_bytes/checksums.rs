@@ -128,7 +128,8 @@ fn every_page_with_a_wrong_checksum_is_found_on_every_way_to_read_it() {
     let path = folder.path().join("flipped.parquet");
     for name in FILES {
         let whole = fixture(name);
-        for page in pages(&whole) {
+        // The dictionary of a column without a value has no byte.
+        for page in pages(&whole).into_iter().filter(|page| page.body < page.end) {
             let mut bytes = whole.clone();
             bytes[page.body] ^= 1;
             fs::write(&path, bytes).unwrap();

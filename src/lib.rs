@@ -111,7 +111,7 @@
 //! # let out = folder.path().join("report");
 //! let study = mirrorstats::Study::open(["fixtures/paper"])?.filter("experiment = 'E1'")?;
 //! let options = mirrorstats::ReportOptions { figures: false, ..Default::default() };
-//! let files = study.report(&options)?.write(&out)?;
+//! let files = study.report(&options)?.write(&out)?.files;
 //! assert!(files.contains(&"tables/main.tex".to_owned()));
 //! # Ok(())
 //! # }

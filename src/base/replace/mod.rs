@@ -15,7 +15,7 @@ mod same_file;
 
 pub use error::without_name;
 pub use folder::{FolderError, FolderFiles, replace_folder};
-pub use new_file::{NewFile, commit_named, replace};
+pub use new_file::{NewFile, replace};
 pub use place::folder_of;
 pub use same_file::{TargetIsInput, check_target, is_same_file};
 

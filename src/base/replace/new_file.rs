@@ -130,17 +130,6 @@ pub fn replace(target: &Path, bytes: &[u8]) -> io::Result<()> {
     file.commit()
 }
 
-/// Replaces the file at `target` by the complete `file`, which has the name `temporary` in the same folder: for content
-/// that is useful under a name of its own before it is complete.
-///
-/// # Errors
-/// As [`NewFile::commit`].
-pub fn commit_named(file: &File, temporary: &Path, target: &Path) -> io::Result<()> {
-    file.sync_all()?;
-    fs::rename(temporary, target)?;
-    sync_folder(folder_of(target))
-}
-
 /// A temporary file with the permissions of an ordinary new one, locked for as long as it is open.
 fn locked_file(folder: &Path, prefix: &OsStr) -> io::Result<NamedTempFile> {
     loop {

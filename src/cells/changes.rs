@@ -3,6 +3,7 @@
 //! Rule: integers are compared, never floats. An episode is the same in both if its whole key is; what only one
 //! scoring has (metrics, episodes, cells) is told and never stands for a zero.
 
+use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 
 use indexmap::IndexMap;
@@ -14,7 +15,7 @@ use super::group::{GroupError, group};
 use super::moments::Moments;
 use crate::metric::catalog::{Catalog, Kind};
 use crate::score::evidence::Evidence;
-use crate::score::table::{EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
+use crate::score::table::{EpisodeKey, EpisodeKeys, EpisodeTable, KeyRef, MetricColumn};
 
 /// A value of the scoring before, and the one after.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -146,16 +147,16 @@ impl Changes {
     pub fn of(before: &EpisodeTable, after: &EpisodeTable, by: &[String]) -> Result<Self, GroupError> {
         let metrics = Overlap::of(&names(before), &names(after));
         let (cells_compared, cells) = cell_changes(&group(before, by)?, &group(after, by)?);
-        let rows = Pair { before: rows(before), after: rows(after) };
+        let aligned = Aligned::of(&before.keys, &after.keys);
         Ok(Self {
             definitions: Pair { before: origin(&before.catalog), after: origin(&after.catalog) },
             rewritten: rewritten(before, after),
             metrics,
-            episodes: episodes(&rows),
+            episodes: aligned.overlap(before, after),
             by: by.to_vec(),
             cells_compared,
             cells,
-            flips: flips(before, after, &rows),
+            flips: flips(before, after, &aligned.both),
         })
     }
 
@@ -256,34 +257,54 @@ fn rewritten(before: &EpisodeTable, after: &EpisodeTable) -> Vec<Rewritten> {
     found
 }
 
-/// The row of each episode.
-type Rows<'a> = BTreeMap<KeyRef<'a>, usize>;
-
-fn rows(table: &EpisodeTable) -> Rows<'_> {
-    table.keys.iter().zip(0..).collect()
+/// The rows of two tables by their keys; both are in the order of them.
+#[derive(Default)]
+struct Aligned {
+    /// Rows with the same key.
+    both: Vec<Pair<usize>>,
+    only_before: Vec<usize>,
+    only_after: Vec<usize>,
 }
 
-fn episodes(rows: &Pair<Rows>) -> Overlap<EpisodeName> {
-    let without = |some: &Rows, others: &Rows| -> Vec<EpisodeName> {
-        some.keys().filter(|key| !others.contains_key(*key)).map(|key| EpisodeName::from(*key)).collect()
-    };
-    let only_after = without(&rows.after, &rows.before);
-    Overlap {
-        both: (rows.after.len() - only_after.len()) as u64,
-        only_before: without(&rows.before, &rows.after),
-        only_after,
+impl Aligned {
+    fn of(before: &EpisodeKeys, after: &EpisodeKeys) -> Self {
+        let mut aligned = Self::default();
+        let (mut old, mut new) = (0, 0);
+        while old < before.len() && new < after.len() {
+            let order = before.get(old).cmp(&after.get(new));
+            match order {
+                Ordering::Less => aligned.only_before.push(old),
+                Ordering::Greater => aligned.only_after.push(new),
+                Ordering::Equal => aligned.both.push(Pair { before: old, after: new }),
+            }
+            old += usize::from(order.is_le());
+            new += usize::from(order.is_ge());
+        }
+        aligned.only_before.extend(old..before.len());
+        aligned.only_after.extend(new..after.len());
+        aligned
+    }
+
+    fn overlap(&self, before: &EpisodeTable, after: &EpisodeTable) -> Overlap<EpisodeName> {
+        let names = |rows: &[usize], table: &EpisodeTable| -> Vec<EpisodeName> {
+            rows.iter().map(|row| EpisodeName::from(table.keys.get(*row))).collect()
+        };
+        Overlap {
+            both: self.both.len() as u64,
+            only_before: names(&self.only_before, before),
+            only_after: names(&self.only_after, after),
+        }
     }
 }
 
-fn flips(before: &EpisodeTable, after: &EpisodeTable, rows: &Pair<Rows>) -> Vec<Flip> {
+fn flips(before: &EpisodeTable, after: &EpisodeTable, both: &[Pair<usize>]) -> Vec<Flip> {
     let mut found = Vec::new();
     for new in &after.metrics {
         let Some(old) = column(before, &new.name) else { continue };
-        for (key, &row) in &rows.after {
-            let Some(&old_row) = rows.before.get(key) else { continue };
-            let value = Pair { before: old.get(old_row), after: new.get(row) };
+        for rows in both {
+            let value = Pair { before: old.get(rows.before), after: new.get(rows.after) };
             if value.before != value.after {
-                let (metric, episode) = (new.name.clone(), EpisodeName::from(*key));
+                let (metric, episode) = (new.name.clone(), EpisodeName::from(after.keys.get(rows.after)));
                 found.push(Flip { metric, episode, value, timesteps: Pair { before: None, after: None } });
             }
         }

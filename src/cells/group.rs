@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::cell::{Cells, Group, KeyValue};
 use super::moments::{MomentOverflow, Moments};
 use crate::base::near::nearest;
-use crate::score::table::{EpisodeTable, KeyRef, LabelColumn};
+use crate::score::table::{EpisodeTable, KeyRef, LabelColumn, TextColumn};
 
 /// The key columns of every episode table.
 pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episode_id"];
@@ -62,36 +62,34 @@ fn suggestion(nearest: Option<&str>) -> String {
 /// # Errors
 /// For no column, a repeated or an unknown one, and for sums that leave 128 bits.
 pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
-    let columns = columns(table, by)?;
-    let mut groups: BTreeMap<Vec<KeyValue>, Group> = BTreeMap::new();
-    for row in 0..table.len() {
-        let key: Vec<KeyValue> = columns.iter().map(|column| column.value(table, row)).collect();
-        let group = groups.entry(key.clone()).or_insert_with(|| Group {
-            key,
-            episodes: 0,
-            moments: vec![Moments::default(); table.metrics.len()],
-        });
-        group.episodes += 1;
+    let Membership { keys, of_row } = Membership::of(table, by)?;
+    let none = |key| Group { key, episodes: 0, moments: vec![Moments::default(); table.metrics.len()] };
+    let mut groups: Vec<Group> = keys.into_iter().map(none).collect();
+    let mut start = 0;
+    // A table is ordered by experiment and model: grouped by them, each group is one run of rows.
+    for run in of_row.chunk_by(|a, b| a == b) {
+        let rows = start..start + run.len();
+        start = rows.end;
+        let group = &mut groups[run[0]];
+        group.episodes += run.len() as u64;
         for (moments, metric) in group.moments.iter_mut().zip(&table.metrics) {
-            if let Some(value) = metric.get(row) {
-                *moments = moments
-                    .with(value)
-                    .map_err(|source| GroupError::Overflow { metric: metric.name.clone(), source })?;
-            }
+            *moments = moments
+                .with_rows(metric, rows.clone())
+                .map_err(|source| GroupError::Overflow { metric: metric.name.clone(), source })?;
         }
     }
     Ok(Cells {
         catalog: table.catalog.clone(),
         by: by.to_vec(),
         metrics: table.metrics.iter().map(|metric| metric.name.clone()).collect(),
-        groups: groups.into_values().collect(),
+        groups,
     })
 }
 
 /// The different values of a key column, a label or a metric; `None` for any other name.
 pub fn column_values(table: &EpisodeTable, name: &str) -> Option<BTreeSet<KeyValue>> {
     if let Some(column) = column(table, name) {
-        return Some((0..table.len()).map(|row| column.value(table, row)).collect());
+        return Some(column.ranks(table).values.into_iter().collect());
     }
     let metric = table.metrics.iter().find(|metric| metric.name == name)?;
     Some(metric.iter().map(|value| value.map_or(KeyValue::Missing, KeyValue::Int)).collect())
@@ -102,24 +100,102 @@ pub fn column_values(table: &EpisodeTable, name: &str) -> Option<BTreeSet<KeyVal
 /// # Errors
 /// As [`group`], sums apart.
 pub fn membership(table: &EpisodeTable, by: &[String]) -> Result<Vec<usize>, GroupError> {
-    let columns = columns(table, by)?;
-    let key = |row| -> Vec<KeyValue> { columns.iter().map(|column| column.value(table, row)).collect() };
-    let keys: Vec<Vec<KeyValue>> = (0..table.len()).map(key).collect();
-    let groups: BTreeSet<&Vec<KeyValue>> = keys.iter().collect();
-    let places: BTreeMap<&Vec<KeyValue>, usize> = groups.into_iter().zip(0..).collect();
-    Ok(keys.iter().map(|key| places[key]).collect())
+    Ok(Membership::of(table, by)?.of_row)
+}
+
+/// Which group each episode is in.
+struct Membership {
+    /// The groups' keys, ascending.
+    keys: Vec<Vec<KeyValue>>,
+    /// For each row the position of its key.
+    of_row: Vec<usize>,
+}
+
+impl Membership {
+    fn of(table: &EpisodeTable, by: &[String]) -> Result<Self, GroupError> {
+        let columns: Vec<Ranks> = columns(table, by)?.iter().map(|column| column.ranks(table)).collect();
+        let ranks = |row: usize| columns.iter().map(move |column| column.of_row[row]);
+        let mut seen: BTreeMap<Vec<usize>, usize> = BTreeMap::new();
+        let mut of_row: Vec<usize> = Vec::with_capacity(table.len());
+        for row in 0..table.len() {
+            let group = match row.checked_sub(1) {
+                Some(before) if ranks(before).eq(ranks(row)) => of_row[before],
+                _ => {
+                    let new = seen.len();
+                    *seen.entry(ranks(row).collect()).or_insert(new)
+                }
+            };
+            of_row.push(group);
+        }
+        // Groups are numbered as they appear, and then by their keys.
+        let mut places = vec![0; seen.len()];
+        seen.values().zip(0..).for_each(|(seen, place)| places[*seen] = place);
+        of_row.iter_mut().for_each(|group| *group = places[*group]);
+        let key = |ranks: &Vec<usize>| -> Vec<KeyValue> {
+            columns.iter().zip(ranks).map(|(column, rank)| column.values[*rank].clone()).collect()
+        };
+        Ok(Self { keys: seen.keys().map(key).collect(), of_row })
+    }
+}
+
+/// A column as the places of its values among all different ones.
+struct Ranks {
+    /// The different values, ascending.
+    values: Vec<KeyValue>,
+    /// For each row the position of its value.
+    of_row: Vec<usize>,
+}
+
+impl Ranks {
+    /// A column of `rows` values, of which many are equal: each row has a code, and each code a value.
+    fn of(rows: usize, code: impl Fn(usize) -> usize, value: impl Fn(usize) -> KeyValue) -> Self {
+        let mut of_row: Vec<usize> = (0..rows).map(code).collect();
+        let mut first = vec![None; of_row.iter().max().map_or(0, |most| most + 1)];
+        (0..rows).for_each(|row| first[of_row[row]] = first[of_row[row]].or(Some(row)));
+        let of_code: Vec<Option<KeyValue>> = first.into_iter().map(|row| row.map(&value)).collect();
+        let mut values: Vec<KeyValue> = of_code.iter().flatten().cloned().collect();
+        values.sort_unstable();
+        values.dedup();
+        let place = |value: &KeyValue| values.binary_search(value).unwrap_or_default();
+        let places: Vec<usize> = of_code.iter().map(|value| value.as_ref().map_or(0, place)).collect();
+        of_row.iter_mut().for_each(|code| *code = places[*code]);
+        Self { values, of_row }
+    }
+
+    fn of_ints(ints: impl Iterator<Item = i32>) -> Self {
+        let ints: Vec<i32> = ints.collect();
+        let mut values = ints.clone();
+        values.sort_unstable();
+        values.dedup();
+        let of_row = ints.iter().map(|value| values.binary_search(value).unwrap_or_default()).collect();
+        Self { values: values.into_iter().map(|value| KeyValue::Int(value.into())).collect(), of_row }
+    }
 }
 
 /// A column to group by, found in the table.
 enum KeyColumn<'a> {
-    Key(fn(KeyRef<'_>) -> KeyValue),
+    Text(&'a TextColumn),
+    Int(fn(KeyRef<'_>) -> i32),
     Label { column: &'a LabelColumn, is_integer: bool },
 }
 
 impl KeyColumn<'_> {
+    fn ranks(&self, table: &EpisodeTable) -> Ranks {
+        let of_text = |column: &TextColumn| {
+            // Null has a code of its own.
+            Ranks::of(table.len(), |row| column.code(row).map_or(0, |code| code + 1), |row| self.value(table, row))
+        };
+        match self {
+            Self::Int(of) => Ranks::of_ints(table.keys.iter().map(of)),
+            Self::Text(column) => of_text(column),
+            Self::Label { column, .. } => of_text(&column.values),
+        }
+    }
+
     fn value(&self, table: &EpisodeTable, row: usize) -> KeyValue {
         match self {
-            Self::Key(of) => of(table.keys.get(row)),
+            Self::Int(of) => KeyValue::Int(of(table.keys.get(row)).into()),
+            Self::Text(column) => column.get(row).map_or(KeyValue::Missing, |text| KeyValue::Text(text.to_owned())),
             Self::Label { column, is_integer } => match column.values.get(row) {
                 None => KeyValue::Missing,
                 Some(text) if *is_integer => canonical_integer(text).map_or(KeyValue::Missing, KeyValue::Int),
@@ -154,11 +230,11 @@ fn known_columns(table: &EpisodeTable) -> Vec<&str> {
 
 fn column<'a>(table: &'a EpisodeTable, name: &str) -> Option<KeyColumn<'a>> {
     Some(match name {
-        "experiment" => KeyColumn::Key(|key| KeyValue::Text(key.experiment.to_owned())),
-        "model" => KeyColumn::Key(|key| KeyValue::Text(key.model.to_owned())),
-        "seed" => KeyColumn::Key(|key| KeyValue::Int(key.seed.into())),
-        "run" => KeyColumn::Key(|key| KeyValue::Int(key.run.into())),
-        "episode_id" => KeyColumn::Key(|key| KeyValue::Text(key.episode_id.to_owned())),
+        "experiment" => KeyColumn::Text(table.keys.experiments()),
+        "model" => KeyColumn::Text(table.keys.models()),
+        "seed" => KeyColumn::Int(|key| key.seed),
+        "run" => KeyColumn::Int(|key| key.run),
+        "episode_id" => KeyColumn::Text(table.keys.episode_ids()),
         _ => {
             let column = table.labels.iter().find(|label| label.name == name)?;
             let is_integer = column.values.iter().flatten().all(|text| canonical_integer(text).is_some());

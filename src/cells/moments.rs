@@ -1,6 +1,9 @@
 //! Exact moments of integers, and the mean and standard errors that follow from them.
 
+use std::ops::Range;
+
 use crate::metric::catalog::StandardError;
+use crate::score::table::MetricColumn;
 
 /// n, the sum and the sum of squares of some integers: all that mean and standard error need.
 ///
@@ -31,6 +34,24 @@ impl Moments {
             n: self.n + 1,
             sum: self.sum.checked_add(value).ok_or(MomentOverflow)?,
             sum_sq: self.sum_sq.checked_add(value * value).ok_or(MomentOverflow)?,
+        })
+    }
+
+    /// These moments and the defined values of some rows of a metric.
+    ///
+    /// # Errors
+    /// As [`Moments::with`].
+    pub fn with_rows(self, column: &MetricColumn, rows: Range<usize>) -> Result<Self, MomentOverflow> {
+        // A few rows are faster one by one than as a slice of bits.
+        let counts = if rows.len() < 16 { None } else { column.count_truths(rows.clone()) };
+        let Some((zeros, ones)) = counts else {
+            return rows.filter_map(|row| column.get(row)).try_fold(self, Self::with);
+        };
+        let (n, sum) = ((zeros + ones) as u64, ones as i128);
+        Ok(Self {
+            n: self.n + n,
+            sum: self.sum.checked_add(sum).ok_or(MomentOverflow)?,
+            sum_sq: self.sum_sq.checked_add(sum).ok_or(MomentOverflow)?,
         })
     }
 

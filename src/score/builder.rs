@@ -4,7 +4,6 @@
 //! order in which they come, and the sorted column points at them.
 
 use std::collections::HashMap;
-use std::sync::Arc;
 
 use arrow::array::{
     Array, ArrayRef, AsArray as _, BooleanArray, BooleanBufferBuilder, DictionaryArray, Int32Array, Int64Array,
@@ -14,7 +13,9 @@ use arrow::buffer::NullBuffer;
 use arrow::datatypes::{ArrowNativeType as _, DataType, Float64Type, Int32Type, Int64Type};
 
 use super::order::order;
-use super::table::{EpisodeKeys, EpisodeTable, Header, KeyRef, LabelColumn, MetricColumn, TextColumn, narrow};
+use super::table::{
+    EpisodeKeys, EpisodeTable, Header, KeyRef, LabelColumn, MetricColumn, MetricValues, TextColumn, narrow,
+};
 use crate::trace::scan::EPISODE_COLUMNS;
 
 /// A table under way.
@@ -253,17 +254,19 @@ impl MetricBuilder {
         }
     }
 
-    fn finish(mut self) -> ArrayRef {
+    fn finish(mut self) -> MetricValues {
         let nulls = Some(NullBuffer::new(self.valid.finish())).filter(|nulls| nulls.null_count() > 0);
         match self.values {
-            Values::Bools(mut bools) => Arc::new(BooleanArray::new(bools.finish(), nulls)),
-            Values::Ints(ints) => Arc::new(Int64Array::new(ints.into(), nulls)),
+            Values::Bools(mut bools) => MetricValues::Bools(BooleanArray::new(bools.finish(), nulls)),
+            Values::Ints(ints) => MetricValues::Ints(Int64Array::new(ints.into(), nulls)),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use proptest::collection::vec;
     use proptest::option;
     use proptest::prelude::*;
@@ -395,7 +398,7 @@ mod tests {
             &episode_id.codes,
             &episode_id.texts,
         ];
-        let metrics = table.metrics.iter().map(|metric| metric.values.as_ref());
+        let metrics = table.metrics.iter().map(MetricColumn::array);
         let size = |column: &dyn Array| column.to_data().get_slice_memory_size().unwrap();
         let bytes: usize = columns.into_iter().chain(metrics).map(size).sum();
         assert!(bytes - text < 50 * EPISODES, "{bytes} bytes, {text} of them ids");

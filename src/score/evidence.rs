@@ -159,7 +159,7 @@ pub fn explain_each(
 }
 
 /// What computes the metrics asked for and every value that they build on.
-struct Reader<'a> {
+pub(super) struct Reader<'a> {
     definitions: &'a Definitions,
     plan: PhysicalPlan,
     /// The steps of those values.
@@ -167,7 +167,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    fn of(definitions: &'a Definitions) -> Self {
+    pub(super) fn of(definitions: &'a Definitions) -> Self {
         let logical = &definitions.plan;
         let nodes = logical.needed_by(logical.outputs.iter().map(|output| output.node));
         let mut plan = PhysicalPlan::default();
@@ -175,7 +175,22 @@ impl<'a> Reader<'a> {
         Self { definitions, plan, steps }
     }
 
-    fn episode(&self, batch: &EpisodeBatch, episode: usize, episode_id: &str) -> Result<Evidence, EngineError> {
+    /// Adds the steps of these values to a plan.
+    pub(super) fn add_to(&self, plan: &mut PhysicalPlan) {
+        let logical = &self.definitions.plan;
+        plan.add_nodes(logical, logical.needed_by(logical.outputs.iter().map(|output| output.node)));
+    }
+
+    /// What decided the metrics of one episode of a batch.
+    ///
+    /// # Errors
+    /// When a number leaves 64 bits.
+    pub(super) fn episode(
+        &self,
+        batch: &EpisodeBatch,
+        episode: usize,
+        episode_id: &str,
+    ) -> Result<Evidence, EngineError> {
         let (start, end) = (batch.offsets[episode], batch.offsets[episode + 1]);
         let offsets = [0, end - start];
         let segments = Segments::new(&offsets);
@@ -189,7 +204,8 @@ impl<'a> Reader<'a> {
     }
 }
 
-fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
+/// The ids of the episodes of a batch.
+pub(super) fn episode_ids(batch: &EpisodeBatch) -> Vec<String> {
     let column = batch.episodes.column_by_name("episode_id").expect("every batch names its episodes");
     let dictionary = column.as_dictionary::<Int32Type>();
     let texts = dictionary.values().as_string::<i32>();

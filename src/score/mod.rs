@@ -13,6 +13,7 @@ mod elementwise;
 pub mod error;
 pub mod evaluate;
 pub mod evidence;
+pub mod flips;
 pub mod format;
 mod order;
 pub mod physical;

@@ -229,11 +229,7 @@ pub fn score_each<const N: usize>(
     let first = definitions.first().filter(|_| outputs.timelines);
     let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
     let projection = projection(traces, &definitions, &plan, outputs.labels)?;
-    let headers = definitions.map(|definitions| Header {
-        catalog: definitions.catalog.clone(),
-        labels: outputs.labels.to_vec(),
-        metrics: definitions.plan.outputs.iter().map(|output| output.name.clone()).collect(),
-    });
+    let headers = definitions.map(|definitions| header(definitions, outputs.labels));
     let mut found = timelines.as_ref().map(|_| Vec::new());
     let read = |batch: &EpisodeBatch| {
         let values = plan.evaluate(&view(batch))?;
@@ -244,6 +240,12 @@ pub fn score_each<const N: usize>(
         found.iter_mut().zip(part).for_each(|(found, part)| found.extend(part));
     })?;
     Ok(Scored { tables, timelines: found.map(in_key_order) })
+}
+
+/// The columns of the table that definitions give.
+pub(super) fn header(definitions: &Definitions, labels: &[String]) -> Header {
+    let metrics = definitions.plan.outputs.iter().map(|output| output.name.clone()).collect();
+    Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics }
 }
 
 /// The episodes of some traces without a metric: keys and labels, the traces checked as [`score`] checks them.
@@ -266,7 +268,7 @@ pub fn unscored(
 }
 
 /// The tables of what `score` gives for each batch; what else it gives goes to `other`, in the order of the files.
-fn collect<T: Send, const N: usize>(
+pub(super) fn collect<T: Send, const N: usize>(
     traces: &TraceSet,
     projection: &Projection,
     headers: [Header; N],

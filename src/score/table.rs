@@ -1,12 +1,12 @@
 //! The episode table: one row per episode, its keys and one integer per metric, in Arrow columns.
 
 use std::collections::HashSet;
+use std::ops::Range;
 
 use arrow::array::{
     Array, ArrayRef, AsArray as _, BooleanArray, Int32Array, Int64Array, LargeStringArray, UInt32Array,
 };
 use arrow::compute::take;
-use arrow::datatypes::Int64Type;
 
 use super::builder::TableBuilder;
 use crate::metric::catalog::Catalog;
@@ -81,8 +81,16 @@ pub struct LabelColumn {
 pub struct MetricColumn {
     /// The metric's name in the catalog.
     pub name: String,
-    /// Truth values, for 0 and 1, or 64-bit integers; one per episode.
-    pub(super) values: ArrayRef,
+    pub(super) values: MetricValues,
+}
+
+/// One value per episode.
+#[derive(Clone, Debug)]
+pub(super) enum MetricValues {
+    /// Truth values, for 0 and 1.
+    Bools(BooleanArray),
+    /// Integers.
+    Ints(Int64Array),
 }
 
 /// The names of a table's columns.
@@ -200,6 +208,37 @@ impl EpisodeKeys {
         }
     }
 
+    /// The experiment of each row.
+    pub fn experiments(&self) -> &TextColumn {
+        &self.experiment
+    }
+
+    /// The model of each row.
+    pub fn models(&self) -> &TextColumn {
+        &self.model
+    }
+
+    /// The id of each row.
+    pub fn episode_ids(&self) -> &TextColumn {
+        &self.episode_id
+    }
+
+    /// The seed of a row.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn seed(&self, row: usize) -> i32 {
+        self.seed.value(row)
+    }
+
+    /// The run of a row.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn run(&self, row: usize) -> i32 {
+        self.run.value(row)
+    }
+
     /// The keys, in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = KeyRef<'_>> + Clone {
         (0..self.len()).map(|row| self.get(row))
@@ -277,6 +316,14 @@ impl TextColumn {
         self.codes.is_valid(row).then(|| self.texts.value(self.codes.value(row) as usize))
     }
 
+    /// A number that stands for the text of a row; `None` for null. Equal texts may have several.
+    ///
+    /// # Panics
+    /// For a row that is not there.
+    pub fn code(&self, row: usize) -> Option<usize> {
+        self.codes.is_valid(row).then(|| self.codes.value(row) as usize)
+    }
+
     /// The texts of all rows.
     pub fn iter(&self) -> impl Iterator<Item = Option<&str>> {
         (0..self.len()).map(|row| self.get(row))
@@ -296,8 +343,7 @@ impl PartialEq for TextColumn {
 impl MetricColumn {
     /// A column of these values.
     pub fn new(name: impl Into<String>, values: impl IntoIterator<Item = Option<i64>>) -> Self {
-        let values: Int64Array = values.into_iter().collect();
-        Self { name: name.into(), values: std::sync::Arc::new(values) }
+        Self { name: name.into(), values: MetricValues::Ints(values.into_iter().collect()) }
     }
 
     /// The value of a row; `None` where the metric is undefined.
@@ -305,26 +351,41 @@ impl MetricColumn {
     /// # Panics
     /// For a row that is not there.
     pub fn get(&self, row: usize) -> Option<i64> {
-        if self.values.is_null(row) {
-            return None;
+        match &self.values {
+            MetricValues::Bools(bools) => bools.is_valid(row).then(|| bools.value(row).into()),
+            MetricValues::Ints(ints) => ints.is_valid(row).then(|| ints.value(row)),
         }
-        Some(match self.bools() {
-            Some(bools) => bools.value(row).into(),
-            None => self.values.as_primitive::<Int64Type>().value(row),
-        })
     }
 
     /// The values of all rows.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Option<i64>> + Clone {
-        (0..self.values.len()).map(|row| self.get(row))
+        (0..self.array().len()).map(|row| self.get(row))
     }
 
-    fn bools(&self) -> Option<&BooleanArray> {
-        self.values.as_boolean_opt()
+    /// How many values of these rows are 0, and how many are 1, where all of them are truth values.
+    ///
+    /// # Panics
+    /// For rows that are not there.
+    pub fn count_truths(&self, rows: Range<usize>) -> Option<(usize, usize)> {
+        let MetricValues::Bools(bools) = &self.values else { return None };
+        let some = bools.slice(rows.start, rows.len());
+        Some((some.false_count(), some.true_count()))
+    }
+
+    pub(super) fn array(&self) -> &dyn Array {
+        match &self.values {
+            MetricValues::Bools(bools) => bools,
+            MetricValues::Ints(ints) => ints,
+        }
     }
 
     pub(super) fn taken(&self, rows: &UInt32Array) -> Self {
-        Self { name: self.name.clone(), values: taken(&self.values, rows) }
+        let values = taken(self.array(), rows);
+        let values = match &self.values {
+            MetricValues::Bools(_) => MetricValues::Bools(values.as_boolean().clone()),
+            MetricValues::Ints(_) => MetricValues::Ints(values.as_primitive().clone()),
+        };
+        Self { name: self.name.clone(), values }
     }
 }
 

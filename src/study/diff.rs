@@ -17,8 +17,9 @@ use crate::cells::group::DEFAULT_BY;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::report::order::TableOrder;
 use crate::report::style::Style;
-use crate::score::evidence;
-use crate::score::score_traces::{self, Outputs, ScoreError};
+use crate::score::evidence::{self, Evidence};
+use crate::score::flips;
+use crate::score::score_traces::{self, ScoreError};
 use crate::score::table::EpisodeTable;
 use crate::trace::inputs::{self, Input};
 use crate::trace::open::TraceSet;
@@ -74,6 +75,8 @@ pub struct Diff {
 pub(super) struct Pair {
     pub before: Scored,
     pub after: Scored,
+    /// What decided each difference, where one scan scored both sides.
+    pub evidence: Option<[BTreeMap<String, Evidence>; 2]>,
 }
 
 /// One side, scored.
@@ -208,9 +211,11 @@ impl Pair {
             })
         };
         let definitions = [old.bind(&common, traces, request)?, new.bind(&common, traces, request)?];
-        let tables = score_sides(&definitions, [of_common(old_table), of_common(new_table)], traces, request)?;
+        let (tables, evidence) =
+            score_sides(&definitions, [of_common(old_table), of_common(new_table)], traces, request)?;
         let ([old_definitions, new_definitions], [old_table, new_table]) = (definitions, tables);
         Ok(Self {
+            evidence,
             before: Scored { table: old_table, metrics: before, definitions: old_definitions },
             after: Scored { table: new_table, metrics: after, definitions: new_definitions },
         })
@@ -236,6 +241,11 @@ impl Pair {
         traces: &TraceSet,
         threads: NonZeroUsize,
     ) -> Result<Vec<String>, StudyError> {
+        if let Some([before, after]) = &self.evidence {
+            changes.explain_before(before);
+            changes.explain_after(after);
+            return Ok(Vec::new());
+        }
         let wanted = changes.flipped_episodes();
         let mut notes = Vec::new();
         if wanted.is_empty() {
@@ -274,26 +284,26 @@ impl Scored {
     }
 }
 
-/// The tables of both sides: those that were read, and in one scan those that definitions give.
+/// The tables of both sides, and what decided where they differ.
+type ScoredSides = ([EpisodeTable; 2], Option<[BTreeMap<String, Evidence>; 2]>);
+
+/// Both sides: those that were read, and in one scan those that definitions give.
 fn score_sides(
     definitions: &[Option<Definitions>; 2],
     read: [Option<EpisodeTable>; 2],
     traces: Option<&TraceSet>,
     request: &DiffRequest,
-) -> Result<[EpisodeTable; 2], StudyError> {
+) -> Result<ScoredSides, StudyError> {
     let labels = Question { by: request.by.clone(), ..Question::default() }.labels();
-    let outputs = Outputs { labels: &labels, timelines: false };
+    let score = |traces, definitions| score_traces::score(traces, definitions, &labels, request.threads);
     match (definitions, read, traces) {
-        ([None, None], [Some(old), Some(new)], _) => Ok([old, new]),
+        ([None, None], [Some(old), Some(new)], _) => Ok(([old, new], None)),
         ([Some(old), Some(new)], _, Some(traces)) => {
-            Ok(score_traces::score_each(traces, [old, new], outputs, request.threads)?.tables)
+            let pair = flips::score_pair(traces, [old, new], &labels, request.threads)?;
+            Ok((pair.tables, Some(pair.evidence)))
         }
-        ([Some(old), None], [_, Some(new)], Some(traces)) => {
-            Ok([score_traces::score(traces, old, &labels, request.threads)?, new])
-        }
-        ([None, Some(new)], [Some(old), _], Some(traces)) => {
-            Ok([old, score_traces::score(traces, new, &labels, request.threads)?])
-        }
+        ([Some(old), None], [_, Some(new)], Some(traces)) => Ok(([score(traces, old)?, new], None)),
+        ([None, Some(new)], [Some(old), _], Some(traces)) => Ok(([old, score(traces, new)?], None)),
         _ => Err(StudyError::NoScores),
     }
 }

@@ -1,11 +1,12 @@
 //! The report of a study: tables, figures, a page, and the folder that holds them.
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use super::Study;
 use super::error::StudyError;
 use super::figure_inputs::{Drawings, FigureInputs};
 use super::scan::{Outputs, Results};
+use super::{Study, scores};
 use crate::cells::cell::Cells;
 use crate::cells::group::group;
 use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
@@ -16,7 +17,7 @@ use crate::report::statistics::{Options, Statistics};
 use crate::report::style::{MAIN_TABLE, Style};
 use crate::report::table::Table;
 use crate::report::tables::markdown;
-use crate::score::format::{self, Format};
+use crate::score::format::Format;
 use crate::trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.
@@ -51,6 +52,7 @@ pub struct Report {
     /// What the folder lacks and why, one sentence each.
     pub notes: Vec<String>,
     pub(super) style: Style,
+    threads: NonZeroUsize,
     /// Figures and the page.
     illustrations: Vec<OutputFile>,
     /// The files that it is made from, none of which it may replace.
@@ -90,7 +92,8 @@ impl Study {
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
         let (notes, illustrations, read) = (Vec::new(), Vec::new(), self.files_read(Some(&options.style)));
-        let mut report = Report { results, cells, tables, manifest, notes, style, illustrations, read };
+        let threads = self.threads;
+        let mut report = Report { results, cells, tables, manifest, notes, style, threads, illustrations, read };
         if options.figures {
             report.illustrate()?;
         }
@@ -116,7 +119,7 @@ impl Report {
     /// report that this one is made from.
     pub fn write(&self, out: &Path) -> Result<WrittenReport, StudyError> {
         let mut episodes = Vec::new();
-        format::write(&self.results.episodes, Format::Parquet, &mut episodes)?;
+        scores::write(&self.results.episodes, Format::Parquet, &mut episodes, self.threads)?;
         let Self { cells, tables, manifest, illustrations: others, read, .. } = self;
         let written = bundle::write(out, &Bundle { cells, tables, episodes: &episodes, manifest, read, others })?;
         let inside = |path: &PathBuf| path.strip_prefix(out).unwrap_or(path).display().to_string();

@@ -132,7 +132,7 @@ fn changes(study: &Study, before: EpisodeTable, report: &Report) -> Result<Diff,
     let scored = |table: EpisodeTable, definitions| Scored { metrics: names(&table), table, definitions };
     let definitions = study.question.bind(traces)?;
     let after = scored(report.results.episodes.clone(), Some(definitions));
-    let pair = Pair { before: scored(before, None), after };
+    let pair = Pair { before: scored(before, None), after, evidence: None };
     let mut changes = pair.changes(&study.question.by)?;
     TableOrder { catalog: &report.cells.catalog, style: &report.style }.sort(&mut changes);
     let notes = pair.explain(&mut changes, traces, study.threads)?;

@@ -1,7 +1,5 @@
 //! Every cell with its count and its intervals.
 
-use std::collections::BTreeMap;
-
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::study::{Study, counts};
 use crate::cells::bootstrap;
 use crate::cells::cell::{Cells, Group, KeyValue};
+use crate::cells::group::membership;
 use crate::cells::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
 use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::EpisodeTable;
@@ -66,20 +65,13 @@ pub enum Intervals {
 impl CellRow {
     /// All cells, in the order of the groups and metrics.
     pub(super) fn all(study: &Study, cells: &Cells, confidence: f64) -> Vec<Self> {
-        let rows = rows_by_group(study.table, &cells.by);
-        cells.groups.iter().flat_map(|group| Self::of_group(study, cells, group, &rows, confidence)).collect()
+        let rows = rows_by_group(study.table, cells);
+        let groups = cells.groups.iter().zip(&rows);
+        groups.flat_map(|(group, rows)| Self::of_group(study, cells, group, rows, confidence)).collect()
     }
 
-    fn of_group(
-        study: &Study,
-        cells: &Cells,
-        group: &Group,
-        rows: &BTreeMap<Vec<String>, Vec<usize>>,
-        confidence: f64,
-    ) -> Vec<Self> {
+    fn of_group(study: &Study, cells: &Cells, group: &Group, rows: &[usize], confidence: f64) -> Vec<Self> {
         let key: IndexMap<String, KeyValue> = cells.by.iter().cloned().zip(group.key.iter().cloned()).collect();
-        let texts: Vec<String> = group.key.iter().map(ToString::to_string).collect();
-        let rows = rows.get(&texts).map_or(&[][..], Vec::as_slice);
         let of_metric = |(metric, moments)| {
             let moments: &crate::cells::moments::Moments = moments;
             let metric: &String = metric;
@@ -124,26 +116,10 @@ fn values(study: &Study, metric: &str, rows: &[usize]) -> Vec<i64> {
     study.column(metric).map_or_else(Vec::new, |column| rows.iter().filter_map(|&row| column.get(row)).collect())
 }
 
-/// The rows of the table by the text of their key; a column that the table lacks is empty everywhere.
-fn rows_by_group(table: &EpisodeTable, by: &[String]) -> BTreeMap<Vec<String>, Vec<usize>> {
-    let mut rows: BTreeMap<Vec<String>, Vec<usize>> = BTreeMap::new();
-    for row in 0..table.len() {
-        rows.entry(by.iter().map(|name| key_text(table, name, row)).collect()).or_default().push(row);
-    }
+/// The rows of each group of the cells.
+fn rows_by_group(table: &EpisodeTable, cells: &Cells) -> Vec<Vec<usize>> {
+    let mut rows = vec![Vec::new(); cells.groups.len()];
+    let groups = membership(table, &cells.by).expect("the cells are grouped by columns of this table");
+    groups.into_iter().zip(0..).for_each(|(group, row)| rows[group].push(row));
     rows
-}
-
-fn key_text(table: &EpisodeTable, name: &str, row: usize) -> String {
-    let key = table.keys.get(row);
-    match name {
-        "experiment" => key.experiment.to_owned(),
-        "model" => key.model.to_owned(),
-        "seed" => key.seed.to_string(),
-        "run" => key.run.to_string(),
-        "episode_id" => key.episode_id.to_owned(),
-        label => {
-            let column = table.labels.iter().find(|column| column.name == label);
-            column.and_then(|column| column.values.get(row)).unwrap_or_default().to_owned()
-        }
-    }
 }

@@ -1,11 +1,9 @@
 //! Cells by seed: what a claim about new seeds could rest on.
 
-use std::collections::BTreeMap;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::{Block, Study, moments};
+use super::study::{Block, Study};
 use crate::cells::clustered::{Clustered, clustered};
 use crate::cells::moments::Moments;
 use crate::metric::catalog::{Kind, StandardError};
@@ -61,10 +59,6 @@ impl ClusterRow {
 
 /// The moments of each seed that has a defined value, by seed.
 fn by_seed(table: &EpisodeTable, block: &Block, column: &MetricColumn) -> Vec<Moments> {
-    let mut seeds: BTreeMap<i32, Vec<Option<i64>>> = BTreeMap::new();
-    for &row in &block.rows {
-        seeds.entry(table.keys.get(row).seed).or_default().push(column.get(row));
-    }
-    let of_seed = |values| moments(values).expect("a part of a block that was summed whole");
-    seeds.into_values().map(of_seed).filter(|moments| moments.n > 0).collect()
+    let of_seed = |rows| Moments::default().with_rows(column, rows).expect("a part of a block that was summed whole");
+    block.seeds(table).into_iter().map(of_seed).filter(|moments| moments.n > 0).collect()
 }

@@ -75,9 +75,9 @@ impl DurationRow {
 }
 
 fn durations(block: &Block, (duration, finished): (&MetricColumn, &MetricColumn)) -> Vec<survival::Duration> {
-    let of = |&row: &usize| {
+    let of = |row: usize| {
         let end = if finished.get(row).is_some() { End::Finished } else { End::Unfinished };
         duration.get(row).map(|steps| Duration { steps, end })
     };
-    block.rows.iter().filter_map(of).collect()
+    block.rows.clone().filter_map(of).collect()
 }

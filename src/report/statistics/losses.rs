@@ -51,7 +51,7 @@ fn of_block(study: &Study, block: &Block, lost: &BTreeSet<String>, confidence: f
     study
         .rates()
         .filter_map(|column| {
-            let episodes = block.rows.iter().map(|&at| (column.get(at), fate(at)));
+            let episodes = block.rows.clone().map(|at| (column.get(at), fate(at)));
             bounds(episodes, confidence).map(|lossy| row(&column.name, lossy))
         })
         .filter(|row| row.lossy.lost > 0)

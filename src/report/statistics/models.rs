@@ -1,12 +1,13 @@
 //! Models against each other in one experiment: paired by seed and run, and sets of ties instead of ranks.
 
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
+use arrow::buffer::BooleanBuffer;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::{Block, Place, Study};
+use super::study::{Block, Places, Study};
 use crate::cells::detectable::{Detectable, detectable};
 use crate::cells::interval::Interval;
 use crate::cells::multiplicity::{holm, level};
@@ -87,11 +88,23 @@ pub struct Gap {
     pub episodes: usize,
 }
 
-/// A model's rows by seed and run.
+/// A model in an experiment, its episodes by seed and run.
 struct Entrant<'a> {
     model: &'a str,
     mean: Option<f64>,
-    places: BTreeMap<Place, Vec<usize>>,
+    outcomes: Outcomes,
+}
+
+/// A bit per seed and run of the experiment.
+struct Outcomes {
+    /// Whether there is an episode, or several.
+    present: BooleanBuffer,
+    /// Whether there is exactly one.
+    single: BooleanBuffer,
+    /// Whether there is exactly one, and the metric is defined in it.
+    defined: BooleanBuffer,
+    /// Whether it is 1 then.
+    one: BooleanBuffer,
 }
 
 impl Family {
@@ -99,8 +112,9 @@ impl Family {
     pub(super) fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let mut families = Vec::new();
         for experiment in study.experiments.iter().filter(|experiment| experiment.blocks.len() > 1) {
+            let places = Places::of(&experiment.blocks, study.table);
             for column in study.rates() {
-                let entrants = entrants(study, &experiment.blocks, column);
+                let entrants = entrants(study, &experiment.blocks, &places, column);
                 families.push(Self::of(experiment.name, column, &entrants, confidence));
             }
         }
@@ -110,7 +124,7 @@ impl Family {
     fn of(experiment: &str, column: &MetricColumn, entrants: &[Entrant], confidence: f64) -> Self {
         let mut tests = Vec::new();
         for (at, first) in entrants.iter().enumerate() {
-            tests.extend(entrants[at + 1..].iter().map(|second| PairTest::of(first, second, column, confidence)));
+            tests.extend(entrants[at + 1..].iter().map(|second| PairTest::of(first, second, confidence)));
         }
         adjust(&mut tests, confidence);
         let models: Vec<String> = entrants.iter().map(|entrant| entrant.model.to_owned()).collect();
@@ -130,18 +144,14 @@ impl Family {
 }
 
 impl PairTest {
-    fn of(first: &Entrant, second: &Entrant, column: &MetricColumn, confidence: f64) -> Self {
-        let (mut pairs, mut missing, mut undefined) = (Pairs::default(), 0, 0);
-        let places: BTreeSet<Place> = first.places.keys().chain(second.places.keys()).copied().collect();
-        for place in places {
-            match (first.only(place), second.only(place)) {
-                (Some(a), Some(b)) => match (column.get(a), column.get(b)) {
-                    (Some(a), Some(b)) => pairs = pairs.with(a == 1, b == 1),
-                    _ => undefined += 1,
-                },
-                _ => missing += 1,
-            }
-        }
+    fn of(first: &Entrant, second: &Entrant, confidence: f64) -> Self {
+        let (a, b) = (&first.outcomes, &second.outcomes);
+        let count = |bits: &BooleanBuffer| bits.count_set_bits() as u64;
+        let [either, paired, defined] = [&a.present | &b.present, &a.single & &b.single, &a.defined & &b.defined];
+        let (both, n) = (count(&(&a.one & &b.one)), count(&defined));
+        let (first_only, second_only) = (count(&(&a.one & &defined)) - both, count(&(&b.one & &defined)) - both);
+        let pairs = Pairs { both, first_only, second_only, neither: n - both - first_only - second_only };
+        let (missing, undefined) = (count(&either) - count(&paired), count(&paired) - n);
         Self {
             first: first.model.to_owned(),
             second: second.model.to_owned(),
@@ -158,10 +168,17 @@ impl PairTest {
     }
 }
 
-impl Entrant<'_> {
-    /// The row at this place, if there is exactly one.
-    fn only(&self, place: Place) -> Option<usize> {
-        self.places.get(&place).and_then(|rows| <[usize; 1]>::try_from(rows.as_slice()).ok()).map(|[row]| row)
+impl Outcomes {
+    fn of(rows: &[Range<usize>], column: &MetricColumn) -> Self {
+        let only = |at: usize| (rows[at].len() == 1).then_some(rows[at].start);
+        let value = |at: usize| only(at).and_then(|row| column.get(row));
+        let bits = |of: &dyn Fn(usize) -> bool| BooleanBuffer::collect_bool(rows.len(), of);
+        Self {
+            present: bits(&|at| !rows[at].is_empty()),
+            single: bits(&|at| only(at).is_some()),
+            defined: bits(&|at| value(at).is_some()),
+            one: bits(&|at| value(at) == Some(1)),
+        }
     }
 }
 
@@ -180,16 +197,11 @@ impl Gap {
     pub(super) fn all(study: &Study) -> Vec<Self> {
         let mut gaps = Vec::new();
         for experiment in &study.experiments {
-            let places: Vec<_> = experiment.blocks.iter().map(|block| block.places(study.table)).collect();
-            let union: BTreeSet<&Place> = places.iter().flat_map(BTreeMap::keys).collect();
-            for (block, places) in experiment.blocks.iter().zip(&places) {
-                for &place in &union {
-                    let episodes = places.get(place).map_or(0, Vec::len);
-                    if episodes != 1 {
-                        let (seed, run) = *place;
-                        let (experiment, model) = (block.experiment.to_owned(), block.model.to_owned());
-                        gaps.push(Self { experiment, model, seed, run, episodes });
-                    }
+            let places = Places::of(&experiment.blocks, study.table);
+            for (block, rows) in experiment.blocks.iter().zip(&places.rows) {
+                for (&(seed, run), rows) in places.all.iter().zip(rows).filter(|(_, rows)| rows.len() != 1) {
+                    let (experiment, model) = (block.experiment.to_owned(), block.model.to_owned());
+                    gaps.push(Self { experiment, model, seed, run, episodes: rows.len() });
                 }
             }
         }
@@ -198,13 +210,13 @@ impl Gap {
 }
 
 /// The models, best mean first.
-fn entrants<'a>(study: &Study, blocks: &[Block<'a>], column: &MetricColumn) -> Vec<Entrant<'a>> {
-    let entrant = |block: &Block<'a>| Entrant {
+fn entrants<'a>(study: &Study, blocks: &[Block<'a>], places: &Places, column: &MetricColumn) -> Vec<Entrant<'a>> {
+    let entrant = |(block, rows): (&Block<'a>, &Vec<Range<usize>>)| Entrant {
         model: block.model,
         mean: block.moments(column).mean(),
-        places: block.places(study.table),
+        outcomes: Outcomes::of(rows, column),
     };
-    let mut entrants: Vec<_> = blocks.iter().map(entrant).collect();
+    let mut entrants: Vec<_> = blocks.iter().zip(&places.rows).map(entrant).collect();
     let better = study.better(&column.name);
     entrants.sort_by(|a, b| by_mean(a.mean, b.mean, better).then_with(|| a.model.cmp(b.model)));
     entrants

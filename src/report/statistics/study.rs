@@ -1,6 +1,7 @@
 //! The episode table seen by experiment and model: the blocks that every statistic compares.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use crate::cells::moments::{MomentOverflow, Moments};
 use crate::metric::catalog::{Better, Kind, Metric};
@@ -22,19 +23,29 @@ pub(super) struct Experiment<'a> {
 pub(super) struct Block<'a> {
     pub experiment: &'a str,
     pub model: &'a str,
-    pub rows: Vec<usize>,
+    pub rows: Range<usize>,
     moments: BTreeMap<&'a str, Moments>,
 }
 
 /// Where an episode stands in its block: what pairs it with another model's.
 pub(super) type Place = (i32, i32);
 
+/// The seeds and runs of an experiment's episodes.
+pub(super) struct Places {
+    /// The seeds and runs that some block has, ascending.
+    pub all: Vec<Place>,
+    /// Per block and place the rows of its episodes: one, none, or several where the same seed and run was recorded again.
+    pub rows: Vec<Vec<Range<usize>>>,
+}
+
 impl<'a> Study<'a> {
     pub fn of(table: &'a EpisodeTable) -> Result<Self, MomentOverflow> {
-        let mut rows: BTreeMap<(usize, &str), BTreeMap<&str, Vec<usize>>> = BTreeMap::new();
-        for (row, key) in table.keys.iter().enumerate() {
+        // A table is ordered by experiment, then by model.
+        let mut rows: BTreeMap<(usize, &str), Vec<(&str, Range<usize>)>> = BTreeMap::new();
+        for block in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
+            let key = table.keys.get(block.start);
             let rank = table.catalog.experiment_rank(key.experiment);
-            rows.entry((rank, key.experiment)).or_default().entry(key.model).or_default().push(row);
+            rows.entry((rank, key.experiment)).or_default().push((key.model, block));
         }
         let mut experiments = Vec::with_capacity(rows.len());
         for ((_, name), models) in rows {
@@ -77,11 +88,11 @@ impl<'a> Block<'a> {
         table: &'a EpisodeTable,
         experiment: &'a str,
         model: &'a str,
-        rows: Vec<usize>,
+        rows: Range<usize>,
     ) -> Result<Self, MomentOverflow> {
         let of_column = |column: &'a MetricColumn| {
-            let values = rows.iter().map(|&row| column.get(row));
-            moments(values).map(|moments| (column.name.as_str(), moments))
+            let moments = Moments::default().with_rows(column, rows.clone())?;
+            Ok((column.name.as_str(), moments))
         };
         let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
         Ok(Self { experiment, model, rows, moments })
@@ -92,20 +103,39 @@ impl<'a> Block<'a> {
         self.moments[column.name.as_str()]
     }
 
-    /// The rows by seed and run; more than one where the same seed and run was recorded again.
-    pub fn places(&self, table: &EpisodeTable) -> BTreeMap<Place, Vec<usize>> {
-        let mut places: BTreeMap<Place, Vec<usize>> = BTreeMap::new();
-        for &row in &self.rows {
-            let key = table.keys.get(row);
-            places.entry((key.seed, key.run)).or_default().push(row);
-        }
-        places
+    /// The rows of each seed.
+    pub fn seeds(&self, table: &EpisodeTable) -> Vec<Range<usize>> {
+        runs(self.rows.clone(), |row| table.keys.seed(row))
     }
 }
 
-/// The moments of the defined values.
-pub(super) fn moments(values: impl IntoIterator<Item = Option<i64>>) -> Result<Moments, MomentOverflow> {
-    values.into_iter().flatten().try_fold(Moments::default(), Moments::with)
+impl Places {
+    /// The places of an experiment's blocks.
+    pub fn of(blocks: &[Block<'_>], table: &EpisodeTable) -> Self {
+        let place = |row: usize| (table.keys.seed(row), table.keys.run(row));
+        let of_block: Vec<_> = blocks.iter().map(|block| runs(block.rows.clone(), place)).collect();
+        let mut all: Vec<Place> = of_block.iter().flatten().map(|rows| place(rows.start)).collect();
+        all.sort_unstable();
+        all.dedup();
+        let rows = of_block.into_iter().map(|rows| {
+            let mut rows = rows.into_iter().peekable();
+            let at = |wanted: &Place| rows.next_if(|rows| place(rows.start) == *wanted).unwrap_or_default();
+            all.iter().map(at).collect()
+        });
+        Self { rows: rows.collect(), all }
+    }
+}
+
+/// The runs of rows that have the same key.
+fn runs<K: PartialEq>(rows: Range<usize>, key: impl Fn(usize) -> K) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for row in rows {
+        match runs.last_mut() {
+            Some(run) if key(run.start) == key(row) => run.end = row + 1,
+            _ => runs.push(row..row + 1),
+        }
+    }
+    runs
 }
 
 /// The successes of a rate and its episodes, where every value is 0 or 1.

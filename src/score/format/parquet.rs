@@ -178,7 +178,7 @@ impl Encoder<'_> {
             4 => number(&keys.run),
             other => {
                 let metric = &metrics[other - KEYS.len() - labels.len()];
-                cast(&metric.values.slice(rows.start, rows.len()), &DataType::Int64)
+                cast(&metric.array().slice(rows.start, rows.len()), &DataType::Int64)
                     .map_err(|error| ParquetError::ArrowError(error.to_string()))?
             }
         })

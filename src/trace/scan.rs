@@ -10,13 +10,13 @@ use arrow::array::{Array as _, ArrayRef, RecordBatch, RecordBatchOptions, String
 use arrow::datatypes::{Field, Schema};
 use arrow::error::ArrowError;
 
-use super::colors::set::{Spellings, other_names};
-use super::finding::TraceError;
-use super::ids::{Prints, hashes};
-use super::layout::Layout;
-use super::open::TraceSet;
-use super::pass::{Episodes, Event, pass};
-use super::rules::{Located, Rules};
+use super::error::TraceError;
+use super::read::open::TraceSet;
+use super::read::parallel_scan::{Episodes, Event, pass};
+use super::read::projection::Layout;
+use super::validate::color_set::{Spellings, other_names};
+use super::validate::duplicate_ids::{Prints, hashes};
+use super::validate::rules::{Located, Rules};
 
 /// The columns that a scan delivers, and what it checks beyond the schema.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

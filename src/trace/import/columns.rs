@@ -5,11 +5,11 @@
 
 use indexmap::IndexMap;
 
-use super::super::colors;
-use super::super::schema::{self, COLUMNS, Column, Kind, Stored};
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
 use crate::base::near::nearest;
+use crate::trace::schema::colors;
+use crate::trace::schema::{self, COLUMNS, Column, Kind, Stored};
 
 /// A column that the schema does not know.
 #[derive(Clone, Debug, PartialEq, Eq)]

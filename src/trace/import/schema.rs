@@ -2,9 +2,9 @@
 
 use serde_json::{Map, Value, json};
 
-use super::super::colors;
-use super::super::colors::spelling::WORDS;
-use super::super::schema::{COLUMNS, Column, Kind};
+use crate::trace::schema::colors;
+use crate::trace::schema::colors::spelling::WORDS;
+use crate::trace::schema::{COLUMNS, Column, Kind};
 
 /// What one line may hold: `schemas/step.schema.json`.
 pub fn document() -> Value {

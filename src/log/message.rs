@@ -1,6 +1,6 @@
 //! The JSON messages of a log: episodes and rows, with the columns of a trace as keys.
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema};
 use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -24,7 +24,7 @@ pub enum EpisodeMessage {
 
 /// A message of the topic `/decision`: a row of the trace. A column without a value is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[schemars(extend("additionalProperties" = false))]
+#[schemars(transform = without_strangers)]
 #[expect(missing_docs, reason = "each field is the column of its name")]
 pub struct Decision {
     pub t: i32,
@@ -41,6 +41,13 @@ pub struct Decision {
     #[serde(flatten, skip_serializing)]
     #[schemars(skip)]
     strangers: Map<String, Value>,
+}
+
+/// Says in the schema of a row that it has no other keys, which a type with keys of another one cannot.
+fn without_strangers(schema: &mut Schema) {
+    let required = schema.remove("required");
+    schema.insert("additionalProperties".to_owned(), false.into());
+    schema.insert("required".to_owned(), required.unwrap_or_default());
 }
 
 /// An action that is none of the five.

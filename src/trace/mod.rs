@@ -29,4 +29,4 @@ pub mod write;
 pub(crate) use read::footer::shape as footer_shape;
 pub use read::{in_order, open, verify};
 pub use schema::{colors, describe};
-pub use write::{merge, rewrite};
+pub use write::merge;

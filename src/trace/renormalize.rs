@@ -11,8 +11,8 @@ use super::error::TraceError;
 use super::identification::{VERSION, normal_form};
 use super::inputs::Input;
 use super::open::{TraceFile, TraceSet};
-use super::rewrite::{self, Before, Columns};
 use super::schema::RECORDING_KEY;
+use super::write::rewrite::{Before, rewrite};
 
 /// The free text, as replied.
 const SOURCE: &str = "identification";
@@ -87,23 +87,22 @@ impl Old {
     pub fn renormalize<W: Write + Send>(&self, out: W) -> Result<(W, Renormalized), TraceError> {
         let mut recording = self.recording.clone();
         let mut result = Renormalized { version_before: put_version(&mut recording), ..Renormalized::default() };
-        let columns = Columns { source: SOURCE, target: TARGET };
-        let out = rewrite::rewrite(&self.set, columns, |step| result.attribution(step), &recording, out)?;
+        let out = rewrite(&self.set, [SOURCE, TARGET], |step| result.attribution(step), &recording, out)?;
         Ok((out, result))
     }
 }
 
 impl Renormalized {
     /// The attribution of a step, noted if it is another one than before.
-    fn attribution(&mut self, step: Before<'_>) -> Option<String> {
+    fn attribution(&mut self, (episode_id, t, source, target): Before<'_>) -> Option<String> {
         self.steps += 1;
-        let before = step.target.map(str::to_owned);
-        let Some(text) = step.source else { return before };
+        let before = target.map(str::to_owned);
+        let Some(text) = source else { return before };
         self.texts += 1;
         let after = normal_form(text).map(str::to_owned);
         if before != after {
-            let (episode_id, identification) = (step.episode_id.to_owned(), text.to_owned());
-            self.flips.push(Flip { episode_id, t: step.t, before, after: after.clone(), identification });
+            let (episode_id, identification) = (episode_id.to_owned(), text.to_owned());
+            self.flips.push(Flip { episode_id, t, before, after: after.clone(), identification });
         }
         after
     }

@@ -122,11 +122,21 @@ pub(super) fn statement(rules: &[Rule]) -> String {
 
 #[cfg(all(test, feature = "polars"))]
 mod tests {
-    use polars::prelude::{IntoLazy as _, df};
+    use std::collections::BTreeSet;
+    use std::num::NonZeroUsize;
+    use std::path::Path;
+
+    use polars::prelude::{IntoLazy as _, LazyFrame, PlRefPath, PlSmallStr, df};
     use polars::sql::SQLContext;
 
-    use super::no_color;
+    use super::{Rule, no_color, rules};
+    use crate::metric::definitions::Definitions;
+    use crate::score::score_traces::schema_columns;
     use crate::trace::colors::{COLOR_COLUMNS, palette::Palette};
+    use crate::trace::diagnostic::{Code, Finding};
+    use crate::trace::inputs::Input;
+    use crate::trace::schema::COLUMNS;
+    use crate::trace::validate::validate;
 
     const TEXTS: [&str; 22] = [
         "red",
@@ -170,5 +180,50 @@ mod tests {
                 assert_eq!(bad, expected, "{} {palette:?}", column.name);
             }
         }
+    }
+
+    /// The first of the rules that an episode of a file breaks. Polars stands in for Spark.
+    fn first_broken(path: &Path, definitions: &Definitions) -> Option<Rule> {
+        let path = PlRefPath::try_from_path(path).unwrap();
+        let mut frame = LazyFrame::scan_parquet(path, polars::prelude::ScanArgsParquet::default()).unwrap();
+        let schema = frame.collect_schema().unwrap();
+        let mut context = SQLContext::new();
+        context.register("steps", frame);
+        rules(schema.iter_names().map(PlSmallStr::as_str), &definitions.catalog, None).into_iter().find(|rule| {
+            let found = rule.found.replace("\\\\", "\\").replace("SIZE(COLLECT_SET(s.t))", "COUNT(DISTINCT s.t)");
+            let statement = format!("SELECT {found} AS found FROM steps s GROUP BY s.episode_id");
+            let found = context.execute(&statement).unwrap().collect().unwrap();
+            let found = found.column("found").unwrap();
+            found.null_count() < found.len()
+        })
+    }
+
+    fn first_finding(path: &Path, definitions: &Definitions) -> Finding {
+        let experiments: Vec<String> = definitions.catalog.experiment.keys().cloned().collect();
+        let report = validate(&[Input::new(path)], Some(&experiments), NonZeroUsize::MIN).unwrap();
+        report.findings.into_iter().next().unwrap()
+    }
+
+    /// Every rule has a damaged trace that both checkers refuse by it, in the same words but where they tell of rows.
+    #[test]
+    fn a_damaged_trace_breaks_the_same_rule_on_either_side() {
+        let definitions = Definitions::load("paper", &schema_columns()).unwrap();
+        let all = rules(COLUMNS.iter().map(|column| column.name), &definitions.catalog, None);
+        let mut left: BTreeSet<Code> = all.iter().map(|rule| rule.code).collect();
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/damaged");
+        for file in std::fs::read_dir(folder).unwrap() {
+            let path = file.unwrap().path();
+            let is_trace = path.extension().is_some_and(|ending| ending == "parquet");
+            if !is_trace || !left.contains(&first_finding(&path, &definitions).code) {
+                continue;
+            }
+            let native = first_finding(&path, &definitions);
+            let rule = first_broken(&path, &definitions).unwrap_or_else(|| panic!("no rule is broken: {native}"));
+            assert_eq!((rule.code, Some(&rule.column)), (native.code, native.column.as_ref()), "{native}");
+            let tells_of_rows = [Code::InconsistentConstant, Code::TDuplicate, Code::TGap].contains(&rule.code);
+            assert!(tells_of_rows || rule.expected == native.expected, "{native}");
+            left.remove(&rule.code);
+        }
+        assert_eq!(left, BTreeSet::new(), "no damaged trace breaks these");
     }
 }

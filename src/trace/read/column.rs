@@ -90,6 +90,14 @@ impl Column {
         }
     }
 
+    /// The values that stand behind the rows; those of no row, or of two keys, may be among them.
+    pub(in crate::trace) fn entries(&self) -> &ArrayRef {
+        let values = match self {
+            Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. }) => values,
+        };
+        values.as_any_dictionary_opt().map_or(values, |texts| texts.values())
+    }
+
     /// The keys and texts of a text column that is held as keys.
     pub(in crate::trace) fn byte_texts(&self) -> Option<(&UInt8Array, &StringArray)> {
         let Self::Keys(Keys { keys, values }) = self else { return None };

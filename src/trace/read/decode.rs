@@ -124,16 +124,8 @@ impl Library {
 }
 
 impl<'a> RowGroup<'a> {
-    pub(in crate::trace) fn open(
-        file: &'a TraceFile,
-        layout: &'a Layout,
-        row_group: usize,
-    ) -> Result<Self, Box<Finding>> {
-        Self::after(file, layout, row_group, None)
-    }
-
     /// A row group of which the ids of the episodes may be known already.
-    pub(in crate::trace) fn after(
+    pub(in crate::trace) fn open(
         file: &'a TraceFile,
         layout: &'a Layout,
         row_group: usize,

@@ -184,7 +184,7 @@ struct Abandoned;
 
 impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
     fn run(mut self, ids: Option<Ids>) {
-        let result = match RowGroup::after(self.file, self.layout, self.job.row_group, ids) {
+        let result = match RowGroup::open(self.file, self.layout, self.job.row_group, ids) {
             Ok(rows) => self.split(rows),
             Err(finding) => self.send(Part::Fault(finding)),
         };

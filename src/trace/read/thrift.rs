@@ -189,22 +189,10 @@ impl<'a> Compact<'a> {
 }
 
 fn wire(code: u8) -> Result<Wire, Fault> {
-    Ok(match code {
-        1 => Wire::True,
-        2 => Wire::False,
-        3 => Wire::I8,
-        4 => Wire::I16,
-        5 => Wire::I32,
-        6 => Wire::I64,
-        7 => Wire::Double,
-        8 => Wire::Binary,
-        9 => Wire::List,
-        10 => Wire::Set,
-        11 => Wire::Map,
-        12 => Wire::Struct,
-        13 => Wire::Uuid,
-        _ => return Err(Fault::Invalid("a value of an unknown type")),
-    })
+    use Wire::{Binary, Double, False, I8, I16, I32, I64, List, Map, Set, Struct, True, Uuid};
+    const BY_CODE: [Wire; 13] = [True, False, I8, I16, I32, I64, Double, Binary, List, Set, Map, Struct, Uuid];
+    let wire = usize::from(code).checked_sub(1).and_then(|at| BY_CODE.get(at));
+    wire.copied().ok_or(Fault::Invalid("a value of an unknown type"))
 }
 
 /// The encoding of the elements of a collection. Truth values take a byte each there, which the Parquet library does not

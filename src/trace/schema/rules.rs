@@ -5,7 +5,7 @@
 
 use super::colors::palette::Palette;
 use super::colors::{self, ColorColumn};
-use super::{Column, Kind};
+use super::{Column, Kind, Value};
 use crate::trace::diagnostic::Code;
 
 /// A rule of a column.
@@ -108,6 +108,16 @@ impl Rule<'_> {
             Requirement::FromOne => "t = 1 in the episode's first row".to_owned(),
             Requirement::Once => "every t once, in one file".to_owned(),
             Requirement::WithoutGap => "every t up to the last".to_owned(),
+        }
+    }
+
+    /// Whether the rule allows a value; so does every rule that is not about single ones.
+    pub(crate) fn allows_value(&self, value: Value<'_>) -> bool {
+        match value {
+            Value::Bool(_) => true,
+            Value::Int(number) => self.allows_int(number),
+            Value::Float(number) => self.allows_float(number),
+            Value::Text(text) => self.allows(text),
         }
     }
 

@@ -198,11 +198,7 @@ impl Sighting {
 /// The colours that some episodes may have beyond those of the study: entries of dictionaries, whether a row has them or
 /// not. Costs as much as the entries are many, whatever the number of rows.
 pub(in crate::trace) fn other_names(layout: &Layout, episodes: &Episodes) -> Vec<String> {
-    let entries = color_columns(layout, episodes).flat_map(|(held, _)| match held {
-        Column::Flat(values) => values.as_dictionary::<Int32Type>().values().as_string::<i32>().iter(),
-        Column::Keys(keyed) => keyed.values().as_string().iter(),
-        Column::Runs(runs) => runs.values().as_dictionary::<Int32Type>().values().as_string().iter(),
-    });
+    let entries = color_columns(layout, episodes).flat_map(|(held, _)| held.entries().as_string::<i32>());
     let is_other = |name: &&str| Color::named(name).is_none() && !WORDS.contains(name);
     entries.flatten().filter(is_other).map(str::to_owned).collect()
 }

@@ -81,16 +81,13 @@ fn may_break(rule: &Rule<'_>, held: &Held, offsets: &[usize]) -> bool {
         // One search finds all that is wrong with the order of the steps.
         (Requirement::FromOne, held) => !counts_from_one(held, offsets),
         (Requirement::Once | Requirement::WithoutGap, _) => false,
-        (_, Held::Flat(values)) => has_odd(rule, values),
-        (_, Held::Runs(runs)) => has_odd(rule, runs.values()),
-        (_, Held::Keys(keys)) => has_odd(rule, keys.values()),
+        (_, held) => has_odd(rule, held.entries()),
     }
 }
 
 /// Whether one of some values, what stands in the place of nulls included, is none that the rule allows. Counted
 /// without an early end, which the compiler turns into few instructions.
 fn has_odd(rule: &Rule<'_>, values: &ArrayRef) -> bool {
-    let values = values.as_any_dictionary_opt().map_or(values, |texts| texts.values());
     if let Some(texts) = values.as_string_opt::<i32>() {
         return texts.iter().flatten().any(|text| !rule.allows(text));
     }

@@ -6,7 +6,7 @@
 
 pub mod decode_episode;
 pub mod merge;
-pub mod rewrite;
+pub(super) mod rewrite;
 pub(super) mod row_groups;
 
 use std::collections::HashSet;
@@ -18,7 +18,8 @@ use parquet::errors::ParquetError;
 use self::row_groups::{Gathered, RowGroups};
 use super::episode::Episode;
 use super::error::TraceError;
-use super::schema::{COLUMNS, Column, Value, colors, writable};
+use super::schema::rules::{Known, Requirement, Rule, rules_of};
+use super::schema::{COLUMNS, Column, Value, writable};
 use crate::base::replace::NewFile;
 use crate::base::visible::visible;
 
@@ -138,8 +139,10 @@ fn check(episode: &Episode, undeclared: &[&'static Column]) -> Result<(), TraceE
         return refused(episode, format!("1 to {} steps", i32::MAX), steps.to_string());
     }
     for column in writable() {
-        if let Some((expected, found)) = column.of_steps(episode).flatten().find_map(|value| fault(column, value)) {
-            return refused(episode, format!("`{}` {expected}", column.name), found);
+        let rules = rules_of(column, Known::default());
+        let broken = |value| rules.iter().find(|rule| !rule.allows_value(value)).map(|rule| (rule, value));
+        if let Some((rule, value)) = column.of_steps(episode).flatten().find_map(broken) {
+            return refused(episode, format!("`{}` {}", column.name, expected(rule)), shown(value));
         }
     }
     match undeclared.iter().find(|column| has_value(column, episode)) {
@@ -151,24 +154,22 @@ fn check(episode: &Episode, undeclared: &[&'static Column]) -> Result<(), TraceE
     }
 }
 
-/// What is wrong with a value of a column, if anything is: expected and found.
-fn fault(column: &Column, value: Value<'_>) -> Option<(String, String)> {
-    let negative = |found: String| Some(("not to be below zero".to_owned(), found));
+/// What a rule asks for, behind a column's name.
+fn expected(rule: &Rule<'_>) -> String {
+    match rule.asks {
+        Requirement::Name => "not to be empty".to_owned(),
+        Requirement::Count => "not to be below zero".to_owned(),
+        Requirement::OneOf(_) => format!("to be one of {}", rule.expected()),
+        _ => format!("to be {}", rule.expected()),
+    }
+}
+
+fn shown(value: Value<'_>) -> String {
     match value {
-        Value::Int(count) if column.counts() && count < 0 => negative(count.to_string()),
-        Value::Float(count) if column.counts() && (count < 0.0 || count.is_nan()) => negative(count.to_string()),
-        Value::Text(text) => {
-            let expected = if !column.values.is_empty() && !column.values.contains(&text) {
-                format!("to be one of {}", column.values.join(", "))
-            } else if text.is_empty() && column.names() {
-                "not to be empty".to_owned()
-            } else {
-                let color = colors::column(column.name).filter(|color| !color.may_hold(text, None))?;
-                format!("to be {}", color.expected(None))
-            };
-            Some((expected, format!("`{}`", visible(text))))
-        }
-        _ => None,
+        Value::Bool(truth) => truth.to_string(),
+        Value::Int(number) => number.to_string(),
+        Value::Float(number) => number.to_string(),
+        Value::Text(text) => format!("`{}`", visible(text)),
     }
 }
 

@@ -25,51 +25,33 @@ use crate::trace::read::open::{TraceFile, TraceSet};
 use crate::trace::read::projection::{Layout, T};
 use crate::trace::schema::RECORDING_KEY;
 
-/// A step as it is, with the text that the new one is made from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Before<'a> {
-    /// The episode's id.
-    pub episode_id: &'a str,
-    /// The timestep.
-    pub t: i64,
-    /// The text to look at.
-    pub source: Option<&'a str>,
-    /// The text to make anew.
-    pub target: Option<&'a str>,
-}
+/// What a text is made anew from: the episode's id, the timestep, the text to look at, and the text as it is.
+pub(in crate::trace) type Before<'a> = (&'a str, i64, Option<&'a str>, Option<&'a str>);
 
-/// Which column is made anew, and what from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Columns<'a> {
-    /// The column to look at.
-    pub source: &'a str,
-    /// The column to make anew; it is there already.
-    pub target: &'a str,
-}
-
-/// Writes the trace of a set's only file to `out`, with the target column as `change` has it and this recording.
+/// Writes the trace of a set's only file to `out`, with the column `target`, which it has, as `change` makes it from the
+/// column `source`, and with this recording.
 ///
 /// # Errors
 /// A column that is not there or no text, data that does not decode, whatever writing gives.
-pub fn rewrite<W: Write + Send>(
+pub(in crate::trace) fn rewrite<W: Write + Send>(
     set: &TraceSet,
-    columns: Columns<'_>,
+    [source, target]: [&str; 2],
     mut change: impl FnMut(Before<'_>) -> Option<String>,
     recording: &serde_json::Value,
     out: W,
 ) -> Result<W, TraceError> {
-    let layout = Layout::new(set, [columns.source, columns.target], [])?;
+    let layout = Layout::new(set, [source, target], [])?;
     let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
     let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?;
-    let schema = with_text(metadata.file_metadata().schema_descr(), columns.target).map_err(failed)?;
+    let schema = with_text(metadata.file_metadata().schema_descr(), target).map_err(failed)?;
     let mut writer = SerializedFileWriter::new(out, schema, properties(file, recording)).map_err(failed)?;
     let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
     for row_group in 0..file.row_groups() {
-        let texts = texts(file, &layout, columns, row_group, &mut change)?;
+        let texts = texts(file, &layout, [source, target], row_group, &mut change)?;
         let chunks = metadata.row_group(row_group).columns();
         let mut group = writer.next_row_group().map_err(failed)?;
-        copy(&mut group, chunks, &input, columns.target, &texts).map_err(failed)?;
+        copy(&mut group, chunks, &input, target, &texts).map_err(failed)?;
         group.close().map_err(failed)?;
     }
     writer.into_inner().map_err(failed)
@@ -79,22 +61,17 @@ pub fn rewrite<W: Write + Send>(
 fn texts(
     file: &TraceFile,
     layout: &Layout,
-    columns: Columns<'_>,
+    columns: [&str; 2],
     row_group: usize,
     change: &mut impl FnMut(Before<'_>) -> Option<String>,
 ) -> Result<Vec<Option<String>>, TraceError> {
-    let place = |name: &str| layout.position(name).expect("the layout was made with it");
-    let (source, target) = (place(columns.source), place(columns.target));
+    let [source, target] = columns.map(|name| layout.position(name).expect("the layout was made with it"));
     let mut texts = Vec::with_capacity(file.row_group_rows(row_group));
-    for rows in RowGroup::open(file, layout, row_group).map_err(|finding| TraceError::from(*finding))? {
+    for rows in RowGroup::open(file, layout, row_group, None).map_err(|finding| TraceError::from(*finding))? {
         let rows = rows.map_err(|finding| TraceError::from(*finding))?;
         for row in 0..rows.len() {
-            texts.push(change(Before {
-                episode_id: rows.episode(row).unwrap_or_default(),
-                t: rows.columns[T].int(row).unwrap_or_default(),
-                source: rows.columns[source].text(row),
-                target: rows.columns[target].text(row),
-            }));
+            let (id, t) = (rows.episode(row).unwrap_or_default(), rows.columns[T].int(row).unwrap_or_default());
+            texts.push(change((id, t, rows.columns[source].text(row), rows.columns[target].text(row))));
         }
     }
     Ok(texts)

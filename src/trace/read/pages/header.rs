@@ -20,8 +20,11 @@ pub(super) struct Header {
     pub(super) kind: Kind,
     /// Values, the nulls among them; keys of a dictionary.
     pub(super) values: usize,
-    /// Of a page of version 2.
-    newer: Newer,
+    /// What only a page of version 2 declares; the levels, in bytes, are not compressed.
+    nulls: usize,
+    rows: usize,
+    levels: usize,
+    is_plain: bool,
 }
 
 /// What a page is.
@@ -32,16 +35,6 @@ pub(super) enum Kind {
     Index,
     Dictionary,
     DataV2,
-}
-
-/// What only a page of version 2 declares.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-struct Newer {
-    nulls: usize,
-    rows: usize,
-    /// The bytes of the levels, which are not compressed.
-    levels: usize,
-    plain: bool,
 }
 
 /// What the footer says of a column of a row group.
@@ -95,11 +88,11 @@ impl Header {
             once(&mut seen, field)?;
             match (kind, field.id) {
                 (_, 1) => self.values = size(compact.int(field)?)?,
-                (8, 2) => self.newer.nulls = size(compact.int(field)?)?,
-                (8, 3) => self.newer.rows = size(compact.int(field)?)?,
-                (8, 5 | 6) => self.newer.levels += size(compact.int(field)?)?,
+                (8, 2) => self.nulls = size(compact.int(field)?)?,
+                (8, 3) => self.rows = size(compact.int(field)?)?,
+                (8, 5 | 6) => self.levels += size(compact.int(field)?)?,
                 (8, 7) if matches!(field.wire, Wire::True | Wire::False) => {
-                    self.newer.plain = field.wire == Wire::False;
+                    self.is_plain = field.wire == Wire::False;
                 }
                 (8, 7) => return Err(Fault::Invalid("a field of another type")),
                 (5, 2..=4) | (7, 2) | (8, 4) => drop(compact.int(field)?),
@@ -118,7 +111,7 @@ impl Header {
     /// What is wrong with a page of a flat column of which `read` values came before: expected and found.
     pub(super) fn fault(&self, about: &About, read: usize) -> Option<(String, String)> {
         let fault = |expected: String, found: String| Some((expected, found));
-        if self.whole > most(about.codec, self.stored) || (self.is_plain(about) && self.whole != self.stored) {
+        if self.whole > most(about.codec, self.stored) || (self.is_stored_plain(about) && self.whole != self.stored) {
             return fault(format!("a size that {} bytes can hold", self.stored), format!("{} bytes", self.whole));
         }
         if self.kind == Kind::Dictionary {
@@ -128,7 +121,7 @@ impl Header {
         if self.values > left {
             return fault(format!("at most {left} values"), self.values.to_string());
         }
-        let Newer { nulls, rows, levels, .. } = self.newer;
+        let Self { nulls, rows, levels, .. } = *self;
         match self.kind {
             Kind::DataV2 if rows != self.values => fault(format!("{} rows", self.values), rows.to_string()),
             Kind::DataV2 if nulls > if about.optional { self.values } else { 0 } => {
@@ -142,8 +135,8 @@ impl Header {
     }
 
     /// Whether the page is stored as it is.
-    fn is_plain(&self, about: &About) -> bool {
-        about.codec == Compression::UNCOMPRESSED || (self.kind == Kind::DataV2 && self.newer.plain)
+    fn is_stored_plain(&self, about: &About) -> bool {
+        about.codec == Compression::UNCOMPRESSED || (self.kind == Kind::DataV2 && self.is_plain)
     }
 
     fn dictionary_fault(&self, about: &About) -> Option<(String, String)> {

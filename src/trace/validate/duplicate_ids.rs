@@ -32,17 +32,12 @@ fn hash(id: &str) -> u64 {
 #[derive(Default)]
 pub(in crate::trace) struct Prints(Vec<u64>);
 
-/// What ends the search for the first repeated id.
-enum End {
-    Found(Box<Finding>),
-    /// All episodes have been looked at.
-    Searched,
-    Failed(TraceError),
-}
+/// The end of the search for the first repeated id.
+struct Stop(Result<Option<Box<Finding>>, TraceError>);
 
-impl From<TraceError> for End {
+impl From<TraceError> for Stop {
     fn from(error: TraceError) -> Self {
-        Self::Failed(error)
+        Self(Err(error))
     }
 }
 
@@ -104,22 +99,18 @@ fn first_equal(
         };
         for start in starts {
             if left == 0 {
-                return Err(End::Searched);
+                return Err(Stop(Ok(None)));
             }
             left -= 1;
             if alike.contains(&hash(&start.id))
                 && let Some(Located { finding, .. }) = ids.admit(start, file, name)
             {
-                return Err(End::Found(Box::new(finding)));
+                return Err(Stop(Ok(Some(Box::new(finding)))));
             }
         }
         Ok(())
     });
-    match search {
-        Err(End::Found(finding)) => Ok(Some(finding)),
-        Err(End::Failed(error)) => Err(error),
-        Err(End::Searched) | Ok(()) => Ok(None),
-    }
+    search.map_or_else(|Stop(end)| end, |()| Ok(None))
 }
 
 /// That an id was there before: in another file if `other` names it; `groups` are the row groups, before and again.

@@ -70,7 +70,7 @@ bench-scores:
 		cargo build --release --no-default-features --features "$(BENCH_FEATURES)" --bin mirrorstats && \
 		cp $${CARGO_TARGET_DIR:-target}/release/mirrorstats target/bench/mirrorstats-polars; \
 	fi
-	cargo build --release --no-default-features --bin mirrorstats --example generate --example decode --example pages
+	cargo build --release --no-default-features --bin mirrorstats --example generate --example decode
 	python3 -m pip install --quiet --upgrade --target $(BENCH_PYTHON) $(BENCH_PACKAGES)
 	PYTHONPATH=$(BENCH_PYTHON) python3 scripts/bench/bench.py --program $${CARGO_TARGET_DIR:-target}/release/mirrorstats \
 		--polars "$(if $(BENCH_FEATURES),target/bench/mirrorstats-polars)" \

@@ -1,24 +1,37 @@
-//! Decodes columns of traces and does nothing with them: what any engine on this Parquet library pays at least.
+//! Reads columns of traces and does nothing with them: what any reader on this Parquet library pays at least.
 //!
-//! `cargo run --release --example decode -- FOLDER` reads the columns of the paper's definitions with `parquet` and
-//! `arrow`, text as dictionaries, row groups on all cores, and prints the number of rows.
+//! `cargo run --release --example decode -- FOLDER` takes the columns of the paper's definitions, row groups on all
+//! cores. It decodes them with `parquet` and `arrow`, text as dictionaries, and prints the number of rows. With `--pages`
+//! it reads and decompresses their pages alone, a column of a row group in one piece, and prints the number of values.
 
 use std::error::Error;
 use std::fs::{self, File};
+use std::hint::black_box;
+use std::io::{Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
 use arrow::datatypes::{DataType, Field, Schema};
+use bytes::Bytes;
+use bytes::buf::{Buf as _, Reader};
 use clap::Parser;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::column::page::{Page, PageReader as _};
+use parquet::errors::ParquetError;
+use parquet::file::metadata::ColumnChunkMetaData;
+use parquet::file::reader::{ChunkReader, Length};
+use parquet::file::serialized_reader::SerializedPageReader;
 
-/// Decode columns of traces and do nothing with them
+/// Read columns of traces and do nothing with them
 #[derive(Debug, Parser)]
 struct Arguments {
-    /// Row groups at a time [default: one a core].
+    /// Read and decompress their pages alone.
+    #[arg(long)]
+    pages: bool,
+    /// Row groups at a time [default: one per core].
     #[arg(long)]
     threads: Option<usize>,
     /// The columns.
@@ -48,21 +61,22 @@ fn main() -> Result<(), Failure> {
     let jobs: Vec<(usize, usize)> = (0..files.len()).flat_map(groups).collect();
     let threads = arguments.threads.or_else(|| thread::available_parallelism().ok().map(Into::into)).unwrap_or(1);
     let next = AtomicUsize::new(0);
-    let rows = thread::scope(|scope| {
+    let read = if arguments.pages { pages } else { rows };
+    let total = thread::scope(|scope| {
         let worker = || {
-            let mut rows = 0;
+            let mut total = 0;
             while let Some(&(file, group)) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let (metadata, path) = &files[file];
-                rows += decode(metadata, path, group, &arguments.columns)?;
+                let (footer, path) = &files[file];
+                total += read(footer, path, group, &arguments.columns)?;
             }
-            Ok::<_, Failure>(rows)
+            Ok::<_, Failure>(total)
         };
         let workers: Vec<_> = (0..threads).map(|_| scope.spawn(worker)).collect();
-        let decoded =
+        let totals =
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err("a reader panicked".into())));
-        decoded.sum::<Result<usize, Failure>>()
+        totals.sum::<Result<usize, Failure>>()
     })?;
-    println!("{rows} rows");
+    println!("{total} {}", if arguments.pages { "values" } else { "rows" });
     Ok(())
 }
 
@@ -78,16 +92,85 @@ fn footer(path: &Path) -> Result<ArrowReaderMetadata, Failure> {
     Ok(ArrowReaderMetadata::try_new(Arc::clone(stored.metadata()), ArrowReaderOptions::new().with_schema(schema))?)
 }
 
-fn decode(metadata: &ArrowReaderMetadata, path: &Path, group: usize, columns: &[String]) -> Result<usize, Failure> {
-    let mask = ProjectionMask::columns(metadata.parquet_schema(), columns.iter().map(String::as_str));
-    let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(File::open(path)?, metadata.clone())
+/// The number of rows of a row group, decoded.
+fn rows(footer: &ArrowReaderMetadata, path: &Path, group: usize, columns: &[String]) -> Result<usize, Failure> {
+    let mask = ProjectionMask::columns(footer.parquet_schema(), columns.iter().map(String::as_str));
+    let reader = ParquetRecordBatchReaderBuilder::new_with_metadata(File::open(path)?, footer.clone())
         .with_row_groups(vec![group])
         .with_projection(mask)
         .with_batch_size(BATCH_ROWS)
         .build()?;
     let mut rows = 0;
     for batch in reader {
-        rows += std::hint::black_box(batch?).num_rows();
+        rows += black_box(batch?).num_rows();
     }
     Ok(rows)
+}
+
+/// The number of values in the data pages of some columns of a row group.
+fn pages(footer: &ArrowReaderMetadata, path: &Path, group: usize, columns: &[String]) -> Result<usize, Failure> {
+    // A handle of its own: threads would share the position of one handle.
+    let mut file = File::open(path)?;
+    let group = footer.metadata().row_group(group);
+    let rows = usize::try_from(group.num_rows())?;
+    let mut values = 0;
+    for column in group.columns() {
+        if columns.iter().any(|name| name == column.column_path().string().as_str()) {
+            values += column_pages(&mut file, column, rows)?;
+        }
+    }
+    Ok(values)
+}
+
+fn column_pages(file: &mut File, column: &ColumnChunkMetaData, rows: usize) -> Result<usize, Failure> {
+    let (start, length) = column.byte_range();
+    let mut bytes = Vec::with_capacity(usize::try_from(length)?);
+    file.seek(SeekFrom::Start(start))?;
+    file.take(length).read_to_end(&mut bytes)?;
+    let piece = Arc::new(Piece { start, bytes: bytes.into() });
+    let mut pages = SerializedPageReader::new(piece, column, rows, None)?;
+    let mut values = 0;
+    while let Some(page) = pages.get_next_page()? {
+        if !matches!(page, Page::DictionaryPage { .. }) {
+            values += usize::try_from(page.num_values())?;
+        }
+        black_box(page.buffer());
+    }
+    Ok(values)
+}
+
+/// Part of a file in memory, with the addresses of the file.
+struct Piece {
+    start: u64,
+    bytes: Bytes,
+}
+
+impl Piece {
+    fn from(&self, address: u64) -> Result<Bytes, ParquetError> {
+        let from = address.checked_sub(self.start).and_then(|from| usize::try_from(from).ok());
+        let from = from.filter(|from| *from <= self.bytes.len()).ok_or(ParquetError::EOF("a page's address".into()))?;
+        Ok(self.bytes.slice(from..))
+    }
+}
+
+impl Length for Piece {
+    fn len(&self) -> u64 {
+        self.start + self.bytes.len() as u64
+    }
+}
+
+impl ChunkReader for Piece {
+    type T = Reader<Bytes>;
+
+    fn get_read(&self, start: u64) -> Result<Self::T, ParquetError> {
+        Ok(self.from(start)?.reader())
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes, ParquetError> {
+        let mut rest = self.from(start)?;
+        if length > rest.len() {
+            return Err(ParquetError::EOF("a page's length".into()));
+        }
+        Ok(rest.split_to(length))
+    }
 }

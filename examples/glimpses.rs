@@ -41,8 +41,7 @@ fn episode(model: &str, run: i32, pixels: &[i32]) -> Episode {
         seed: 1,
         run,
         body_color: "blue".to_owned(),
-        stated_color: None,
-        distractors: None,
         steps: pixels.iter().enumerate().map(step).collect(),
+        ..Episode::default()
     }
 }

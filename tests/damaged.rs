@@ -6,7 +6,8 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
-use mirrorstats::trace::finding::{Code, Severity, TraceError};
+use mirrorstats::trace::diagnostic::{Code, Severity};
+use mirrorstats::trace::error::TraceError;
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::scan::Projection;

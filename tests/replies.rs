@@ -1,9 +1,9 @@
 //! Replies as models write them, and what is read from each.
 
-use mirrorstats::agent::identification::normal_form;
 use mirrorstats::agent::reply::{self, Ending, Repair};
 use mirrorstats::agent::{Family, Status};
 use mirrorstats::trace::episode::Action;
+use mirrorstats::trace::identification::normal_form;
 
 const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
 

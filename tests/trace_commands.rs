@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use assert_cmd::Command;
+use mirrorstats::trace::diagnostic::Code;
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::finding::Code;
 use mirrorstats::trace::schema::COLUMNS;
 use mirrorstats::trace::write::write_episodes;
 use serde_json::{Value, json};

@@ -11,7 +11,8 @@ use arrow::array::{
     UInt32Array, UInt64Array,
 };
 use arrow::datatypes::{Float64Type, Int8Type, Int32Type, Int64Type};
-use mirrorstats::trace::finding::{Code, TraceError};
+use mirrorstats::trace::diagnostic::Code;
+use mirrorstats::trace::error::TraceError;
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::scan::{EpisodeBatch, Projection};

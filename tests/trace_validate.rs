@@ -8,8 +8,8 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::datatypes::DataType;
+use mirrorstats::trace::diagnostic::{Code, Severity};
 use mirrorstats::trace::episode::{Action, Episode, Step};
-use mirrorstats::trace::finding::{Code, Severity};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::validate::{Validation, validate};
 use mirrorstats::trace::write::{TraceEncoder, TraceMetadata};
@@ -25,9 +25,8 @@ fn sound(folder: &Path) -> RecordBatch {
         seed: 1,
         run,
         body_color: "red".into(),
-        stated_color: None,
-        distractors: None,
         steps: vec![Step { action: Some(Action::Done), ..Step::default() }; 4],
+        ..Episode::default()
     };
     let path = folder.join("sound.parquet");
     let mut encoder = TraceEncoder::new(File::create(&path).unwrap(), &TraceMetadata::default()).unwrap();

@@ -18,9 +18,8 @@ fn episode(id: &str, steps: usize) -> Episode {
         seed: 1,
         run: 2,
         body_color: "red".into(),
-        stated_color: None,
-        distractors: None,
         steps: (0..steps).map(|_| Step { action: Some(Action::TurnLeft), ..Step::default() }).collect(),
+        ..Episode::default()
     }
 }
 

@@ -56,7 +56,7 @@ def ours(program, episode):
 def floors(examples):
     """What reading costs at least: pages, then values."""
     return [
-        Contender(PAGES, lambda folder, _: [examples / "pages", folder], own=True),
+        Contender(PAGES, lambda folder, _: [examples / "decode", "--pages", folder], own=True),
         Contender(DECODE, lambda folder, _: [examples / "decode", folder], own=True),
     ]
 

@@ -9,7 +9,7 @@ import subprocess
 STAGES = [
     ("decompression (zstd)", r"ZSTD_decompress|HUF_decompress|ZSTD_(?!compress).*(decode|Seq)|zstd.*decomp|FSE_read|FSE_build.*DTable|XXH|HUF_read"),
     ("compression of the output", r"ZSTD_|HUF_|FSE_"),
-    ("pages: runs and keys", r"trace.*(pages|hybrid|chunk)"),
+    ("pages: runs and keys", r"trace.*(pages|hybrid|rle|chunk)"),
     ("output", r"ArrowWriter|arrow_writer|encod|writer|score.*format"),
     ("decoding", r"parquet"),
     ("rules and cutting into episodes", r"mirrorstats.*trace|trace::"),

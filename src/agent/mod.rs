@@ -7,9 +7,7 @@
 
 #[cfg(feature = "sim")]
 pub mod exec;
-pub mod identification;
 pub mod prompt;
-pub mod renormalize;
 pub mod reply;
 #[cfg(feature = "sim")]
 pub mod scripted;

@@ -9,10 +9,12 @@ use mcap::records::Metadata;
 use mcap::{Compression, Message, WriteOptions, Writer};
 use serde_json::Value;
 
-use super::message::{EpisodeMessage, Head};
+use super::error::LogError;
+use super::message::EpisodeMessage;
 use super::messages::Messages;
-use super::{LogError, METADATA, METADATA_KEY, topic};
+use super::{METADATA, METADATA_KEY, topic};
 use crate::base::replace::NewFile;
+use crate::trace::episode::Episode;
 
 /// What orders the episodes of a log: seed and run.
 pub type Place = (i32, i32);
@@ -115,7 +117,7 @@ struct Source {
     path: PathBuf,
     messages: Messages<BufReader<File>>,
     /// The message with which the next episode begins.
-    begin: Option<(Head, Message<'static>)>,
+    begin: Option<(Episode, Message<'static>)>,
     /// The episode that was copied last.
     last: Option<Place>,
 }

@@ -1,7 +1,9 @@
-//! The JSON messages of a log: episodes and rows, as a trace holds them.
+//! The JSON messages of a log: episodes and rows, with the columns of a trace as keys.
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema};
+use serde::de::Error as _;
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 use crate::trace::episode::{Action, Episode, Extra, Step};
 
@@ -10,7 +12,7 @@ use crate::trace::episode::{Action, Episode, Extra, Step};
 #[serde(tag = "event", rename_all = "lowercase", deny_unknown_fields)]
 pub enum EpisodeMessage {
     /// An episode begins.
-    Begin(Head),
+    Begin(Episode),
     /// It has ended, by `done` or with its last step.
     End {
         /// Its id.
@@ -20,54 +22,9 @@ pub enum EpisodeMessage {
     },
 }
 
-/// The constants of an episode; the columns of the same names.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[expect(missing_docs, reason = "each field is the column of its name")]
-pub struct Head {
-    pub episode_id: String,
-    pub model: String,
-    pub experiment: String,
-    pub seed: i32,
-    pub run: i32,
-    pub body_color: String,
-    pub stated_color: Option<String>,
-    pub distractors: Option<i8>,
-}
-
-impl Head {
-    /// The constants of an episode.
-    pub fn of(episode: &Episode) -> Self {
-        Self {
-            episode_id: episode.episode_id.clone(),
-            model: episode.model.clone(),
-            experiment: episode.experiment.clone(),
-            seed: episode.seed,
-            run: episode.run,
-            body_color: episode.body_color.clone(),
-            stated_color: episode.stated_color.clone(),
-            distractors: episode.distractors,
-        }
-    }
-
-    /// An episode of these constants and these steps.
-    pub fn with_steps(self, steps: Vec<Step>) -> Episode {
-        Episode {
-            episode_id: self.episode_id,
-            model: self.model,
-            experiment: self.experiment,
-            seed: self.seed,
-            run: self.run,
-            body_color: self.body_color,
-            stated_color: self.stated_color,
-            distractors: self.distractors,
-            steps,
-        }
-    }
-}
-
 /// A message of the topic `/decision`: a row of the trace. A column without a value is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(transform = without_strangers)]
 #[expect(missing_docs, reason = "each field is the column of its name")]
 pub struct Decision {
     pub t: i32,
@@ -78,48 +35,19 @@ pub struct Decision {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub selected_cube: Option<String>,
     pub mirror_visible: bool,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mirror_self_px: Option<i32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mirror_other_px: Option<i32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub mirror_px: Option<i32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub direct_other_px: Option<i32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pose_x: Option<f32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pose_y: Option<f32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pose_yaw: Option<f32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bumped: Option<bool>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cube_distance: Option<f32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reply_status: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reply_repair: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub view_description: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reasoning: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub summary: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub identification: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reply: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub latency_ms: Option<i32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub prompt_tokens: Option<i32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub completion_tokens: Option<i32>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub cost_usd: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub frame_time: Option<i64>,
+    #[serde(flatten)]
+    pub extra: Extra,
+    /// Keys that are no column.
+    #[serde(flatten, skip_serializing)]
+    #[schemars(skip)]
+    strangers: Map<String, Value>,
+}
+
+/// Says in the schema of a row that it has no other keys, which a type with keys of another one cannot.
+fn without_strangers(schema: &mut Schema) {
+    let required = schema.remove("required");
+    schema.insert("additionalProperties".to_owned(), false.into());
+    schema.insert("required".to_owned(), required.unwrap_or_default());
 }
 
 /// An action that is none of the five.
@@ -133,34 +61,20 @@ pub struct NoAction {
 impl Decision {
     /// The row of a step.
     pub fn of(t: i32, step: &Step) -> Self {
-        let extra = step.extra.clone();
-        Self {
-            t,
-            action: step.action.map(|action| action.name().to_owned()),
-            self_color: step.self_color.clone(),
-            selected_cube: step.selected_cube.clone(),
-            mirror_visible: step.mirror_visible,
-            mirror_self_px: extra.mirror_self_px,
-            mirror_other_px: extra.mirror_other_px,
-            mirror_px: extra.mirror_px,
-            direct_other_px: extra.direct_other_px,
-            pose_x: extra.pose_x,
-            pose_y: extra.pose_y,
-            pose_yaw: extra.pose_yaw,
-            bumped: extra.bumped,
-            cube_distance: extra.cube_distance,
-            reply_status: extra.reply_status,
-            reply_repair: extra.reply_repair,
-            view_description: extra.view_description,
-            reasoning: extra.reasoning,
-            summary: extra.summary,
-            identification: extra.identification,
-            reply: extra.reply,
-            latency_ms: extra.latency_ms,
-            prompt_tokens: extra.prompt_tokens,
-            completion_tokens: extra.completion_tokens,
-            cost_usd: extra.cost_usd,
-            frame_time: extra.frame_time,
+        let Step { action, self_color, selected_cube, mirror_visible, extra } = step.clone();
+        let (action, strangers) = (action.map(|action| action.name().to_owned()), Map::new());
+        Self { t, action, self_color, selected_cube, mirror_visible, extra, strangers }
+    }
+
+    /// The row in a message.
+    ///
+    /// # Errors
+    /// For JSON that is none, and for keys that are no columns.
+    pub fn parse(json: &[u8]) -> serde_json::Result<Self> {
+        let row: Self = serde_json::from_slice(json)?;
+        match row.strangers.keys().next() {
+            None => Ok(row),
+            Some(key) => Err(serde_json::Error::custom(format_args!("unknown field `{key}`"))),
         }
     }
 
@@ -169,41 +83,36 @@ impl Decision {
     /// # Errors
     /// For an action that is none.
     pub fn into_step(self) -> Result<Step, NoAction> {
-        let action = match &self.action {
-            None => None,
-            Some(name) => {
-                let known = Action::ALL.into_iter().find(|action| action.name() == name);
-                Some(known.ok_or_else(|| NoAction { t: self.t, found: name.clone() })?)
-            }
+        let Self { t, action, self_color, selected_cube, mirror_visible, extra, .. } = self;
+        let named = |name: String| Action::named(&name).ok_or(NoAction { t, found: name });
+        let action = action.map(named).transpose()?;
+        Ok(Step { action, self_color, selected_cube, mirror_visible, extra })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::{Decision, Episode, Step};
+    use crate::trace::schema::TABLE;
+
+    #[test]
+    fn messages_have_the_columns_of_the_table_as_keys() {
+        let keys = |schema: schemars::Schema| -> Vec<String> {
+            json!(schema)["properties"].as_object().unwrap().keys().cloned().collect()
         };
-        Ok(Step {
-            action,
-            self_color: self.self_color,
-            selected_cube: self.selected_cube,
-            mirror_visible: self.mirror_visible,
-            extra: Extra {
-                mirror_self_px: self.mirror_self_px,
-                mirror_other_px: self.mirror_other_px,
-                mirror_px: self.mirror_px,
-                direct_other_px: self.direct_other_px,
-                pose_x: self.pose_x,
-                pose_y: self.pose_y,
-                pose_yaw: self.pose_yaw,
-                bumped: self.bumped,
-                cube_distance: self.cube_distance,
-                reply_status: self.reply_status,
-                reply_repair: self.reply_repair,
-                view_description: self.view_description,
-                reasoning: self.reasoning,
-                summary: self.summary,
-                identification: self.identification,
-                reply: self.reply,
-                latency_ms: self.latency_ms,
-                prompt_tokens: self.prompt_tokens,
-                completion_tokens: self.completion_tokens,
-                cost_usd: self.cost_usd,
-                frame_time: self.frame_time,
-            },
-        })
+        let columns = |constant| TABLE.iter().filter(move |c| c.constant == constant).map(|c| c.name.to_owned());
+        assert_eq!(keys(schemars::schema_for!(Episode)), columns(true).collect::<Vec<_>>());
+        assert_eq!(keys(schemars::schema_for!(Decision)), columns(false).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_key_that_is_no_column_is_refused() {
+        let mut row = json!(Decision::of(1, &Step::default()));
+        assert!(Decision::parse(row.to_string().as_bytes()).is_ok());
+        row["mirror_pixels"] = json!(1);
+        let error = Decision::parse(row.to_string().as_bytes()).unwrap_err();
+        assert_eq!(error.to_string(), "unknown field `mirror_pixels`");
     }
 }

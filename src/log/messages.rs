@@ -11,7 +11,7 @@ use mcap::Message;
 use mcap::read::ChannelAccumulator;
 use mcap::records::Record;
 
-use super::LogError;
+use super::error::LogError;
 use super::records::{Piece, Records, inside};
 
 /// The messages of a log up to its end record.

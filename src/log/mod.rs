@@ -19,6 +19,7 @@
 //! that was cut off, every episode whose `end` is there is whole.
 
 pub mod assemble;
+mod error;
 pub mod message;
 mod messages;
 mod parse;
@@ -27,6 +28,8 @@ mod records;
 pub mod recover;
 #[cfg(feature = "sim")]
 pub mod write;
+
+pub use error::LogError;
 
 /// The name of the metadata record.
 pub const METADATA: &str = "mirrorstats.recording";
@@ -47,63 +50,4 @@ pub mod topic {
     pub const CENSUS: &str = "/census";
     /// Rows of the trace.
     pub const DECISION: &str = "/decision";
-}
-
-/// Why a log cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum LogError {
-    /// The operating system refuses.
-    #[error(
-        "cannot {doing} the log `{file}`: {source}\n  help: is the folder there and writable, and the disk not full?"
-    )]
-    Io {
-        /// What was being done.
-        doing: &'static str,
-        /// The log.
-        file: String,
-        /// Why not.
-        source: std::io::Error,
-    },
-    /// The bytes are not those of a log.
-    #[error(
-        "the log `{file}` is damaged: {fault}\n  help: `mirrorstats recover {file} -o TRACE.parquet` saves what can be saved"
-    )]
-    Damaged {
-        /// The log.
-        file: String,
-        /// What was found.
-        fault: String,
-    },
-    /// The bytes are those of a log, but not of a recording.
-    #[error("`{file}` is no log of a recording: {fault}")]
-    Foreign {
-        /// The log.
-        file: String,
-        /// What is missing.
-        fault: String,
-    },
-}
-
-impl LogError {
-    fn io(doing: &'static str, path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
-        let file = path.display().to_string();
-        move |source| Self::Io { doing, file, source: crate::base::replace::without_name(source) }
-    }
-
-    /// An error of the MCAP library while writing.
-    fn writing(path: &std::path::Path) -> impl FnOnce(mcap::McapError) -> Self {
-        let file = path.display().to_string();
-        move |error| {
-            let source = match error {
-                mcap::McapError::Io(source) => source,
-                other => std::io::Error::other(other),
-            };
-            Self::Io { doing: "write", file, source }
-        }
-    }
-
-    /// The bytes are not those of a log.
-    fn no_log(path: &std::path::Path) -> Self {
-        Self::Foreign { file: path.display().to_string(), fault: "it does not begin as an MCAP file does".to_owned() }
-    }
 }

@@ -6,9 +6,10 @@ use std::path::Path;
 
 use serde_json::Value;
 
+use super::error::LogError;
 use super::message::{Decision, EpisodeMessage};
 use super::messages::Messages;
-use super::{LogError, topic};
+use super::topic;
 
 /// What a message says.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,7 +83,7 @@ pub(super) fn event(name: &str, data: &[u8]) -> serde_json::Result<Event> {
     Ok(match name {
         topic::EPISODE => Event::Episode(serde_json::from_slice(data)?),
         topic::CENSUS => Event::Census(serde_json::from_slice(data)?),
-        topic::DECISION => Event::Decision(serde_json::from_slice(data)?),
+        topic::DECISION => Event::Decision(Decision::parse(data)?.into()),
         topic::CAMERA => Event::Frame(data.to_vec()),
         _ => Event::Other,
     })

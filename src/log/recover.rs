@@ -14,10 +14,11 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::message::{EpisodeMessage, Head};
+use super::error::LogError;
+use super::message::EpisodeMessage;
 use super::read::{Event, event};
 use super::records::{Piece, Records, glimpse, inside};
-use super::{LogError, METADATA, METADATA_KEY, topic};
+use super::{METADATA, METADATA_KEY, topic};
 use crate::trace::episode::{Episode, Step};
 
 /// What was saved of a log, and what was not.
@@ -103,7 +104,7 @@ pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, L
 #[derive(Default)]
 struct Salvage {
     channels: BTreeMap<u16, String>,
-    open: Option<(Head, Vec<Step>, Option<String>)>,
+    open: Option<(Episode, Vec<Step>, Option<String>)>,
     result: Recovered,
 }
 
@@ -255,7 +256,7 @@ impl Salvage {
     fn end(&mut self, episode_id: &str, steps: usize) {
         match self.open.take() {
             Some((head, rows, None)) if head.episode_id == episode_id && rows.len() == steps && steps > 0 => {
-                self.result.episodes.push(head.with_steps(rows));
+                self.result.episodes.push(Episode { steps: rows, ..head });
             }
             Some((head, rows, fault)) => {
                 let reason = fault.unwrap_or_else(|| format!("its end says {steps} rows of `{episode_id}`"));

@@ -15,9 +15,11 @@ use schemars::schema_for;
 use serde::Serialize;
 
 use super::assemble::writer;
-use super::message::{Decision, EpisodeMessage, Head};
-use super::{LogError, topic};
+use super::error::LogError;
+use super::message::{Decision, EpisodeMessage};
+use super::topic;
 use crate::base::replace::NewFile;
+use crate::trace::episode::Episode;
 
 /// Something that moves, in the frame of the room.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,7 +103,7 @@ impl EpisodeLog {
     ///
     /// # Errors
     /// When the file cannot be made or written.
-    pub fn create(path: &Path, head: &Head, census: &serde_json::Value, time: u64) -> Result<Self, LogError> {
+    pub fn create(path: &Path, head: &Episode, census: &serde_json::Value, time: u64) -> Result<Self, LogError> {
         let file = NewFile::create(path).map_err(LogError::io("write", path))?;
         let mut out = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;

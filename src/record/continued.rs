@@ -11,10 +11,10 @@ use serde_json::{Value, json};
 use super::fault::StoreError;
 use super::metadata::{Difference, difference};
 use crate::log::LogError;
-use crate::log::message::{Decision, Head};
+use crate::log::message::Decision;
 use crate::log::recover::{Recovered, recover};
 use crate::trace::episode::Episode;
-use crate::trace::finding::TraceError;
+use crate::trace::error::TraceError;
 use crate::trace::merge::{self, EpisodeRows};
 use crate::trace::write::OptionalColumns;
 
@@ -89,7 +89,7 @@ fn parted(own: &Episode, logged: &Episode) -> Option<String> {
     if own == logged {
         return None;
     }
-    if let Some(words) = differs(&json!(Head::of(own)), &json!(Head::of(logged))) {
+    if let Some(words) = differs(&json!(own), &json!(logged)) {
         return Some(words);
     }
     for (t, (own, logged)) in (1..).zip(own.steps.iter().zip(&logged.steps)) {
@@ -118,9 +118,9 @@ mod tests {
             seed: 1,
             run: 1,
             body_color: "red".into(),
-            stated_color: None,
             distractors: Some(2),
             steps: vec![Step { action: Some(Action::TurnLeft), ..Step::default() }; steps],
+            ..Episode::default()
         }
     }
 

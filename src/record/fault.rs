@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::base::replace::without_name;
 use crate::log::LogError;
-use crate::trace::finding::TraceError;
+use crate::trace::error::TraceError;
 
 /// Why the folder cannot be used.
 #[derive(Debug, thiserror::Error)]

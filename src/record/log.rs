@@ -9,7 +9,7 @@ use serde_json::Value;
 use super::plan::Key;
 use super::play::{Broken, Seen};
 use super::store::Store;
-use crate::log::message::{Decision, Head};
+use crate::log::message::Decision;
 use crate::log::write::{EpisodeLog, Form, Placed, Solid, View};
 use crate::sim::census::Census;
 use crate::sim::snapshot::{self, Shape};
@@ -37,7 +37,7 @@ impl Log {
     /// # Errors
     /// When it cannot be written.
     pub fn begin_at(path: &Path, key: Key, episode: &Episode) -> Result<Self, Broken> {
-        let log = EpisodeLog::create(path, &Head::of(episode), &CENSUS, time(key, 0));
+        let log = EpisodeLog::create(path, episode, &CENSUS, time(key, 0));
         Ok(Self { key, log: log.map_err(Broken::fatal)? })
     }
 

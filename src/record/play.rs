@@ -109,7 +109,7 @@ pub fn head(scene: &Scene, key: Key, model: &str) -> Episode {
         body_color: scene.body_color.name().to_owned(),
         stated_color: scene.stated_color.map(|color| color.name().to_owned()),
         distractors: Some(i8::try_from(scene.others.len()).unwrap_or(i8::MAX)),
-        steps: Vec::new(),
+        ..Episode::default()
     }
 }
 
@@ -188,7 +188,6 @@ fn row(world: &World, key: Key, t: i32, census: &Census, reply: Reply) -> Step {
         pose_x: Some(narrowed(pose.x)),
         pose_y: Some(narrowed(pose.y)),
         pose_yaw: Some(narrowed(pose.heading.degrees())),
-        bumped: None,
         cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
         reply_status: Some(reply.status.name().to_owned()),
         reply_repair: Repair::joined(&reply.repairs),
@@ -202,6 +201,7 @@ fn row(world: &World, key: Key, t: i32, census: &Census, reply: Reply) -> Step {
         completion_tokens: reply.usage.completion_tokens,
         cost_usd: reply.usage.cost_usd,
         frame_time: Some(key.frame_time(t)),
+        ..Extra::default()
     };
     Step {
         action: reply.action,

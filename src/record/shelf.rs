@@ -15,7 +15,7 @@ use super::lock::is_at;
 use super::metadata::{Difference, difference};
 use super::plan::slug;
 use crate::sim::Experiment;
-use crate::trace::finding::TraceError;
+use crate::trace::error::TraceError;
 use crate::trace::inputs::Input;
 use crate::trace::merge::{self, EpisodeRows};
 use crate::trace::open::TraceFile;

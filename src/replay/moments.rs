@@ -81,9 +81,8 @@ mod tests {
             seed: 1,
             run: 1,
             body_color: text(),
-            stated_color: None,
-            distractors: None,
             steps,
+            ..Episode::default()
         }
     }
 

@@ -19,7 +19,7 @@ use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::Faults;
 use crate::metric::file::FileError;
 use crate::metric::restore::RestoreError;
-use crate::trace::finding::TraceError;
+use crate::trace::error::TraceError;
 use crate::trace::open::TraceSet;
 use crate::trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
 use crate::trace::schema::{COLUMNS, Kind};

@@ -21,7 +21,7 @@ use crate::score::evidence::EvidenceError;
 use crate::score::format::FormatError;
 use crate::score::score_traces::ScoreError;
 use crate::score::select::SelectError;
-use crate::trace::finding::TraceError;
+use crate::trace::error::TraceError;
 
 /// Why a study gives no answer. Each message says what, where, expected, found, and what to do.
 #[derive(Debug, thiserror::Error)]

@@ -1,25 +1,23 @@
 //! One recorded episode as a writer gives it: the constants of the episode and its steps in order.
 
-/// What happened in one episode.
-#[derive(Clone, Debug, PartialEq)]
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What happened in one episode. Its JSON holds the constants alone, as logs do.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "Head", description = "The constants of an episode; the columns of the same names.")]
+#[expect(missing_docs, reason = "each field is the column of its name, documented in `schema`")]
 pub struct Episode {
-    /// Unique in a report.
     pub episode_id: String,
-    /// The name shown in tables.
     pub model: String,
-    /// `E1`..`E5`, or any name that a definition file knows.
     pub experiment: String,
-    /// The seed of the episode's block of runs.
     pub seed: i32,
-    /// The run within its seed.
     pub run: i32,
-    /// The true colour of the body, c* in the paper.
     pub body_color: String,
-    /// The false colour told to the agent, where one was (E3).
     pub stated_color: Option<String>,
-    /// Other agents in the room, where known.
     pub distractors: Option<i8>,
-    /// The steps t = 1..T in order; never empty.
+    /// The steps t = 1..T in order; never empty where an episode is whole.
+    #[serde(skip)]
     pub steps: Vec<Step>,
 }
 
@@ -67,31 +65,48 @@ impl Action {
             Self::Done => "done",
         }
     }
+
+    /// The action of this name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|action| action.name() == name)
+    }
 }
 
-/// The optional columns that vary from step to step; names, types and units as in the schema.
-#[derive(Clone, Debug, Default, PartialEq)]
-#[expect(missing_docs, reason = "each field is the column of its name, documented in `schema`")]
-pub struct Extra {
-    pub mirror_self_px: Option<i32>,
-    pub mirror_other_px: Option<i32>,
-    pub mirror_px: Option<i32>,
-    pub direct_other_px: Option<i32>,
-    pub pose_x: Option<f32>,
-    pub pose_y: Option<f32>,
-    pub pose_yaw: Option<f32>,
-    pub bumped: Option<bool>,
-    pub cube_distance: Option<f32>,
-    pub reply_status: Option<String>,
-    pub reply_repair: Option<String>,
-    pub view_description: Option<String>,
-    pub reasoning: Option<String>,
-    pub summary: Option<String>,
-    pub identification: Option<String>,
-    pub reply: Option<String>,
-    pub latency_ms: Option<i32>,
-    pub prompt_tokens: Option<i32>,
-    pub completion_tokens: Option<i32>,
-    pub cost_usd: Option<f64>,
-    pub frame_time: Option<i64>,
+/// Fields that may have no value, and are left out of the JSON then.
+macro_rules! optional {
+    ($(#[$about:meta])+ $name:ident { $($field:ident: $type:ty,)+ }) => {
+        $(#[$about])+
+        pub struct $name {
+            $(#[serde(default, skip_serializing_if = "Option::is_none")] pub $field: Option<$type>,)+
+        }
+    };
+}
+
+optional! {
+    /// The optional columns that vary from step to step; names, types and units as in the schema.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[expect(missing_docs, reason = "each field is the column of its name, documented in `schema`")]
+    Extra {
+        mirror_self_px: i32,
+        mirror_other_px: i32,
+        mirror_px: i32,
+        direct_other_px: i32,
+        pose_x: f32,
+        pose_y: f32,
+        pose_yaw: f32,
+        bumped: bool,
+        cube_distance: f32,
+        reply_status: String,
+        reply_repair: String,
+        view_description: String,
+        reasoning: String,
+        summary: String,
+        identification: String,
+        reply: String,
+        latency_ms: i32,
+        prompt_tokens: i32,
+        completion_tokens: i32,
+        cost_usd: f64,
+        frame_time: i64,
+    }
 }

@@ -11,7 +11,7 @@ use std::fs;
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
-use super::finding::TraceError;
+use super::error::TraceError;
 
 /// A file to read, and what it is called in messages and outputs.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -1,36 +1,32 @@
 //! What an episode is, on disk and in memory: the schema, the writer, the reader, the rules.
 //!
-//! Rule: only this room opens traces. It knows no metric.
+//! | folder | what it knows |
+//! |---|---|
+//! | `schema` | which columns there are, what they may hold, how they are had from an episode |
+//! | `read` | from bytes to whole episodes: footers, pages, columns, one pass on several threads |
+//! | `write` | from episodes to bytes: new traces, traces put together, one column made anew |
+//! | `validate` | the rules that whole episodes keep, alone and together |
+//! | `import` | from JSON lines to a trace |
+//!
+//! `scan` reads for scoring: `read` and `validate` in one pass. Rule: only this room opens traces. It knows no metric.
 
-mod ahead;
-mod bounds;
-pub mod colors;
-mod column;
-pub(crate) mod contain;
-mod decode;
-pub mod describe;
+pub(crate) mod catch_panic;
+pub mod diagnostic;
 pub mod episode;
-pub mod finding;
-mod footer;
-pub(crate) mod footer_shape;
-mod ids;
+pub mod error;
+pub mod identification;
 pub mod import;
-pub mod in_order;
 pub mod info;
 pub mod inputs;
-mod layout;
-pub mod merge;
-pub mod open;
-mod pages;
-mod pass;
+mod read;
+pub mod renormalize;
 pub mod replies;
-pub mod restore;
-pub mod rewrite;
-mod rules;
 pub mod scan;
 pub mod schema;
-mod source;
-mod thrift;
 pub mod validate;
-pub mod verify;
 pub mod write;
+
+pub(crate) use read::footer::shape as footer_shape;
+pub use read::{in_order, open, verify};
+pub use schema::{colors, describe};
+pub use write::merge;

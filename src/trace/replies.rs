@@ -8,7 +8,7 @@ use arrow::datatypes::Int32Type;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::column::Column;
+use super::read::column::Column;
 use super::scan::EpisodeBatch;
 use super::schema::REPLY_STATUSES;
 use crate::base::visible::visible;

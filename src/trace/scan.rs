@@ -10,13 +10,14 @@ use arrow::array::{Array as _, ArrayRef, RecordBatch, RecordBatchOptions, String
 use arrow::datatypes::{Field, Schema};
 use arrow::error::ArrowError;
 
-use super::colors::set::{Spellings, other_names};
-use super::finding::TraceError;
-use super::ids::{Prints, hashes};
-use super::layout::Layout;
-use super::open::TraceSet;
-use super::pass::{Episodes, Event, pass};
-use super::rules::{Located, Rules};
+use super::diagnostic::Finding;
+use super::error::TraceError;
+use super::read::open::TraceSet;
+use super::read::parallel_scan::{Episodes, Event, pass};
+use super::read::projection::Layout;
+use super::validate::color_set::{Spellings, other_names};
+use super::validate::duplicate_ids::{Prints, hashes};
+use super::validate::rules::Rules;
 
 /// The columns that a scan delivers, and what it checks beyond the schema.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -133,11 +134,11 @@ impl TraceSet {
             let ids = hashes(&episodes, last);
             let (count, steps) = (episodes.len(), episodes.columns[0].len());
             let colors = other_names(&layout, &episodes);
-            let outcome = match fault {
-                Some(fault) => Outcome::Fault(fault),
-                None => Outcome::Done(shape.batch(episodes).map_err(E::from).and_then(&work)),
+            let result = match fault {
+                Some(fault) => Err(Box::new(fault.finding)),
+                None => Ok(shape.batch(episodes).map_err(E::from).and_then(&work)),
             };
-            Checked { ids, count, steps, colors, outcome }
+            Checked { ids, count, steps, colors, result }
         };
         let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
             let checked = match event {
@@ -148,9 +149,9 @@ impl TraceSet {
             spellings.add(checked.colors);
             summary.episodes += checked.count as u64;
             summary.steps += checked.steps as u64;
-            match checked.outcome {
-                Outcome::Fault(fault) => Err(TraceError::from(fault.finding).into()),
-                Outcome::Done(result) => sink(result?),
+            match checked.result {
+                Ok(result) => sink(result?),
+                Err(finding) => Err(TraceError::from(*finding).into()),
             }
         });
         // An id that was there before is found at the end, though it comes before whatever ended the pass.
@@ -174,12 +175,8 @@ struct Checked<T, E> {
     steps: usize,
     /// Names of colours beyond those of the study.
     colors: Vec<String>,
-    outcome: Outcome<T, E>,
-}
-
-enum Outcome<T, E> {
-    Fault(Located),
-    Done(Result<T, E>),
+    /// What the work gave, where no rule is broken.
+    result: Result<Result<T, E>, Box<Finding>>,
 }
 
 /// Which columns of the layout go where in a batch.

@@ -71,9 +71,8 @@ fn episode(id: &str, run: i32, visible: [bool; 3]) -> Episode {
         seed: 1,
         run,
         body_color: "red".into(),
-        stated_color: None,
-        distractors: None,
         steps: visible.into_iter().enumerate().map(step).collect(),
+        ..Episode::default()
     }
 }
 

@@ -27,9 +27,8 @@ fn episode(id: &str, rows: &[Row]) -> Episode {
         seed: 1,
         run: 1,
         body_color: "red".into(),
-        stated_color: None,
-        distractors: None,
         steps: rows.iter().map(step).collect(),
+        ..Episode::default()
     }
 }
 

@@ -89,9 +89,8 @@ fn episode(model: &str, experiment: &str, run: i32, choice: &str) -> Episode {
         seed: 1,
         run,
         body_color: if run % 2 == 0 { "red" } else { "blue" }.into(),
-        stated_color: None,
-        distractors: None,
         steps: vec![step(Action::TurnLeft, false), step(Action::MoveForward, true), step(Action::Done, false)],
+        ..Episode::default()
     }
 }
 

@@ -93,8 +93,8 @@ fn every_value_of_every_column_is_the_same_after_it() {
         run: 1,
         body_color: "red".into(),
         stated_color: Some("blue".into()),
-        distractors: None,
         steps,
+        ..Episode::default()
     };
     let original = [episode("é", vec![bare.clone(), full.clone()]), episode("b", vec![full, bare])];
     let folder = tempfile::tempdir().unwrap();

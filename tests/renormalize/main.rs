@@ -53,9 +53,9 @@ fn episode(id: &str, steps: Vec<Step>) -> Episode {
         seed: 1,
         run: 1,
         body_color: "red".into(),
-        stated_color: None,
         distractors: Some(0),
         steps,
+        ..Episode::default()
     }
 }
 

@@ -32,9 +32,8 @@ fn case(text: &str) -> Case {
         seed: 1,
         run: 1,
         body_color: body_color.into(),
-        stated_color: None,
-        distractors: None,
         steps: steps.into_iter().map(step).collect(),
+        ..Episode::default()
     };
     Case { episode, expected: values.map(|value| (value != ".").then(|| value.parse().unwrap())).collect() }
 }

@@ -47,7 +47,6 @@ fn episode() -> impl Strategy<Value = Episode> {
     let numbers = (0..3_i32, 0..8_i32, option::of(0..3_i8));
     (names, numbers, color(&[]), vec(step(), 1..9)).prop_map(
         |((model, experiment, body_color), (seed, run, distractors), stated_color, steps)| Episode {
-            episode_id: String::new(),
             model: model.into(),
             experiment: experiment.into(),
             seed,
@@ -56,6 +55,7 @@ fn episode() -> impl Strategy<Value = Episode> {
             stated_color,
             distractors,
             steps,
+            ..Episode::default()
         },
     )
 }

@@ -85,8 +85,8 @@ fn episode(id: &str, experiment: &str, run: i32) -> Episode {
         run,
         body_color: "blue".into(),
         stated_color: (run == 1).then(|| "red".into()),
-        distractors: None,
         steps: actions.into_iter().enumerate().map(|(at, action)| step(at, action)).collect(),
+        ..Episode::default()
     }
 }
 

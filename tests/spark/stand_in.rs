@@ -38,7 +38,7 @@ fn what_the_driver_answers_is_said_in_words() {
         (r#"{"refused": {"rule": {"fault": null, "faults": 0}}}"#, "no-episodes: a.parquet"),
         (
             r#"{"refused": {"rule": {"fault": {"episode": "x", "rule": 0, "found": "null"}, "faults": 3}}}"#,
-            "null-in-required: a.parquet, episode `x`, column `episode_id`\n  expected a value in every row\n  found null",
+            "null-in-required: a.parquet, episode `x`, column `episode_id`\n  expected a value\n  found null",
         ),
         (
             r#"{"refused": {"rule": {"fault": {"episode": "x", "rule": 0, "found": "null"}, "faults": 3}}}"#,

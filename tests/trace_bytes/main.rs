@@ -7,8 +7,9 @@ use std::sync::Arc;
 
 use arrow::array::RecordBatch;
 use arrow::datatypes::Schema;
+use mirrorstats::trace::diagnostic::Severity;
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::finding::{Severity, TraceError};
+use mirrorstats::trace::error::TraceError;
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::scan::Projection;
@@ -40,9 +41,9 @@ fn episodes() -> Vec<Episode> {
         seed: 1,
         run: 2,
         body_color: "red".into(),
-        stated_color: None,
         distractors: Some(1),
         steps: (0..5 + i).map(step).collect(),
+        ..Episode::default()
     };
     (0..3).map(episode).collect()
 }

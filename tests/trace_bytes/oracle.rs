@@ -12,7 +12,7 @@ use arrow::compute::cast;
 use arrow::datatypes::DataType;
 use arrow::util::display::array_value_to_string;
 use bytes::Bytes;
-use mirrorstats::trace::finding::TraceError;
+use mirrorstats::trace::error::TraceError;
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::scan::{EpisodeBatch, Projection};

@@ -76,9 +76,8 @@ impl Study {
             seed,
             run,
             body_color: body_color.to_owned(),
-            stated_color: None,
-            distractors: None,
             steps,
+            ..Episode::default()
         };
         if self.optional {
             // Draws of their own, so that the required columns are the same with and without the optional ones.

@@ -7,7 +7,7 @@ use std::io;
 use std::path::Path;
 
 use mirrorstats::trace::episode::Episode;
-use mirrorstats::trace::finding::TraceError;
+use mirrorstats::trace::error::TraceError;
 use mirrorstats::trace::write::{self, OptionalColumns, TraceEncoder, TraceMetadata};
 use serde_json::{Value, json};
 

@@ -112,7 +112,7 @@ impl Player for Exec {
             "images": images.name(),
             "prompts": prompt::hashes(),
             "reply_schemas": reply::structure_hashes(),
-            "identification_version": super::identification::VERSION,
+            "identification_version": crate::trace::identification::VERSION,
         })
     }
 

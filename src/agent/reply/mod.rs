@@ -20,10 +20,11 @@ use serde_json::{Value, json};
 use repair::NoObject;
 pub use repair::Repair;
 
-use super::{Family, Reply, Status, Usage, Words, identification, prompt};
+use super::{Family, Reply, Status, Usage, Words, prompt};
 use crate::base::palette::Color;
 use crate::trace::colors::spelling;
 use crate::trace::episode::Action;
+use crate::trace::identification;
 
 /// How a provider says that a reply ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -12,7 +12,7 @@ use super::journal::{Journal, JournalError, Recorded};
 use super::limits::{Account, Spend};
 use super::models::{Choice, Contract};
 use super::provider::Provider;
-use crate::agent::{Lost, identification, prompt, reply};
+use crate::agent::{Lost, prompt, reply};
 
 /// The sampling temperature (paper, Panel A).
 pub const TEMPERATURE: f64 = 0.2;
@@ -147,7 +147,7 @@ impl Vlm {
             "temperature": TEMPERATURE,
             "max_output_tokens": self.max_output_tokens,
             "prompts": prompt::hashes(),
-            "identification_version": identification::VERSION,
+            "identification_version": crate::trace::identification::VERSION,
         });
         // The prompt alone asks for the shape otherwise, and no schema is sent.
         if self.choice.model.contract == Contract::Schema {

@@ -13,7 +13,7 @@ use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::log::recover::{Losses, recover};
-use crate::trace::finding::Severity;
+use crate::trace::diagnostic::Severity;
 use crate::trace::inputs::Input;
 use crate::trace::merge::{self, EpisodeRows};
 use crate::trace::open::TraceFile;

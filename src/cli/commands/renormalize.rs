@@ -8,8 +8,6 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::agent::identification::VERSION;
-use crate::agent::renormalize::{Old, Renormalized};
 use crate::base::replace::{NewFile, is_same_file};
 use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
@@ -17,8 +15,11 @@ use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
 use crate::report::tables::fit::fitted;
-use crate::trace::finding::{Severity, TraceError};
+use crate::trace::diagnostic::Severity;
+use crate::trace::error::TraceError;
+use crate::trace::identification::VERSION;
 use crate::trace::inputs::Input;
+use crate::trace::renormalize::{Old, Renormalized};
 use crate::trace::validate::validate;
 
 /// Make the attributions of old traces anew from the texts of `identification`

@@ -7,7 +7,7 @@ use crate::cli::args::TraceArgs;
 use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::study::known_experiments;
-use crate::trace::finding::Severity;
+use crate::trace::diagnostic::Severity;
 use crate::trace::inputs;
 use crate::trace::validate::{Validation, validate};
 

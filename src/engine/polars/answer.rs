@@ -16,7 +16,7 @@ use polars::sql::SQLContext;
 use super::run::{self, PolarsError};
 use super::statement::{Checked, Table};
 use crate::metric::fault::Faults;
-use crate::trace::contain::contained_on_all_threads;
+use crate::trace::catch_panic::contained_on_all_threads;
 
 /// Rows of one batch at most.
 const BATCH: NonZeroUsize = NonZeroUsize::new(1 << 17).expect("not zero");

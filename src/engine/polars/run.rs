@@ -7,7 +7,7 @@ use polars::sql::SQLContext;
 
 use crate::metric::sql::LoweringError;
 use crate::score::score_traces::ScoreError;
-use crate::trace::contain::contained_on_all_threads;
+use crate::trace::catch_panic::contained_on_all_threads;
 
 /// What keeps Polars from answering.
 #[derive(Debug, thiserror::Error)]

@@ -11,7 +11,7 @@ use super::{Job, SparkError, cause, check, request, source};
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeKey, EpisodeTable, Header};
 use crate::trace::colors;
-use crate::trace::finding::{Code, Finding};
+use crate::trace::diagnostic::{Code, Finding};
 
 /// What happened.
 #[derive(Debug, Deserialize)]
@@ -163,7 +163,7 @@ mod tests {
     use crate::engine::spark::source::Sources;
     use crate::metric::definitions::Definitions;
     use crate::score::score_traces::schema_columns;
-    use crate::trace::finding::Code;
+    use crate::trace::diagnostic::Code;
 
     #[test]
     fn a_color_is_refused_in_the_words_of_the_native_engine() {

@@ -9,10 +9,11 @@ use std::fmt::Write as _;
 use crate::base::palette::Color;
 use crate::metric::catalog::Catalog;
 use crate::metric::sql::Dialect;
+use crate::trace::colors::ColorColumn;
 use crate::trace::colors::palette::Palette;
 use crate::trace::colors::spelling::{STRAY, WORDS};
-use crate::trace::colors::{self, ColorColumn};
-use crate::trace::finding::Code;
+use crate::trace::diagnostic::Code;
+use crate::trace::schema::rules::{Known, Requirement, rules_of};
 use crate::trace::schema::{self, Column, Kind};
 
 /// One rule for one column.
@@ -32,55 +33,48 @@ pub(super) fn rules<'a>(
     catalog: &Catalog,
     palette: Option<&Palette>,
 ) -> Vec<Rule> {
-    let known = columns.into_iter().filter_map(schema::column);
-    known.flat_map(|column| rules_of(column, catalog, palette)).collect()
-}
-
-fn rules_of(column: &Column, catalog: &Catalog, palette: Option<&Palette>) -> Vec<Rule> {
-    let x = format!("s.{}", column.name);
+    let experiments: Option<Vec<String>> = (!catalog.open).then(|| catalog.experiment.keys().cloned().collect());
+    let known = Known { palette, experiments: experiments.as_deref() };
     let mut rules = Vec::new();
-    let mut rule = |code, expected: String, found: String| {
-        rules.push(Rule { code, column: column.name.to_owned(), expected, found });
-    };
-    let first_bad = |bad: String| format!("MIN(CASE WHEN {bad} THEN CONCAT('`', CAST({x} AS STRING), '`') END)");
-    if !column.nullable {
-        let found = format!("CASE WHEN COUNT({x}) < COUNT(*) THEN 'null' END");
-        rule(Code::NullInRequired, "a value in every row".into(), found);
-    }
-    if column.names() {
-        rule(Code::EmptyString, "a name".into(), first_bad(format!("{x} = ''")));
-    }
-    if let Some((min, max)) = column.stored.range().filter(|(min, _)| *min != i64::MIN) {
-        let expected = format!("an integer from {min} to {max}");
-        rule(Code::OutOfRange, expected, first_bad(format!("{x} < {min} OR {x} > {max}")));
-    }
-    if column.counts() {
-        let nan = if column.stored.kind() == Kind::Float { format!(" OR ISNAN({x})") } else { String::new() };
-        rule(Code::NegativeCount, "0 or more".into(), first_bad(format!("{x} < 0{nan}")));
-    }
-    if !column.values.is_empty() {
-        let found = first_bad(format!("{x} NOT IN ({})", texts(column.values.iter().copied())));
-        let code = if column.name == "action" { Code::UnknownAction } else { Code::UnknownReplyStatus };
-        rule(code, column.values.join(", "), found);
-    }
-    if let Some(color) = colors::column(column.name) {
-        rule(Code::InvalidColor, color.expected(palette), first_bad(no_color(&x, color, palette)));
-    }
-    if column.name == "experiment" && !catalog.open {
-        let known: Vec<&str> = catalog.experiment.keys().map(String::as_str).collect();
-        let unknown =
-            if known.is_empty() { "TRUE".to_owned() } else { format!("{x} NOT IN ({})", texts(known.clone())) };
-        rule(Code::UnknownExperiment, format!("one of {}", known.join(", ")), first_bad(unknown));
-    }
-    if column.constant && column.name != "episode_id" {
-        let some = if column.nullable { format!(" OR COUNT({x}) BETWEEN 1 AND COUNT(*) - 1") } else { String::new() };
-        let found = format!("CASE WHEN MIN({x}) <> MAX({x}){some} THEN {} END", extent(&x, column.nullable));
-        rule(Code::InconsistentConstant, "one value in all rows of the episode".into(), found);
-    }
-    if column.name == "t" {
-        rules.extend(sequence(&x));
+    for column in columns.into_iter().filter_map(schema::column) {
+        rules.extend(rules_of(column, known).iter().map(|rule| {
+            let found = found(column, rule.asks);
+            Rule { code: rule.code, column: column.name.to_owned(), expected: rule.expected(), found }
+        }));
     }
     rules
+}
+
+/// What was found in an episode that does not have what is asked for; null in one that has.
+fn found(column: &Column, asks: Requirement<'_>) -> String {
+    let x = format!("s.{}", column.name);
+    let distinct = format!("SIZE(COLLECT_SET({x}))");
+    let first_bad = |bad: &str| format!("MIN(CASE WHEN {bad} THEN CONCAT('`', CAST({x} AS STRING), '`') END)");
+    match asks {
+        Requirement::Present => format!("CASE WHEN COUNT({x}) < COUNT(*) THEN 'null' END"),
+        Requirement::Name => first_bad(&format!("{x} = ''")),
+        Requirement::OneOf(values) => first_bad(&format!("{x} NOT IN ({})", texts(values.iter().copied()))),
+        Requirement::Color(color, palette) => first_bad(&no_color(&x, color, palette)),
+        Requirement::Within(min, max, _) => first_bad(&format!("{x} < {min} OR {x} > {max}")),
+        Requirement::Count if column.stored.kind() == Kind::Float => first_bad(&format!("{x} < 0 OR ISNAN({x})")),
+        Requirement::Count => first_bad(&format!("{x} < 0")),
+        Requirement::Experiment([]) => first_bad("TRUE"),
+        Requirement::Experiment(known) => {
+            first_bad(&format!("{x} NOT IN ({})", texts(known.iter().map(String::as_str))))
+        }
+        Requirement::Constant => {
+            let nulls =
+                if column.nullable { format!(" OR COUNT({x}) BETWEEN 1 AND COUNT(*) - 1") } else { String::new() };
+            format!("CASE WHEN MIN({x}) <> MAX({x}){nulls} THEN {} END", extent(&x, column.nullable))
+        }
+        Requirement::FromOne => format!("CASE WHEN MIN({x}) <> 1 THEN CONCAT('t = ', MIN({x})) END"),
+        Requirement::Once => format!(
+            "CASE WHEN COUNT({x}) > {distinct} THEN CONCAT(COUNT({x}), ' rows of ', {distinct}, ' timesteps') END"
+        ),
+        Requirement::WithoutGap => format!(
+            "CASE WHEN MAX({x}) - MIN({x}) + 1 > {distinct} THEN CONCAT({distinct}, ' timesteps up to t = ', MAX({x})) END"
+        ),
+    }
 }
 
 /// That a text is none that a column of colours may hold.
@@ -95,23 +89,6 @@ fn no_color(x: &str, column: ColorColumn, palette: Option<&Palette>) -> String {
     format!(
         "{x} IN ({words}) OR {x} <> LOWER({x}) OR regexp_like({x}, {stray}) OR ({x} LIKE '% %' AND REPLACE({x}, ' ', '') IN ({study}))"
     )
-}
-
-/// t is 1..T, each once.
-fn sequence(t: &str) -> [Rule; 3] {
-    let rule = |code, expected: &str, found| Rule { code, column: "t".into(), expected: expected.into(), found };
-    let distinct = format!("SIZE(COLLECT_SET({t}))");
-    let start = format!("CASE WHEN MIN({t}) <> 1 THEN CONCAT('t = ', MIN({t})) END");
-    let twice =
-        format!("CASE WHEN COUNT({t}) > {distinct} THEN CONCAT(COUNT({t}), ' rows of ', {distinct}, ' timesteps') END");
-    let gap = format!(
-        "CASE WHEN MAX({t}) - MIN({t}) + 1 > {distinct} THEN CONCAT({distinct}, ' timesteps up to t = ', MAX({t})) END"
-    );
-    [
-        rule(Code::TStart, "t = 1 in the episode's first row", start),
-        rule(Code::TDuplicate, "every t once, in one file", twice),
-        rule(Code::TGap, "every t up to the last", gap),
-    ]
 }
 
 fn extent(x: &str, nullable: bool) -> String {
@@ -145,11 +122,21 @@ pub(super) fn statement(rules: &[Rule]) -> String {
 
 #[cfg(all(test, feature = "polars"))]
 mod tests {
-    use polars::prelude::{IntoLazy as _, df};
+    use std::collections::BTreeSet;
+    use std::num::NonZeroUsize;
+    use std::path::Path;
+
+    use polars::prelude::{IntoLazy as _, LazyFrame, PlRefPath, PlSmallStr, df};
     use polars::sql::SQLContext;
 
-    use super::no_color;
+    use super::{Rule, no_color, rules};
+    use crate::metric::definitions::Definitions;
+    use crate::score::score_traces::schema_columns;
     use crate::trace::colors::{COLOR_COLUMNS, palette::Palette};
+    use crate::trace::diagnostic::{Code, Finding};
+    use crate::trace::inputs::Input;
+    use crate::trace::schema::COLUMNS;
+    use crate::trace::validate::validate;
 
     const TEXTS: [&str; 22] = [
         "red",
@@ -193,5 +180,47 @@ mod tests {
                 assert_eq!(bad, expected, "{} {palette:?}", column.name);
             }
         }
+    }
+
+    /// The first of the rules that an episode of a file breaks. Polars stands in for Spark.
+    fn first_broken(path: &Path, definitions: &Definitions) -> Option<Rule> {
+        let path = PlRefPath::try_from_path(path).unwrap();
+        let mut frame = LazyFrame::scan_parquet(path, polars::prelude::ScanArgsParquet::default()).unwrap();
+        let schema = frame.collect_schema().unwrap();
+        let mut context = SQLContext::new();
+        context.register("steps", frame);
+        rules(schema.iter_names().map(PlSmallStr::as_str), &definitions.catalog, None).into_iter().find(|rule| {
+            let found = rule.found.replace("\\\\", "\\").replace("SIZE(COLLECT_SET(s.t))", "COUNT(DISTINCT s.t)");
+            let statement = format!("SELECT {found} AS found FROM steps s GROUP BY s.episode_id");
+            let found = context.execute(&statement).unwrap().collect().unwrap();
+            let found = found.column("found").unwrap();
+            found.null_count() < found.len()
+        })
+    }
+
+    fn first_finding(path: &Path, definitions: &Definitions) -> Option<Finding> {
+        let experiments: Vec<String> = definitions.catalog.experiment.keys().cloned().collect();
+        let report = validate(&[Input::new(path)], Some(&experiments), NonZeroUsize::MIN).unwrap();
+        report.findings.into_iter().next()
+    }
+
+    /// Every rule has a damaged trace that both checkers refuse by it, in the same words but where they tell of rows.
+    #[test]
+    fn a_damaged_trace_breaks_the_same_rule_on_either_side() {
+        let definitions = Definitions::load("paper", &schema_columns()).unwrap();
+        let all = rules(COLUMNS.iter().map(|column| column.name), &definitions.catalog, None);
+        let mut left: BTreeSet<Code> = all.iter().map(|rule| rule.code).collect();
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/damaged");
+        for file in std::fs::read_dir(folder).unwrap() {
+            let path = file.unwrap().path();
+            let native = first_finding(&path, &definitions).filter(|finding| left.contains(&finding.code));
+            let Some(native) = native else { continue };
+            let rule = first_broken(&path, &definitions).unwrap_or_else(|| panic!("no rule is broken: {native}"));
+            assert_eq!((rule.code, Some(&rule.column)), (native.code, native.column.as_ref()), "{native}");
+            let tells_of_rows = [Code::InconsistentConstant, Code::TDuplicate, Code::TGap].contains(&rule.code);
+            assert!(tells_of_rows || rule.expected == native.expected, "{native}");
+            left.remove(&rule.code);
+        }
+        assert_eq!(left, BTreeSet::new(), "no damaged trace breaks these");
     }
 }

@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use crate::metric::definitions::Definitions;
 use crate::metric::sql::LoweringError;
 use crate::score::table::EpisodeTable;
-use crate::trace::finding::Finding;
+use crate::trace::diagnostic::Finding;
 
 use self::answer::{Answer, Done};
 use self::request::Request;

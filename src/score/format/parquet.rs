@@ -24,7 +24,7 @@ use super::partition::Partition;
 use crate::metric::catalog::Catalog;
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
-use crate::trace::contain::contained;
+use crate::trace::catch_panic::contained;
 use crate::trace::footer_shape;
 
 /// The footer key that tells scores from traces.

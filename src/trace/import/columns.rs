@@ -5,11 +5,11 @@
 
 use indexmap::IndexMap;
 
-use super::super::colors;
-use super::super::schema::{self, COLUMNS, Column, Kind, Stored};
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
 use crate::base::near::nearest;
+use crate::trace::schema::rules::{Known, Requirement, Rule, rules_of};
+use crate::trace::schema::{self, COLUMNS, Column, Kind, Stored};
 
 /// A column that the schema does not know.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -51,7 +51,7 @@ impl Columns {
             let fault = match schema::column(key) {
                 Some(column) => {
                     self.note_known(column);
-                    misfit(column, value).or_else(|| stranger(column, value, experiments?))
+                    misfit(column, value, experiments)
                 }
                 None => self.check_own(key, value, place),
             };
@@ -163,7 +163,7 @@ fn kind_of(value: &Value) -> Result<Option<Kind>, Box<Fault>> {
 }
 
 /// What is wrong with the value of a column of the schema, if anything is.
-fn misfit(column: &Column, value: &Value) -> Option<Fault> {
+fn misfit(column: &Column, value: &Value, experiments: Option<&[String]>) -> Option<Fault> {
     let refused = |help: &str| Some(Fault::new(expected(column), value.shown(), help));
     match (column.stored.kind(), value) {
         (_, Value::Null) if column.nullable => None,
@@ -185,24 +185,16 @@ fn misfit(column: &Column, value: &Value) -> Option<Fault> {
                 refused("correct the number")
             }
         }
-        (Kind::String, Value::Text(text)) if column.values.is_empty() => {
-            if column.names() && text.is_empty() {
-                return refused("give the name, or null where allowed");
-            }
-            let color = colors::column(column.name).filter(|color| !color.may_hold(text, None))?;
-            Some(Fault::new(color.expected(None), value.shown(), color.help(text, None)))
+        (Kind::String, Value::Text(text)) => {
+            let rules = rules_of(column, Known { palette: None, experiments });
+            rules.iter().find(|rule| !rule.allows(text)).map(|rule| odd_text(column, rule, text, value.shown()))
         }
-        (Kind::String, Value::Text(text)) if column.values.contains(&text.as_str()) => None,
-        (Kind::String, Value::Text(text)) => match nearest(text, column.values.iter().copied()) {
-            Some(like) => refused(&format!("did you mean `{like}`?")),
-            None => refused(SEE),
-        },
         _ => refused(SEE),
     }
 }
 
 /// The smallest integer of a column.
-fn lowest(column: &Column) -> i64 {
+pub(super) fn lowest(column: &Column) -> i64 {
     match column.stored.range() {
         _ if column.name == "t" => 1,
         _ if column.counts() => 0,
@@ -242,15 +234,22 @@ pub(super) fn expected(column: &Column) -> String {
     if column.nullable { format!("{what}, or null") } else { what }
 }
 
-/// An experiment that the definitions do not know.
-fn stranger(column: &Column, value: &Value, known: &[String]) -> Option<Fault> {
-    let Value::Text(text) = value else { return None };
-    if column.name != "experiment" || known.contains(text) {
-        return None;
+/// A text that breaks a rule of its column.
+fn odd_text(column: &Column, rule: &Rule<'_>, text: &str, found: String) -> Fault {
+    match rule.asks {
+        Requirement::Color(color, palette) => Fault::new(color.expected(palette), found, color.help(text, palette)),
+        Requirement::Experiment(known) => {
+            let like = nearest(text, known.iter().map(String::as_str));
+            let like = like.map(|like| format!("did you mean `{like}`? Otherwise ")).unwrap_or_default();
+            let help = format!("{like}name the definition file that knows it with --definitions");
+            Fault::new(rule.expected(), found, help)
+        }
+        Requirement::OneOf(names) => {
+            let like = nearest(text, names.iter().copied()).map(|like| format!("did you mean `{like}`?"));
+            Fault::new(expected(column), found, like.unwrap_or_else(|| SEE.to_owned()))
+        }
+        _ => Fault::new(expected(column), found, "give the name, or null where allowed"),
     }
-    let like = nearest(text, known.iter().map(String::as_str)).map(|like| format!("did you mean `{like}`? Otherwise "));
-    let help = format!("{}name the definition file that knows it with --definitions", like.unwrap_or_default());
-    Some(Fault::new(format!("one of {}", known.join(", ")), value.shown(), help))
 }
 
 fn missing(column: &Column, members: &Members) -> Fault {

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::super::schema::{COLUMNS, Column};
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
 use super::text::Line;
 use crate::base::visible::visible;
+use crate::trace::schema::{COLUMNS, Column};
 
 /// Where a step lies.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +75,7 @@ impl Index {
     }
 
     /// The steps of all episodes, one after the other, each in the order of its t; faults where one is not whole.
-    pub(super) fn into_steps(self, names: &[Arc<str>], faults: &mut super::fault::Faults) -> Vec<Step> {
+    pub(super) fn into_steps(self, names: &[Arc<str>], faults: &mut super::error::Faults) -> Vec<Step> {
         let Self { heads, mut steps, .. } = self;
         steps.sort_by_key(|step| (step.episode, step.t));
         for episode in steps.chunk_by(|a, b| a.episode == b.episode) {

@@ -6,7 +6,7 @@
 use std::collections::HashSet;
 use std::fmt;
 
-use serde::de::{Deserialize, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::{Deserialize, DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::fault::Fault;
 use crate::base::visible::{exact, visible};
@@ -101,82 +101,69 @@ fn character(text: &str, byte: usize) -> usize {
 
 impl<'de> Deserialize<'de> for Value {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Top)
+        Plain { is_line: true }.deserialize(deserializer)
     }
 }
 
-/// A value inside of a line: what is in lists and objects is read and not kept.
-struct Inner(Value);
+/// The line itself, or a value inside of it: what is in lists and objects there is read and not kept.
+struct Plain {
+    is_line: bool,
+}
 
-impl<'de> Deserialize<'de> for Inner {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Nested).map(Self)
+impl<'de> DeserializeSeed<'de> for Plain {
+    type Value = Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
+        deserializer.deserialize_any(self)
     }
 }
 
-macro_rules! plain_values {
-    () => {
-        type Value = Value;
+impl<'de> Visitor<'de> for Plain {
+    type Value = Value;
 
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a JSON value")
-        }
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
 
-        fn visit_unit<E>(self) -> Result<Value, E> {
-            Ok(Value::Null)
-        }
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
 
-        fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
-            Ok(Value::Bool(value))
-        }
+    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
+        Ok(Value::Bool(value))
+    }
 
-        fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
-            Ok(Value::Int(value))
-        }
+    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
+        Ok(Value::Int(value))
+    }
 
-        fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
-            Ok(i64::try_from(value).map_or(Value::LargeInt(value), Value::Int))
-        }
+    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
+        Ok(i64::try_from(value).map_or(Value::LargeInt(value), Value::Int))
+    }
 
-        fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
-            Ok(Value::Float(value))
-        }
+    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
+        Ok(Value::Float(value))
+    }
 
-        fn visit_str<E>(self, text: &str) -> Result<Value, E> {
-            Ok(Value::Text(text.to_owned()))
-        }
+    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+        Ok(Value::Text(text.to_owned()))
+    }
 
-        fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Value, A::Error> {
-            while list.next_element::<IgnoredAny>()?.is_some() {}
-            Ok(Value::List)
-        }
-    };
-}
-
-/// The line itself.
-struct Top;
-
-impl<'de> Visitor<'de> for Top {
-    plain_values!();
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Value, A::Error> {
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(Value::List)
+    }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Value, A::Error> {
-        let mut members = Vec::new();
-        while let Some((key, Inner(value))) = map.next_entry()? {
-            members.push((key, value));
+        let mut members = Members::new();
+        while let Some(key) = map.next_key()? {
+            if self.is_line {
+                members.push((key, map.next_value_seed(Self { is_line: false })?));
+            } else {
+                map.next_value::<IgnoredAny>()?;
+            }
         }
         Ok(Value::Object(members))
-    }
-}
-
-/// A value of the line's object.
-struct Nested;
-
-impl<'de> Visitor<'de> for Nested {
-    plain_values!();
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Value, A::Error> {
-        while map.next_entry::<IgnoredAny, IgnoredAny>()?.is_some() {}
-        Ok(Value::Object(Members::new()))
     }
 }
 

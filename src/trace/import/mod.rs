@@ -12,6 +12,7 @@
 //! What is kept in memory is where each step lies, not the steps.
 
 mod columns;
+mod error;
 mod fault;
 mod index;
 mod line;
@@ -22,19 +23,22 @@ mod text;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use parquet::errors::ParquetError;
 use serde_json::json;
 
 pub use columns::Own;
-pub use fault::{Fault, ImportError};
+pub use error::ImportError;
+pub use fault::Fault;
 pub use text::Text;
 
-use super::finding::{Severity, TraceError};
+use super::diagnostic::Severity;
+use super::error::TraceError;
 use super::inputs::Input;
 use super::validate::validate;
 use super::write::unwritable;
 use crate::base::replace::NewFile;
 use columns::Columns;
-use fault::Faults;
+use error::Faults;
 use index::Index;
 
 /// What became of the lines.
@@ -120,10 +124,7 @@ fn write(texts: &mut [Text], columns: &Columns, steps: &[index::Step], out: &Pat
     let hashes = texts.iter_mut().map(Text::hash).collect::<Result<Vec<_>, _>>()?;
     let recording = json!({ "kind": "import", "sources": hashes });
     let file = NewFile::create(out).map_err(|error| unwritable(out, error))?;
-    let failed = |error: TraceError| match error {
-        TraceError::Write { source, .. } => TraceError::Write { file: out.display().to_string(), source },
-        other => other,
-    };
+    let failed = |error: ParquetError| TraceError::Write { file: out.display().to_string(), source: Box::new(error) };
     let mut rows = rows::Rows::new(file, columns, &recording).map_err(failed)?;
     for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
         for step in episode {

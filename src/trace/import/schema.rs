@@ -2,9 +2,10 @@
 
 use serde_json::{Map, Value, json};
 
-use super::super::colors;
-use super::super::colors::spelling::WORDS;
-use super::super::schema::{COLUMNS, Column, Kind};
+use super::columns::lowest;
+use crate::trace::schema::colors;
+use crate::trace::schema::colors::spelling::WORDS;
+use crate::trace::schema::{COLUMNS, Column, Kind};
 
 /// What one line may hold: `schemas/step.schema.json`.
 pub fn document() -> Value {
@@ -37,9 +38,8 @@ fn property(column: &Column) -> Value {
     if column.nullable {
         property["type"] = json!([kind, "null"]);
     }
-    if let Some((lowest, highest)) = column.stored.range() {
-        let lowest = if column.name == "t" { 1 } else { lowest };
-        property["minimum"] = json!(if column.counts() { 0 } else { lowest });
+    if let Some((_, highest)) = column.stored.range() {
+        property["minimum"] = json!(lowest(column));
         property["maximum"] = json!(highest);
     } else if column.counts() {
         property["minimum"] = json!(0);

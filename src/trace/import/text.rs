@@ -8,7 +8,8 @@ use std::io::{self, BufRead as _, BufReader, Read, Seek as _, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
-use super::fault::{ImportError, Place};
+use super::error::ImportError;
+use super::fault::Place;
 use crate::base::hash;
 use crate::trace::inputs::Input;
 

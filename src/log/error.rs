@@ -1,0 +1,65 @@
+//! Why a log cannot be used.
+
+use std::io;
+use std::path::Path;
+
+use crate::base::replace::without_name;
+
+/// Why a log cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum LogError {
+    /// The operating system refuses.
+    #[error(
+        "cannot {doing} the log `{file}`: {source}\n  help: is the folder there and writable, and the disk not full?"
+    )]
+    Io {
+        /// What was being done.
+        doing: &'static str,
+        /// The log.
+        file: String,
+        /// Why not.
+        source: io::Error,
+    },
+    /// The bytes are not those of a log.
+    #[error(
+        "the log `{file}` is damaged: {fault}\n  help: `mirrorstats recover {file} -o TRACE.parquet` saves what can be saved"
+    )]
+    Damaged {
+        /// The log.
+        file: String,
+        /// What was found.
+        fault: String,
+    },
+    /// The bytes are those of a log, but not of a recording.
+    #[error("`{file}` is no log of a recording: {fault}")]
+    Foreign {
+        /// The log.
+        file: String,
+        /// What is missing.
+        fault: String,
+    },
+}
+
+impl LogError {
+    pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let file = path.display().to_string();
+        move |source| Self::Io { doing, file, source: without_name(source) }
+    }
+
+    /// An error of the MCAP library while writing.
+    pub(super) fn writing(path: &Path) -> impl FnOnce(mcap::McapError) -> Self {
+        let file = path.display().to_string();
+        move |error| {
+            let source = match error {
+                mcap::McapError::Io(source) => source,
+                other => io::Error::other(other),
+            };
+            Self::Io { doing: "write", file, source }
+        }
+    }
+
+    /// The bytes are not those of a log.
+    pub(super) fn no_log(path: &Path) -> Self {
+        Self::Foreign { file: path.display().to_string(), fault: "it does not begin as an MCAP file does".to_owned() }
+    }
+}

@@ -1,0 +1,109 @@
+//! Why traces could not be read or written.
+
+use std::io;
+
+use arrow::error::ArrowError;
+
+use super::diagnostic::Finding;
+
+/// Why traces could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum TraceError {
+    /// A rule of the schema does not hold.
+    #[error("{first}{}", more_findings(*.more))]
+    Finding {
+        /// The earliest finding by file, row group and row.
+        first: Box<Finding>,
+        /// How many others are known; `validate` shows them all.
+        more: usize,
+    },
+    /// The operating system refused to read something that is not yet known as a trace.
+    #[error("cannot read {what}")]
+    Read {
+        /// What was to be read, as the user named it.
+        what: String,
+        /// Why not.
+        source: io::Error,
+    },
+    /// An argument gives no trace.
+    #[error("`{argument}`: expected {expected}, found {found}; {help}")]
+    NoInput {
+        /// As typed.
+        argument: String,
+        /// What an argument may be.
+        expected: &'static str,
+        /// What this one is.
+        found: String,
+        /// What to do.
+        help: &'static str,
+    },
+    /// A file cannot be taken over into another trace.
+    #[error("cannot take over the episodes of `{file}`: {source}")]
+    Part {
+        /// The file.
+        file: String,
+        /// Why not.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+    /// Threads could not be started.
+    #[error("cannot start {threads} threads; ask for fewer with --threads")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A column was asked for that the traces cannot give.
+    #[error("column `{column}`: expected {expected}, found {found}")]
+    Column {
+        /// The name asked for.
+        column: String,
+        /// What would do.
+        expected: &'static str,
+        /// What the files have.
+        found: String,
+    },
+    /// Columns could not be put together in memory.
+    #[error("cannot hold the rows in memory; report this as a fault of mirrorstats")]
+    Memory(#[source] ArrowError),
+    /// What a writer was given is not an episode of the schema.
+    #[error("episode `{episode}`: expected {expected}, found {found}; nothing of it was written")]
+    Refused {
+        /// The id of the episode.
+        episode: String,
+        /// The rule.
+        expected: String,
+        /// What was given.
+        found: String,
+    },
+    /// The trace could not be written; no file was left behind.
+    #[error("cannot write the trace {file}, and left no file behind: is the folder writable, and the disk not full?")]
+    Write {
+        /// The file, as named.
+        file: String,
+        /// Why not.
+        source: Box<dyn std::error::Error + Send + Sync>,
+    },
+}
+
+fn more_findings(more: usize) -> String {
+    match more {
+        0 => String::new(),
+        more => format!("\n  and {more} more: `mirrorstats validate` shows them all"),
+    }
+}
+
+impl TraceError {
+    /// The error of these findings, the earliest first; `None` for none.
+    pub fn of(findings: Vec<Finding>) -> Option<Self> {
+        let mut findings = findings.into_iter();
+        let first = Box::new(findings.next()?);
+        Some(Self::Finding { first, more: findings.len() })
+    }
+}
+
+impl From<Finding> for TraceError {
+    fn from(finding: Finding) -> Self {
+        Self::Finding { first: Box::new(finding), more: 0 }
+    }
+}

@@ -1,0 +1,102 @@
+//! Reads footers: where a file's columns lie, and what stands in its key-value metadata.
+
+pub(in crate::trace) mod bounds;
+pub(crate) mod shape;
+
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
+
+use parquet::errors::ParquetError;
+use parquet::file::metadata::{
+    ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy, RowGroupMetaData,
+};
+
+use crate::trace::catch_panic::contained;
+use crate::trace::diagnostic::{Code, Finding};
+use crate::trace::inputs::Input;
+
+const MAGIC: [u8; 4] = *b"PAR1";
+const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
+/// A magic number at each end, and the footer's length.
+const SMALLEST: u64 = 12;
+
+/// How much of a footer is decoded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::trace) enum Extent {
+    /// What reading takes.
+    Pages,
+    /// Statistics too.
+    Whole,
+}
+
+impl Extent {
+    fn options(self) -> ParquetMetaDataOptions {
+        match self {
+            Self::Whole => ParquetMetaDataOptions::new(),
+            Self::Pages => ParquetMetaDataOptions::new()
+                .with_column_stats_policy(ParquetStatisticsPolicy::SkipAll)
+                .with_encoding_stats_policy(ParquetStatisticsPolicy::SkipAll)
+                .with_size_stats_policy(ParquetStatisticsPolicy::SkipAll),
+        }
+    }
+}
+
+/// The file's size and decoded footer.
+pub(in crate::trace) fn footer(input: &Input, extent: Extent) -> Result<(u64, ParquetMetaData), Box<Finding>> {
+    let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
+    let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
+    let mut file = File::open(&input.path).map_err(unreadable)?;
+    let about = file.metadata().map_err(unreadable)?;
+    if about.is_dir() {
+        return Err(finding(Code::NotParquet, "a Parquet file", "a folder".into()));
+    }
+    let bytes = about.len();
+    if bytes == 0 {
+        return Err(finding(Code::EmptyFile, "a Parquet file", "0 bytes".into()));
+    }
+    let start = magic(&mut file, SeekFrom::Start(0)).map_err(unreadable)?;
+    match start {
+        Some(MAGIC) => {}
+        Some(ENCRYPTED_MAGIC) => {
+            return Err(finding(Code::NotParquet, "a Parquet file that is not encrypted", "an encrypted one".into()));
+        }
+        _ => return Err(finding(Code::NotParquet, "a Parquet file, which starts with `PAR1`", "another start".into())),
+    }
+    let end = magic(&mut file, SeekFrom::End(-4)).map_err(unreadable)?;
+    if bytes < SMALLEST || end != Some(MAGIC) {
+        let found = format!("{bytes} bytes that end without it");
+        return Err(finding(Code::Truncated, "a footer at the end, closed with `PAR1`", found));
+    }
+    shape::check_file(&file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
+    let reader = || ParquetMetaDataReader::new().with_metadata_options(Some(extent.options()));
+    match contained(|| reader().parse_and_finish(&file)) {
+        Ok(Ok(metadata)) => Ok((bytes, metadata)),
+        Ok(Err(error)) => Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
+        Err(panic) => Err(finding(Code::CorruptFooter, "a readable footer", panic)),
+    }
+}
+
+fn magic(file: &mut File, at: SeekFrom) -> io::Result<Option<[u8; 4]>> {
+    let mut found = [0; 4];
+    let read = file.seek(at).and_then(|_| file.read_exact(&mut found));
+    match read {
+        Ok(()) => Ok(Some(found)),
+        // Shorter than four bytes.
+        Err(error) if matches!(error.kind(), io::ErrorKind::UnexpectedEof | io::ErrorKind::InvalidInput) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// A decoder's message without its own prefix, in one line.
+pub(in crate::trace) fn plain(error: &ParquetError) -> String {
+    let text = match error {
+        ParquetError::General(text) | ParquetError::EOF(text) | ParquetError::ArrowError(text) => text.clone(),
+        other => other.to_string(),
+    };
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// The rows of a row group; opening refuses a number that is none.
+pub(in crate::trace) fn rows_of(row_group: &RowGroupMetaData) -> usize {
+    usize::try_from(row_group.num_rows()).unwrap_or_default()
+}

@@ -1,0 +1,13 @@
+//! From the bytes of traces to whole episodes, in the order of the files.
+
+pub(in crate::trace) mod column;
+pub(in crate::trace) mod decode;
+mod episode_index;
+pub(crate) mod footer;
+pub mod in_order;
+pub mod open;
+pub(in crate::trace) mod pages;
+pub(in crate::trace) mod parallel_scan;
+pub(in crate::trace) mod projection;
+mod thrift;
+pub mod verify;

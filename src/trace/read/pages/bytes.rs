@@ -1,0 +1,75 @@
+//! The bytes of a file, from the disk or from memory, and where those of a column lie.
+
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
+
+use bytes::Bytes;
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+
+use crate::trace::read::footer::rows_of;
+
+/// One column of one row group of a file.
+#[derive(Clone, Copy)]
+pub(in crate::trace) struct Place<'a> {
+    /// The file's footer.
+    pub(in crate::trace) metadata: &'a ParquetMetaData,
+    pub(in crate::trace) row_group: usize,
+    /// The column, counted among the leaves of the schema.
+    pub(in crate::trace) column: usize,
+}
+
+impl<'a> Place<'a> {
+    pub(super) fn chunk(self) -> &'a ColumnChunkMetaData {
+        self.metadata.row_group(self.row_group).column(self.column)
+    }
+
+    pub(super) fn rows(self) -> usize {
+        rows_of(self.metadata.row_group(self.row_group))
+    }
+}
+
+/// Larger columns of a row group are read a page at a time, for the sake of memory.
+const LARGEST: u64 = 8 << 20;
+
+/// A file, or part of one in memory, addressed as the file is.
+pub(in crate::trace) enum Store {
+    File(File),
+    Memory { start: u64, bytes: Bytes },
+}
+
+impl Store {
+    /// The same, to be read by somebody else. Handles of one file share their position: one thread may have them.
+    pub(in crate::trace) fn again(&self) -> io::Result<Self> {
+        Ok(match self {
+            Self::File(file) => Self::File(file.try_clone()?),
+            Self::Memory { start, bytes } => Self::Memory { start: *start, bytes: bytes.clone() },
+        })
+    }
+
+    /// A range of bytes, held in memory if it is small.
+    pub(super) fn part(&self, start: u64, length: u64) -> io::Result<Self> {
+        if length > LARGEST {
+            return self.again();
+        }
+        let most = usize::try_from(length).unwrap_or(usize::MAX);
+        Ok(Self::Memory { start, bytes: self.read(start, most)? })
+    }
+
+    /// `length` bytes from `start` on, or fewer where the end comes before.
+    pub(super) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
+        match self {
+            Self::File(file) => {
+                let mut file = file;
+                let mut bytes = Vec::new();
+                file.seek(SeekFrom::Start(start))?;
+                file.take(length as u64).read_to_end(&mut bytes)?;
+                Ok(bytes.into())
+            }
+            Self::Memory { start: first, bytes } => {
+                let from = start.checked_sub(*first).and_then(|from| usize::try_from(from).ok());
+                let from = from.map_or(bytes.len(), |from| from.min(bytes.len()));
+                Ok(bytes.slice(from..from.saturating_add(length).min(bytes.len())))
+            }
+        }
+    }
+}

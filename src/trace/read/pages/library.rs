@@ -1,0 +1,84 @@
+//! The Parquet library's reader of rows, on pages that are verified.
+
+use std::sync::Arc;
+use std::vec;
+
+use arrow::datatypes::Fields;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, RowGroups, RowSelection};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
+use parquet::column::page::{PageIterator, PageReader};
+use parquet::errors::{ParquetError, Result};
+use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
+
+use super::bytes::{Place, Store};
+use super::error::FaultSlot;
+use super::reader::Pages;
+use crate::trace::read::footer::rows_of;
+
+/// Some row groups of a file, to be read by the library.
+pub(in crate::trace) struct Library {
+    /// The file.
+    pub(in crate::trace) store: Store,
+    /// Its footer.
+    pub(in crate::trace) metadata: Arc<ParquetMetaData>,
+    /// The row groups, in this order.
+    pub(in crate::trace) row_groups: Vec<usize>,
+    /// Where the first fault of a page is left.
+    pub(in crate::trace) slot: FaultSlot,
+}
+
+impl Library {
+    /// A reader of some columns, as `fields` wants them held.
+    pub(in crate::trace) fn reader(
+        &self,
+        columns: ProjectionMask,
+        fields: Option<&Fields>,
+        batch: usize,
+        selection: Option<RowSelection>,
+    ) -> Result<ParquetRecordBatchReader> {
+        let schema = self.metadata.file_metadata().schema_descr();
+        let levels = parquet_to_arrow_field_levels(schema, columns, fields)?;
+        ParquetRecordBatchReader::try_new_with_row_groups(&levels, self, batch, selection)
+    }
+}
+
+impl RowGroups for Library {
+    fn num_rows(&self) -> usize {
+        self.row_groups().map(rows_of).sum()
+    }
+
+    fn column_chunks(&self, column: usize) -> Result<Box<dyn PageIterator>> {
+        let store = self.store.again().map_err(|error| ParquetError::External(Box::new(error)))?;
+        let (metadata, slot) = (Arc::clone(&self.metadata), Arc::clone(&self.slot));
+        Ok(Box::new(Chunks { store, metadata, column, row_groups: self.row_groups.clone().into_iter(), slot }))
+    }
+
+    fn row_groups(&self) -> Box<dyn Iterator<Item = &RowGroupMetaData> + '_> {
+        Box::new(self.row_groups.iter().map(|at| self.metadata.row_group(*at)))
+    }
+
+    fn metadata(&self) -> &ParquetMetaData {
+        &self.metadata
+    }
+}
+
+/// The pages of one column, row group by row group.
+struct Chunks {
+    store: Store,
+    metadata: Arc<ParquetMetaData>,
+    column: usize,
+    row_groups: vec::IntoIter<usize>,
+    slot: FaultSlot,
+}
+
+impl Iterator for Chunks {
+    type Item = Result<Box<dyn PageReader>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let place = Place { metadata: &self.metadata, row_group: self.row_groups.next()?, column: self.column };
+        let pages = Pages::checked(&self.store, place, Arc::clone(&self.slot));
+        Some(pages.map(|pages| Box::new(pages) as _))
+    }
+}
+
+impl PageIterator for Chunks {}

@@ -1,0 +1,89 @@
+//! The pages of a column, decompressed, for those who decode them.
+
+use std::sync::Arc;
+
+use parquet::column::page::{Page, PageMetadata, PageReader};
+use parquet::errors::{ParquetError, Result};
+use parquet::file::serialized_reader::SerializedPageReader;
+
+use super::bytes::{Place, Store};
+use super::contents::Contents;
+use super::error::FaultSlot;
+use super::verified::Verified;
+
+/// The pages of one column of one row group.
+pub(super) struct Pages {
+    stored: Arc<Verified>,
+    inner: SerializedPageReader<Verified>,
+    /// The page that was looked at and not taken.
+    next: Option<Page>,
+    /// Checks what the pages hold, for a decoder that does not.
+    contents: Option<Contents>,
+}
+
+impl Pages {
+    /// The pages of a column, for a decoder that checks what they hold.
+    pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
+        let stored = Verified::new(store, place, slot).map_err(|error| ParquetError::External(Box::new(error)))?;
+        let stored = Arc::new(stored);
+        let inner = SerializedPageReader::new(Arc::clone(&stored), place.chunk(), place.rows(), None)?;
+        Ok(Self { stored, inner, next: None, contents: None })
+    }
+
+    /// The same for a decoder that does not check what they hold.
+    pub(super) fn checked(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
+        let about = place.chunk().column_descr();
+        let flat = about.max_rep_level() == 0 && about.max_def_level() <= 1;
+        let contents = flat.then(|| Contents::new(about));
+        Ok(Self { contents, ..Self::new(store, place, slot)? })
+    }
+
+    fn load(&mut self) -> Result<Option<Page>> {
+        let Some(page) = self.inner.get_next_page()? else {
+            return self.stored.finish().map(|()| None);
+        };
+        if let Some(Err((expected, found))) = self.contents.as_mut().map(|contents| contents.check(&page)) {
+            return Err(self.stored.fault(self.stored.offset(), expected, found));
+        }
+        Ok(Some(page))
+    }
+}
+
+impl Iterator for Pages {
+    type Item = Result<Page>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        self.get_next_page().transpose()
+    }
+}
+
+/// Pages that are passed over are read and checked like the others.
+impl PageReader for Pages {
+    fn get_next_page(&mut self) -> Result<Option<Page>> {
+        match self.next.take() {
+            Some(page) => Ok(Some(page)),
+            None => self.load(),
+        }
+    }
+
+    fn peek_next_page(&mut self) -> Result<Option<PageMetadata>> {
+        if self.next.is_none() {
+            self.next = self.load()?;
+        }
+        Ok(self.next.as_ref().map(|page| match page {
+            Page::DictionaryPage { .. } => PageMetadata { num_rows: None, num_levels: None, is_dict: true },
+            Page::DataPage { num_values, .. } => {
+                PageMetadata { num_rows: None, num_levels: Some(*num_values as usize), is_dict: false }
+            }
+            Page::DataPageV2 { num_values, num_rows, .. } => PageMetadata {
+                num_rows: Some(*num_rows as usize),
+                num_levels: Some(*num_values as usize),
+                is_dict: false,
+            },
+        }))
+    }
+
+    fn skip_next_page(&mut self) -> Result<()> {
+        self.get_next_page().map(drop)
+    }
+}

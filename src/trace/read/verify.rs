@@ -1,0 +1,37 @@
+//! Checks the stored pages of traces for engines that read files by themselves.
+
+use std::io;
+
+use super::footer::plain;
+use super::open::{TraceFile, TraceSet};
+use super::pages::{FaultSlot, Place, Store, damaged, verify};
+use crate::trace::catch_panic::contained;
+use crate::trace::diagnostic::{Code, Finding};
+use crate::trace::error::TraceError;
+
+/// Reads all pages of all files and checks their headers and, where they have any, their checksums. Nothing is decoded.
+///
+/// # Errors
+/// The first page that contradicts its checksum or the footer, by file, row group and column.
+pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {
+    set.files().iter().try_for_each(|file| verify_file(file).map_err(|finding| TraceError::from(*finding)))
+}
+
+fn verify_file(file: &TraceFile) -> Result<(), Box<Finding>> {
+    let footer = file.footer()?;
+    let unreadable = |error: io::Error| {
+        Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
+    };
+    let store = Store::File(file.reader().map_err(unreadable)?);
+    let metadata = footer.metadata();
+    for (row_group, group) in metadata.row_groups().iter().enumerate() {
+        for column in 0..group.num_columns() {
+            let slot = FaultSlot::default();
+            let walked = contained(|| verify(&store, Place { metadata, row_group, column }, &slot));
+            if let Err(error) = walked.and_then(|walked| walked.map_err(|error| plain(&error))) {
+                return Err(Box::new(damaged(file.name(), &slot, &error).in_row_group(row_group)));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,70 @@
+//! How a colour is spelled: in lower case, with single spaces between words and no character that does not show.
+
+use crate::base::near::nearest;
+use crate::base::palette::Color;
+
+/// Words that some columns hold in place of a colour.
+pub(crate) const WORDS: [&str; 2] = ["none", "unknown"];
+
+/// What a name in normal form has no match of, for engines that match patterns; letters in upper case apart.
+pub(crate) const STRAY: &str = r"^ | $|  |[\s&&[^ ]]|[\p{Cc}\u{ad}\u{61c}\u{200b}-\u{200f}\u{2028}-\u{202e}\u{2060}-\u{206f}\u{feff}\u{e0000}-\u{e007f}]";
+
+/// Whether a name is in normal form and no other spelling of a colour of the study.
+pub(in crate::trace) fn is_well_spelled(name: &str) -> bool {
+    // Nearly every name: no need to make its normal form.
+    name.bytes().all(|byte| byte.is_ascii_lowercase())
+        || normal(name) == name && study_color(name).is_none_or(|color| color == name)
+}
+
+/// A name in lower case, with single spaces between its words and no character that does not show.
+pub(crate) fn normal(name: &str) -> String {
+    let shown: String = name.chars().filter(|c| c.is_whitespace() || !hides(*c)).collect();
+    let words: Vec<&str> = shown.split_whitespace().collect();
+    words.join(" ").to_lowercase()
+}
+
+/// Whether a character does not show, as [`STRAY`] lists them for engines that match patterns.
+fn hides(c: char) -> bool {
+    let is_mark = matches!(c, '\u{ad}' | '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}');
+    c.is_control() || is_mark || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{e0000}'..='\u{e007f}')
+}
+
+/// The normal form without white space: the same for all spellings of a name.
+pub(in crate::trace) fn spelling_key(name: &str) -> String {
+    normal(name).replace(' ', "")
+}
+
+/// The colour of the study that a name is a spelling of.
+pub(in crate::trace) fn study_color(name: &str) -> Option<&'static str> {
+    Color::named(&spelling_key(name)).map(Color::name)
+}
+
+/// The name most like a text, by its spelling or else by its letters.
+pub(in crate::trace) fn most_like<'a>(text: &str, names: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
+    let key = spelling_key(text);
+    names.clone().find(|name| spelling_key(name) == key).or_else(|| nearest(&normal(text), names))
+}
+
+/// The advice that names a colour.
+pub(in crate::trace) fn did_you_mean(name: &str) -> String {
+    format!("did you mean `{}`?", name.escape_debug())
+}
+
+#[cfg(test)]
+mod tests {
+    use regex::Regex;
+
+    use super::{STRAY, normal};
+
+    #[test]
+    fn the_pattern_says_what_the_normal_form_says() {
+        let stray = Regex::new(STRAY).unwrap();
+        for c in ('\0'..='\u{ffff}').chain('\u{e0000}'..='\u{e00ff}') {
+            let lower = c.to_lowercase().collect::<String>();
+            for text in [format!("a{lower}b"), format!("{lower}b"), format!("a{lower}")] {
+                assert_eq!(stray.is_match(&text), normal(&text) != text.to_lowercase(), "{text:?}");
+            }
+        }
+        assert!(stray.is_match("a  b") && !stray.is_match("a b c"));
+    }
+}

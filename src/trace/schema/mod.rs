@@ -1,0 +1,243 @@
+//! The table of columns: what a trace holds, and the one place that says so.
+//!
+//! Writer, reader, `validate`, `import`, the messages of logs, `mirrorstats schema` and `schemas/trace.schema.json` all
+//! follow [`TABLE`]: a new column is an entry there, and a field of `Episode` or `Extra`. Columns that it does not name
+//! are a trace's own: they are kept, and definitions may use them.
+
+pub mod colors;
+mod column;
+pub mod describe;
+mod field_access;
+pub(crate) mod rules;
+
+use serde::Serialize;
+
+use super::episode::Action;
+use field_access::{Access, Field as _};
+
+pub use column::{Column, Kind, Stored};
+pub(crate) use field_access::Value;
+
+/// The version of the schema that this program writes, and the newest that it reads.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// The names that `action` takes.
+pub const ACTIONS: [&str; 5] = {
+    let mut names = [""; 5];
+    let mut i = 0;
+    while i < names.len() {
+        names[i] = Action::ALL[i].name();
+        i += 1;
+    }
+    names
+};
+
+/// The names that `reply_status` takes.
+pub const REPLY_STATUSES: [&str; 10] = [
+    "ok",
+    "repaired",
+    "parse_failed",
+    "schema_invalid",
+    "refusal",
+    "truncated",
+    "empty",
+    "rate_limited",
+    "server_error",
+    "timeout",
+];
+
+/// A column that is a field of the episode.
+macro_rules! constant {
+    ($field:ident, $stored:ident, $doc:expr) => {
+        column!($field, $stored, $doc, episode, _at => episode.$field).constant()
+    };
+}
+
+/// A column that is a field of the step.
+macro_rules! step {
+    ($field:ident, $stored:ident, $doc:expr) => {
+        column!($field, $stored, $doc, episode, at => episode.steps[at].$field)
+    };
+}
+
+/// A column that is a field of what a recorder may add to the step.
+macro_rules! extra {
+    ($field:ident, $stored:ident, $doc:expr) => {
+        column!($field, $stored, $doc, episode, at => episode.steps[at].extra.$field)
+    };
+}
+
+macro_rules! column {
+    ($field:ident, $stored:ident, $doc:expr, $episode:ident, $at:ident => $place:expr) => {{
+        let access = Access { get: |$episode, $at| $place.value(), set: |$episode, $at, value| $place.put(value) };
+        Column::new(stringify!($field), Stored::$stored, $doc, access)
+    }};
+}
+
+/// All columns, those that only recorders know among them: required ones first.
+pub(crate) const TABLE: &[Column] = &[
+    constant!(episode_id, String, "Names the episode; unique in a report.").required(),
+    constant!(model, String, "The model's name as shown in tables.").required(),
+    constant!(experiment, String, "`E1`..`E5`, or any other name that a definition file knows.").required(),
+    constant!(seed, Int32, "The seed of the episode's block of runs; 3 in the paper.").required(),
+    constant!(run, Int32, "The run within its seed; 7 in the paper.").required(),
+    constant!(body_color, String, "The true colour of the agent's own body, c* in the paper; a lower-case name.")
+        .required(),
+    Column::new("t", Stored::Int32, "The timestep: 1 in an episode's first row, one more in each that follows.", T)
+        .required()
+        .unit("steps"),
+    step!(action, String, "The action taken; null where the reply gave none.").required().nullable().values(&ACTIONS),
+    step!(
+        self_color,
+        String,
+        "The self-attribution: the lower-case name of a colour, `unknown`, or null where the reply gave none."
+    )
+    .required()
+    .nullable(),
+    step!(selected_cube, String, "The selected cube: the lower-case name of a colour, `none`, or null.")
+        .required()
+        .nullable(),
+    step!(mirror_visible, Bool, "Ground truth: mirror evidence is in view at t.").required(),
+    constant!(stated_color, String, "The false body colour told to the agent, where one was (E3); a lower-case name."),
+    constant!(distractors, Int8, "Other agents in the room.").unit("agents"),
+    extra!(mirror_self_px, Int32, "Pixels of the view whose ray reaches the agent's own body by way of the mirror.")
+        .unit("px"),
+    extra!(mirror_other_px, Int32, "Pixels whose ray reaches another agent by way of the mirror.").unit("px"),
+    extra!(mirror_px, Int32, "Pixels of the mirror's surface, whatever it shows.").unit("px"),
+    extra!(direct_other_px, Int32, "Pixels of other agents seen directly.").unit("px"),
+    extra!(pose_x, Float32, "Where the agent stands, x.").unit("m"),
+    extra!(pose_y, Float32, "Where the agent stands, y.").unit("m"),
+    extra!(pose_yaw, Float32, "Where the agent faces, counter-clockwise from +x.").unit("degrees"),
+    extra!(bumped, Bool, "The action was stopped by an obstacle."),
+    extra!(cube_distance, Float32, "The distance to the selected cube.").unit("m"),
+    extra!(reply_status, String, "The outcome of getting and reading the reply.").values(&REPLY_STATUSES),
+    extra!(
+        reply_repair,
+        String,
+        "The repairs that made a `repaired` reply valid, in order, joined with `+`; null where there was none."
+    )
+    .of_recorders(),
+    extra!(view_description, String, "What the agent says it sees, as replied."),
+    extra!(reasoning, String, "Why it acts, as replied."),
+    extra!(summary, String, "Its notes for the next step, as replied."),
+    extra!(identification, String, "How it says it recognised itself, as replied."),
+    extra!(reply, String, "The whole reply, raw."),
+    extra!(latency_ms, Int32, "From sending the request to the end of the reply.").unit("ms"),
+    extra!(prompt_tokens, Int32, "Tokens of the request, as billed.").unit("tokens"),
+    extra!(completion_tokens, Int32, "Tokens of the reply, as billed.").unit("tokens"),
+    extra!(cost_usd, Float64, "What the request cost.").unit("USD"),
+    extra!(frame_time, Int64, "The time of the frame in the episode's recording (MCAP).").unit("ns"),
+];
+
+/// The timestep is the place of its row.
+const T: Access = Access { get: |_, at| i64::try_from(at).ok().map(|at| Value::Int(at + 1)), set: |_, _, _| true };
+
+/// The columns of the schema, in the order in which the writer stores them.
+pub const COLUMNS: &[Column] = &{
+    let mut columns = [TABLE[0]; TABLE.len() - OF_RECORDERS];
+    let (mut from, mut to) = (0, 0);
+    while from < TABLE.len() {
+        if TABLE[from].since.is_some() {
+            columns[to] = TABLE[from];
+            to += 1;
+        }
+        from += 1;
+    }
+    columns
+};
+
+/// How many columns of the table the schema does not know.
+const OF_RECORDERS: usize = 1;
+
+/// The columns of the schema, then those that only recorders know: all that the writer can write, in its order.
+pub(crate) fn writable() -> impl Iterator<Item = &'static Column> {
+    COLUMNS.iter().chain(TABLE.iter().filter(|column| column.since.is_none()))
+}
+
+/// The column of this name.
+pub fn column(name: &str) -> Option<&'static Column> {
+    COLUMNS.iter().find(|column| column.name == name)
+}
+
+/// One entry of the key-value metadata in a trace's footer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct MetadataKey {
+    /// The key in the footer.
+    pub key: &'static str,
+    /// What stands there.
+    pub doc: &'static str,
+}
+
+/// Footer key: the version of this schema, a decimal integer.
+pub const VERSION_KEY: &str = "mirrorstats.schema_version";
+/// Footer key: the program that wrote the file.
+pub const WRITER_KEY: &str = "mirrorstats.writer";
+/// Footer key: how the recording was made, JSON.
+pub const RECORDING_KEY: &str = "mirrorstats.recording";
+
+/// The key-value metadata of a trace's footer.
+pub const METADATA: &[MetadataKey] = &[
+    MetadataKey {
+        key: VERSION_KEY,
+        doc: "The version of this schema, a decimal integer. A file without it is read as version 1; a newer one is \
+              refused.",
+    },
+    MetadataKey { key: WRITER_KEY, doc: "The program that wrote the file: `mirrorstats` and its version." },
+    MetadataKey {
+        key: RECORDING_KEY,
+        doc: "How the recording was made, a JSON object: scene, prompt and configuration hashes, view size, \
+              visibility threshold in pixels, model id as returned, seeds. A `palette` in it, a list of lower-case names, \
+              holds all colours of the trace; another value is refused.",
+    },
+];
+
+#[cfg(test)]
+mod tests {
+    use super::{COLUMNS, Kind, TABLE, Value, column};
+    use crate::trace::episode::{Episode, Step};
+
+    #[test]
+    fn names_are_unique_and_found() {
+        for (i, wanted) in COLUMNS.iter().enumerate() {
+            assert_eq!(column(wanted.name), Some(wanted));
+            assert!(COLUMNS[..i].iter().all(|before| before.name != wanted.name), "{} twice", wanted.name);
+        }
+        assert_eq!(column("no_such_column"), None);
+    }
+
+    #[test]
+    fn the_constants_of_an_episode_are_these() {
+        let constants: Vec<_> = COLUMNS.iter().filter(|c| c.constant).map(|c| c.name).collect();
+        let expected =
+            ["episode_id", "model", "experiment", "seed", "run", "body_color", "stated_color", "distractors"];
+        assert_eq!(constants, expected);
+    }
+
+    #[test]
+    fn every_column_gives_what_was_put_into_its_field() {
+        for column in TABLE {
+            let mut episode = Episode { steps: vec![Step::default(); 2], ..Episode::default() };
+            let value = match column.stored.kind() {
+                Kind::Bool => Value::Bool(true),
+                Kind::Int => Value::Int(2),
+                Kind::Float => Value::Float(0.5),
+                _ => Value::Text(column.values.first().unwrap_or(&"red")),
+            };
+            assert!(column.put(&mut episode, 1, Some(value)), "{}", column.name);
+            let values: Vec<_> = column.of_steps(&episode).collect();
+            assert_eq!(values[1], Some(value), "{}", column.name);
+            assert_eq!(values[0] == values[1], column.constant, "{}", column.name);
+            if column.name != "t" {
+                let other = if column.stored.kind() == Kind::Bool { Value::Int(1) } else { Value::Bool(true) };
+                assert!(!column.put(&mut episode, 1, Some(other)), "{}", column.name);
+                assert_eq!(column.put(&mut episode, 1, None), column.nullable, "{}", column.name);
+            }
+            // The type that is stored is the field's: it holds all of that range, and nothing beyond.
+            if let Some((lowest, highest)) = column.stored.range().filter(|_| column.name != "t") {
+                assert!([lowest, highest].map(Value::Int).iter().all(|v| column.put(&mut episode, 0, Some(*v))));
+                let beyond = highest.checked_add(1).map(Value::Int);
+                assert!(beyond.is_none_or(|beyond| !column.put(&mut episode, 0, Some(beyond))), "{}", column.name);
+            }
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Traces put together from others, episode by episode, as they are: no value is read or changed.
+//!
+//! Rule: the same episodes in the same order give the same bytes, whatever files they came from.
+
+use std::fs::File;
+use std::path::Path;
+use std::sync::Arc;
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
+use arrow::compute::{cast, concat_batches};
+use arrow::datatypes::{DataType, Int64Type, SchemaRef};
+use parquet::arrow::ProjectionMask;
+use parquet::file::metadata::ParquetMetaData;
+
+use super::decode_episode::{self, NotAnEpisode};
+use crate::base::replace::{self, NewFile};
+use crate::trace::catch_panic::contained;
+use crate::trace::diagnostic::{Code, Finding};
+use crate::trace::episode::Episode;
+use crate::trace::error::TraceError;
+use crate::trace::inputs::Input;
+use crate::trace::read::footer::bounds;
+use crate::trace::read::footer::{Extent, footer, plain};
+use crate::trace::read::open::is_nested;
+use crate::trace::read::pages::{FaultSlot, Library, Store, damaged};
+use crate::trace::write::row_groups::{Gathered, RowGroups};
+use crate::trace::write::{self, OptionalColumns};
+
+/// Rows that are decoded at a time.
+const BATCH_ROWS: usize = 8 << 10;
+
+/// The rows of one episode, with what it is ordered and found by.
+#[derive(Clone, Debug)]
+pub struct EpisodeRows {
+    /// The episode's id.
+    pub episode_id: String,
+    /// The seed of its block of runs.
+    pub seed: i64,
+    /// The run within its seed.
+    pub run: i64,
+    rows: RecordBatch,
+}
+
+impl EpisodeRows {
+    /// The number of steps.
+    pub fn len(&self) -> usize {
+        self.rows.num_rows()
+    }
+
+    /// The episode itself.
+    ///
+    /// # Errors
+    /// When a column of the schema has another type, or an action is none.
+    pub fn episode(&self) -> Result<Episode, NotAnEpisode> {
+        decode_episode::episode(&self.rows)
+    }
+
+    /// The same rows with some columns of integers or truths replaced; a column that is not there is left out.
+    ///
+    /// # Errors
+    /// When a column does not have a value for each row.
+    pub fn with_columns(&self, columns: &[(&str, ArrayRef)]) -> Result<Self, TraceError> {
+        let schema = self.rows.schema();
+        let mut arrays = self.rows.columns().to_vec();
+        for (name, values) in columns {
+            if let Ok(at) = schema.index_of(name) {
+                let values = cast(values, schema.field(at).data_type());
+                arrays[at] = values.map_err(|error| unreadable(&self.episode_id, error.into()))?;
+            }
+        }
+        let rows = RecordBatch::try_new(schema, arrays).map_err(|error| unreadable(&self.episode_id, error.into()))?;
+        Ok(Self { rows, ..self.clone() })
+    }
+
+    /// Whether there is no step, which no episode of a file has.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// The episodes of one trace file, in its order.
+///
+/// # Errors
+/// When the file cannot be read, is damaged, or lacks the columns that tell episodes apart.
+pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
+    let name = path.display().to_string();
+    let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
+    let file = File::open(path).map_err(|error| unreadable(&name, error.into()))?;
+    let (bytes, metadata) = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
+    match bounds::fault(&name, bytes, &metadata) {
+        // Whoever puts traces together takes one without rows as it is.
+        Some(fault) if fault.code != Code::NoEpisodes => Err(damaged(fault)),
+        _ => decode(&name, file, metadata),
+    }
+}
+
+fn decode(name: &str, file: File, metadata: ParquetMetaData) -> Result<Vec<EpisodeRows>, TraceError> {
+    let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
+    let columns = metadata.file_metadata().schema_descr().columns();
+    if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
+        return Err(failed(is_nested(name, &nested.path().parts()[0]).to_string().into()));
+    }
+    contained(|| {
+        let row_groups = (0..metadata.num_row_groups()).collect();
+        let slot = FaultSlot::default();
+        let library =
+            Library { store: Store::File(file), metadata: Arc::new(metadata), row_groups, slot: Arc::clone(&slot) };
+        let damaged = |error: String| failed(damaged(name, &slot, &error).to_string().into());
+        let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, None);
+        let batches = reader.map_err(|error| damaged(plain(&error)))?.collect::<Result<Vec<_>, _>>();
+        let batches = batches.map_err(|error| damaged(error.to_string()))?;
+        let Some(first) = batches.first() else { return Ok(Vec::new()) };
+        let rows = concat_batches(&first.schema(), &batches).map_err(|error| failed(error.into()))?;
+        episodes(&rows).map_err(|fault| failed(fault.into()))
+    })
+    .unwrap_or_else(|fault| Err(failed(fault.into())))
+}
+
+fn unreadable(name: &str, source: Box<dyn std::error::Error + Send + Sync>) -> TraceError {
+    TraceError::Part { file: name.to_owned(), source }
+}
+
+fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
+    let column = |name: &str, kind: &DataType| {
+        let column = rows.column_by_name(name).ok_or_else(|| format!("there is no column `{name}`"))?;
+        cast(column, kind).map_err(|fault| format!("the column `{name}`: {fault}"))
+    };
+    let (ids, seeds, runs) =
+        (column("episode_id", &DataType::Utf8)?, column("seed", &DataType::Int64)?, column("run", &DataType::Int64)?);
+    let (ids, seeds, runs) =
+        (ids.as_string::<i32>(), seeds.as_primitive::<Int64Type>(), runs.as_primitive::<Int64Type>());
+    let mut found = Vec::new();
+    let mut start = 0;
+    for end in 1..=ids.len() {
+        if end == ids.len() || ids.value(end) != ids.value(start) {
+            found.push(EpisodeRows {
+                episode_id: ids.value(start).to_owned(),
+                seed: seeds.value(start),
+                run: runs.value(start),
+                rows: rows.slice(start, end - start),
+            });
+            start = end;
+        }
+    }
+    Ok(found)
+}
+
+/// The rows of an episode as a trace with these optional columns holds them.
+///
+/// # Errors
+/// For what the schema forbids, as [`TraceEncoder::write`](super::TraceEncoder::write).
+pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows, TraceError> {
+    let (columns, undeclared) = columns.split();
+    write::check(episode, &undeclared)?;
+    let mut gathered = Gathered::of_columns(columns.iter().copied());
+    write::gather(&mut gathered, &columns, episode);
+    let rows = gathered.take().map_err(TraceError::Memory)?;
+    let (seed, run) = (episode.seed.into(), episode.run.into());
+    Ok(EpisodeRows { episode_id: episode.episode_id.clone(), seed, run, rows })
+}
+
+/// Replaces the trace at `path` by one of these episodes, in this order.
+///
+/// # Errors
+/// When the episodes do not have the same columns, or whatever writing gives; the trace at `path` is as it was then.
+pub fn write(path: &Path, recording: Option<&serde_json::Value>, episodes: &[EpisodeRows]) -> Result<(), TraceError> {
+    write_in(replace::folder_of(path), path, recording, episodes)
+}
+
+/// As [`write()`], with the temporary file in `scratch`, a folder of the same file system.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_in(
+    scratch: &Path,
+    path: &Path,
+    recording: Option<&serde_json::Value>,
+    episodes: &[EpisodeRows],
+) -> Result<(), TraceError> {
+    let failed = |source: Box<dyn std::error::Error + Send + Sync>| TraceError::Write {
+        file: path.display().to_string(),
+        source,
+    };
+    let Some(first) = episodes.first() else { return Err(failed("there is no episode to write".into())) };
+    let schema = first.rows.schema();
+    if let Some(other) = episodes.iter().find(|episode| !same_columns(&schema, &episode.rows.schema())) {
+        return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
+    }
+    let file = NewFile::create_in(scratch, path).map_err(|error| failed(error.into()))?;
+    let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
+    file.commit().map_err(|error| failed(error.into()))
+}
+
+fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {
+    let columns = |schema: &SchemaRef| {
+        schema.fields().iter().map(|field| (field.name().clone(), field.data_type().clone())).collect::<Vec<_>>()
+    };
+    columns(a) == columns(b)
+}
+
+fn encode(
+    file: NewFile,
+    schema: &SchemaRef,
+    recording: Option<&serde_json::Value>,
+    episodes: &[EpisodeRows],
+) -> parquet::errors::Result<NewFile> {
+    let mut row_groups = RowGroups::new(file, schema, recording)?;
+    episodes.iter().try_for_each(|episode| row_groups.write(&episode.rows))?;
+    row_groups.finish(None)
+}

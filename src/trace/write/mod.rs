@@ -1,0 +1,250 @@
+//! Writes traces: whole episodes into row groups, and a file that appears whole or not at all.
+//!
+//! Rule: what this writer makes passes `validate` without a note, and the same episodes give the same bytes.
+//! The optional columns of a file are declared when it is created, so that memory stays flat; a value for a
+//! column that was not declared is refused, never dropped.
+
+pub mod decode_episode;
+pub mod merge;
+pub(super) mod rewrite;
+pub(super) mod row_groups;
+
+use std::collections::HashSet;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use parquet::errors::ParquetError;
+
+use self::row_groups::{Gathered, RowGroups};
+use super::episode::Episode;
+use super::error::TraceError;
+use super::schema::rules::{Known, Requirement, Rule, rules_of};
+use super::schema::{COLUMNS, Column, Value, writable};
+use crate::base::replace::NewFile;
+use crate::base::visible::visible;
+
+/// What a trace file is created with, besides its episodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TraceMetadata {
+    /// How the recording was made, a JSON object (scene and prompt hashes, view size, ...); left out if `None`.
+    pub recording: Option<serde_json::Value>,
+    /// The optional columns that the file has.
+    pub columns: OptionalColumns,
+}
+
+/// Columns that a trace may have besides the required ones: the schema's in its order, then the recorder's own.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct OptionalColumns(Vec<&'static Column>);
+
+impl OptionalColumns {
+    /// No optional column.
+    pub const NONE: Self = Self(Vec::new());
+
+    /// All of the schema.
+    pub fn all() -> Self {
+        Self(COLUMNS.iter().filter(|column| !column.required).collect())
+    }
+
+    /// Those of a recording: all of the schema, and where its agent's replies are read, what had to be repaired.
+    pub fn recorded(recording: &serde_json::Value) -> Self {
+        let mut columns = Self::all();
+        let agent = &recording["agent"];
+        if agent.is_object() && agent.get("scripted").is_none() {
+            columns.0.extend(writable().filter(|column| column.since.is_none()));
+        }
+        columns
+    }
+
+    /// Those of these names; `None` if one is no optional column of the schema.
+    pub fn named(names: &[&str]) -> Option<Self> {
+        let columns = Self::all().0.into_iter().filter(|column| names.contains(&column.name)).collect::<Vec<_>>();
+        names.iter().all(|name| columns.iter().any(|column| column.name == *name)).then_some(Self(columns))
+    }
+
+    /// Those that have a value in one of these episodes.
+    pub fn used_by<'a>(episodes: impl IntoIterator<Item = &'a Episode>) -> Self {
+        let mut used = Vec::new();
+        let mut unused: Vec<_> = writable().filter(|column| !column.required).collect();
+        for episode in episodes {
+            let (found, rest) = unused.into_iter().partition::<Vec<_>, _>(|column| has_value(column, episode));
+            used.extend(found);
+            unused = rest;
+        }
+        Self(writable().filter(|column| used.contains(column)).collect())
+    }
+
+    /// The columns of a file that has these, and those that it has not.
+    fn split(&self) -> (Vec<&'static Column>, Vec<&'static Column>) {
+        writable().partition(|column| column.required || self.0.contains(column))
+    }
+}
+
+/// Encodes episodes as a trace into anything that bytes can be written to.
+pub struct TraceEncoder<W: Write + Send> {
+    file: RowGroups<W>,
+    columns: Vec<&'static Column>,
+    gathered: Gathered,
+    undeclared: Vec<&'static Column>,
+    seen: HashSet<String>,
+}
+
+impl<W: Write + Send> TraceEncoder<W> {
+    /// Starts a trace.
+    ///
+    /// # Errors
+    /// Whatever writing gives.
+    pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        let (columns, undeclared) = metadata.columns.split();
+        let gathered = Gathered::of_columns(columns.iter().copied());
+        let file = RowGroups::new(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
+        Ok(Self { file, columns, gathered, undeclared, seen: HashSet::new() })
+    }
+
+    /// Adds an episode; t is 1, 2, ... in the order of its steps.
+    ///
+    /// # Errors
+    /// [`TraceError::Refused`] for what the schema forbids: no step, an id that was there before, an empty name, a
+    /// negative count, a value in an optional column that was not declared. Otherwise whatever writing gives.
+    pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
+        check(episode, &self.undeclared)?;
+        if !self.seen.insert(episode.episode_id.clone()) {
+            return refused(episode, "an id of its own".into(), "the id of an episode before it".into());
+        }
+        gather(&mut self.gathered, &self.columns, episode);
+        self.file.end_episode(&mut self.gathered).map_err(failed)
+    }
+
+    /// Writes what is left and the footer.
+    ///
+    /// # Errors
+    /// Whatever writing gives.
+    pub fn finish(self) -> Result<W, TraceError> {
+        self.file.finish(Some(self.gathered)).map_err(failed)
+    }
+}
+
+/// Adds the rows of an episode.
+fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episode) {
+    for (column, values) in columns.iter().zip(&mut gathered.columns) {
+        for value in column.of_steps(episode) {
+            values.push(value).expect("a field gives values of its column's type");
+        }
+    }
+    gathered.rows += episode.steps.len();
+}
+
+fn check(episode: &Episode, undeclared: &[&'static Column]) -> Result<(), TraceError> {
+    let steps = episode.steps.len();
+    if steps == 0 || i32::try_from(steps).is_err() {
+        return refused(episode, format!("1 to {} steps", i32::MAX), steps.to_string());
+    }
+    for column in writable() {
+        let rules = rules_of(column, Known::default());
+        let broken = |value| rules.iter().find(|rule| !rule.allows_value(value)).map(|rule| (rule, value));
+        if let Some((rule, value)) = column.of_steps(episode).flatten().find_map(broken) {
+            return refused(episode, format!("`{}` {}", column.name, expected(rule)), shown(value));
+        }
+    }
+    match undeclared.iter().find(|column| has_value(column, episode)) {
+        None => Ok(()),
+        Some(column) => {
+            let expected = format!("no value for `{}`, which was not declared when the file was created", column.name);
+            refused(episode, expected, "one".into())
+        }
+    }
+}
+
+/// What a rule asks for, behind a column's name.
+fn expected(rule: &Rule<'_>) -> String {
+    match rule.asks {
+        Requirement::Name => "not to be empty".to_owned(),
+        Requirement::Count => "not to be below zero".to_owned(),
+        Requirement::OneOf(_) => format!("to be one of {}", rule.expected()),
+        _ => format!("to be {}", rule.expected()),
+    }
+}
+
+fn shown(value: Value<'_>) -> String {
+    match value {
+        Value::Bool(truth) => truth.to_string(),
+        Value::Int(number) => number.to_string(),
+        Value::Float(number) => number.to_string(),
+        Value::Text(text) => format!("`{}`", visible(text)),
+    }
+}
+
+fn has_value(column: &Column, episode: &Episode) -> bool {
+    column.of_steps(episode).any(|value| value.is_some())
+}
+
+fn refused(episode: &Episode, expected: String, found: String) -> Result<(), TraceError> {
+    Err(TraceError::Refused { episode: episode.episode_id.clone(), expected, found })
+}
+
+pub(super) fn failed(error: ParquetError) -> TraceError {
+    TraceError::Write { file: "stream".into(), source: Box::new(error) }
+}
+
+/// Writes a trace file, which appears under its name when [`finish`](Self::finish) returns.
+pub struct TraceWriter {
+    encoder: TraceEncoder<NewFile>,
+    path: PathBuf,
+}
+
+impl TraceWriter {
+    /// Starts the trace that will be at `path`, replacing what is there; its folder must exist.
+    ///
+    /// # Errors
+    /// When no file can be made in that folder.
+    pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        let file = NewFile::create(path).map_err(|source| unwritable(path, source))?;
+        let encoder = TraceEncoder::new(file, metadata).map_err(|error| named(error, path))?;
+        Ok(Self { encoder, path: path.to_owned() })
+    }
+
+    /// Adds an episode; t is 1, 2, ... in the order of its steps.
+    ///
+    /// # Errors
+    /// As [`TraceEncoder::write`].
+    pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
+        self.encoder.write(episode).map_err(|error| named(error, &self.path))
+    }
+
+    /// Completes the file, synchronises it with the disk and gives it its name.
+    ///
+    /// # Errors
+    /// Whatever writing gives; the file at the path is as it was then.
+    pub fn finish(self) -> Result<(), TraceError> {
+        let Self { encoder, path } = self;
+        let file = encoder.finish().map_err(|error| named(error, &path))?;
+        file.commit().map_err(|source| unwritable(&path, source))
+    }
+}
+
+/// Writes these episodes as one trace file with the optional columns that they use.
+///
+/// # Errors
+/// As [`TraceWriter`].
+pub fn write_episodes(
+    path: &Path,
+    recording: Option<serde_json::Value>,
+    episodes: &[Episode],
+) -> Result<(), TraceError> {
+    let metadata = TraceMetadata { recording, columns: OptionalColumns::used_by(episodes) };
+    let mut writer = TraceWriter::create(path, &metadata)?;
+    for episode in episodes {
+        writer.write(episode)?;
+    }
+    writer.finish()
+}
+
+pub(super) fn unwritable(path: &Path, source: io::Error) -> TraceError {
+    TraceError::Write { file: path.display().to_string(), source: Box::new(source) }
+}
+
+fn named(error: TraceError, path: &Path) -> TraceError {
+    match error {
+        TraceError::Write { source, .. } => TraceError::Write { file: path.display().to_string(), source },
+        other => other,
+    }
+}

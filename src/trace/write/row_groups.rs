@@ -1,0 +1,174 @@
+//! Rows on their way into the row groups of a file: gathered column by column, an episode never in two row groups.
+
+use std::io::Write;
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanBuilder, Float64Builder, Int64Builder, NullArray, RecordBatch, StringBuilder};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use arrow::error::ArrowError;
+use parquet::arrow::ArrowWriter;
+use parquet::arrow::arrow_writer::ArrowWriterOptions;
+use parquet::basic::{Compression, ZstdLevel};
+use parquet::errors::Result;
+use parquet::file::metadata::KeyValue;
+use parquet::file::properties::WriterProperties;
+
+use crate::trace::schema::{self, Column, Kind, Stored, Value};
+
+/// Rows after which a row group is closed, at the next end of an episode.
+const ROW_GROUP_ROWS: usize = 128 * 1024;
+/// Rows that are gathered before they are encoded.
+const GATHERED_ROWS: usize = 8 * 1024;
+
+/// A file that is being written.
+pub(in crate::trace) struct RowGroups<W: Write + Send> {
+    parquet: ArrowWriter<W>,
+    /// Rows of the row group under way.
+    rows: usize,
+}
+
+/// Rows that are not in a file yet.
+pub(in crate::trace) struct Gathered {
+    pub(in crate::trace) layout: SchemaRef,
+    pub(in crate::trace) columns: Vec<Values>,
+    pub(in crate::trace) rows: usize,
+}
+
+/// The values of one column of some rows.
+pub(in crate::trace) enum Values {
+    Bool(BooleanBuilder),
+    Int(Int64Builder),
+    Float(Float64Builder),
+    Text(StringBuilder),
+    /// Nothing but nulls.
+    Null(usize),
+}
+
+impl<W: Write + Send> RowGroups<W> {
+    /// Starts a file of these columns.
+    pub(in crate::trace) fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
+        // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
+        let options = ArrowWriterOptions::new().with_properties(properties(recording)).with_skip_arrow_metadata(true);
+        Ok(Self { parquet: ArrowWriter::try_new_with_options(out, Arc::clone(layout), options)?, rows: 0 })
+    }
+
+    /// Says that an episode ends with what is gathered; it is encoded where it is much.
+    pub(in crate::trace) fn end_episode(&mut self, gathered: &mut Gathered) -> Result<()> {
+        let is_full = self.rows + gathered.rows >= ROW_GROUP_ROWS;
+        if is_full || gathered.rows >= GATHERED_ROWS { self.write(&gathered.take()?) } else { Ok(()) }
+    }
+
+    /// Writes rows that end with an episode.
+    pub(in crate::trace) fn write(&mut self, rows: &RecordBatch) -> Result<()> {
+        self.parquet.write(rows)?;
+        self.rows += rows.num_rows();
+        if self.rows >= ROW_GROUP_ROWS {
+            self.parquet.flush()?;
+            self.rows = 0;
+        }
+        Ok(())
+    }
+
+    /// Writes what is left and the footer.
+    pub(in crate::trace) fn finish(mut self, gathered: Option<Gathered>) -> Result<W> {
+        if let Some(mut gathered) = gathered.filter(|gathered| gathered.rows > 0) {
+            self.parquet.write(&gathered.take()?)?;
+        }
+        self.parquet.into_inner()
+    }
+}
+
+fn properties(recording: Option<&serde_json::Value>) -> WriterProperties {
+    let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
+    let mut pairs = vec![
+        pair(schema::VERSION_KEY, schema::SCHEMA_VERSION.to_string()),
+        pair(schema::WRITER_KEY, concat!("mirrorstats ", env!("CARGO_PKG_VERSION")).to_owned()),
+    ];
+    pairs.extend(recording.map(|json| pair(schema::RECORDING_KEY, json.to_string())));
+    WriterProperties::builder()
+        .set_key_value_metadata(Some(pairs))
+        .set_compression(Compression::ZSTD(ZstdLevel::default()))
+        // Row groups end where an episode does, never at a number of rows.
+        .set_max_row_group_row_count(None)
+        .build()
+}
+
+impl Gathered {
+    /// No row yet; the columns are held as their kinds, and take the types of their fields.
+    pub(in crate::trace) fn new(columns: impl IntoIterator<Item = (Field, Option<Kind>)>) -> Self {
+        let (fields, kinds): (Vec<Field>, Vec<Option<Kind>>) = columns.into_iter().unzip();
+        let columns = kinds.into_iter().map(Values::new).collect();
+        Self { layout: Arc::new(Schema::new(fields)), columns, rows: 0 }
+    }
+
+    /// No row yet, of columns that the schema knows.
+    pub(in crate::trace) fn of_columns<'a>(columns: impl IntoIterator<Item = &'a Column>) -> Self {
+        Self::new(columns.into_iter().map(|column| (field(column), Some(column.stored.kind()))))
+    }
+
+    /// The rows so far; gathering starts anew.
+    pub(in crate::trace) fn take(&mut self) -> Result<RecordBatch, ArrowError> {
+        self.rows = 0;
+        let columns = self.columns.iter_mut().zip(self.layout.fields());
+        let columns = columns.map(|(values, field)| cast(&values.take(), field.data_type()));
+        RecordBatch::try_new(Arc::clone(&self.layout), columns.collect::<Result<_, _>>()?)
+    }
+}
+
+impl Values {
+    fn new(kind: Option<Kind>) -> Self {
+        match kind {
+            Some(Kind::Bool) => Self::Bool(BooleanBuilder::new()),
+            Some(Kind::Int) => Self::Int(Int64Builder::new()),
+            Some(Kind::Float) => Self::Float(Float64Builder::new()),
+            Some(Kind::String) => Self::Text(StringBuilder::new()),
+            Some(Kind::Unsupported) | None => Self::Null(0),
+        }
+    }
+
+    /// Adds a value; an error if it is of another type.
+    pub(in crate::trace) fn push(&mut self, value: Option<Value<'_>>) -> Result<(), ()> {
+        match (self, value) {
+            (Self::Bool(values), None) => values.append_null(),
+            (Self::Int(values), None) => values.append_null(),
+            (Self::Float(values), None) => values.append_null(),
+            (Self::Text(values), None) => values.append_null(),
+            (Self::Null(count), None) => *count += 1,
+            (Self::Bool(values), Some(Value::Bool(value))) => values.append_value(value),
+            (Self::Int(values), Some(Value::Int(value))) => values.append_value(value),
+            (Self::Float(values), Some(Value::Float(value))) => values.append_value(value),
+            (Self::Text(values), Some(Value::Text(text))) => values.append_value(text),
+            _ => return Err(()),
+        }
+        Ok(())
+    }
+
+    fn take(&mut self) -> ArrayRef {
+        match self {
+            Self::Bool(values) => Arc::new(values.finish()),
+            Self::Int(values) => Arc::new(values.finish()),
+            Self::Float(values) => Arc::new(values.finish()),
+            Self::Text(values) => Arc::new(values.finish()),
+            Self::Null(count) => Arc::new(NullArray::new(std::mem::take(count))),
+        }
+    }
+}
+
+/// The column as a field of the file that the writer makes.
+pub(in crate::trace) fn field(column: &Column) -> Field {
+    Field::new(column.name, data_type(column.stored), column.nullable)
+}
+
+/// The type of a column in memory as the writer stores it.
+pub(super) fn data_type(stored: Stored) -> DataType {
+    match stored {
+        Stored::Bool => DataType::Boolean,
+        Stored::Int8 => DataType::Int8,
+        Stored::Int32 => DataType::Int32,
+        Stored::Int64 => DataType::Int64,
+        Stored::Float32 => DataType::Float32,
+        Stored::Float64 => DataType::Float64,
+        Stored::String => DataType::Utf8,
+    }
+}

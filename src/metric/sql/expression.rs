@@ -38,8 +38,8 @@ impl Layout<'_> {
                 Aggregate::Any => format!("MAX(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
                 Aggregate::All => format!("MIN(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
                 Aggregate::Count => {
-                    let counted = format!("CASE WHEN {} THEN 1 END", self.truth(*x));
-                    format!("COUNT({})", self.each_step(*x, counted))
+                    let counted = format!("CASE WHEN {} THEN 1 ELSE 0 END", self.truth(*x));
+                    format!("SUM({})", self.each_step(*x, counted))
                 }
                 Aggregate::Min => self.extreme("MIN", node.ty, &self.value(*x)),
                 Aggregate::Max => self.extreme("MAX", node.ty, &self.value(*x)),
@@ -195,7 +195,7 @@ impl Layout<'_> {
             Op::Column(name) if node.level == Level::Step => format!("s.{}", self.name(name)),
             Op::Spread(x) => self.truth(*x),
             Op::Not(x) => match &self.plan.node(*x).op {
-                Op::IsNull(x) => format!("({} IS NOT NULL)", self.operand(*x)),
+                Op::IsNull(y) if !self.shared.contains(x) => format!("({} IS NOT NULL)", self.operand(*y)),
                 _ => format!("(NOT {})", self.truth(*x)),
             },
             Op::And(x, y) => format!("({} AND {})", self.truth(*x), self.truth(*y)),
@@ -235,7 +235,7 @@ impl Layout<'_> {
         for (when, then) in branches {
             // Null counts as false here.
             let when = match self.plan.node(*when).op {
-                Op::IsTrue(when) => self.truth(when),
+                Op::IsTrue(x) if !self.shared.contains(when) => self.truth(x),
                 _ => self.truth(*when),
             };
             let _ = write!(text, " WHEN {when} THEN {}", value(*then));

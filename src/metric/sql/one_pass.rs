@@ -43,6 +43,7 @@ impl OnePass {
             new: Vec::new(),
             local: Vec::new(),
             per_step: HashMap::new(),
+            within: HashMap::new(),
             windowed: BTreeMap::new(),
         };
         for node in plan.nodes() {
@@ -69,6 +70,8 @@ struct Rewriter<'p> {
     local: Vec<bool>,
     /// Values per episode that have been made values per step.
     per_step: HashMap<NodeId, NodeId>,
+    /// Landmarks in windows, and whether there is one.
+    within: HashMap<NodeId, NodeId>,
     windowed: BTreeMap<NodeId, Windowed>,
 }
 
@@ -80,6 +83,11 @@ impl Rewriter<'_> {
             (_, Op::Aggregate(aggregate, x)) => self.aggregate(aggregate, x, node.ty),
             (_, Op::At(x, moment)) => self.at(x, moment, node.ty),
             (_, Op::Coalesce(values)) => self.coalesce(values, node),
+            (_, Op::IsNull(x)) if let Some(within) = self.within.get(&x) => {
+                let found = self.add(Op::IsTrue(*within), Type::Bool, Level::Episode);
+                self.add(Op::Not(found), Type::Bool, Level::Episode)
+            }
+            (_, Op::Not(x)) if let Op::Not(x) = self.op(x) => *x,
             (Op::Compare(comparison, x, y), op) if node.level == Level::Episode => {
                 self.compare(*comparison, (*x, *y), op)
             }
@@ -189,7 +197,12 @@ impl Rewriter<'_> {
         }
         match aggregate {
             Aggregate::Any => self.add(Op::IsTrue(within), Type::Bool, Level::Episode),
-            _ => self.add(Op::Case { branches: vec![(within, found)], otherwise: None }, ty, Level::Episode),
+            _ => {
+                let case = Op::Case { branches: vec![(within, found)], otherwise: None };
+                let id = self.add(case, ty, Level::Episode);
+                self.within.insert(id, within);
+                id
+            }
         }
     }
 

@@ -86,8 +86,8 @@ impl<'l, 'p> Statement<'l, 'p> {
         let keys: &[&str] = if pass == 1 { &KEYS } else { &[] };
         let own = ["episode_id", "t"].iter().chain(keys);
         reads.columns.extend(own.map(|name| self.layout.dialect.quoted(name)));
-        let columns: Vec<String> = reads.columns.iter().map(|name| format!("s.{name} AS {name}")).collect();
-        let _ = write!(self.text, "\n  FROM (\n    SELECT {}", columns.join(",\n      "));
+        let columns: Vec<String> = reads.columns.iter().map(|name| format!("s.{name}")).collect();
+        let _ = write!(self.text, "\n  FROM (\n    SELECT {}", columns.join(", "));
         for id in reads.shared {
             let value = if inline.plan.node(id).ty == Type::Bool { inline.truth(id) } else { inline.value(id) };
             self.column(6, &format!("{value} AS {}", inline.step_column(id)))?;

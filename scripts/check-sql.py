@@ -1,4 +1,5 @@
-"""Runs the SQL lowering on an independent engine (DuckDB) and compares every score with the native engine's.
+"""Runs the SQL lowering on an independent engine (DuckDB) and compares every score with the native engine's: the portable
+statement, and DuckDB's own.
 
 Usage: check-sql.py MIRRORSTATS TRACES_FOLDER [MIRRORSTATS_ARGUMENT...]
 """
@@ -21,8 +22,8 @@ def native(program, folder, extra):
     return [(*row[:3], int(row[3]), int(row[4]), *(int(v) if v else None for v in row[5:])) for row in rows]
 
 
-def independent(program, folder, extra):
-    statement = run(program, "sql", *extra)
+def independent(program, dialect, folder, extra):
+    statement = run(program, "sql", "--dialect", dialect, *extra)
     connection = duckdb.connect()
     source = f"read_parquet('{folder}/*.parquet', union_by_name = true)"
     connection.execute(f"CREATE VIEW steps AS SELECT * FROM {source}")
@@ -31,13 +32,15 @@ def independent(program, folder, extra):
 
 def main():
     program, folder, *extra = sys.argv[1:]
-    expected, found = native(program, folder, extra), independent(program, folder, extra)
-    for left, right in zip(expected, found):
-        if left != right:
-            sys.exit(f"native {left}\nDuckDB {right}")
-    if len(expected) != len(found) or not expected:
-        sys.exit(f"native has {len(expected)} episodes, DuckDB {len(found)}")
-    print(f"{len(found)} episodes, {len(found[0]) - 5} metrics: the same on DuckDB {duckdb.__version__}")
+    expected = native(program, folder, extra)
+    for dialect in "portable", "duckdb":
+        found = independent(program, dialect, folder, extra)
+        for left, right in zip(expected, found):
+            if left != right:
+                sys.exit(f"native {left}\nDuckDB, {dialect} {right}")
+        if len(expected) != len(found) or not expected:
+            sys.exit(f"native has {len(expected)} episodes, DuckDB, {dialect} {len(found)}")
+        print(f"{len(found)} episodes, {len(found[0]) - 5} metrics: the same on DuckDB {duckdb.__version__}, {dialect} SQL")
 
 
 if __name__ == "__main__":

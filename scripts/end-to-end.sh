@@ -35,6 +35,8 @@ packages=$target/python
   --target "$packages" duckdb==2.0.0
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper --where "seed <> 2 and TSA = 1"
+PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper \
+  --definitions scripts/check-sql.toml
 
 echo "end-to-end: logs as MCAP's and Foxglove's own packages read them"
 [ -d "$packages/mcap" ] || python3 -m pip install --quiet --disable-pip-version-check --root-user-action=ignore \

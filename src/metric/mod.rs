@@ -1,7 +1,7 @@
 //! Definition files: metrics as data, checked and planned.
 //!
 //! ```text
-//! file.rs ──► syntax.rs ──► bind.rs ──► plan.rs ──► (kernels in score)
+//! file.rs ──► syntax ─────► bind ─────► plan.rs ──► (kernels in score)
 //! (TOML)      (SQL text)    (names,     (typed
 //!                            types,      operations)
 //!                            levels)
@@ -21,10 +21,9 @@ mod keys;
 pub mod names;
 pub mod origin;
 pub mod overflow;
-mod pattern;
 pub mod plan;
 mod print;
 pub mod restore;
 pub mod shape;
 pub mod sql;
-mod syntax;
+pub(crate) mod syntax;

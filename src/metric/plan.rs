@@ -242,28 +242,40 @@ impl Plan {
 impl Op {
     /// The nodes that this one reads.
     pub fn operands(&self) -> Vec<NodeId> {
+        let mut operands = Vec::new();
+        let _ = self.with_operands(|operand| {
+            operands.push(operand);
+            operand
+        });
+        operands
+    }
+
+    /// The same operation on other nodes: what `to` gives for each operand, in order.
+    #[must_use]
+    pub fn with_operands(&self, mut to: impl FnMut(NodeId) -> NodeId) -> Self {
         match self {
-            Self::Column(_) | Self::Time | Self::Length | Self::Constant(_) => vec![],
-            Self::Spread(x)
-            | Self::Not(x)
-            | Self::IsNull(x)
-            | Self::IsTrue(x)
-            | Self::IsFalse(x)
-            | Self::Negate(x)
-            | Self::Matches(x, _)
-            | Self::IntFromBool(x)
-            | Self::FloatFromInt(x)
-            | Self::Aggregate(_, x) => vec![*x],
-            Self::And(x, y)
-            | Self::Or(x, y)
-            | Self::Compare(_, x, y)
-            | Self::Distinct(x, y)
-            | Self::Arithmetic(_, x, y)
-            | Self::At(x, y) => vec![*x, *y],
-            Self::Case { branches, otherwise } => {
-                branches.iter().flat_map(|(when, then)| [*when, *then]).chain(*otherwise).collect()
-            }
-            Self::Coalesce(values) => values.clone(),
+            Self::Column(_) | Self::Time | Self::Length | Self::Constant(_) => self.clone(),
+            Self::Spread(x) => Self::Spread(to(*x)),
+            Self::Not(x) => Self::Not(to(*x)),
+            Self::And(x, y) => Self::And(to(*x), to(*y)),
+            Self::Or(x, y) => Self::Or(to(*x), to(*y)),
+            Self::Compare(comparison, x, y) => Self::Compare(*comparison, to(*x), to(*y)),
+            Self::Distinct(x, y) => Self::Distinct(to(*x), to(*y)),
+            Self::IsNull(x) => Self::IsNull(to(*x)),
+            Self::IsTrue(x) => Self::IsTrue(to(*x)),
+            Self::IsFalse(x) => Self::IsFalse(to(*x)),
+            Self::Arithmetic(op, x, y) => Self::Arithmetic(*op, to(*x), to(*y)),
+            Self::Negate(x) => Self::Negate(to(*x)),
+            Self::Case { branches, otherwise } => Self::Case {
+                branches: branches.iter().map(|(when, then)| (to(*when), to(*then))).collect(),
+                otherwise: otherwise.map(&mut to),
+            },
+            Self::Coalesce(values) => Self::Coalesce(values.iter().map(|value| to(*value)).collect()),
+            Self::Matches(x, pattern) => Self::Matches(to(*x), pattern.clone()),
+            Self::IntFromBool(x) => Self::IntFromBool(to(*x)),
+            Self::FloatFromInt(x) => Self::FloatFromInt(to(*x)),
+            Self::Aggregate(aggregate, x) => Self::Aggregate(*aggregate, to(*x)),
+            Self::At(x, moment) => Self::At(to(*x), to(*moment)),
         }
     }
 }

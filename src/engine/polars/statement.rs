@@ -4,18 +4,17 @@
 //! query is read and checked here before Polars sees it; Polars is given what was checked, written out again.
 
 use std::collections::BTreeSet;
-use std::ops::{ControlFlow, Range};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use sqlparser::ast::{
     Ident, ObjectName, Query, Select, SetExpr, Spanned as _, Statement, TableAlias, TableFactor, Visit as _, Visitor,
 };
-use sqlparser::dialect::GenericDialect;
-use sqlparser::parser::{Parser, ParserError};
-use sqlparser::tokenizer::{Location, Span, Token, Tokenizer};
+use sqlparser::tokenizer::Span;
 
 use crate::base::near::nearest;
 use crate::metric::fault::{Fault, Faults, Place, Source};
+use crate::metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened};
 
 /// A table that a query may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -56,9 +55,8 @@ pub struct Checked {
     source: Arc<Source>,
 }
 
-/// The longest query, in bytes, and the most words and signs of one: parsers recurse.
-const LONGEST: usize = 64 * 1024;
-const MOST_TOKENS: usize = 8000;
+/// A query.
+const QUERY: Grammar = Grammar { noun: "query", one: "a query", longest: 64 * 1024, most_tokens: 8000, help: None };
 
 /// Reads a query and checks that it can read nothing but the tables.
 ///
@@ -66,7 +64,10 @@ const MOST_TOKENS: usize = 8000;
 /// Everything that is wrong with it, each with its place.
 pub fn check(text: &str) -> Result<Checked, Faults> {
     let source = Arc::new(Source { name: "query".to_owned(), text: text.to_owned() });
-    let statement = parse(&source).map_err(|fault| Faults(vec![*fault]))?;
+    let statement = parse(text).map_err(|fault| {
+        let place = Place { source: Arc::clone(&source), span: fault.span };
+        Faults(vec![Fault::new(place, fault.message).help_if(fault.help)])
+    })?;
     let mut reader = Reader { source: &source, ctes: BTreeSet::new(), tables: BTreeSet::new(), faults: Vec::new() };
     let _ = statement.visit(&mut Names(&mut reader.ctes));
     let _ = statement.visit(&mut reader);
@@ -107,66 +108,19 @@ fn word_at(text: &str, word: &str) -> usize {
     text.match_indices(word).map(|(at, _)| at).find(alone).unwrap_or(0)
 }
 
-fn parse(source: &Arc<Source>) -> Result<Statement, Box<Fault>> {
-    let text = source.text.as_str();
-    let whole = || Place { source: Arc::clone(source), span: 0..text.len() };
-    let refuse = |message: String| Box::new(Fault::new(whole(), message));
-    if text.len() > LONGEST {
-        return Err(refuse(format!("a query of {} bytes is too long: the most is {LONGEST}", text.len())));
-    }
-    let words = |error: &ParserError| Box::new(grammar_fault(source, error));
-    let dialect = GenericDialect {};
-    let tokens = Tokenizer::new(&dialect, text).tokenize_with_location().map_err(|error| words(&error.into()))?;
-    let count = tokens.iter().filter(|token| !matches!(token.token, Token::Whitespace(_))).count();
-    if count > MOST_TOKENS {
-        return Err(refuse(format!("a query of {count} words and signs is too long: the most is {MOST_TOKENS}")));
-    }
-    let parsed = Parser::new(&dialect).with_tokens_with_locations(tokens).parse_statements();
-    let mut statements = parsed.map_err(|error| words(&error))?;
-    match (statements.pop(), statements.len()) {
-        (Some(statement @ Statement::Query(_)), 0) => Ok(statement),
+fn parse(text: &str) -> Result<Statement, SyntaxFault> {
+    let parsed = QUERY.parser(text, |tokens| tokens)?.parse_statements();
+    let mut statements = parsed.map_err(|error| QUERY.fault(text, &error))?;
+    let (message, help) = match (statements.pop(), statements.len()) {
+        (Some(statement @ Statement::Query(_)), 0) => return Ok(statement),
         (Some(_), 0) => {
-            let fault = refuse("a query is a SELECT: it reads, and changes nothing".to_owned());
-            Err(Box::new(fault.help("write SELECT ... FROM steps, episodes or cells")))
+            let help = "write SELECT ... FROM steps, episodes or cells";
+            ("a query is a SELECT: it reads, and changes nothing".to_owned(), Some(help))
         }
-        (Some(_), more) => Err(refuse(format!("expected one statement, found {}", more + 1))),
-        (None, _) => {
-            Err(Box::new(refuse("expected a query, found none".to_owned()).help("write SELECT ... FROM steps")))
-        }
-    }
-}
-
-fn grammar_fault(source: &Arc<Source>, error: &ParserError) -> Fault {
-    let message = match error {
-        ParserError::ParserError(message) | ParserError::TokenizerError(message) => message.as_str(),
-        ParserError::RecursionLimitExceeded => "it is nested too deeply",
+        (Some(_), more) => (format!("expected one statement, found {}", more + 1), None),
+        (None, _) => ("expected a query, found none".to_owned(), Some("write SELECT ... FROM steps")),
     };
-    let (words, span) = match message.rsplit_once(" at Line: ").and_then(|(words, at)| Some((words, location(at)?))) {
-        Some((words, start)) => {
-            let start = byte_of(&source.text, start);
-            (words, start..source.text.len().min(start + 1))
-        }
-        None => (message, 0..source.text.len()),
-    };
-    let words = words.replace("EOF", "the end of the query");
-    Fault::new(Place { source: Arc::clone(source), span }, format!("not a query: {words}"))
-}
-
-/// `1, Column: 2`
-fn location(text: &str) -> Option<Location> {
-    let (line, column) = text.split_once(", Column: ")?;
-    Some(Location::new(line.parse().ok()?, column.parse().ok()?))
-}
-
-/// The byte of a 1-based line and column (in characters); the end of the text for a place beyond it.
-fn byte_of(text: &str, location: Location) -> usize {
-    let Some(before) = location.line.checked_sub(1).and_then(|line| usize::try_from(line).ok()) else {
-        return text.len();
-    };
-    let start = text.split_inclusive('\n').take(before).map(str::len).sum::<usize>();
-    let line = text[start..].split('\n').next().unwrap_or_default();
-    let column = usize::try_from(location.column.saturating_sub(1)).unwrap_or(usize::MAX);
-    start + line.char_indices().nth(column).map_or(line.len(), |(at, _)| at)
+    Err(SyntaxFault { message, span: 0..text.len(), help: help.map(str::to_owned) })
 }
 
 /// Collects the names that a query gives to its own tables.
@@ -192,16 +146,9 @@ struct Reader<'s> {
 
 impl Reader<'_> {
     fn refuse(&mut self, span: Span, message: impl Into<String>, help: Option<String>) {
-        let fault = Fault::new(Place { source: Arc::clone(self.source), span: self.bytes(span) }, message);
+        let fault =
+            Fault::new(Place { source: Arc::clone(self.source), span: bytes_of(&self.source.text, span) }, message);
         self.faults.push(fault.help_if(help));
-    }
-
-    fn bytes(&self, span: Span) -> Range<usize> {
-        let text = &self.source.text;
-        if span.start.line == 0 {
-            return 0..text.len();
-        }
-        byte_of(text, span.start)..byte_of(text, span.end).max(byte_of(text, span.start))
     }
 
     /// A name that a query makes must not hide a table.
@@ -278,21 +225,13 @@ impl Visitor for Reader<'_> {
                 }
             }
             other => {
-                let message = format!("`{}` is no table", short(&other.to_string()));
+                let message = format!("`{}` is no table", shortened(&other.to_string()));
                 let help =
                     "a query reads the traces that are named on the command line: tables are steps, episodes, cells";
                 self.refuse(other.span(), message, Some(help.to_owned()));
             }
         }
         ControlFlow::Continue(())
-    }
-}
-
-fn short(text: &str) -> String {
-    const ENOUGH: usize = 60;
-    match text.char_indices().nth(ENOUGH) {
-        Some((end, _)) => format!("{}...", &text[..end]),
-        None => text.to_owned(),
     }
 }
 

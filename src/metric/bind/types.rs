@@ -24,28 +24,15 @@ impl Scope<'_, '_> {
         // An operation on constants alone is carried out once an episode.
         let (op, level) = match (level, op) {
             (Level::Constant, op @ Op::Constant(_)) => (op, level),
-            (Level::Constant, op) => (self.with_spread_operands(op), Level::Episode),
+            (Level::Constant, op) => (op.with_operands(|operand| self.once_an_episode(operand)), Level::Episode),
             (level, op) => (op, level),
         };
         Bound { node: self.binder.builder.add(op, ty, level), ty: Some(ty), level, rate: false }
     }
 
-    pub(super) fn with_spread_operands(&mut self, op: Op) -> Op {
-        let mut up = |node: NodeId| {
-            let ty = self.binder.builder.node(node).ty;
-            self.binder.spread(node, ty, Level::Constant, Level::Episode)
-        };
-        match op {
-            Op::Not(x) => Op::Not(up(x)),
-            Op::Negate(x) => Op::Negate(up(x)),
-            Op::IsNull(x) => Op::IsNull(up(x)),
-            Op::IsTrue(x) => Op::IsTrue(up(x)),
-            Op::IsFalse(x) => Op::IsFalse(up(x)),
-            Op::Matches(x, pattern) => Op::Matches(up(x), pattern),
-            Op::IntFromBool(x) => Op::IntFromBool(up(x)),
-            Op::FloatFromInt(x) => Op::FloatFromInt(up(x)),
-            other => other,
-        }
+    fn once_an_episode(&mut self, constant: NodeId) -> NodeId {
+        let ty = self.binder.builder.node(constant).ty;
+        self.binder.spread(constant, ty, Level::Constant, Level::Episode)
     }
 
     /// An operation over several operands of known types, brought to one level (constants stay as they are).

@@ -1,0 +1,177 @@
+//! A plan as one SQL statement over a table `steps`: the second lowering, for other engines.
+//!
+//! ```text
+//! plan ──► one_pass.rs ──► layout.rs ───────► statement.rs (passes and columns)
+//!          (landmarks of   (which pass, which  expression.rs (nodes)
+//!           one pass)       column)            dialect.rs (what engines write differently)
+//! ```
+//!
+//! A pass over the steps is a common table expression with one row per episode. An aggregate belongs to the first pass
+//! in which everything it reads is known; most definitions need one pass, which reads as one writes it by hand:
+//!
+//! ```text
+//! WITH e1 AS (SELECT s.episode_id, MIN(CASE WHEN ... THEN s.t END) AS done_4, ... FROM (...) s GROUP BY s.episode_id)
+//! SELECT ... FROM e1 ORDER BY ...
+//! ```
+//!
+//! The portable form uses nothing but CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN and arithmetic, so that Polars SQL,
+//! `DuckDB`, Spark SQL and `DataFusion` run it as it is. Of a search between two landmarks it makes a second pass, as
+//! Polars does, which has no filters of lists; `DuckDB` and Spark have them.
+//!
+//! Sums beyond 64 bits, which the native engine refuses, are an error or a wrap of the engine that
+//! runs the statement.
+
+mod checks;
+mod dialect;
+mod expression;
+mod layout;
+mod one_pass;
+mod pattern;
+mod statement;
+
+use std::collections::BTreeSet;
+
+pub use self::checks::lower_checks;
+pub use self::dialect::Dialect;
+use self::dialect::is_plain;
+use self::layout::Layout;
+use self::one_pass::OnePass;
+use self::statement::Statement;
+use super::plan::{NodeId, Op, Plan};
+
+/// A plan that a dialect cannot say.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LoweringError {
+    /// Regular expressions.
+    #[error("`{metric}` uses regexp_like, which has no form that all engines share; choose --dialect spark or duckdb")]
+    Regexp {
+        /// The first metric that needs it.
+        metric: String,
+    },
+    /// A name that needs quotes, which engines write differently.
+    #[error("the name `{name}` needs quotes, which engines write differently; choose --dialect spark or duckdb")]
+    Name {
+        /// The column.
+        name: String,
+    },
+    /// Two metrics whose names are one without quotes.
+    #[error("two metrics would both be called `{name}`; choose --dialect spark or duckdb")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// Too long a statement.
+    #[error("the statement exceeds {limit} bytes; choose fewer metrics with --metrics")]
+    Length {
+        /// The longest statement written.
+        limit: usize,
+    },
+}
+
+/// The statement that computes the episode table: `episode_id, model, experiment, seed, run`, then the metrics.
+///
+/// Engines differ in how they quote names, so the portable form quotes none: a metric's `-` becomes `_` there.
+///
+/// # Errors
+/// A construct that the dialect cannot say, by the name of the metric that uses it.
+pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
+    check_patterns(plan, dialect)?;
+    check_names(plan, dialect)?;
+    let OnePass { plan, windowed } = OnePass::of(plan);
+    let layout = Layout::new(&plan, dialect, &roots(&plan), &windowed);
+    let mut statement = Statement::new(&layout);
+    statement.passes(&[])?;
+    statement.episodes()?;
+    Ok(statement.text)
+}
+
+/// The nodes that the episode table is made of.
+fn roots(plan: &Plan) -> Vec<NodeId> {
+    plan.outputs.iter().map(|output| output.node).chain(plan.filter).collect()
+}
+
+fn check_patterns(plan: &Plan, dialect: Dialect) -> Result<(), LoweringError> {
+    if dialect.matches().is_some() {
+        return Ok(());
+    }
+    let uses = |root: NodeId| plan.needed_by([root]).into_iter().any(|id| matches!(plan.node(id).op, Op::Matches(..)));
+    let output = plan.outputs.iter().find(|output| uses(output.node)).map(|output| output.name.clone());
+    let filter = plan.filter.filter(|&node| uses(node)).map(|_| "the filter".to_owned());
+    output.or(filter).map_or(Ok(()), |metric| Err(LoweringError::Regexp { metric }))
+}
+
+fn check_names(plan: &Plan, dialect: Dialect) -> Result<(), LoweringError> {
+    if dialect != Dialect::Portable {
+        return Ok(());
+    }
+    let needed = plan.needed_by(roots(plan));
+    if let Some((name, _)) = plan.columns(&needed).into_iter().find(|(name, _)| !is_plain(name)) {
+        return Err(LoweringError::Name { name: name.to_owned() });
+    }
+    let mut seen = BTreeSet::new();
+    for name in plan.outputs.iter().map(|output| dialect.output_name(&output.name)) {
+        // Some engines fold the case of names without quotes.
+        if !seen.insert(name.to_lowercase()) {
+            return Err(LoweringError::SameName { name });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metric::columns::{Column, Columns, Level, Type};
+    use crate::metric::definitions::Definitions;
+
+    fn plan(text: &str) -> Plan {
+        let columns = [
+            ("action", Type::Text, Level::Step),
+            ("mirror_visible", Type::Bool, Level::Step),
+            ("pose_x", Type::Float, Level::Step),
+            ("grip force", Type::Int, Level::Step),
+            ("body_color", Type::Text, Level::Episode),
+        ];
+        let columns: Columns = columns.map(|(name, ty, level)| (name, Column { ty, level })).into_iter().collect();
+        Definitions::from_toml("test", text, &columns).unwrap().plan
+    }
+
+    fn metric(value: &str) -> Plan {
+        plan(&format!("[metric.M]\nvalue = \"{value}\""))
+    }
+
+    #[test]
+    fn each_aggregate_stands_in_the_first_stage_that_knows_what_it_reads() {
+        let plan = plan(
+            r#"
+            [let]
+            done = "first(action = 'done')"
+            [metric.SEEN]
+            value = "any(mirror_visible and t < coalesce(done, length()))"
+            [metric.X-Y]
+            value = "count(pose_x > 1)"
+            when = "SEEN = 1 and body_color <> 'it''s'"
+            "#,
+        );
+        insta::assert_snapshot!(lower(&plan, Dialect::Portable).unwrap());
+    }
+
+    #[test]
+    fn what_a_dialect_cannot_say_is_refused_by_name() {
+        let pattern = metric("any(regexp_like(action, 'd.n[e]'))");
+        assert_eq!(lower(&pattern, Dialect::Portable), Err(LoweringError::Regexp { metric: "M".into() }));
+        assert!(lower(&pattern, Dialect::Duckdb).unwrap().contains("regexp_matches(s.action, 'd.n[e]')"));
+        let odd = metric(r#"max(\"grip force\")"#);
+        assert_eq!(lower(&odd, Dialect::Portable), Err(LoweringError::Name { name: "grip force".into() }));
+        assert!(lower(&odd, Dialect::Spark).unwrap().contains("MAX(s.`grip force`)"));
+        let same = plan("[metric.A-B]\nvalue = \"length()\"\n[metric.a_b]\nvalue = \"1\"");
+        assert_eq!(lower(&same, Dialect::Portable), Err(LoweringError::SameName { name: "a_b".into() }));
+    }
+
+    #[test]
+    fn texts_cannot_leave_their_quotes() {
+        let quoted = metric(r"any(action = 'a\\'' or 1=1 --')");
+        assert!(lower(&quoted, Dialect::Portable).unwrap().contains(r"'a\'' or 1=1 --'"));
+        assert!(lower(&quoted, Dialect::Spark).unwrap().contains(r"'a\\\' or 1=1 --'"));
+    }
+}

@@ -2,10 +2,16 @@
 
 mod author;
 mod by_hand;
+mod changes;
+mod definitions;
+#[cfg(feature = "polars")]
+mod differential;
 mod expressions;
 mod interpreter;
 mod language;
 mod layouts;
 mod plain_loop;
+#[cfg(feature = "polars")]
+mod query;
 mod random;
 mod traces;

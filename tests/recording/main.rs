@@ -1,0 +1,8 @@
+//! Episodes as they come about: the world, recordings, their logs, and recorded episodes again.
+
+#![cfg(feature = "sim")]
+
+mod log;
+mod record;
+mod replay;
+mod world;

@@ -1,0 +1,10 @@
+//! Traces: written, imported, read, checked, damaged.
+
+mod damaged;
+mod import;
+mod renormalize;
+mod trace_bytes;
+mod trace_commands;
+mod trace_scan;
+mod trace_validate;
+mod trace_write;

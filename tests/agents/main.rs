@@ -16,6 +16,8 @@
 mod calibration;
 #[cfg(all(feature = "sim", unix))]
 mod exec;
+#[path = "../harness/mod.rs"]
+mod harness;
 #[cfg(feature = "sim")]
 mod painted;
 #[cfg(feature = "sim")]

@@ -1,18 +1,16 @@
 //! The folder of a report over an older one: the old one whole or the new one whole, and nothing of others is touched.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use mirrorstats::base::hash;
 use serde_json::{Value, json};
 
-use super::{contents, run, two_files};
-
-type Contents = BTreeMap<String, Vec<u8>>;
+use crate::harness::files::Contents;
+use crate::{contents, program, run, two_files};
 
 /// The files of others.
 const FOREIGN: [(&str, &str); 4] =
@@ -132,8 +130,8 @@ fn a_manifest_of_something_else_lists_nothing_to_remove() {
 
 /// A report that is killed after a while; whether it was done before.
 fn killed_after(folder: &Path, words: &[&str], pause: Duration) -> bool {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-    command.current_dir(folder).args(["report", "--out", "out"]).args(words);
+    let mut command = program(folder);
+    command.args(["report", "--out", "out"]).args(words);
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     std::thread::sleep(pause);
     drop(child.kill());

@@ -2,6 +2,8 @@
 
 #![cfg(feature = "sim")]
 
+#[path = "../harness/mod.rs"]
+mod harness;
 mod log;
 mod record;
 mod replay;

@@ -2,6 +2,8 @@
 
 #[cfg(feature = "raster")]
 mod figures;
+#[path = "../harness/mod.rs"]
+mod harness;
 mod html;
 mod reconstruction;
 mod report;

@@ -8,10 +8,11 @@ mod rebuilt;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use mirrorstats::trace::episode::{Action, Episode, Step};
+
+use crate::harness::files::fixture;
 
 use rebuilt::errata::ERRATA;
 use rebuilt::files::{self, Trace};
@@ -22,10 +23,6 @@ static TRACES: LazyLock<Vec<Trace>> = LazyLock::new(|| files::traces().unwrap())
 
 fn episodes() -> impl Iterator<Item = &'static Episode> {
     TRACES.iter().flat_map(|trace| &trace.episodes)
-}
-
-fn fixture() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/paper")
 }
 
 /// What an episode's rows say, with t from 1.
@@ -222,7 +219,7 @@ fn the_solver_finds_exactly_the_known_contradictions() {
 
 #[test]
 fn the_committed_traces_are_what_the_generator_makes() {
-    let differences = files::differences(&fixture(), &TRACES).unwrap();
+    let differences = files::differences(&fixture("paper"), &TRACES).unwrap();
     assert!(
         differences.is_empty(),
         "run `cargo run --example reconstruct -- fixtures/paper`:\n{}",
@@ -256,7 +253,7 @@ fn the_fixture_is_the_grid_of_the_study() {
         assert_eq!(places, grid, "{}", trace.name);
         assert_eq!(trace.recording["kind"], "reconstruction", "{}", trace.name);
     }
-    let size: u64 = TRACES.iter().map(|trace| fs::metadata(fixture().join(&trace.name)).unwrap().len()).sum();
+    let size: u64 = TRACES.iter().map(|trace| fs::metadata(fixture("paper").join(&trace.name)).unwrap().len()).sum();
     assert!(size < 2_000_000, "{size} bytes");
 }
 

@@ -7,6 +7,8 @@ mod definitions;
 #[cfg(feature = "polars")]
 mod differential;
 mod expressions;
+#[path = "../harness/mod.rs"]
+mod harness;
 mod interpreter;
 mod language;
 mod layouts;

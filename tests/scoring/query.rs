@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use assert_cmd::Command;
+use crate::harness::files::repository;
+use crate::harness::program::{self, Answer};
 
 const FIXTURE: &str = "fixtures/paper";
 
 /// Exit code, standard output and standard error of the program.
 fn run(arguments: &[&str]) -> (i32, String, String) {
-    let output = Command::cargo_bin("mirrorstats").unwrap().args(arguments).output().unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    let Answer { code, stdout, stderr } = program::run(&repository(), arguments);
+    (code, stdout, stderr)
 }
 
 fn rows(query: &str) -> String {

@@ -3,21 +3,23 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::num::NonZeroUsize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use assert_cmd::Command;
 use mirrorstats::trace::finding::{Code, Severity, TraceError};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::scan::Projection;
 use mirrorstats::trace::schema;
 
+use crate::harness::files::fixture;
+use crate::harness::program::{answer, program, run};
+
 #[path = "../../examples/damage.rs"]
 #[expect(dead_code, reason = "an example's main is of no use here")]
 mod damage;
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/damaged")
+    fixture("damaged")
 }
 
 /// The codes of the README's table with their files; a pair has one code.
@@ -56,13 +58,11 @@ fn every_code_of_damage_has_its_file() {
 #[test]
 fn validate_names_the_damage() {
     for (case, files) in cases() {
-        let mut command = Command::cargo_bin("mirrorstats").unwrap();
-        command.current_dir(folder()).args(["validate", "--json"]).args(files.iter().map(|(name, _)| name));
-        let output = command.output().unwrap();
-        let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let mut command = program(&folder());
+        let answer = answer(command.args(["validate", "--json"]).args(files.iter().map(|(name, _)| name)));
+        let report: serde_json::Value = serde_json::from_str(&answer.stdout).unwrap();
         let code = &files[0].1;
-        assert_eq!(output.status.code(), Some(1), "{case}");
-        assert!(output.stderr.is_empty(), "{case}: {}", String::from_utf8_lossy(&output.stderr));
+        assert_eq!((answer.code, answer.stderr.as_str()), (1, ""), "{case}");
         let found: Vec<_> = report["findings"].as_array().unwrap().iter().map(|finding| &finding["code"]).collect();
         assert!(!found.is_empty() && found.iter().all(|found| *found == code), "{case}: {found:?}");
     }
@@ -100,9 +100,9 @@ fn a_scan_refuses_all_of_them() {
 
 #[test]
 fn one_damaged_file_does_not_hide_the_others() {
-    let mut command = Command::cargo_bin("mirrorstats").unwrap();
-    command.current_dir(folder()).args(["validate", "--json", "truncated.parquet", "t-gap.parquet", "empty.parquet"]);
-    let report: serde_json::Value = serde_json::from_slice(&command.output().unwrap().stdout).unwrap();
+    let files = ["truncated.parquet", "t-gap.parquet", "empty.parquet"];
+    let answer = run(&folder(), &[&["validate", "--json"][..], &files].concat());
+    let report: serde_json::Value = serde_json::from_str(&answer.stdout).unwrap();
     let findings = report["findings"].as_array().unwrap();
     let pairs: Vec<_> = findings.iter().map(|f| (f["file"].as_str().unwrap(), f["code"].as_str().unwrap())).collect();
     let expected = [("empty.parquet", "empty-file"), ("t-gap.parquet", "t-gap"), ("truncated.parquet", "truncated")];

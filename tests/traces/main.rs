@@ -1,6 +1,8 @@
 //! Traces: written, imported, read, checked, damaged.
 
 mod damaged;
+#[path = "../harness/mod.rs"]
+mod harness;
 mod import;
 mod renormalize;
 mod trace_bytes;

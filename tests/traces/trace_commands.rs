@@ -3,12 +3,15 @@
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use mirrorstats::trace::finding::Code;
 use mirrorstats::trace::schema::COLUMNS;
 use mirrorstats::trace::write::write_episodes;
 use serde_json::{Value, json};
+
+use crate::harness::files::repository;
+use crate::harness::program::{Answer, run_with_input};
+use crate::harness::traces;
 
 /// An episode with a value in every column of the schema.
 fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
@@ -44,15 +47,13 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         extra,
     };
     Episode {
-        episode_id: format!("{experiment}-{model}-{seed}-{run}"),
         model: model.into(),
         experiment: experiment.into(),
         seed,
         run,
-        body_color: "red".into(),
         stated_color: Some("blue".into()),
         distractors: Some(2),
-        steps: vec![step; 3],
+        ..traces::episode(&format!("{experiment}-{model}-{seed}-{run}"), vec![step; 3])
     }
 }
 
@@ -73,10 +74,8 @@ fn folder() -> tempfile::TempDir {
 
 /// Exit code, standard output and standard error.
 fn run(folder: &Path, arguments: &[&str], input: &str) -> (i32, String, String) {
-    let mut command = Command::cargo_bin("mirrorstats").unwrap();
-    let output = command.current_dir(folder).args(arguments).write_stdin(input).output().unwrap();
-    let text = |bytes| String::from_utf8(bytes).unwrap();
-    (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    let Answer { code, stdout, stderr } = run_with_input(folder, arguments, input);
+    (code, stdout, stderr)
 }
 
 #[test]
@@ -182,5 +181,5 @@ fn schema_prints_every_column_and_rule() {
 }
 
 fn kept(name: &str) -> String {
-    fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("schemas").join(name)).unwrap()
+    fs::read_to_string(repository().join("schemas").join(name)).unwrap()
 }

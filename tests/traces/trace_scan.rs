@@ -1,6 +1,5 @@
 //! The scan: what it delivers, however the rows are laid out, and what it refuses.
 
-use std::fs::File;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,9 +14,10 @@ use mirrorstats::trace::finding::{Code, TraceError};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::scan::{EpisodeBatch, Projection};
-use parquet::arrow::ArrowWriter;
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
+
+use crate::harness::traces::write_rows;
 
 /// One row, as plain values.
 #[derive(Clone, Debug, PartialEq)]
@@ -100,12 +100,7 @@ fn write(path: &Path, groups: &[RecordBatch]) -> Input {
 /// Writes a file with these row groups, columns as keys as long as their distinct values take no more bytes than that.
 fn write_keyed(path: &Path, groups: &[RecordBatch], bytes: usize) -> Input {
     let properties = WriterProperties::builder().set_dictionary_page_size_limit(bytes).build();
-    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), groups[0].schema(), Some(properties)).unwrap();
-    for group in groups {
-        writer.write(group).unwrap();
-        writer.flush().unwrap();
-    }
-    writer.close().unwrap();
+    write_rows(path, groups, Some(properties));
     Input::new(path)
 }
 

@@ -1,6 +1,5 @@
 //! Validation reports all that is wrong, in the order of files and rows, and counts what it checked.
 
-use std::fs::File;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::Arc;
@@ -12,31 +11,17 @@ use mirrorstats::trace::episode::{Action, Episode, Step};
 use mirrorstats::trace::finding::{Code, Severity};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::validate::{Validation, validate};
-use mirrorstats::trace::write::{TraceEncoder, TraceMetadata};
-use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use mirrorstats::trace::write::OptionalColumns;
+
+use crate::harness::traces;
 
 /// Two episodes of four steps, as rows.
 fn sound(folder: &Path) -> RecordBatch {
-    let episode = |id: &str, run| Episode {
-        episode_id: id.into(),
-        model: "m".into(),
-        experiment: "E1".into(),
-        seed: 1,
-        run,
-        body_color: "red".into(),
-        stated_color: None,
-        distractors: None,
-        steps: vec![Step { action: Some(Action::Done), ..Step::default() }; 4],
-    };
+    let steps = vec![Step { action: Some(Action::Done), ..Step::default() }; 4];
+    let episode = |(id, run)| Episode { run, ..traces::episode(id, steps.clone()) };
     let path = folder.join("sound.parquet");
-    let mut encoder = TraceEncoder::new(File::create(&path).unwrap(), &TraceMetadata::default()).unwrap();
-    for (id, run) in [("a", 1), ("b", 2)] {
-        encoder.write(&episode(id, run)).unwrap();
-    }
-    encoder.finish().unwrap();
-    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(&path).unwrap()).unwrap();
-    reader.build().unwrap().next().unwrap().unwrap()
+    traces::write_trace(&path, &[("a", 1), ("b", 2)].map(episode), OptionalColumns::NONE);
+    traces::rows(&path)
 }
 
 fn with(rows: &RecordBatch, name: &str, values: impl Into<ArrayRef>) -> RecordBatch {
@@ -59,12 +44,7 @@ fn ints<const N: usize>(values: [i64; N]) -> ArrayRef {
 /// What validation says of one file of these row groups; the same for any number of threads.
 fn check(folder: &Path, row_groups: &[RecordBatch], experiments: Option<&[String]>) -> Validation {
     let input = Input::new(folder.join("checked.parquet"));
-    let mut writer = ArrowWriter::try_new(File::create(&input.path).unwrap(), row_groups[0].schema(), None).unwrap();
-    for rows in row_groups {
-        writer.write(rows).unwrap();
-        writer.flush().unwrap();
-    }
-    writer.close().unwrap();
+    traces::write_rows(&input.path, row_groups, None);
     let [one, many] = [1, 8].map(|threads| {
         validate(std::slice::from_ref(&input), experiments, NonZeroUsize::new(threads).unwrap()).unwrap()
     });

@@ -10,18 +10,10 @@ use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, Tr
 use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
+use crate::harness::traces;
+
 fn episode(id: &str, steps: usize) -> Episode {
-    Episode {
-        episode_id: id.into(),
-        model: "m".into(),
-        experiment: "E1".into(),
-        seed: 1,
-        run: 2,
-        body_color: "red".into(),
-        stated_color: None,
-        distractors: None,
-        steps: (0..steps).map(|_| Step { action: Some(Action::TurnLeft), ..Step::default() }).collect(),
-    }
+    traces::episode(id, vec![Step { action: Some(Action::TurnLeft), ..Step::default() }; steps])
 }
 
 fn with_extra(mut episode: Episode, extra: Extra) -> Episode {

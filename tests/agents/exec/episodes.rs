@@ -1,7 +1,6 @@
 //! Programs that behave: what they are told, and what their replies become.
 
 use std::collections::BTreeSet;
-use std::process::Command;
 
 use base64::Engine as _;
 use mirrorstats::agent::exec::message::Message;
@@ -10,10 +9,12 @@ use schemars::schema_for;
 use serde_json::Value;
 
 use super::recordings::{Bench, FORWARD, done, outcome, three_steps};
+use crate::harness::files::repository;
+use crate::harness::need;
 
 #[test]
 fn a_program_is_told_its_task_each_observation_and_the_end() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program(&format!("echo '{FORWARD}'"));
     let output = bench.record(&["--experiment", "E3", "--model", "My Agent"]).output().unwrap();
     let (code, answer, said) = outcome(&output);
@@ -49,7 +50,7 @@ fn a_program_is_told_its_task_each_observation_and_the_end() {
 
 #[test]
 fn nothing_of_the_truth_is_told() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program(&three_steps());
     outcome(&bench.record(&["--runs", "2", "--threads", "1"]).output().unwrap());
     let body = bench.texts("runs/E1-exec.parquet", "body_color")[0].clone().unwrap();
@@ -70,7 +71,7 @@ fn nothing_of_the_truth_is_told() {
 
 #[test]
 fn frames_come_as_files_for_as_long_as_the_episode_or_in_the_line() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     // Every frame so far is still there at the last step.
     bench.program(&format!(
         "path=${{line##*'\"path\":\"'}}; path=${{path%%'\"'*}}; [ $n = 3 ] && cat \"${{path%/*}}\"/*.png > frames; {}",
@@ -94,7 +95,7 @@ fn frames_come_as_files_for_as_long_as_the_episode_or_in_the_line() {
 
 #[test]
 fn every_message_is_of_the_schema() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program(&three_steps());
     outcome(&bench.record(&[]).output().unwrap());
     let schema = schema_for!(Message).to_value();
@@ -114,7 +115,7 @@ fn every_message_is_of_the_schema() {
 
 #[test]
 fn replies_are_read_as_those_of_a_model() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     let done = done();
     // Text around the object is repaired, words alone are no decision; `done` ends the episode.
     bench.program(&format!("case $n in 1) echo 'Sure: {FORWARD}' ;; 2) echo 'I go on.' ;; *) echo '{done}' ;; esac"));
@@ -132,7 +133,7 @@ fn replies_are_read_as_those_of_a_model() {
 
 #[test]
 fn other_broken_replies_are_steps_without_a_decision() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program(&format!(
         "case $n in 1) echo ;; 2) echo '{}' ;; 3) printf '\\377\\n' ;; *) printf '%s\\r\\n' '{}' ;; esac",
         FORWARD.replace("\"w\"", "\"jump\""),
@@ -147,13 +148,9 @@ fn other_broken_replies_are_steps_without_a_decision() {
 
 #[test]
 fn the_example_in_python_plays() {
-    let Some(bench) = Bench::new() else { return };
-    if Command::new("python3").arg("--version").output().is_err() {
-        eprintln!("skipped: there is no python3");
-        return;
-    }
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/agents/agent.py");
-    let agent = format!("exec:python3 '{script}'");
+    let bench = Bench::new();
+    let script = repository().join("examples/agents/agent.py");
+    let agent = format!("exec:{} '{}'", need::python(), script.display());
     let (code, answer, said) = outcome(&bench.record_of(&agent, &["--experiment", "E1,E5"]).output().unwrap());
     assert_eq!((code, &answer["recorded"], &answer["steps"]), (Some(0), &2.into(), &40.into()), "{said}");
     for trace in ["runs/E1-exec.parquet", "runs/E5-exec.parquet"] {
@@ -163,7 +160,7 @@ fn the_example_in_python_plays() {
 
 #[test]
 fn replies_of_a_program_that_cannot_be_read_are_told() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program("printf 'I go \\033[31mon.\\n'");
     let output = bench.record(&[]).output().unwrap();
     let (code, answer, said) = outcome(&output);

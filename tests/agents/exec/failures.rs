@@ -1,13 +1,13 @@
 //! Programs that fail: their episode is lost, named, counted, and recorded by the same command later.
 
-use std::process::Command;
 use std::time::Instant;
 
 use super::recordings::{Bench, FORWARD, done, outcome, three_steps};
+use crate::harness::program::run;
 
 /// That a program which does this at its second observation loses its episode, for a reason with these words.
 fn loses(answer: &str, words: &[&str], expected: &[&str]) {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program(&format!("if [ $n = 1 ]; then echo '{FORWARD}'; else {answer}; fi"));
     let (code, found, said) = outcome(&bench.record(words).output().unwrap());
     assert_eq!((code, &found["recorded"]), (Some(1), &0.into()), "{answer}: {said}");
@@ -46,7 +46,7 @@ fn a_program_that_hangs_is_ended_in_time() {
 #[test]
 fn a_program_that_closes_its_output() {
     // The shell is replaced, or it would hold the output open.
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program("exec >&-; sleep 600");
     let (code, found, said) = outcome(&bench.record_of("exec:exec sh program.sh", &[]).output().unwrap());
     assert_eq!(code, Some(1), "{said}");
@@ -62,7 +62,7 @@ fn a_line_without_end() {
 #[test]
 fn a_program_that_talks_out_of_turn() {
     // Two lines for one observation: the second would be taken for the answer to the next.
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program(&format!("printf '%s\\n%s\\n' '{FORWARD}' 'loading the model'"));
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(1), "{said}");
@@ -72,7 +72,7 @@ fn a_program_that_talks_out_of_turn() {
 
 #[test]
 fn a_command_that_is_none_ends_the_recording_at_once() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     let command = bench.record_of("exec:no-such-program --fast", &["--runs", "9", "--threads", "1"]).output().unwrap();
     let (code, _, said) = outcome(&command);
     assert_eq!(code, Some(2), "{said}");
@@ -85,7 +85,7 @@ fn a_command_that_is_none_ends_the_recording_at_once() {
 
 #[test]
 fn another_command_is_another_agent() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program(&three_steps());
     assert_eq!(outcome(&bench.record(&[]).output().unwrap()).0, Some(0));
     let (code, _, said) = outcome(&bench.record_of("exec:sh ./program.sh", &["--runs", "2"]).output().unwrap());
@@ -95,7 +95,7 @@ fn another_command_is_another_agent() {
 
 #[test]
 fn no_key_of_the_environment_is_kept_of_what_a_program_says() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     let key = "sk-loopback-0123456789";
     let said_back = |reply: &str| reply.replace("went on", "'\"$MY_API_KEY\"'");
     for (third, expected) in
@@ -116,7 +116,7 @@ fn no_key_of_the_environment_is_kept_of_what_a_program_says() {
 
 #[test]
 fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     // Of four episodes those that find the name of another one fail.
     let fails = |runs: &str| {
         format!(
@@ -134,10 +134,8 @@ fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     let first = &bench.lost()[0];
     assert_eq!((&first["episode_id"], &first["status"]), (&"E1/exec/s1/r2".into(), &"server_error".into()));
 
-    let mut report = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-    let report = report.current_dir(bench.folder.path()).args(["validate", "runs", "--json"]).output().unwrap();
-    let validation = String::from_utf8_lossy(&report.stdout).into_owned();
-    assert!(report.status.success() && !validation.contains("lost.jsonl"), "{validation}");
+    let validation = run(bench.folder.path(), &["validate", "runs", "--json"]).done();
+    assert!(!validation.contains("lost.jsonl"), "{validation}");
 
     // One of them is recorded, another is lost again; a run that asks for neither leaves the list as it is.
     bench.program(&fails("4"));

@@ -1,23 +1,20 @@
 //! Programs as processes: one an episode, and none of them is there afterwards.
 
 use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::thread::sleep;
 use std::time::Duration;
 
 use super::recordings::{Bench, outcome, three_steps};
+use crate::harness::program::{interrupt, wait_for};
 
 /// Waits until a file has so many lines, and gives them.
 fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
-    for _ in 0..12_000 {
+    wait_for(name, || {
         let text = fs::read_to_string(bench.path(name)).unwrap_or_default();
         let lines: Vec<String> = text.lines().map(str::to_owned).collect();
-        if lines.len() >= count && text.ends_with('\n') {
-            return lines;
-        }
-        sleep(Duration::from_millis(5));
-    }
-    panic!("{name} does not get its {count} lines");
+        (lines.len() >= count && text.ends_with('\n')).then_some(lines)
+    })
 }
 
 /// Waits until no process of these ids is there, or only one that waits to be collected.
@@ -35,7 +32,7 @@ fn are_gone(ids: &[String]) -> bool {
 
 #[test]
 fn each_episode_has_a_process_of_its_own() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     bench.program(&format!("echo $$ >> ids; {}", three_steps()));
     let words = ["--runs", "5", "--in-flight", "5", "--threads", "2"];
     let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
@@ -49,7 +46,7 @@ fn each_episode_has_a_process_of_its_own() {
 
 #[test]
 fn in_flight_is_how_many_run_at_once() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     // A program that is alone makes a folder; a second one at the same time finds it there.
     let lock = "[ $n = 1 ] && { mkdir alone || exit 9; }; [ $n = 3 ] && rmdir alone";
     bench.program(&format!("{lock}; {}", three_steps()));
@@ -60,7 +57,7 @@ fn in_flight_is_how_many_run_at_once() {
 
 #[test]
 fn what_a_program_starts_ends_with_it() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     // It leaves at the end, and a child of it would stay and hold its streams.
     bench.program(&format!("[ $n = 1 ] && {{ sleep 600 & echo $! >> ids; }}; {}", three_steps()));
     let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
@@ -70,7 +67,7 @@ fn what_a_program_starts_ends_with_it() {
 
 #[test]
 fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     for times in [1, 2] {
         let _ = fs::remove_file(bench.path("ids"));
         // The first time it answers after the interrupt, the second time never.
@@ -83,8 +80,7 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let ids = lines(&bench, "ids", 2);
         for _ in 0..times {
-            let told = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
-            assert!(told.success());
+            interrupt(&child);
             sleep(Duration::from_millis(100));
         }
         fs::write(bench.path("go"), "").unwrap();
@@ -100,7 +96,7 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
 
 #[test]
 fn frames_of_a_recording_that_was_killed_are_cleared_away() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     // It hears of the end of the recording by the end of its input.
     bench.program("echo $$ >> ids; cat > rest");
     let mut child = bench.record(&[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();

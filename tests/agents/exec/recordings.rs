@@ -1,19 +1,15 @@
 //! Recordings of programs in a small world with short episodes.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Output};
 
-use arrow::array::{AsArray as _, RecordBatch};
-use arrow::compute::concat_batches;
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::eye::Eye;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// The world seen through a smaller eye, in episodes that are as short as its rooms allow.
-const SMALL: &str = "eye.width = 64\neye.height_px = 48\neye.samples = 0\nepisode.steps = 20\n";
+use crate::harness::files::write_small_world;
+use crate::harness::program::{program, stderr};
+use crate::harness::{need, traces};
 
 /// A reply that moves forward, as the shell writes it.
 pub const FORWARD: &str = r#"{"view-description":"a wall","reasoning":"go on","action":"w","summary":"went on","selected_cube":"none","identification":"I am red"}"#;
@@ -34,16 +30,12 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// `None`, said on standard error, where the machine cannot draw.
-    pub fn new() -> Option<Self> {
-        let config = WorldConfig::from_toml(SMALL).unwrap();
-        if let Err(error) = Eye::new(&config) {
-            eprintln!("skipped: {error}");
-            return None;
-        }
+    /// Episodes are as short as their rooms allow; a program is given frames, so that they must be drawn.
+    pub fn new() -> Self {
+        need::drawing();
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("small.toml"), SMALL).unwrap();
-        Some(Self { folder })
+        write_small_world(folder.path(), "episode.steps = 20\n");
+        Self { folder }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
@@ -65,8 +57,8 @@ impl Bench {
     }
 
     pub fn record_of(&self, agent: &str, words: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-        command.current_dir(self.folder.path()).args(["record", "--config", "small.toml"]);
+        let mut command = program(self.folder.path());
+        command.args(["record", "--config", "small.toml"]);
         if !words.contains(&"--out") {
             command.args(["--out", "runs"]);
         }
@@ -82,29 +74,22 @@ impl Bench {
 
     /// The lines that programs got, in the order of their coming.
     pub fn heard(&self) -> Vec<Value> {
-        let text = fs::read_to_string(self.path("heard.jsonl")).unwrap_or_default();
-        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
+        self.lines("heard.jsonl")
     }
 
     /// The list of lost episodes.
     pub fn lost(&self) -> Vec<Value> {
-        let text = fs::read_to_string(self.path("runs/lost.jsonl")).unwrap_or_default();
+        self.lines("runs/lost.jsonl")
+    }
+
+    fn lines(&self, name: &str) -> Vec<Value> {
+        let text = fs::read_to_string(self.path(name)).unwrap_or_default();
         text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 
-    /// The rows of a trace.
-    pub fn rows(&self, name: &str) -> RecordBatch {
-        let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(self.path(name)).unwrap()).unwrap();
-        let batches: Vec<_> = reader.build().unwrap().map(Result::unwrap).collect();
-        concat_batches(&batches[0].schema(), &batches).unwrap()
-    }
-
-    /// A column of text, null as `None`.
+    /// A column of text of a trace, null as `None`.
     pub fn texts(&self, name: &str, column: &str) -> Vec<Option<String>> {
-        let rows = self.rows(name);
-        let texts = rows.column_by_name(column).unwrap_or_else(|| panic!("no column {column}"));
-        let texts = arrow::compute::cast(texts, &arrow::datatypes::DataType::Utf8).unwrap();
-        texts.as_string::<i32>().iter().map(|text| text.map(str::to_owned)).collect()
+        traces::texts(&self.path(name), column)
     }
 
     /// What stays of a recording besides its traces.
@@ -118,5 +103,5 @@ impl Bench {
 /// The exit code, the answer of `--json`, and what was said.
 pub fn outcome(output: &Output) -> (Option<i32>, Value, String) {
     let answer = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
-    (output.status.code(), answer, String::from_utf8_lossy(&output.stderr).into_owned())
+    (output.status.code(), answer, stderr(output))
 }

@@ -1,55 +1,29 @@
 //! A model behind a server on loopback, from the command line: what was spent is told, and a failing server loses an
 //! episode under the name of its failure.
 
-use std::io::{BufRead as _, BufReader, Read as _, Write as _};
-use std::net::TcpListener;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use serde_json::{Value, json};
+use mirrorstats::agent::vlm::dialect::Dialect;
+use serde_json::Value;
 
 use super::recordings::{Bench, FORWARD, done, outcome};
+use crate::vlm::server::{JSON, Server, http, spoken};
 
-/// A server whose n-th answer, from 1, is this status and reply.
-fn serve(script: impl Fn(usize) -> (u16, String) + Send + 'static) -> String {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = format!("http://{}/v1", listener.local_addr().unwrap());
-    let count = AtomicUsize::new(0);
-    std::thread::spawn(move || {
-        for mut stream in listener.incoming().flatten() {
-            let mut reader = BufReader::new(stream.try_clone().unwrap());
-            let (mut line, mut length) = (String::new(), 0);
-            while reader.read_line(&mut line).unwrap_or(0) > 2 {
-                if let Some(value) = line.to_ascii_lowercase().strip_prefix("content-length:") {
-                    length = value.trim().parse().unwrap();
-                }
-                line.clear();
-            }
-            std::io::copy(&mut reader.take(length), &mut std::io::sink()).unwrap();
-            let (status, text) = script(count.fetch_add(1, Ordering::SeqCst) + 1);
-            let body = json!({
-                "choices": [{ "index": 0, "finish_reason": "stop", "message": { "role": "assistant", "content": text } }],
-                "usage": { "prompt_tokens": 1000, "completion_tokens": 100 },
-            })
-            .to_string();
-            let head = format!("HTTP/1.1 {status} X\r\nconnection: close\r\ncontent-type: application/json\r\n");
-            let _ = write!(stream, "{head}content-length: {}\r\n\r\n{body}", body.len());
-        }
-    });
-    address
+/// An answer with this status and reply.
+fn answer(status: &str, reply: &str) -> Vec<u8> {
+    http(status, JSON, spoken(Dialect::OpenaiCompatible, reply, "stop").to_string().as_bytes())
 }
 
 #[test]
 fn what_was_spent_is_told_over_all_starts() {
-    let Some(bench) = Bench::new() else { return };
+    let bench = Bench::new();
     let model = "[model.Loop]\nbackend = \"compatible\"\nid = \"m\"\nprices = { input = 1.0, output = 10.0 }\n";
     std::fs::write(bench.path("models.toml"), model).unwrap();
     // The second request fails, the fourth is answered with `done`.
-    let address = serve(|n| match n {
-        2 => (500, String::new()),
-        4 => (200, done()),
-        _ => (200, FORWARD.to_owned()),
+    let server = Server::start(|at, _| match at {
+        1 => answer("500 Internal Server Error", ""),
+        3 => answer("200 OK", &done()),
+        _ => answer("200 OK", FORWARD),
     });
-    let words = ["--model", "Loop", "--models", "models.toml", "--base-url", &address, "--attempts", "1"];
+    let words = ["--model", "Loop", "--models", "models.toml", "--base-url", &server.address, "--attempts", "1"];
     let (code, answer, said) = outcome(&bench.record_of("vlm", &words).output().unwrap());
     assert_eq!((code, &answer["recorded"]), (Some(1), &0.into()), "{said}");
     let lost = &answer["lost"][0];

@@ -9,8 +9,9 @@ use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
 
 use super::bench::{Bench, KEY};
-use super::recordings::{Folder, stderr};
+use super::recordings::Folder;
 use super::server::{JSON, Server, decision, http, whole};
+use crate::harness::program::stderr;
 
 #[test]
 fn no_key_is_in_anything_that_is_kept_or_told() {

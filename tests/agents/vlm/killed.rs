@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -10,8 +10,9 @@ use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::journal::Entry;
 use mirrorstats::base::hash;
 
-use super::recordings::{Folder, counting, stderr};
+use super::recordings::{Folder, counting};
 use super::server::{JSON, Request, Server, http, whole};
+use crate::harness::program::{run, stderr};
 
 const STEPS: u32 = 4;
 
@@ -96,10 +97,8 @@ impl Study {
 
     /// The identifiers of the episodes in the traces.
     fn episodes(&self) -> Vec<String> {
-        let mut score = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-        let output = score.current_dir(self.folder.path()).args(["score", "runs"]).output().unwrap();
-        assert!(output.status.success(), "{}", stderr(&output));
-        let mut rows = csv::Reader::from_reader(output.stdout.as_slice());
+        let scores = run(self.folder.path(), &["score", "runs"]).done();
+        let mut rows = csv::Reader::from_reader(scores.as_bytes());
         let id = rows.headers().unwrap().iter().position(|header| header == "episode_id").unwrap();
         rows.records().map(|row| row.unwrap()[id].to_owned()).collect()
     }

@@ -1,7 +1,6 @@
 //! Each provider is asked in its own language, and is told no more than the paper's prompt tells.
 
 use std::collections::BTreeSet;
-use std::process::Command;
 
 use mirrorstats::agent::vlm::OnOutage;
 use mirrorstats::agent::vlm::dialect::Dialect;
@@ -11,8 +10,9 @@ use mirrorstats::trace::episode::Action;
 use serde_json::Value;
 
 use super::bench::{Bench, KEY};
-use super::recordings::{Folder, stderr};
+use super::recordings::Folder;
 use super::server::{Request, Server, decision, whole};
+use crate::harness::program::{program, stderr};
 
 #[test]
 fn each_provider_is_asked_in_its_language() {
@@ -59,9 +59,18 @@ fn of_all_experiments(backend: &str, dialect: Dialect) -> Vec<Request> {
     let folder = Folder::new();
     let models = format!("[backend.own]\ndialect = \"{backend}\"\nkey = \"MIRRORSTATS_API_KEY\"\n");
     std::fs::write(folder.path().join("models.toml"), models).unwrap();
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-    command.current_dir(folder.path()).env("MIRRORSTATS_API_KEY", KEY);
-    command.args(["record", "--agent", "vlm", "--model", "model-1", "--models", "models.toml", "--backend", "own"]);
+    let mut command = program(folder.path());
+    command.env("MIRRORSTATS_API_KEY", KEY).args([
+        "record",
+        "--agent",
+        "vlm",
+        "--model",
+        "model-1",
+        "--models",
+        "models.toml",
+        "--backend",
+        "own",
+    ]);
     command.args(["--base-url", &server.address, "--experiment", "E1..E5", "--seeds", "1", "--runs", "1"]);
     let output = command.args(["--config", "small.toml", "--no-log"]).output().unwrap();
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));

@@ -7,7 +7,7 @@ mod languages;
 mod memory;
 mod recordings;
 mod refusals;
-mod server;
+pub mod server;
 mod spending;
 mod statuses;
 mod unreadable;

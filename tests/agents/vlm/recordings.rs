@@ -3,26 +3,25 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 
-use arrow::array::AsArray as _;
-use arrow::compute::cast;
-use arrow::datatypes::DataType;
 use mirrorstats::agent::vlm::journal::Entry;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use tempfile::TempDir;
 
 use super::bench::KEY;
 use super::server::{Request, Server, decision};
+use crate::harness::files::write_small_world;
+use crate::harness::program::program;
+use crate::harness::{need, traces};
 
 /// A folder to record in.
 pub struct Folder(TempDir);
 
 impl Folder {
     pub fn new() -> Self {
+        need::drawing();
         let folder = tempfile::tempdir().unwrap();
-        let world = "eye.width = 64\neye.height_px = 48\neye.samples = 0\n";
-        fs::write(folder.path().join("small.toml"), world).unwrap();
+        write_small_world(folder.path(), "");
         Self(folder)
     }
 
@@ -32,9 +31,8 @@ impl Folder {
 
     /// `record` of a model into `runs`, with these words added.
     pub fn record(&self, server: &Server, model: &str, words: &str) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-        command.current_dir(self.path()).env("MIRRORSTATS_API_KEY", KEY);
-        command.args(["record", "--agent", "vlm", "--model", model]);
+        let mut command = program(self.path());
+        command.env("MIRRORSTATS_API_KEY", KEY).args(["record", "--agent", "vlm", "--model", model]);
         if !words.contains("--base-url") {
             command.args(["--base-url", &server.address]);
         }
@@ -65,16 +63,6 @@ pub fn counting(request: &Request, last: u32, mark: usize) -> String {
 
 /// The column `reply_status` of the trace of E1 in this folder.
 pub fn rows(folder: &Folder, runs: &str) -> Vec<String> {
-    let file = fs::File::open(folder.path().join(runs).join("E1-own.parquet")).unwrap();
-    let reader = ParquetRecordBatchReaderBuilder::try_new(file).unwrap().build().unwrap();
-    let mut statuses = Vec::new();
-    for batch in reader.map(Result::unwrap) {
-        let texts = cast(batch.column_by_name("reply_status").unwrap(), &DataType::Utf8).unwrap();
-        statuses.extend(texts.as_string::<i32>().iter().map(|text| text.unwrap().to_owned()));
-    }
-    statuses
-}
-
-pub fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    let statuses = traces::texts(&folder.path().join(runs).join("E1-own.parquet"), "reply_status");
+    statuses.into_iter().map(Option::unwrap).collect()
 }

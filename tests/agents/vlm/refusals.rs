@@ -9,8 +9,9 @@ use mirrorstats::agent::{Lost, Reply, Status};
 use serde_json::{Value, json};
 
 use super::bench::{Bench, KEY, choice};
-use super::recordings::{Folder, counting, rows, stderr};
+use super::recordings::{Folder, counting, rows};
 use super::server::{JSON, Server, decision, http, ok, whole};
+use crate::harness::program::stderr;
 
 const PROVIDERS: [Dialect; 4] =
     [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];

@@ -5,8 +5,9 @@ use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
 
 use super::bench::Bench;
-use super::recordings::{Folder, counting, stderr};
+use super::recordings::{Folder, counting};
 use super::server::{Server, decision, whole};
+use crate::harness::program::stderr;
 
 #[test]
 fn limits_stop_before_the_request_over_them() {

@@ -1,32 +1,24 @@
 //! Replies that cannot be read are told while they come, at the end, and of the trace that they leave.
 
-use std::fs;
-use std::process::Command;
-
 use mirrorstats::agent::vlm::dialect::Dialect;
 use serde_json::{Value, json};
 
 use super::bench::KEY;
-use super::recordings::{Folder, stderr};
+use super::recordings::Folder;
 use super::server::{Server, decision, ok, spoken, whole};
+use crate::harness::files::write_small_world;
+use crate::harness::program::{run, stderr};
 
 /// A folder whose episodes have 20 steps.
 fn short() -> Folder {
     let folder = Folder::new();
-    let world = "eye.width = 64\neye.height_px = 48\neye.samples = 0\nepisode.steps = 20\n";
-    fs::write(folder.path().join("small.toml"), world).unwrap();
+    write_small_world(folder.path(), "episode.steps = 20\n");
     folder
 }
 
 /// What a command says of the traces in `runs`, as text and as JSON.
 fn told(folder: &Folder, verb: &str) -> (String, Value) {
-    let run = |words: &[&str]| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-        let output = command.current_dir(folder.path()).arg(verb).arg("runs").args(words).output().unwrap();
-        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
-        String::from_utf8(output.stdout).unwrap()
-    };
-    (run(&[]), serde_json::from_str(&run(&["--json"])).unwrap())
+    (run(folder.path(), &[verb, "runs"]).done(), run(folder.path(), &[verb, "runs", "--json"]).json())
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! A log with other bytes than were written.
 
 use super::logs::{Desk, RECORDING, ids, json, recovered};
+use crate::harness::files::fixture;
 
 /// Every episode but one.
 fn all_but(lost: usize) -> Vec<String> {
@@ -101,8 +102,7 @@ fn a_value_that_changed_in_the_metadata_is_told() {
 
 #[test]
 fn the_episode_of_a_damaged_chunk_is_named_and_none_of_its_rows_is_believed() {
-    let bundled = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/recorded/E1-guesser.mcap");
-    let mut bytes = std::fs::read(bundled).unwrap();
+    let mut bytes = std::fs::read(fixture("recorded/E1-guesser.mcap")).unwrap();
     let before = ids(&recovered(&bytes));
     let index = mcap::Summary::read(&bytes).unwrap().unwrap().chunk_indexes;
     let chunk = index.iter().min_by_key(|chunk| chunk.chunk_start_offset).unwrap();

@@ -4,12 +4,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io::Cursor;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use mcap::records::{Metadata, op};
 use mirrorstats::log::{METADATA, METADATA_KEY};
 
-use super::logs::{RECORDING, ids, recovered};
+use super::logs::{RECORDING, SHORT, ids, recovered};
+use crate::harness::files::write_small_world;
+use crate::harness::program::{self, stderr};
 
 /// Of an opcode and a length.
 const FRAME: usize = 9;
@@ -157,12 +159,7 @@ fn damaged(log: &[u8], field: Field) -> Vec<(String, Vec<u8>)> {
 
 /// Runs the program with 512 MB of memory.
 fn limited(folder: &Path, words: &str) -> Output {
-    let script = format!("ulimit -v 524288; exec '{}' {words}", env!("CARGO_BIN_EXE_mirrorstats"));
-    Command::new("sh").current_dir(folder).args(["-c", &script]).output().unwrap()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
+    program::limited(folder, "ulimit -v 524288").args(words.split(' ')).output().unwrap()
 }
 
 /// The log of the recording with chunks that are not packed.
@@ -246,7 +243,7 @@ fn a_recording_is_not_continued_with_such_a_log() {
     let folder = tempfile::tempdir().unwrap();
     let runs = folder.path().join("runs");
     fs::create_dir(&runs).unwrap();
-    fs::write(folder.path().join("small.toml"), super::logs::SMALL).unwrap();
+    write_small_world(folder.path(), SHORT);
     fs::write(runs.join("E1-random.parquet"), &RECORDING.trace).unwrap();
     let words = "record --config small.toml --out runs --agent random --experiment E1 --seeds 1 --runs 4 --no-frames";
     for field in fields_of(&RECORDING.log) {
@@ -270,7 +267,7 @@ fn an_episode_that_waits_with_such_a_log_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let parts = folder.path().join("runs/.parts");
     fs::create_dir_all(&parts).unwrap();
-    fs::write(folder.path().join("small.toml"), super::logs::SMALL).unwrap();
+    write_small_world(folder.path(), SHORT);
     let words = "record --config small.toml --out runs --agent random --experiment E1 --seeds 1 --runs 3 --no-frames";
     fs::write(parts.join("E1-random-s1-r1.parquet"), one_episode()).unwrap();
     let chunk = fields_of(&RECORDING.log).into_iter().find(|field| field.what == "chunk packed").unwrap();
@@ -296,7 +293,7 @@ fn an_episode_that_waits_with_such_a_log_is_named() {
 #[cfg(unix)]
 fn one_episode() -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("small.toml"), super::logs::SMALL).unwrap();
+    write_small_world(folder.path(), SHORT);
     let words = "record --config small.toml --out runs --agent random --experiment E1 --seeds 1 --runs 1 --no-frames";
     let output = limited(folder.path(), words);
     assert!(output.status.success(), "{}", stderr(&output));

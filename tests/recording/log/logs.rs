@@ -3,12 +3,15 @@
 use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 use std::sync::LazyLock;
 
 use mirrorstats::log::recover::{Recovered, recover_from};
 use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::harness::files::write_small_world;
+use crate::harness::program::{program, run, succeeds, typed};
 
 /// A log of three episodes and the trace that was recorded with it.
 pub struct Recording {
@@ -18,16 +21,15 @@ pub struct Recording {
     pub chunks: Vec<(usize, usize)>,
 }
 
-/// What the recording of these tests changes in the world.
-pub const SMALL: &str = "eye.width = 64\neye.height_px = 48\neye.samples = 0\nepisode.steps = 40\n";
+/// What the recording of these tests changes in the small world.
+pub const SHORT: &str = "episode.steps = 40\n";
 
 /// The recording of these tests; made once.
 pub static RECORDING: LazyLock<Recording> = LazyLock::new(|| {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("small.toml"), SMALL).unwrap();
+    write_small_world(folder.path(), SHORT);
     let words = "record --config small.toml --out runs --agent random --experiment E1 --seeds 1 --runs 3 --no-frames";
-    let output = program().current_dir(folder.path()).args(words.split(' ')).output().unwrap();
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    succeeds(&mut typed(folder.path(), words));
     let [log, trace] =
         ["mcap", "parquet"].map(|ending| fs::read(folder.path().join(format!("runs/E1-random.{ending}"))).unwrap());
     let index = mcap::Summary::read(&log).unwrap().unwrap().chunk_indexes;
@@ -66,10 +68,6 @@ impl Recording {
     }
 }
 
-pub fn program() -> Command {
-    Command::new(env!("CARGO_BIN_EXE_mirrorstats"))
-}
-
 /// What is recovered of these bytes.
 pub fn recovered(bytes: &[u8]) -> Recovered {
     recover_from(Path::new("log.mcap"), Cursor::new(bytes)).unwrap()
@@ -95,17 +93,15 @@ impl Desk {
     pub fn recover(&self, bytes: &[u8], more: &[&str]) -> Output {
         drop(fs::remove_file(self.trace()));
         fs::write(self.0.path().join("cut.mcap"), bytes).unwrap();
-        let mut command = program();
-        command.current_dir(self.0.path()).args(["recover", "cut.mcap", "-o", "trace.parquet"]).args(more);
+        let mut command = program(self.0.path());
+        command.args(["recover", "cut.mcap", "-o", "trace.parquet"]).args(more);
         command.output().unwrap()
     }
 
     /// The ids of the trace's episodes, after `validate` found nothing wrong with it.
     pub fn validated(&self) -> Vec<String> {
-        let checked = program().arg("validate").arg(self.trace()).output().unwrap();
-        assert!(checked.status.success(), "{}", String::from_utf8_lossy(&checked.stdout));
-        let scores = program().arg("score").arg(self.trace()).output().unwrap();
-        let text = String::from_utf8(scores.stdout).unwrap();
+        run(self.0.path(), &["validate", "trace.parquet"]).ends(0);
+        let text = run(self.0.path(), &["score", "trace.parquet"]).done();
         text.lines().skip(1).map(|line| line.split(',').next().unwrap().to_owned()).collect()
     }
 }

@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use super::logs::{Desk, RECORDING, json, program};
+use super::logs::{Desk, RECORDING, SHORT, json};
+use crate::harness::files::{fixture, write_small_world};
+use crate::harness::program::{run, succeeds, typed};
 
 #[test]
 fn it_gives_the_trace_byte_for_byte() {
@@ -17,7 +19,7 @@ fn it_gives_the_trace_byte_for_byte() {
 
 #[test]
 fn the_bundled_log_with_frames_gives_the_bundled_trace() {
-    let bundled = |name: &str| format!("{}/fixtures/recorded/{name}", env!("CARGO_MANIFEST_DIR"));
+    let bundled = |name: &str| fixture("recorded").join(name);
     let desk = Desk::new();
     let output = desk.recover(&fs::read(bundled("E1-guesser.mcap")).unwrap(), &[]);
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stdout));
@@ -49,34 +51,27 @@ fn what_is_no_log_is_refused_and_nothing_is_written() {
 fn a_trace_that_has_more_than_the_log_is_not_written_over() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
-    fs::write(path("small.toml"), super::logs::SMALL).unwrap();
+    write_small_world(folder.path(), SHORT);
     let words = "record --config small.toml --agent random --experiment E1 --seeds 1 --no-frames --runs";
-    let record = |more: &str| {
-        let words = format!("{words} {more}");
-        let output = program().current_dir(folder.path()).args(words.split(' ')).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    };
-    let recover =
-        |trace: &str| program().current_dir(folder.path()).args(["recover", "log.mcap", "-o", trace]).output();
+    let record = |more: &str| succeeds(&mut typed(folder.path(), &format!("{words} {more}")));
+    let recover = |trace: &str| run(folder.path(), &["recover", "log.mcap", "-o", trace]);
     fs::write(path("log.mcap"), &RECORDING.log).unwrap();
     record("4 --out more");
-    fs::write(path("small.toml"), format!("{}eye.fovy = 90.0\n", super::logs::SMALL)).unwrap();
+    write_small_world(folder.path(), &format!("{SHORT}eye.fovy = 90.0\n"));
     record("3 --out other");
     for (trace, expected) in [
         ("more/E1-random.parquet", "has the episode `E1/random/s1/r4`, which cannot be recovered from the log"),
         ("other/E1-random.parquet", "is a trace of another recording than the log"),
     ] {
         let before = fs::read(path(trace)).unwrap();
-        let output = recover(trace).unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{said}");
+        let said = recover(trace).refused();
         assert!(said.contains(trace) && said.contains(expected) && said.contains("help: name another file"), "{said}");
         assert!(fs::read(path(trace)).unwrap() == before);
     }
     // One of the same recording, or what is no trace any more, is what a recovery replaces.
     for before in [&RECORDING.trace[..], &RECORDING.trace[..1_000]] {
         fs::write(path("trace.parquet"), before).unwrap();
-        assert_eq!(recover("trace.parquet").unwrap().status.code(), Some(0));
+        recover("trace.parquet").ends(0);
         assert!(fs::read(path("trace.parquet")).unwrap() == RECORDING.trace);
     }
 }
@@ -89,9 +84,7 @@ fn a_log_that_is_not_there_and_a_place_that_cannot_be_written() {
         (["recover", "none.mcap", "-o", "trace.parquet"], "cannot open the log `none.mcap`"),
         (["recover", "whole.mcap", "-o", "none/trace.parquet"], "none/trace.parquet"),
     ] {
-        let output = program().current_dir(folder.path()).args(words).output().unwrap();
-        let said = String::from_utf8_lossy(&output.stderr).into_owned();
-        assert_eq!(output.status.code(), Some(2), "{said}");
+        let said = run(folder.path(), &words).refused();
         assert!(said.contains(expected), "{said}");
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);

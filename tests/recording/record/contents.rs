@@ -1,43 +1,26 @@
 //! What a recording holds: rows that follow from one another, metadata, and something to report on.
 
-use std::collections::BTreeMap;
-use std::fs::File;
-use std::process::Command;
-
-use arrow::array::{Array, ArrayRef, AsArray, BooleanArray, RecordBatch};
-use arrow::compute::concat_batches;
+use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
 use arrow::datatypes::{Float32Type, Int32Type, Int64Type};
-use mirrorstats::trace::schema::{COLUMNS, RECORDING_KEY};
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
+use mirrorstats::trace::schema::COLUMNS;
 use serde_json::{Value, json};
 
-use super::recordings::{Bench, SMALL, stderr, succeeds};
+use super::recordings::Bench;
+use crate::harness::files::{Contents, fixture, write_small_world};
+use crate::harness::need;
+use crate::harness::program::{run, succeeds};
+use crate::harness::traces::{column, recording, rows};
 
 /// The rows of a trace, and its metadata.
 fn read(bench: &Bench, name: &str) -> (RecordBatch, Value) {
-    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(bench.path(name)).unwrap()).unwrap();
-    let metadata: BTreeMap<String, Option<String>> = reader
-        .metadata()
-        .file_metadata()
-        .key_value_metadata()
-        .unwrap()
-        .iter()
-        .map(|p| (p.key.clone(), p.value.clone()))
-        .collect();
-    let recording = serde_json::from_str(metadata[RECORDING_KEY].as_ref().unwrap()).unwrap();
-    let batches: Vec<_> = reader.build().unwrap().map(Result::unwrap).collect();
-    (concat_batches(&batches[0].schema(), &batches).unwrap(), recording)
-}
-
-fn column(rows: &RecordBatch, name: &str) -> ArrayRef {
-    rows.column_by_name(name).unwrap_or_else(|| panic!("no column {name}")).clone()
+    (rows(&bench.path(name)), recording(&bench.path(name)))
 }
 
 #[test]
 fn rows_follow_from_one_another() {
     let bench = Bench::new();
     // Long steps, so that even a short walk comes to a wall.
-    std::fs::write(bench.path("small.toml"), format!("{SMALL}body.step_length = 1.0\n")).unwrap();
+    write_small_world(bench.folder.path(), "body.step_length = 1.0\n");
     bench.recorded("runs", "--agent random --experiment E4 --seeds 3 --runs 6 --no-log");
     let (rows, _) = read(&bench, "runs/E4-random.parquet");
     let names: Vec<String> = rows.schema().fields().iter().map(|field| field.name().clone()).collect();
@@ -69,7 +52,7 @@ fn rows_follow_from_one_another() {
 #[test]
 fn ground_truth_is_what_the_counts_say() {
     let bench = Bench::new();
-    std::fs::write(bench.path("small.toml"), format!("{SMALL}evidence.mirror_self_px = 2\n")).unwrap();
+    write_small_world(bench.folder.path(), "evidence.mirror_self_px = 2\n");
     let words = "--agent random --experiment E1..E3 --seeds 1 --runs 4 --no-log";
     bench.recorded("runs", words);
     let mut visible = 0;
@@ -119,11 +102,9 @@ fn a_report_can_be_made_of_it() {
     for agent in ["random", "frozen"] {
         bench.recorded("runs", &format!("--agent {agent} --experiment E1..E5 --seeds 1 --runs 2"));
     }
-    let program = || Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-    let checked = succeeds(program().args(["validate"]).arg(bench.path("runs")));
-    assert!(String::from_utf8_lossy(&checked.stdout).contains("0 errors, 0 notes"));
-    let report = succeeds(program().arg("report").arg(bench.path("runs")).arg("--out").arg(bench.path("report")));
-    let table = String::from_utf8_lossy(&report.stdout).into_owned();
+    let checked = run(bench.folder.path(), &["validate", "runs"]).done();
+    assert!(checked.contains("0 errors, 0 notes"));
+    let table = run(bench.folder.path(), &["report", "runs", "--out", "report"]).done();
     assert!(table.contains("frozen") && table.contains("random"), "{table}");
     let cells = std::fs::read_to_string(bench.path("report/cells.csv")).unwrap();
     // The frozen one never decides, and without a mirror nobody consults one.
@@ -134,16 +115,10 @@ fn a_report_can_be_made_of_it() {
 #[test]
 fn agents_that_look_are_shown_frames() {
     let bench = Bench::new();
-    let output =
-        bench.record_with_frames("runs", "--agent oracle --experiment E5 --seeds 1 --runs 1").output().unwrap();
-    if stderr(&output).contains("libegl1") {
-        assert!(std::env::var_os("MIRRORSTATS_REQUIRE_EGL").is_none(), "{}", stderr(&output));
-        eprintln!("skipped: nothing to draw with; libegl1 and libgl1-mesa-dri bring it");
-        return;
-    }
-    assert!(output.status.success(), "{}", stderr(&output));
+    need::drawing();
+    succeeds(&mut bench.record_with_frames("runs", "--agent oracle --experiment E5 --seeds 1 --runs 1"));
     let with_frames = bench.files("runs");
-    let count = |files: &BTreeMap<String, Vec<u8>>| files["E5-oracle.mcap"].len();
+    let count = |files: &Contents| files["E5-oracle.mcap"].len();
     // Without frames in the log the agent is shown them all the same, and decides the same.
     let without = bench.recorded("without", "--agent oracle --experiment E5 --seeds 1 --runs 1");
     assert!(with_frames["E5-oracle.parquet"] == without["E5-oracle.parquet"]);
@@ -157,7 +132,9 @@ fn the_bundled_recordings_are_those_that_this_program_makes() {
     bench.recorded("runs", "--agent random --experiment E1..E5 --seeds 1 --runs 2 --no-log");
     bench.recorded("runs", "--agent frozen --experiment E1 --seeds 1 --runs 1 --no-log");
     for (name, bytes) in bench.files("runs") {
-        let bundled = format!("{}/fixtures/recorded/{name}", env!("CARGO_MANIFEST_DIR"));
-        assert!(std::fs::read(bundled).unwrap() == bytes, "{name} is not current; `make recorded` writes it");
+        assert!(
+            std::fs::read(fixture("recorded").join(&name)).unwrap() == bytes,
+            "{name} is not current; `make recorded` writes it"
+        );
     }
 }

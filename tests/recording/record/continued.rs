@@ -3,16 +3,15 @@
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
-use std::process::Command;
 
 use arrow::array::{ArrayRef, Int32Array};
 use mirrorstats::log::recover::recover;
-use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::merge;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::schema::RECORDING_KEY;
 
-use super::recordings::{Bench, assert_same, stderr, succeeds};
+use super::recordings::Bench;
+use crate::harness::files::assert_same;
+use crate::harness::program::{run, stderr};
+use crate::harness::traces::recording;
 
 fn words(runs: u32) -> String {
     format!("--agent random --experiment E1 --seeds 1 --runs {runs} --threads 1")
@@ -37,9 +36,7 @@ fn remove(bench: &Bench, ending: &str) {
 }
 
 fn recover_into(bench: &Bench, trace: &str) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-    command.current_dir(bench.folder.path()).args(["recover", "runs/E1-random.mcap", "-o", trace]);
-    succeeds(&mut command);
+    run(bench.folder.path(), &["recover", "runs/E1-random.mcap", "-o", trace]).done();
 }
 
 #[test]
@@ -90,9 +87,7 @@ fn a_log_with_an_episode_that_the_trace_does_not_have() {
 
 /// Changes a column of the first episode of the trace.
 fn alter(trace: &Path, column: &str, value: i32) {
-    let input = Input { name: trace.display().to_string(), path: trace.to_owned() };
-    let set = TraceSet::open(&[input]).unwrap();
-    let recording = serde_json::from_str(set.files()[0].metadata_value(RECORDING_KEY).unwrap()).unwrap();
+    let recording = recording(trace);
     let mut episodes = merge::read(trace).unwrap();
     let values: ArrayRef = std::sync::Arc::new(Int32Array::from(vec![value; episodes[0].len()]));
     episodes[0] = episodes[0].with_columns(&[(column, values)]).unwrap();

@@ -4,7 +4,9 @@ use std::fs;
 
 use serde_json::Value;
 
-use super::recordings::{Bench, assert_same, stderr, succeeds};
+use super::recordings::Bench;
+use crate::harness::files::assert_same;
+use crate::harness::program::{stderr, succeeds};
 
 /// The answer of a dry run, and that it left the folder as it was.
 fn forecast(bench: &Bench, words: &str) -> Value {

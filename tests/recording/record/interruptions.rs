@@ -1,12 +1,14 @@
 //! A recording that is ended in the middle: what was whole stays, and the same command goes on to the same bytes.
 
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
 use serde_json::Value;
 
-use super::recordings::{Bench, assert_same, stderr, succeeds};
+use super::recordings::Bench;
+use crate::harness::files::assert_same;
+use crate::harness::program::{interrupt, limited, run, stderr, succeeds};
 
 const WORDS: &str = "--agent random --experiment E1,E5 --seeds 2 --runs 4 --threads 1";
 
@@ -43,7 +45,7 @@ fn ctrl_c_ends_it_at_whole_episodes_and_says_how_to_go_on() {
     let mut child = bench.record("cut", &format!("{WORDS} --json"));
     let mut child = child.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_for_parts(&bench, &mut child, 2);
-    succeeds(Command::new("kill").args(["-INT", &child.id().to_string()]));
+    interrupt(&child);
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", stderr(&output));
     assert!(stderr(&output).contains("the same command continues"), "{}", stderr(&output));
@@ -53,9 +55,7 @@ fn ctrl_c_ends_it_at_whole_episodes_and_says_how_to_go_on() {
     assert!((2..16).contains(&recorded), "{answer}");
     // What it left is a recording like any other: whole episodes in a trace, and nothing beside traces and logs.
     assert!(bench.files("cut").keys().all(|name| !name.starts_with('.')));
-    let checked =
-        Command::new(env!("CARGO_BIN_EXE_mirrorstats")).args(["validate", "--json"]).arg(bench.path("cut")).output();
-    let checked: Value = serde_json::from_slice(&checked.unwrap().stdout).unwrap();
+    let checked = run(bench.folder.path(), &["validate", "--json", "cut"]).json();
     let episodes: u64 =
         checked["files"].as_array().unwrap().iter().map(|file| file["episodes"].as_u64().unwrap()).sum();
     assert_eq!(episodes, recorded);
@@ -72,17 +72,14 @@ fn a_full_disk_is_told_and_loses_no_episode_that_was_there() {
     let bench = Bench::new();
     let before = bench.recorded("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
     // A limit of the size of files stands in for a full disk: writes begin to fail in the middle of a file.
-    let limited = |blocks: u32| {
-        let mut shell = Command::new("sh");
-        let program = env!("CARGO_BIN_EXE_mirrorstats");
+    let within = |blocks: u32| {
         let words =
             "record --config small.toml --out runs --agent random --experiment E1 --seeds 1 --runs 3 --no-frames";
-        let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec '{program}' {words}");
-        shell.current_dir(bench.folder.path()).args(["-c", &script]);
-        shell.output().unwrap()
+        let mut command = limited(bench.folder.path(), &format!("trap '' XFSZ; ulimit -f {blocks}"));
+        command.args(words.split(' ')).output().unwrap()
     };
     for blocks in [1, 8] {
-        let output = limited(blocks);
+        let output = within(blocks);
         assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
         assert!(stderr(&output).starts_with("error: cannot write"), "{}", stderr(&output));
         assert!(stderr(&output).contains("the disk not full?"), "{}", stderr(&output));

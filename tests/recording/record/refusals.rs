@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use super::recordings::{Bench, assert_same, stderr};
+use super::recordings::Bench;
+use crate::harness::files::{assert_same, fixture};
+use crate::harness::program::stderr;
 
 /// That this is refused with these words, and with nothing else said.
 fn refused(bench: &Bench, out: &str, words: &str, expected: &[&str]) {
@@ -92,10 +94,10 @@ fn a_trace_that_is_damaged_or_of_another_recorder_is_not_written_over() {
     refused(&bench, "runs", words, &["E1-random.parquet"]);
     assert_eq!(fs::read(&place).unwrap(), b"no parquet");
 
-    let foreign = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper/E1-claude-sonnet-4-6.parquet");
-    fs::copy(foreign, &place).unwrap();
+    let foreign = fixture("paper/E1-claude-sonnet-4-6.parquet");
+    fs::copy(&foreign, &place).unwrap();
     refused(&bench, "runs", words, &["E1-random.parquet", "help: "]);
-    assert_eq!(fs::read(&place).unwrap(), fs::read(foreign).unwrap());
+    assert_eq!(fs::read(&place).unwrap(), fs::read(&foreign).unwrap());
     assert_eq!(bench.files("runs").len(), 1);
 }
 

@@ -1,6 +1,8 @@
 //! The same episodes give the same bytes: traces and logs, whatever made them.
 
-use super::recordings::{Bench, assert_same, succeeds};
+use super::recordings::Bench;
+use crate::harness::files::assert_same;
+use crate::harness::program::succeeds;
 
 const WHOLE: &str = "--agent random --experiment E1,E4..E5 --seeds 2 --runs 2";
 

@@ -1,6 +1,5 @@
 //! The same recording by several processes at once: they divide the episodes, and what one is killed at another does.
 
-use std::collections::BTreeMap;
 use std::io::{BufRead as _, BufReader, Read as _};
 use std::process::{Child, Stdio};
 use std::thread::sleep;
@@ -10,15 +9,16 @@ use mirrorstats::record::claim::Claim;
 use mirrorstats::record::lock::{Attempt, EpisodeLock};
 use serde_json::Value;
 
-use super::recordings::{Bench, assert_same, stderr, succeeds};
+use super::recordings::Bench;
+use crate::harness::files::{Contents, assert_same, write_small_world};
+use crate::harness::program::{interrupt, stderr, succeeds};
 
 const EPISODES: u64 = 4;
 const WORDS: &str = "--agent random --experiment E1,E5 --seeds 1 --runs 2 --threads 1";
 
 fn bench() -> Bench {
     let bench = Bench::new();
-    let small = format!("{}episode.steps = 40\n", super::recordings::SMALL);
-    std::fs::write(bench.path("small.toml"), small).unwrap();
+    write_small_world(bench.folder.path(), "episode.steps = 40\n");
     bench
 }
 
@@ -54,7 +54,7 @@ fn identical_commands_divide_the_episodes() {
 }
 
 /// A round in which all but the processes that are to stay are killed, one after so many parts, the next one later.
-fn killed(bench: &Bench, whole: &BTreeMap<String, Vec<u8>>, round: usize, stay: usize) -> usize {
+fn killed(bench: &Bench, whole: &Contents, round: usize, stay: usize) -> usize {
     let out = format!("runs-{round}");
     let mut children = started(bench, &out, 2 + round % 2);
     let mut killed = 0;
@@ -129,7 +129,7 @@ fn waiting_can_be_ended() {
     let bench = bench();
     let whole = bench.recorded("whole", WORDS);
     let (claim, lock, mut child, _) = waiting(&bench);
-    succeeds(std::process::Command::new("kill").args(["-INT", &child.id().to_string()]));
+    interrupt(&child);
     let mut said = String::new();
     child.stderr.as_mut().unwrap().read_to_string(&mut said).unwrap();
     assert_eq!(child.wait().unwrap().code(), Some(130), "{said}");

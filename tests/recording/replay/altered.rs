@@ -3,7 +3,9 @@
 use mirrorstats::trace::episode::{Action, Episode};
 use serde_json::Value;
 
-use super::traces::{copy, replay, stdout};
+use super::traces::{copy, recorded, replay};
+use crate::harness::program::{stderr, stdout};
+use crate::harness::traces::episodes;
 
 /// That the replay of a trace that was altered so parts from it at this step of its longest episode, in this column, and in
 /// no other episode.
@@ -64,7 +66,7 @@ fn a_distance() {
         *known += 0.5;
     };
     let at = |experiment: &str| {
-        let episodes = super::traces::episodes(&super::traces::recorded(experiment));
+        let episodes = episodes(&recorded(experiment));
         let longest = episodes.into_iter().max_by_key(|episode| episode.steps.len()).unwrap();
         let known = longest.steps.iter().position(|step| step.extra.cube_distance.is_some()).unwrap();
         i32::try_from(known + 1).unwrap()
@@ -124,5 +126,5 @@ fn a_name_that_is_no_experiment_of_the_world() {
     let (_folder, path) = copy("E1", |episodes, _| episodes[0].experiment = "E9".to_owned());
     let output = replay(&path, &[]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(super::traces::stderr(&output).contains("E9"), "{}", super::traces::stderr(&output));
+    assert!(stderr(&output).contains("E9"), "{}", stderr(&output));
 }

@@ -2,7 +2,10 @@
 
 use serde_json::Value;
 
-use super::traces::{RECORDED, copy, episodes, program, recorded, replay, stderr, stdout, succeeds};
+use super::traces::{RECORDED, copy, recorded, replay};
+use crate::harness::files::fixture;
+use crate::harness::program::{run, stderr, stdout};
+use crate::harness::traces::episodes;
 
 #[test]
 fn every_step_matches() {
@@ -11,8 +14,7 @@ fn every_step_matches() {
         .flat_map(|experiment| episodes(&recorded(experiment)))
         .map(|episode| episode.steps.len())
         .sum();
-    let output = succeeds(program(&RECORDED).args(["replay", ".", "--json"]));
-    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let answer = run(&RECORDED, &["replay", ".", "--json"]).json();
     assert_eq!(answer["episodes"], 9);
     assert_eq!(answer["steps"], steps);
     assert_eq!(answer["divergences"].as_array().map(Vec::len), Some(0));
@@ -33,15 +35,13 @@ fn one_episode_alone() {
 
 #[test]
 fn the_bundled_recordings_match() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/recorded");
-    let output = succeeds(program(folder.as_ref()).args(["replay", "E1-guesser.parquet", "E5-random.parquet"]));
-    assert!(stdout(&output).contains("all match"), "{}", stdout(&output));
+    let said = run(&fixture("recorded"), &["replay", "E1-guesser.parquet", "E5-random.parquet"]).done();
+    assert!(said.contains("all match"), "{said}");
 }
 
 #[test]
 fn what_does_not_say_its_world_is_refused() {
-    let paper = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper/E1-claude-sonnet-4-6.parquet");
-    let output = replay(paper.as_ref(), &[]);
+    let output = replay(&fixture("paper/E1-claude-sonnet-4-6.parquet"), &[]);
     assert_eq!(output.status.code(), Some(2));
     assert!(stderr(&output).contains("does not say how its world was made"), "{}", stderr(&output));
     assert!(stderr(&output).contains("help: traces of `mirrorstats record` do"), "{}", stderr(&output));

@@ -4,11 +4,15 @@ use std::fs;
 use std::os::unix::fs::symlink;
 use std::os::unix::process::ExitStatusExt as _;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Output;
 
 use tempfile::TempDir;
 
-use super::traces::{cannot_draw, copy, episodes, program, recorded, replay, stderr, succeeds};
+use super::traces::{copy, recorded, replay};
+use crate::harness::files::{fixture, write_small_world};
+use crate::harness::need;
+use crate::harness::program::{limited, program, stderr, succeeds, typed};
+use crate::harness::traces::episodes;
 
 #[test]
 fn the_trace_is_no_output_under_any_name() {
@@ -48,7 +52,7 @@ fn a_frame_does_not_replace_the_trace() {
 fn a_film_strip_does_not_replace_its_log_or_trace() {
     let folder = tempfile::tempdir().unwrap();
     for ending in ["mcap", "parquet"] {
-        let source = format!("{}/fixtures/recorded/E1-guesser.{ending}", env!("CARGO_MANIFEST_DIR"));
+        let source = fixture(&format!("recorded/E1-guesser.{ending}"));
         let path = folder.path().join(format!("a.{ending}"));
         fs::copy(source, &path).unwrap();
         symlink(&path, folder.path().join(format!("{ending}.svg"))).unwrap();
@@ -66,7 +70,7 @@ fn a_film_strip_does_not_replace_its_log_or_trace() {
 fn a_log_is_not_replaced_by_the_trace_that_it_gives() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("a.mcap");
-    fs::copy(concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/recorded/E1-guesser.mcap"), &log).unwrap();
+    fs::copy(fixture("recorded/E1-guesser.mcap"), &log).unwrap();
     symlink("a.mcap", folder.path().join("a.parquet")).unwrap();
     let before = fs::read(&log).unwrap();
     for out in ["a.mcap", "./a.mcap", "a.parquet"] {
@@ -80,9 +84,9 @@ fn a_log_is_not_replaced_by_the_trace_that_it_gives() {
 /// A folder with `E1-random.parquet` of two episodes and its log without frames.
 fn with_log() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("small.toml"), "eye.width = 64\neye.height_px = 48\nepisode.steps = 40\n").unwrap();
+    write_small_world(folder.path(), "episode.steps = 40\n");
     let words = "record --config small.toml --out . --agent random --experiment E1 --seeds 1 --runs 2 --no-frames";
-    succeeds(program(folder.path()).args(words.split(' ')));
+    succeeds(&mut typed(folder.path(), words));
     folder
 }
 
@@ -102,12 +106,9 @@ fn one_episode_does_not_take_the_place_of_a_log_with_others() {
         assert!(fs::read(folder.path().join(name)).unwrap() == old, "{name}");
     }
     // A log of that episode alone may be written again, and the whole log by a replay of all.
+    need::drawing();
     for (words, count) in [(&words[..], 1), (&words, 1), (&["replay", "E1-random.parquet", "--mcap"], 2)] {
-        let output = program(folder.path()).args(words).arg("again.mcap").output().unwrap();
-        if cannot_draw(&output) {
-            return;
-        }
-        assert!(output.status.success(), "{}", stderr(&output));
+        succeeds(program(folder.path()).args(words).arg("again.mcap"));
         succeeds(program(folder.path()).args(["recover", "again.mcap", "--out", "again.parquet"]));
         assert_eq!(episodes(&folder.path().join("again.parquet")).len(), count);
     }
@@ -116,21 +117,16 @@ fn one_episode_does_not_take_the_place_of_a_log_with_others() {
 /// Replays onto `again.mcap` where no file may grow beyond `bytes`; writing more fails, or ends the process.
 fn replay_within(folder: &Path, bytes: usize, ends: bool) -> Output {
     let ignored = if ends { "" } else { "trap '' XFSZ; " };
-    let script = format!("{ignored}ulimit -f {}; exec \"$0\" \"$@\"", bytes / 512);
-    let mut command = Command::new("sh");
-    command.current_dir(folder).args(["-c", &script, env!("CARGO_BIN_EXE_mirrorstats"), "replay"]);
-    command.arg(recorded("E1")).args(["--mcap", "again.mcap"]).output().unwrap()
+    let mut command = limited(folder, &format!("{ignored}ulimit -f {}", bytes / 512));
+    command.arg("replay").arg(recorded("E1")).args(["--mcap", "again.mcap"]).output().unwrap()
 }
 
 #[test]
 fn an_old_log_stays_where_there_is_no_room_for_the_new_one() {
     let folder = tempfile::tempdir().unwrap();
     let words = ["--mcap", "again.mcap"];
-    let output = program(folder.path()).arg("replay").arg(recorded("E1")).args(words).output().unwrap();
-    if cannot_draw(&output) {
-        return;
-    }
-    assert!(output.status.success(), "{}", stderr(&output));
+    need::drawing();
+    succeeds(program(folder.path()).arg("replay").arg(recorded("E1")).args(words));
     let log = folder.path().join("again.mcap");
     let whole = fs::read(&log).unwrap();
     // There is room for the log of each of the three episodes, not for all of them in one.

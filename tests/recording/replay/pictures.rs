@@ -3,20 +3,19 @@
 use std::fs;
 use std::path::Path;
 
-use super::traces::{cannot_draw, episodes, program, recorded, stderr, succeeds};
-
-const BUNDLED: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/recorded");
+use super::traces::recorded;
+use crate::harness::files::fixture;
+use crate::harness::need;
+use crate::harness::program::{limited, program, stderr, succeeds, typed};
+use crate::harness::traces::episodes;
 
 #[test]
 fn frames_and_a_log_of_a_replay() {
     let folder = tempfile::tempdir().unwrap();
+    need::drawing();
     let mut command = program(folder.path());
     command.arg("replay").arg(recorded("E1")).args(["--frames", "frames", "--mcap", "again.mcap"]);
-    let output = command.output().unwrap();
-    if cannot_draw(&output) {
-        return;
-    }
-    assert!(output.status.success(), "{}", stderr(&output));
+    succeeds(&mut command);
     for episode in episodes(&recorded("E1")) {
         let name = episode.episode_id.replace('/', "-");
         for t in 1..=episode.steps.len() {
@@ -38,17 +37,11 @@ fn the_log_that_is_there_stays_if_the_new_one_cannot_be_written() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("again.mcap");
     let replay = |blocks: &str| {
-        let script = format!(
-            "trap '' XFSZ; ulimit -f {blocks}; exec '{}' replay '{}' --mcap again.mcap",
-            env!("CARGO_BIN_EXE_mirrorstats"),
-            recorded("E1").display()
-        );
-        std::process::Command::new("sh").current_dir(folder.path()).args(["-c", &script]).output().unwrap()
+        let mut command = limited(folder.path(), &format!("trap '' XFSZ; ulimit -f {blocks}"));
+        command.arg("replay").arg(recorded("E1")).args(["--mcap", "again.mcap"]).output().unwrap()
     };
+    need::drawing();
     let output = replay("unlimited");
-    if cannot_draw(&output) {
-        return;
-    }
     assert!(output.status.success(), "{}", stderr(&output));
     let whole = fs::read(&log).unwrap();
     // The limit of the size of files stands in for a full disk: each episode fits, all of them do not.
@@ -66,11 +59,8 @@ fn a_film_strip_is_the_same_from_the_log_and_from_the_trace() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("small.toml"), "eye.width = 64\neye.height_px = 48\nepisode.steps = 40\n").unwrap();
     let words = "record --config small.toml --out runs --agent random --experiment E3 --seeds 1 --runs 2";
-    let output = program(folder.path()).args(words.split(' ')).output().unwrap();
-    if cannot_draw(&output) {
-        return;
-    }
-    assert!(output.status.success(), "{}", stderr(&output));
+    need::drawing();
+    succeeds(&mut typed(folder.path(), words));
     let drawn = |source: &str, name: &str, more: &[&str]| {
         let mut command = program(folder.path());
         command.args(["filmstrip", "E3/random/s1/r2", source, "--out", name]).args(more);
@@ -88,7 +78,7 @@ fn a_film_strip_is_the_same_from_the_log_and_from_the_trace() {
 /// The SVG of the bundled log's episode.
 fn strip(folder: &Path, more: &[&str]) -> String {
     let mut command = program(folder);
-    command.args(["filmstrip", "E1/guesser/s1/r1"]).arg(format!("{BUNDLED}/E1-guesser.mcap"));
+    command.args(["filmstrip", "E1/guesser/s1/r1"]).arg(fixture("recorded/E1-guesser.mcap"));
     succeeds(command.args(["--out", "strip.svg"]).args(more));
     fs::read_to_string(folder.join("strip.svg")).unwrap()
 }
@@ -96,7 +86,7 @@ fn strip(folder: &Path, more: &[&str]) -> String {
 #[test]
 fn a_film_strip_tells_the_story_of_its_episode() {
     let folder = tempfile::tempdir().unwrap();
-    let bundled = episodes(Path::new(&format!("{BUNDLED}/E1-guesser.parquet")));
+    let bundled = episodes(&fixture("recorded/E1-guesser.parquet"));
     let episode = bundled.iter().find(|episode| episode.episode_id == "E1/guesser/s1/r1").unwrap();
     let svg = strip(folder.path(), &["--count", "4"]);
     assert_eq!(svg.matches("<image").count(), 4.min(episode.steps.len()));
@@ -118,8 +108,8 @@ fn a_film_strip_tells_the_story_of_its_episode() {
 #[test]
 fn a_film_strip_that_cannot_be_is_refused_and_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
-    let log = format!("{BUNDLED}/E1-guesser.mcap");
-    let last = episodes(Path::new(&format!("{BUNDLED}/E1-guesser.parquet")))[0].steps.len();
+    let log = fixture("recorded/E1-guesser.mcap").display().to_string();
+    let last = episodes(&fixture("recorded/E1-guesser.parquet"))[0].steps.len();
     let beyond = (last + 1).to_string();
     for (episode, source, words, expected) in [
         ("E1/guesser/s9/r9", log.as_str(), &["--out", "a.svg"][..], "has the episode `E1/guesser/s9/r9`"),

@@ -11,12 +11,14 @@ use mirrorstats::sim::snapshot::{Shape, Solid};
 use mirrorstats::sim::world::World;
 
 use super::poses::{scatter, world};
+use crate::harness::need;
 
 const OWN: Shown = Shown::Direct(Item::Agent(0));
 
 #[test]
 fn a_body_never_shows_directly_in_its_own_view() {
     let mut chance = Chance::of(7, 7, 7);
+    need::drawing();
     let mut eye = LabelEye::new(&WorldConfig::default(), 160, 120).unwrap();
     let mut world = world(Experiment::E1, 4);
     for at in 0..1000 {

@@ -9,6 +9,7 @@ use mirrorstats::sim::model::Item;
 use mirrorstats::sim::world::World;
 
 use super::poses::{face_mirror, world};
+use crate::harness::need;
 
 /// The world of a seed with everything that has a colour in one.
 fn all_in(color: Color) -> World {
@@ -45,6 +46,7 @@ fn nearest(pixel: [f64; 3]) -> Option<Color> {
 #[test]
 fn the_ten_colours_are_told_apart_directly_and_in_the_mirror() {
     let config = WorldConfig::default();
+    need::drawing();
     let mut eye = Eye::new(&config).unwrap();
     for color in Color::ALL {
         let mut world = all_in(color);
@@ -81,6 +83,7 @@ fn the_ten_colours_are_told_apart_directly_and_in_the_mirror() {
 #[test]
 fn a_colour_in_the_mirror_is_that_of_the_thing() {
     let config = WorldConfig::default();
+    need::drawing();
     let mut eye = Eye::new(&config).unwrap();
     for color in Color::ALL {
         let mut world = all_in(color);

@@ -12,6 +12,8 @@ use mirrorstats::sim::floor::distance;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::world::World;
 
+use crate::assert_shown;
+
 const SEEDS: i32 = 20;
 const RUNS: i32 = 10;
 
@@ -37,7 +39,7 @@ fn scenes_are_these_on_every_machine() {
             .collect();
         format!("{} {}", experiment.name(), &hash::of_bytes(serde_json::to_string(&drawn).unwrap().as_bytes())[..16])
     });
-    insta::assert_snapshot!(hashes.join("\n"));
+    assert_shown!("three seeds with seven runs of each experiment, hashed as JSON", hashes.join("\n"));
 }
 
 #[test]

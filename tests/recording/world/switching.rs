@@ -6,10 +6,12 @@ use mirrorstats::sim::eye::Eye;
 use mirrorstats::trace::episode::Action;
 
 use super::poses::{face_mirror, world};
+use crate::harness::need;
 
 #[test]
 fn a_picture_does_not_depend_on_what_the_eye_drew_before() {
     let config = WorldConfig::default();
+    need::drawing();
     let mut eye = Eye::new(&config).unwrap();
     let mut worlds: Vec<_> = Experiment::ALL.into_iter().map(|experiment| world(experiment, 5)).collect();
     for world in &mut worlds {
@@ -25,6 +27,7 @@ fn a_picture_does_not_depend_on_what_the_eye_drew_before() {
 #[test]
 fn the_picture_is_of_now() {
     let config = WorldConfig::default();
+    need::drawing();
     let mut eye = Eye::new(&config).unwrap();
     let mut world = world(Experiment::E1, 5);
     let before = eye.frame(&world).unwrap();

@@ -12,6 +12,7 @@ use mirrorstats::sim::model::Item;
 use mirrorstats::sim::world::World;
 
 use super::poses::for_scattered;
+use crate::harness::need;
 
 const WITH_MIRROR: [Experiment; 3] = [Experiment::E1, Experiment::E4, Experiment::E5];
 const OWN: Shown = Shown::Reflected(Item::Agent(0));
@@ -45,6 +46,7 @@ fn mean(values: &[f64]) -> f64 {
 #[test]
 fn the_census_is_what_a_picture_of_labels_shows() {
     let config = WorldConfig::default();
+    need::drawing();
     let mut eye = LabelEye::new(&config, 640, 480).unwrap();
     let (mut same, mut all) = (0_usize, 0_usize);
     let mut overlaps = Vec::new();
@@ -171,6 +173,7 @@ fn is_twin(world: &World, shown: Shown) -> bool {
 #[test]
 fn the_census_is_what_colours_in_the_picture_show() {
     let config = WorldConfig::default();
+    need::drawing();
     let mut eye = Eye::new(&config).unwrap();
     let mut overlaps = Vec::new();
     for_scattered(&WITH_MIRROR, 210, |world| {

@@ -3,9 +3,8 @@
 //! Rule: a console message, an exception, a breach of the page's policy or a request for anything but the page
 //! itself is remembered, and fails the test that ends with [`Browser::close`].
 
-use std::env;
-use std::io::{self, BufRead as _, BufReader, Write as _};
-use std::path::{Path, PathBuf};
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::Path;
 use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::thread;
@@ -14,10 +13,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
-
-/// Set where a missing browser is a failure: in CI.
-const REQUIRED: &str = "MIRRORSTATS_REQUIRE_BROWSER";
+use crate::harness::need;
 
 /// Nothing that a page does on one machine takes this long.
 const PATIENCE: Duration = Duration::from_mins(2);
@@ -51,31 +47,15 @@ pub struct Browser {
     home: TempDir,
 }
 
-/// The browser on this machine.
-///
-/// `None`, and a line on standard error that no test harness swallows, where there is none.
-fn program(test: &str) -> Option<PathBuf> {
-    let folders: Vec<PathBuf> = env::var_os("PATH").map(|path| env::split_paths(&path).collect()).unwrap_or_default();
-    let mut candidates = NAMES.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
-    let found = candidates.find(|program| program.is_file());
-    if found.is_none() {
-        let is_required = env::var_os(REQUIRED).is_some_and(|value| value != "0" && !value.is_empty());
-        assert!(!is_required, "{REQUIRED} is set, and none of {NAMES:?} is on PATH; run scripts/get-browser.sh");
-        let note = format!("SKIPPED {test}: none of {NAMES:?} is on PATH; run scripts/get-browser.sh\n");
-        io::stderr().write_all(note.as_bytes()).unwrap();
-    }
-    found
-}
-
 impl Browser {
-    /// Opens `html` from disk; `None` where there is no browser.
-    pub fn open(test: &str, html: &str) -> Option<Self> {
-        Self::open_with(test, html, &[])
+    /// Opens `html` from disk.
+    pub fn open(html: &str) -> Self {
+        Self::open_with(html, &[])
     }
 
     /// The same after these commands.
-    pub fn open_with(test: &str, html: &str, before: &[(&str, Value)]) -> Option<Self> {
-        let mut browser = Self::start(&program(test)?);
+    pub fn open_with(html: &str, before: &[(&str, Value)]) -> Self {
+        let mut browser = Self::start(&need::browser());
         let file = browser.home.path().join("report.html");
         std::fs::write(&file, html).unwrap();
         browser.page = format!("file://{}", file.display());
@@ -93,7 +73,7 @@ impl Browser {
         while browser.loads == 0 {
             browser.receive();
         }
-        Some(browser)
+        browser
     }
 
     /// The pipe has the numbers 3 and 4, which a shell sets up.
@@ -278,9 +258,7 @@ fn whatever_goes_wrong_in_a_page_is_noticed() {
             "Content Security Policy",
         ),
     ] {
-        let Some(mut browser) = Browser::open("complaints", &format!("<!doctype html><title>t</title>{body}")) else {
-            return;
-        };
+        let mut browser = Browser::open(&format!("<!doctype html><title>t</title>{body}"));
         let complaints = browser.complaints();
         assert!(complaints.iter().any(|found| found.contains(complaint)), "{body}: {complaints:?}");
     }

@@ -24,7 +24,7 @@ fn expected(report: &Report, experiment: &str, model: &str, metric: &str) -> BTr
 #[test]
 fn a_click_opens_the_episodes_of_the_cell() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("episodes", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     for (table, experiment, model, metric) in [
         ("main", "E1", "GPT 5.1", "TTD"),
         ("main", "E4", "Ministral 3 14B", "MTATO"),
@@ -47,7 +47,7 @@ fn a_click_opens_the_episodes_of_the_cell() {
 #[test]
 fn episodes_sort_by_value() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("sorting of episodes", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     browser.click("#table-main tr[data-experiment='E1'][data-model='GPT 5.1'] td[data-metric='TTD']");
     browser.click("#episodes thead th:nth-child(4) button");
     let values = "[...document.querySelectorAll('#episodes tbody td:last-child')].map((c) => Number(c.textContent))";
@@ -65,7 +65,7 @@ fn integers_that_javascript_would_round_stay_exact() {
     *ttd = MetricColumn::new("TTD", std::iter::once(Some(i64::MAX)).chain(ttd.iter().skip(1)).collect::<Vec<_>>());
     let key = episodes.keys.get(0).to_owned();
     let report = Report::of(episodes, &["experiment", "model"], "default");
-    let Some(mut browser) = Browser::open("large integers", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     browser.click(&format!(
         "#table-main tr[data-experiment='{}'][data-model='{}'] td[data-metric='TTD']",
         key.experiment, key.model
@@ -78,7 +78,7 @@ fn integers_that_javascript_would_round_stay_exact() {
 fn without_its_script_the_page_is_whole() {
     let report = Report::bare();
     let disable = ("Emulation.setScriptExecutionDisabled", json!({"value": true}));
-    let Some(mut browser) = Browser::open_with("no script", &report.render().unwrap(), &[disable]) else { return };
+    let mut browser = Browser::open_with(&report.render().unwrap(), &[disable]);
     assert!(browser.holds("document.querySelector('#table-main thead button') === null"), "the script did not run");
     let shown = "[...document.querySelectorAll('td[data-metric]')].filter((c) => c.checkVisibility()).length";
     assert_eq!(browser.value(shown), json!(40 * (6 + 7)));

@@ -7,7 +7,7 @@ const TIP: &str = "document.getElementById('tip').hidden ? '' : document.getElem
 
 #[test]
 fn a_mark_tells_its_value_to_pointer_and_keyboard() {
-    let Some(mut browser) = Browser::open("values of figures", &PAPER_PAGE) else { return };
+    let mut browser = Browser::open(&PAPER_PAGE);
     let title = browser.text("document.querySelector('#figure-heatmap .mark > title').textContent");
     assert!(title.starts_with("E1 · "), "{title}");
     browser.point_at("#figure-heatmap .mark");
@@ -36,7 +36,7 @@ fn a_mark_tells_its_value_to_pointer_and_keyboard() {
 
 #[test]
 fn marks_have_the_numbers_of_the_tables() {
-    let Some(mut browser) = Browser::open("numbers of figures", &PAPER_PAGE) else { return };
+    let mut browser = Browser::open(&PAPER_PAGE);
     let differing = "[...document.querySelectorAll('#figure-heatmap .mark[data-metric]')].filter((mark) => { \
         const { experiment, model, metric, value, n } = mark.dataset; \
         const row = [...document.querySelectorAll('#table-main tr')] \
@@ -50,7 +50,7 @@ fn marks_have_the_numbers_of_the_tables() {
 
 #[test]
 fn a_figure_grows_and_fits_again() {
-    let Some(mut browser) = Browser::open("the size of figures", &PAPER_PAGE) else { return };
+    let mut browser = Browser::open(&PAPER_PAGE);
     let width = "document.querySelector('#figure-spider svg').getBoundingClientRect().width";
     let before = browser.value(width).as_f64().unwrap();
     browser.click("#figure-spider [data-zoom=in]");

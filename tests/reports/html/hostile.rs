@@ -88,7 +88,7 @@ fn names_in_any_script_are_in_the_page_as_they_are() {
 
 #[test]
 fn hostile_names_are_shown_and_do_nothing() {
-    let Some(mut browser) = Browser::open("hostile names", &page(HOSTILE)) else { return };
+    let mut browser = Browser::open(&page(HOSTILE));
     let names = browser.texts(
         "[...document.querySelectorAll('#table-main tbody:nth-of-type(1) th[scope=row]')].map((t) => t.textContent)",
     );

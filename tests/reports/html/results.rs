@@ -33,7 +33,7 @@ fn by_mean(report: &Report, is_descending: bool) -> Vec<String> {
 #[test]
 fn a_header_sorts_within_groups_both_ways_and_back() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("sorting", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     let header = "#table-main thead th[data-metric=TSA] button";
     let way = "document.querySelector('#table-main th[data-metric=TSA]').getAttribute('aria-sort') ?? 'none'";
     let original = browser.texts(ROWS);
@@ -50,7 +50,7 @@ fn a_header_sorts_within_groups_both_ways_and_back() {
 #[test]
 fn every_column_sorts_all_rows_as_one_list_with_the_undefined_last() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("sorting of one list", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     browser.click("#grouped");
     for (table, metric) in report.tables.iter().flat_map(|t| t.columns.iter().map(|c| (&t.name, &c.metric))) {
         let header = format!("#table-{table} thead th[data-metric='{metric}'] button");
@@ -88,7 +88,7 @@ fn split(means: &[String]) -> (Vec<f64>, usize) {
 #[test]
 fn filters_show_what_is_chosen_and_nothing_else() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("filters", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     let status = "document.getElementById('shown').textContent";
     let chip = |key: usize, at: usize| format!("fieldset[data-key='{key}'] label:nth-of-type({}) span", at + 1);
     let counts = |rows: &[String], at: usize| {
@@ -124,7 +124,7 @@ fn filters_show_what_is_chosen_and_nothing_else() {
 #[test]
 fn a_cell_tells_its_numbers_and_its_definition() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("the numbers of a cell", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     let cell = "#table-main tr[data-experiment=E1][data-model='GPT 5.1'] td[data-metric=MTATO]";
     assert!(browser.holds("document.getElementById('tip').hidden"));
     browser.point_at(cell);
@@ -162,7 +162,7 @@ fn a_cell_tells_its_numbers_and_its_definition() {
 #[test]
 fn the_keyboard_alone_is_enough() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("the keyboard", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     browser.press("Tab");
     assert_eq!(browser.text("document.activeElement.textContent"), "Skip to the tables");
     browser.press("Enter");

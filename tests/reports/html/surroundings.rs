@@ -8,7 +8,7 @@ use crate::html::scored::{PAPER_PAGE, Report};
 #[test]
 fn dark_and_light_follow_the_system_until_told_otherwise() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("dark and light", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     let ground = "getComputedStyle(document.body).backgroundColor";
     let system = |scheme: &str| json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
     browser.send("Emulation.setEmulatedMedia", &system("light"));
@@ -32,7 +32,7 @@ const LEAST_CONTRAST: f64 = 4.5;
 #[test]
 fn text_stands_out_from_its_ground_in_both_themes() {
     let report = Report::bare();
-    let Some(mut browser) = Browser::open("contrast", &report.render().unwrap()) else { return };
+    let mut browser = Browser::open(&report.render().unwrap());
     let contrast = "(() => { \
         const light = (c) => c.match(/[0-9.]+/g).slice(0, 3).map(Number) \
             .map((v) => v / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)) \
@@ -53,7 +53,7 @@ fn text_stands_out_from_its_ground_in_both_themes() {
 
 #[test]
 fn a_narrow_window_scrolls_tables_and_never_the_page() {
-    let Some(mut browser) = Browser::open("a narrow window", &PAPER_PAGE) else { return };
+    let mut browser = Browser::open(&PAPER_PAGE);
     let narrow = json!({"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": false});
     browser.send("Emulation.setDeviceMetricsOverride", &narrow);
     let overflow = "document.documentElement.scrollWidth - document.documentElement.clientWidth";
@@ -65,7 +65,7 @@ fn a_narrow_window_scrolls_tables_and_never_the_page() {
 
 #[test]
 fn paper_has_everything_but_the_controls() {
-    let Some(mut browser) = Browser::open("paper", &PAPER_PAGE) else { return };
+    let mut browser = Browser::open(&PAPER_PAGE);
     browser.value("document.documentElement.dataset.theme = 'dark'");
     browser.send("Emulation.setEmulatedMedia", &json!({"media": "print"}));
     let controls = "[...document.querySelectorAll('button:not(thead button), nav, #filters, .skip')] \

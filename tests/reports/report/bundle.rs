@@ -3,11 +3,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::report::published;
 use mirrorstats::cells::cell::Cells;
 use mirrorstats::report::bundle::{Bundle, BundleError, Input, Manifest, OutputFile, cells_csv, write};
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::Table;
+
+use crate::assert_shown;
+use crate::report::published;
 
 struct Report {
     cells: Cells,
@@ -15,10 +17,12 @@ struct Report {
     manifest: Manifest,
 }
 
+/// Traces as typed.
+const INPUTS: [&str; 4] = ["b.parquet", "/data/of/someone/a.parquet", "../up/c.parquet", "./traces/d.parquet"];
+
 fn report() -> Report {
     let cells = published::cells();
-    let inputs = ["b.parquet", "/data/of/someone/a.parquet", "../up/c.parquet", "./traces/d.parquet"];
-    let inputs = inputs.map(|path| Input::new(Path::new(path), "0".repeat(64), 5)).to_vec();
+    let inputs = INPUTS.map(|path| Input::new(Path::new(path), "0".repeat(64), 5)).to_vec();
     let filter = Some("seed = 1".to_owned());
     let manifest = Manifest::new(&cells, &Style::load("paper").unwrap(), 1, filter, inputs);
     Report { cells, tables: published::tables("paper"), manifest }
@@ -40,7 +44,7 @@ fn every_file_is_written_and_none_is_left_over() {
     let out = home.path().join("reports/latest");
     let figure = OutputFile { path: "figures/spider.svg".into(), bytes: b"<svg/>".to_vec() };
     let written = write_to(&out, &report(), &[figure]).unwrap();
-    insta::assert_snapshot!(names(&out, &written).join("\n"));
+    assert_shown!("the paper's tables, its cells and a figure", names(&out, &written).join("\n"));
     assert!(written.iter().all(|file| file.is_file()));
     assert_eq!(fs::read(out.join("episodes.parquet")).unwrap(), b"PAR1");
     assert_eq!(fs::read_dir(home.path().join("reports")).unwrap().count(), 1, "no temporary folder stays");
@@ -93,9 +97,8 @@ fn a_manifest_names_inputs_in_order_and_no_absolute_path() {
     assert!(!json.contains("someone"));
     let back: Manifest = serde_json::from_str(&json).unwrap();
     assert_eq!(back, report().manifest);
-    insta::assert_snapshot!(
-        json.replace(&report().manifest.style.sha256, "<hash>").lines().take(20).collect::<Vec<_>>().join("\n")
-    );
+    let json = json.replace(&report().manifest.style.sha256, "<hash>");
+    assert_shown!(INPUTS.join("\n"), json.lines().take(20).collect::<Vec<_>>().join("\n"));
 }
 
 #[test]
@@ -104,5 +107,5 @@ fn cells_have_full_precision_and_nothing_for_undefined() {
     let lines = csv.lines().filter(|line| {
         line.starts_with("experiment,") || line.starts_with("E1,Gemini 2.5 Flash") || line.contains("E2,Ministral")
     });
-    insta::assert_snapshot!(lines.collect::<Vec<_>>().join("\n"));
+    assert_shown!("cells.csv of fixtures/published, two models of it", lines.collect::<Vec<_>>().join("\n"));
 }

@@ -9,6 +9,9 @@ use mirrorstats::report::published::{Published, read};
 use mirrorstats::report::style::Style;
 use mirrorstats::report::tables::side_by_side;
 
+use crate::assert_shown;
+use crate::report::published;
+
 fn file(text: &str) -> tempfile::NamedTempFile {
     let file = tempfile::NamedTempFile::new().unwrap();
     fs::write(&file, text).unwrap();
@@ -16,18 +19,18 @@ fn file(text: &str) -> tempfile::NamedTempFile {
 }
 
 fn paper(table: &str) -> Published {
-    read(Path::new(&crate::report::published::path(table, "csv"))).unwrap()
+    read(Path::new(&published::path(table, "csv"))).unwrap()
 }
 
 fn against(published: &Published, errata: &Errata) -> Comparison {
     let style = Style::load("paper").unwrap();
-    let tables = crate::report::published::tables("paper");
+    let tables = published::tables("paper");
     compare(choose(&tables, published, None, &style).unwrap(), published, errata)
 }
 
 /// The published main table after `change`, compared under the paper's errata.
 fn changed(change: impl Fn(&str) -> String) -> Comparison {
-    let text = fs::read_to_string(crate::report::published::path("main", "csv")).unwrap();
+    let text = fs::read_to_string(published::path("main", "csv")).unwrap();
     against(&read(file(&change(&text)).path()).unwrap(), &Errata::of_paper())
 }
 
@@ -35,7 +38,7 @@ fn changed(change: impl Fn(&str) -> String) -> Comparison {
 fn all_but_two_published_cells_are_as_published() {
     let main = against(&paper("main"), &Errata::of_paper());
     assert!(main.holds());
-    insta::assert_snapshot!(side_by_side::render(&main, None));
+    assert_shown!("fixtures/paper against fixtures/published/main_table.csv", side_by_side::render(&main, None));
     let appendix = against(&paper("appendix"), &Errata::of_paper());
     assert!(appendix.holds());
     assert_eq!(
@@ -76,9 +79,9 @@ fn an_erratum_excuses_exactly_what_it_states() {
     let found = changed(|text| text.replace("57.90,10.07", "57.91,10.07"));
     assert!(found.holds());
     assert_eq!(found.unused_errata.len(), 1);
-    insta::assert_snapshot!(
-        side_by_side::render(&found, None).lines().find(|line| line.contains("not needed")).unwrap()
-    );
+    let text = side_by_side::render(&found, None);
+    let note = text.lines().find(|line| line.contains("not needed")).unwrap();
+    assert_shown!("main_table.csv with 57.91,10.07 for 57.90,10.07, the errata of the paper", note);
 }
 
 #[test]
@@ -86,25 +89,30 @@ fn cells_that_one_side_lacks_are_told() {
     let found = changed(|text| text.replace("E1,Gemma4 26B,TSA,0.57,0.11,\n", ""));
     assert!(found.holds());
     assert_eq!((found.cells, found.unpublished.len()), (239, 1));
-    let found = changed(|text| format!("{text}E1,Unheard Of,TSA,0.57,0.11,\n"));
+    let line = "E1,Unheard Of,TSA,0.57,0.11,\n";
+    let found = changed(|text| format!("{text}{line}"));
     assert!(!found.holds());
-    insta::assert_snapshot!(side_by_side::render(&found, None));
+    assert_shown!(format!("main_table.csv and {line}"), side_by_side::render(&found, None));
 }
 
 #[test]
 fn a_table_that_cannot_be_chosen_is_an_error() {
     let of = |style: &str, csv: &str, name: Option<&str>| {
         let published = read(file(&format!("experiment,model,metric,mean,se,emphasis\n{csv}\n")).path()).unwrap();
-        let tables = crate::report::published::tables(style);
+        let tables = published::tables(style);
         choose(&tables, &published, name, &Style::load(style).unwrap())
             .map(|table| table.name.clone())
             .map_err(|e| e.to_string())
     };
     assert_eq!(of("paper", "E1,a,TSA,1,1,", None), Ok("main".to_owned()));
     assert_eq!(of("paper", "E1,a,TSA,1,1,", Some("appendix")), Ok("appendix".to_owned()));
-    insta::assert_snapshot!(of("paper", "E1,a,TTD,1,1,\nE1,a,SC,1,1,", None).unwrap_err());
-    insta::assert_snapshot!(of("paper", "E1,a,TSA,1,1,", Some("mian")).unwrap_err());
-    insta::assert_snapshot!(of("default", "E1,a,TSA,1,1,", None).unwrap_err());
+    for (style, csv, name) in [
+        ("paper", "E1,a,TTD,1,1,\nE1,a,SC,1,1,", None),
+        ("paper", "E1,a,TSA,1,1,", Some("mian")),
+        ("default", "E1,a,TSA,1,1,", None),
+    ] {
+        assert_shown!(format!("{csv} as the table {name:?} of the style {style}"), of(style, csv, name).unwrap_err());
+    }
 }
 
 #[test]
@@ -115,9 +123,13 @@ fn errata_files_are_checked() {
         message.replace(&file.path().display().to_string(), "errata.toml")
     };
     let erratum = "[[erratum]]\ntable = 'main'\nexperiment = 'E1'\nmodel = 'a'\nmetric = 'TSA'\nfield = 'mean'\npublished = '1'\ncomputed = '2'\n";
-    insta::assert_snapshot!(message(&format!("{erratum}reason = ' '\n")));
-    insta::assert_snapshot!(message(erratum));
-    insta::assert_snapshot!(message(&format!("{erratum}reason = 'x'\n").replace("'mean'", "'median'")));
+    for text in [
+        format!("{erratum}reason = ' '\n"),
+        erratum.to_owned(),
+        format!("{erratum}reason = 'x'\n").replace("'mean'", "'median'"),
+    ] {
+        assert_shown!(text.as_str(), message(&text));
+    }
 }
 
 #[test]

@@ -2,8 +2,10 @@
 
 use std::fs;
 
-use crate::report::published;
 use mirrorstats::report::style::Style;
+
+use crate::assert_shown;
+use crate::report::published;
 
 const MAIN: &str = "[table.main]\ntitle = 'T'\ncolumns = ['TSA']\n";
 
@@ -38,7 +40,7 @@ fn each_fault_of_a_style_file_is_named() {
         "[table".to_owned(),
     ];
     let told: Vec<String> = faults.iter().map(|text| format!("{text}--> {}\n", message(text))).collect();
-    insta::assert_snapshot!(told.join("\n"));
+    assert_shown!("style files, and what is said of each behind an arrow", told.join("\n"));
 }
 
 #[test]

@@ -4,53 +4,11 @@ mod diff;
 mod rescore;
 mod worked;
 
-use std::path::{Path, PathBuf};
-
-use assert_cmd::Command;
 use mirrorstats::trace::episode::{Action, Episode, Step};
 use mirrorstats::trace::write::write_episodes;
-use serde_json::Value;
 
-/// What the program did.
-struct Answer {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
-
-impl Answer {
-    #[track_caller]
-    fn ends(self, code: i32) -> Self {
-        assert_eq!(self.code, code, "stdout: {}\nstderr: {}", self.stdout, self.stderr);
-        self
-    }
-
-    #[track_caller]
-    fn json(self) -> Value {
-        serde_json::from_str(&self.ends(0).stdout).unwrap()
-    }
-
-    #[track_caller]
-    fn refused(self) -> String {
-        let answer = self.ends(2);
-        assert!(answer.stdout.is_empty() && answer.stderr.contains("error: "), "{}", answer.stderr);
-        answer.stderr
-    }
-}
-
-fn run(folder: &Path, arguments: &[&str]) -> Answer {
-    let mut command = Command::cargo_bin("mirrorstats").unwrap();
-    let output = command.current_dir(folder).args(arguments).env("NO_COLOR", "1").output().unwrap();
-    Answer {
-        code: output.status.code().expect("the program ends by itself"),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
-}
-
-fn repository() -> PathBuf {
-    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
-}
+use crate::harness::program::run;
+use crate::harness::traces;
 
 /// Definitions of one metric, the timesteps with the mirror in view, in all or from `t` on.
 fn gaze(from: i64) -> String {
@@ -64,17 +22,8 @@ fn episode(id: &str, run: i32, visible: [bool; 3]) -> Episode {
         mirror_visible,
         ..Step::default()
     };
-    Episode {
-        episode_id: id.into(),
-        model: "ant".into(),
-        experiment: "E1".into(),
-        seed: 1,
-        run,
-        body_color: "red".into(),
-        stated_color: None,
-        distractors: None,
-        steps: visible.into_iter().enumerate().map(step).collect(),
-    }
+    let steps = visible.into_iter().enumerate().map(step).collect();
+    Episode { model: "ant".into(), run, ..traces::episode(id, steps) }
 }
 
 /// A folder with `a.parquet` (episodes e1, e2), `b.parquet` (e3) and the definitions `all.toml` and `late.toml`.

@@ -1,26 +1,11 @@
 //! `rescore`: the same traces, the same options, other definitions; nothing of the old report touched.
 
-use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
 
 use serde_json::json;
 
 use crate::changes::{folder, run};
-
-/// Every file below a folder with its bytes.
-fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut open = vec![folder.to_owned()];
-    while let Some(path) = open.pop() {
-        if path.is_dir() {
-            open.extend(fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
-        } else {
-            found.insert(path.strip_prefix(folder).unwrap().display().to_string(), fs::read(&path).unwrap());
-        }
-    }
-    found
-}
+use crate::harness::files::{contents, repository};
 
 /// The folder of traces with a report `old` of them, made with options of its own.
 fn reported() -> tempfile::TempDir {
@@ -145,7 +130,7 @@ fn a_folder_that_is_no_report_is_refused() {
 fn a_style_that_was_a_file_must_be_named_again() {
     let folder = folder();
     let at = folder.path();
-    let style = fs::read_to_string(crate::changes::repository().join("assets/styles/default.toml")).unwrap();
+    let style = fs::read_to_string(repository().join("assets/styles/default.toml")).unwrap();
     fs::create_dir(at.join("styles")).unwrap();
     fs::write(at.join("styles/mine.toml"), style).unwrap();
     let report = ["report", "a.parquet", "--no-figures", "--style", "styles/mine.toml", "--out", "old"];

@@ -7,25 +7,9 @@ use std::borrow::Borrow;
 use std::fs;
 use std::path::Path;
 
-use assert_cmd::Command;
 use serde_json::{Value, json};
 
-/// What the program did.
-struct Answer {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
-
-fn run(folder: &Path, arguments: &[&str], input: impl Into<Vec<u8>>) -> Answer {
-    let mut command = Command::cargo_bin("mirrorstats").unwrap();
-    let output = command.current_dir(folder).args(arguments).write_stdin(input).output().unwrap();
-    Answer {
-        code: output.status.code().expect("the program ends by itself"),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
-}
+use crate::harness::program::run_with_input as run;
 
 /// A step of an episode of E1 with the required keys alone.
 fn step(episode: &str, t: i64) -> Value {

@@ -1,14 +1,14 @@
 //! Traces as JSON lines and back: every value is the same, and so is every score.
 
 use std::fs;
-use std::path::Path;
 
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::merge;
 use mirrorstats::trace::write::write_episodes;
 use serde_json::{Map, Value, json};
 
 use super::{lines, run, scores};
+use crate::harness::files::fixture;
+use crate::harness::traces::{self, episodes};
 
 /// The rows of an episode as a harness would write them, optional keys only where there is a value.
 fn exported(episode: &Episode) -> Vec<Value> {
@@ -43,13 +43,9 @@ fn exported(episode: &Episode) -> Vec<Value> {
     rows.collect()
 }
 
-fn episodes(trace: &Path) -> Vec<Episode> {
-    merge::read(trace).unwrap().iter().map(|rows| rows.episode().unwrap()).collect()
-}
-
 #[test]
 fn the_paper_is_the_same_after_it() {
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/paper");
+    let fixtures = fixture("paper");
     let mut traces: Vec<_> = fs::read_dir(&fixtures).unwrap().map(|entry| entry.unwrap().path()).collect();
     traces.retain(|path| path.extension().is_some_and(|ending| ending == "parquet"));
     traces.sort();
@@ -86,15 +82,9 @@ fn every_value_of_every_column_is_the_same_after_it() {
         extra,
     };
     let episode = |id: &str, steps: Vec<Step>| Episode {
-        episode_id: id.into(),
-        model: "m".into(),
         experiment: "E3".into(),
-        seed: 1,
-        run: 1,
-        body_color: "red".into(),
         stated_color: Some("blue".into()),
-        distractors: None,
-        steps,
+        ..traces::episode(id, steps)
     };
     let original = [episode("é", vec![bare.clone(), full.clone()]), episode("b", vec![full, bare])];
     let folder = tempfile::tempdir().unwrap();

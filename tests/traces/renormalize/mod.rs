@@ -1,36 +1,25 @@
 //! `mirrorstats renormalize` at the process boundary: what changes, what stays, what is refused.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use arrow::array::{Array, AsArray, Int32Array, RecordBatch, StringArray, TimestampMicrosecondArray};
-use arrow::compute::concat_batches;
+use arrow::array::{Array, Int32Array, RecordBatch, StringArray, TimestampMicrosecondArray};
 use arrow::datatypes::{DataType, Field, Schema};
-use assert_cmd::Command;
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats::trace::episode::{Action, Extra, Step};
 use mirrorstats::trace::write::write_episodes;
-use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::Compression;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Value, json};
 
-struct Answer {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
+use crate::assert_shown;
+use crate::harness::files::fixture;
+use crate::harness::program::{self, Answer};
+use crate::harness::traces::{episode, reader, rows, texts, write_rows};
 
 fn run(folder: &Path, arguments: &[&str]) -> Answer {
-    let mut command = Command::cargo_bin("mirrorstats").unwrap();
-    let output = command.current_dir(folder).arg("renormalize").args(arguments).write_stdin("").output().unwrap();
-    Answer {
-        code: output.status.code().expect("the program ends by itself"),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
+    program::run(folder, &[&["renormalize"], arguments].concat())
 }
 
 fn step(text: Option<&str>, color: Option<&str>) -> Step {
@@ -42,20 +31,6 @@ fn step(text: Option<&str>, color: Option<&str>) -> Step {
         selected_cube: Some("none".into()),
         mirror_visible: true,
         extra,
-    }
-}
-
-fn episode(id: &str, steps: Vec<Step>) -> Episode {
-    Episode {
-        episode_id: id.into(),
-        model: "m".into(),
-        experiment: "E1".into(),
-        seed: 1,
-        run: 1,
-        body_color: "red".into(),
-        stated_color: None,
-        distractors: Some(0),
-        steps,
     }
 }
 
@@ -81,21 +56,12 @@ fn old(folder: &Path, name: &str) -> PathBuf {
     path
 }
 
-fn rows(path: &Path) -> RecordBatch {
-    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap().build().unwrap();
-    let batches: Vec<_> = reader.collect::<Result<_, _>>().unwrap();
-    concat_batches(&batches[0].schema(), &batches).unwrap()
-}
-
 fn pairs(path: &Path) -> Vec<KeyValue> {
-    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
-    reader.metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default()
+    reader(path).metadata().file_metadata().key_value_metadata().cloned().unwrap_or_default()
 }
 
 fn colors(path: &Path) -> Vec<Option<String>> {
-    let rows = rows(path);
-    let colors = arrow::compute::cast(rows.column_by_name("self_color").unwrap(), &DataType::Utf8).unwrap();
-    colors.as_string::<i32>().iter().map(|color| color.map(str::to_owned)).collect()
+    texts(path, "self_color")
 }
 
 /// That all columns but the attribution are the same.
@@ -120,7 +86,8 @@ fn attributions_follow_the_texts_and_all_else_stays() {
     let before = fs::read(&old).unwrap();
     let answer = run(folder.path(), &["old.parquet", "-o", "new"]);
     assert_eq!((answer.code, answer.stderr.as_str()), (0, ""));
-    insta::assert_snapshot!(answer.stdout);
+    let steps: Vec<_> = texts(&old, "identification").into_iter().zip(colors(&old)).collect();
+    assert_shown!(format!("mirrorstats renormalize old.parquet -o new, of the steps {steps:?}"), answer.stdout);
     let new = folder.path().join("new/old.parquet");
     assert_eq!(fs::read(&old).unwrap(), before);
     assert_eq!(colors(&new), AFTER.map(|color| color.map(str::to_owned)));
@@ -137,8 +104,7 @@ fn attributions_follow_the_texts_and_all_else_stays() {
         pairs.into_iter().filter(|pair| pair.key != "mirrorstats.recording").collect()
     };
     assert_eq!(rest(is), rest(was));
-    let checked = Command::cargo_bin("mirrorstats").unwrap().arg("validate").arg(&new).output().unwrap();
-    assert!(checked.status.success());
+    program::run(folder.path(), &["validate", "new/old.parquet"]).done();
 }
 
 #[test]
@@ -209,17 +175,14 @@ fn foreign(path: &Path, identification: &[Option<&str>]) {
     let fields =
         columns.iter().map(|(name, array)| Field::new(*name, array.data_type().clone(), *name == "identification"));
     let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
-    let batch =
-        RecordBatch::try_new(Arc::clone(&schema), columns.into_iter().map(|(_, array)| array).collect()).unwrap();
+    let batch = RecordBatch::try_new(schema, columns.into_iter().map(|(_, array)| array).collect()).unwrap();
     let properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_max_row_group_row_count(Some(2))
         .set_bloom_filter_enabled(true)
         .set_key_value_metadata(Some(vec![KeyValue::new("theirs".to_owned(), "kept".to_owned())]))
         .build();
-    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), schema, Some(properties)).unwrap();
-    writer.write(&batch).unwrap();
-    writer.close().unwrap();
+    write_rows(path, &[batch], Some(properties));
 }
 
 #[test]
@@ -239,14 +202,12 @@ fn traces_of_other_writers_keep_their_columns_and_keys() {
     assert!(kept.iter().any(|pair| pair.key == "theirs" && pair.value.as_deref() == Some("kept")));
     let recording = kept.iter().find(|pair| pair.key == "mirrorstats.recording").unwrap();
     assert_eq!(recording.value.as_deref(), Some(r#"{"identification_version":"1"}"#));
-    let checked = Command::cargo_bin("mirrorstats").unwrap().arg("validate").arg(&new).output().unwrap();
-    assert!(checked.status.success(), "{}", String::from_utf8_lossy(&checked.stdout));
+    program::run(folder.path(), &["validate", "deep/new/theirs.parquet"]).ends(0);
 }
 
 #[test]
 fn recorded_traces_of_scripted_agents_stay() {
-    let fixtures = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures");
-    let answer = run(&fixtures, &["recorded", "--dry-run"]);
+    let answer = run(&fixture(""), &["recorded", "--dry-run"]);
     assert_eq!(answer.code, 0, "{}", answer.stderr);
     assert!(answer.stdout.starts_with("0 attributions change of "), "{}", answer.stdout);
 }

@@ -4,7 +4,6 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use assert_cmd::Command;
 use mirrorstats::score::format::{self, Format};
 use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::trace::finding::{Code, Finding, TraceError};
@@ -13,12 +12,14 @@ use mirrorstats::trace::merge;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::verify::verify_pages;
 
+use crate::harness::files;
+use crate::harness::program::program;
 use crate::trace_bytes::pages::{Page, pages, told};
 
 const FILES: [&str; 3] = ["v1-snappy.parquet", "v1-none.parquet", "v2-zstd.parquet"];
 
 fn fixture(name: &str) -> Vec<u8> {
-    fs::read(Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/checksums").join(name)).unwrap()
+    fs::read(files::fixture("checksums").join(name)).unwrap()
 }
 
 /// The episode table of a file as CSV, if it can be read.
@@ -142,7 +143,7 @@ fn every_page_with_a_wrong_checksum_is_found_on_every_way_to_read_it() {
                 assert_eq!(page.column, "description");
                 continue;
             }
-            let output = Command::cargo_bin("mirrorstats").unwrap().arg("validate").arg(&path).output().unwrap();
+            let output = program(folder.path()).arg("validate").arg(&path).output().unwrap();
             let told = told(&output);
             assert_eq!(output.status.code(), Some(1), "{name}, {page:?}: {told}");
             assert!(told.contains("CRC-32") && told.contains(&format!("byte {}", page.offset)), "{told}");
@@ -158,8 +159,7 @@ fn polars_is_given_verified_pages() {
     let mut bytes = fixture(FILES[0]);
     let page = pages(&bytes).into_iter().find(|page| page.column == "cost_usd").unwrap();
     let query = |path: &Path| {
-        let mut command = Command::cargo_bin("mirrorstats").unwrap();
-        command.args(["query", "SELECT sum(cost_usd) FROM steps"]).arg(path).output().unwrap()
+        program(folder.path()).args(["query", "SELECT sum(cost_usd) FROM steps"]).arg(path).output().unwrap()
     };
     fs::write(&path, &bytes).unwrap();
     assert!(query(&path).status.success());

@@ -4,7 +4,6 @@
 //! threads, and its exit code is another one.
 
 use std::path::Path;
-use std::process::Command;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, ListArray, RecordBatch, StructArray};
@@ -14,6 +13,7 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::properties::{WriterProperties, WriterVersion};
 
+use crate::harness::program::limited;
 use crate::trace_bytes::pages::{Header, Page, pages, rebuild, told, with_rows};
 use crate::trace_bytes::stored;
 
@@ -23,11 +23,9 @@ const MEMORY: u32 = 512 << 10;
 
 /// Runs the program on a file within the limits.
 fn run(arguments: &[&str], file: &Path) -> (Option<i32>, String) {
-    let limited = format!("ulimit -t {SECONDS} && ulimit -v {MEMORY} && exec \"$@\"");
-    let mut command = Command::new("sh");
-    command.args(["-c", &limited, "sh", env!("CARGO_BIN_EXE_mirrorstats")]).args(arguments).arg(file);
+    let mut command = limited(file.parent().unwrap(), &format!("ulimit -t {SECONDS} && ulimit -v {MEMORY}"));
     // Each thread of the allocator's would reserve memory that nobody uses.
-    let output = command.env("MALLOC_ARENA_MAX", "1").output().unwrap();
+    let output = command.args(arguments).arg(file).env("MALLOC_ARENA_MAX", "1").output().unwrap();
     (output.status.code(), told(&output))
 }
 

@@ -15,8 +15,9 @@ use mirrorstats::trace::scan::Projection;
 use mirrorstats::trace::validate::validate;
 use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
+
+use crate::harness::traces::{self, reader};
 
 mod checksums;
 #[cfg(unix)]
@@ -33,17 +34,8 @@ fn episodes() -> Vec<Episode> {
         mirror_visible: t.is_multiple_of(2),
         extra: Extra { mirror_px: i32::try_from(t).ok(), cost_usd: Some(0.5), ..Extra::default() },
     };
-    let episode = |i: usize| Episode {
-        episode_id: format!("e{i}"),
-        model: "m".into(),
-        experiment: "E1".into(),
-        seed: 1,
-        run: 2,
-        body_color: "red".into(),
-        stated_color: None,
-        distractors: Some(1),
-        steps: (0..5 + i).map(step).collect(),
-    };
+    let steps = |i| (0..5 + i).map(step).collect();
+    let episode = |i: usize| Episode { run: 2, distractors: Some(1), ..traces::episode(&format!("e{i}"), steps(i)) };
     (0..3).map(episode).collect()
 }
 
@@ -60,7 +52,7 @@ fn trace() -> Vec<u8> {
 fn foreign(folder: &Path) -> Vec<u8> {
     let path = folder.join("whole.parquet");
     fs::write(&path, trace()).unwrap();
-    let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(&path).unwrap()).unwrap();
+    let reader = reader(&path);
     let properties = WriterProperties::builder()
         .set_writer_version(WriterVersion::PARQUET_2_0)
         .set_dictionary_enabled(false)
@@ -77,7 +69,7 @@ fn foreign(folder: &Path) -> Vec<u8> {
 fn stored(folder: &Path, properties: WriterPropertiesBuilder) -> Vec<u8> {
     let path = folder.join("whole.parquet");
     fs::write(&path, trace()).unwrap();
-    let reader = ParquetRecordBatchReaderBuilder::try_new(fs::File::open(&path).unwrap()).unwrap();
+    let reader = reader(&path);
     let fields = reader.schema().fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
     let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
     let mut writer = ArrowWriter::try_new(Vec::new(), Arc::clone(&schema), Some(properties.build())).unwrap();

@@ -68,10 +68,17 @@ fn native(folder: &Path, arguments: &[&str]) -> String {
 fn a_cluster_gives_the_scores_of_the_native_engine() {
     let mut cluster = Cluster::start();
     texts_and_patterns_from_a_uri_into_a_folder(&cluster);
-    what_the_traces_break_is_refused(&cluster);
-    a_report_is_the_native_one(&cluster);
+    an_episode_in_two_files_is_refused(&cluster);
     nothing_runs_on_when_the_program_is_gone(&cluster);
     a_worker_may_be_killed(&mut cluster);
+}
+
+#[test]
+#[ignore = "soak: a cluster of its own, three more statements"]
+fn soak_a_cluster_gives_the_native_report_and_refuses_what_it_cannot_read() {
+    let cluster = Cluster::start();
+    what_a_uri_does_not_give_is_refused(&cluster);
+    a_report_is_the_native_one(&cluster);
 }
 
 fn texts_and_patterns_from_a_uri_into_a_folder(cluster: &Cluster) {
@@ -92,7 +99,8 @@ fn texts_and_patterns_from_a_uri_into_a_folder(cluster: &Cluster) {
     assert!(spark(cluster, at, &[&uri, "-o", "out"]).refused().contains("`out` is there already"));
 }
 
-fn what_the_traces_break_is_refused(cluster: &Cluster) {
+/// A folder with `a.parquet`, and `b.parquet` that has one of its episodes and no optional column.
+fn overlapping() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let (one, other) = (episode("one", "E1", 1), episode("other", "E1", 2));
@@ -100,10 +108,22 @@ fn what_the_traces_break_is_refused(cluster: &Cluster) {
     let mut bare = Episode { stated_color: None, ..one };
     bare.steps.iter_mut().for_each(|step| step.extra = Extra::default());
     write(&at.join("b.parquet"), &[bare], OptionalColumns::NONE);
+    folder
+}
+
+fn an_episode_in_two_files_is_refused(cluster: &Cluster) {
+    let folder = overlapping();
+    let at = folder.path();
     let twice = spark(cluster, at, &["a.parquet", "b.parquet", "-o", "out.csv"]).refused();
     for words in ["t-duplicate: ", "episode `one`", "8 rows of 4 timesteps", "help: "] {
         assert!(twice.contains(words), "no `{words}` in {twice}");
     }
+    assert!(!at.join("out.csv").exists());
+}
+
+fn what_a_uri_does_not_give_is_refused(cluster: &Cluster) {
+    let folder = overlapping();
+    let at = folder.path();
     fs::write(at.join("mine.toml"), "[metric.M]\nvalue = \"count(reasoning is null)\"\n").unwrap();
     let uri = format!("file://{}/*.parquet", at.display());
     let absent = spark(cluster, at, &[&uri, "--definitions", "mine.toml"]).refused();
@@ -112,7 +132,6 @@ fn what_the_traces_break_is_refused(cluster: &Cluster) {
     );
     let none = spark(cluster, at, &[&format!("file://{}/none", at.display())]).refused();
     assert!(none.contains("[PATH_NOT_FOUND]") && none.lines().count() == 2, "{none}");
-    assert!(!at.join("out.csv").exists());
 }
 
 fn a_report_is_the_native_one(cluster: &Cluster) {

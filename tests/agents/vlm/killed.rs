@@ -161,9 +161,8 @@ fn killed_again_and_again_it_records_every_episode_once_and_asks_for_nothing_twi
     check(2, 2, 6);
 }
 
-/// `cargo test --features sim --test agents -- --ignored eight_models` takes a minute.
 #[test]
-#[ignore = "a minute: eight models, twenty-one episodes each, killed twenty times"]
-fn eight_models_killed_twenty_times_record_every_episode_once_and_ask_for_nothing_twice() {
+#[ignore = "soak: eight models, twenty-one episodes each, killed twenty times"]
+fn soak_eight_models_killed_twenty_times_record_every_episode_once_and_ask_for_nothing_twice() {
     check(8, 7, 20);
 }

@@ -26,9 +26,14 @@ fn episode(id: &str, run: i32, visible: [bool; 3]) -> Episode {
     Episode { model: "ant".into(), run, ..traces::episode(id, steps) }
 }
 
+/// A folder beside which nobody else has files: traces are looked for there too.
+fn secluded() -> tempfile::TempDir {
+    tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap()
+}
+
 /// A folder with `a.parquet` (episodes e1, e2), `b.parquet` (e3) and the definitions `all.toml` and `late.toml`.
 fn folder() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
+    let folder = secluded();
     let at = |name: &str| folder.path().join(name);
     let [e1, e2] = [episode("e1", 1, [true, true, false]), episode("e2", 2, [false, false, true])];
     write_episodes(&at("a.parquet"), None, &[e1, e2]).unwrap();

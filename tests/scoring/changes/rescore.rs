@@ -4,7 +4,7 @@ use std::fs;
 
 use serde_json::json;
 
-use crate::changes::{folder, run};
+use crate::changes::{folder, run, secluded};
 use crate::harness::files::{contents, repository};
 
 /// The folder of traces with a report `old` of them, made with options of its own.
@@ -67,7 +67,7 @@ fn a_choice_of_metrics_is_kept() {
 fn traces_are_found_from_anywhere_by_what_they_are() {
     let folder = reported();
     let at = folder.path();
-    let elsewhere = tempfile::tempdir().unwrap();
+    let elsewhere = secluded();
     let report = at.join("old").display().to_string();
     fs::copy(at.join("late.toml"), elsewhere.path().join("late.toml")).unwrap();
     let arguments = ["rescore", report.as_str(), "--definitions", "late.toml", "--out"];

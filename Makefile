@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint unit docs end-to-end bless recorded calibrate bench bench-scores bench-world bench-agents sheet
+.PHONY: demo test fmt lint needed unit soak docs end-to-end bless recorded calibrate bench bench-scores bench-world bench-agents sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -19,13 +19,19 @@ lint:
 	cargo clippy --all-targets -- -D warnings
 	cargo clippy --all-targets --all-features -- -D warnings
 
-# Without a browser the test of report.html says that it was skipped; MIRRORSTATS_REQUIRE_BROWSER=1 makes that a failure.
-# The same holds for Spark, and Java to run it on, which are required where they could be had.
-unit:
-	-scripts/get-browser.sh
-	-scripts/get-egl.sh
+# What the tests need, each script says what it cannot get.
+needed:
+	scripts/get-browser.sh
+	scripts/get-egl.sh
 	scripts/get-mujoco.sh
-	if scripts/get-spark.sh; then export MIRRORSTATS_REQUIRE_SPARK=1; fi; cargo test --all-features --no-fail-fast
+	scripts/get-spark.sh
+
+unit: needed
+	cargo test --all-features --no-fail-fast
+
+## The campaigns that are too long for CI, with their full numbers of rounds: benches/SOAK.md.
+soak: needed
+	cargo test --all-features --no-fail-fast -- --ignored soak
 
 docs:
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --all-features --quiet
@@ -35,7 +41,7 @@ end-to-end:
 	scripts/end-to-end.sh
 
 ## Write generated files anew: JSON Schemas, snapshots, the committed report.
-bless:
+bless: needed
 	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --all-features --no-fail-fast
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
 	cd reports/paper && sha256sum report.html >../report.html.sha256

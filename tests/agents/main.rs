@@ -1,15 +1,34 @@
-//! The scripted agents: what they make of pictures, and whether each shows the metrics that its name predicts.
+//! Agents: what they are asked, how replies are read, scripted ones, models behind a provider, programs.
+//!
+//! The scripted agents are in this folder: what they make of pictures, and whether each shows the metrics that its name
+//! predicts.
 
-#![cfg(feature = "sim")]
-#![expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_precision_loss,
-    reason = "a picture is small, a colour a byte"
+#![cfg_attr(
+    feature = "sim",
+    expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_precision_loss,
+        reason = "a picture is small, a colour a byte"
+    )
 )]
 
+#[cfg(feature = "sim")]
 mod calibration;
+#[cfg(all(feature = "sim", unix))]
+mod exec;
+#[path = "../harness/mod.rs"]
+mod harness;
+#[cfg(feature = "sim")]
 mod painted;
+#[cfg(feature = "sim")]
 mod profile;
+mod prompts;
+#[cfg(feature = "sim")]
 mod recorded;
+mod replies;
+#[cfg(feature = "sim")]
 mod sight;
+#[cfg(feature = "sim")]
+mod vlm;
+#[cfg(feature = "sim")]
 mod walks;

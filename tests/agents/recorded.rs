@@ -16,10 +16,10 @@ use mirrorstats::sim::eye::Eye;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::world::World;
 use mirrorstats::trace::episode::{Episode, Step};
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+use mirrorstats::trace::write::OptionalColumns;
 
+use crate::harness::need;
+use crate::harness::traces::{open, write_trace};
 use crate::painted::ready;
 
 /// Nobody looks on.
@@ -48,6 +48,7 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Eye>>, agent: Scripted, key
 
 /// Records episodes on `threads` threads, each with an eye of its own; the order is that of the plan.
 pub fn record_all(plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
+    need::drawing();
     let config = WorldConfig::default();
     let next = AtomicUsize::new(0);
     let episodes = Mutex::new(vec![None; plan.len()]);
@@ -71,13 +72,8 @@ pub fn record_all(plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
 pub fn score(episodes: &[Episode]) -> EpisodeTable {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("trace.parquet");
-    let metadata = TraceMetadata { recording: None, columns: OptionalColumns::all() };
-    let mut writer = TraceWriter::create(&path, &metadata).unwrap();
-    for episode in episodes {
-        writer.write(episode).unwrap();
-    }
-    writer.finish().unwrap();
-    let traces = TraceSet::open(&[Input::new(&path)]).unwrap();
+    write_trace(&path, episodes, OptionalColumns::all());
+    let traces = open(&[&path]);
     let definitions = score_traces::definitions(&traces, &Request::of("paper")).unwrap();
     score_traces::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()
 }

@@ -1,16 +1,16 @@
 //! Colours are checked wherever traces are read for values: what is refused, in which words, and what is only noted.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, BooleanArray, Int32Array, RecordBatch, StringArray};
-use parquet::arrow::ArrowWriter;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Value, json};
 
-use crate::{Answer, fixtures, run};
+use crate::harness::traces::write_rows;
+use crate::{Answer, fixture, run};
 
 /// The columns of colours in a trace of one episode of four steps.
 #[derive(Clone, Copy)]
@@ -67,9 +67,7 @@ fn write(path: &Path, colors: Colors, recording: Option<&str>) {
     let batch = RecordBatch::try_from_iter_with_nullable(columns.map(|(name, values)| (name, values, true))).unwrap();
     let pair = recording.map(|text| vec![KeyValue::new("mirrorstats.recording".to_owned(), text.to_owned())]);
     let properties = WriterProperties::builder().set_key_value_metadata(pair).build();
-    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), batch.schema(), Some(properties)).unwrap();
-    writer.write(&batch).unwrap();
-    writer.close().unwrap();
+    write_rows(path, &[batch], Some(properties));
 }
 
 /// The findings of `validate --json`, and its exit code.
@@ -335,7 +333,7 @@ fn an_entry_of_a_dictionary_that_no_row_has_is_not_refused() {
 
 #[test]
 fn the_fixtures_keep_the_rules() {
-    let Answer { code, stdout, .. } = run(&fixtures(), &["validate", "paper", "recorded", "glimpses.parquet"]);
+    let Answer { code, stdout, .. } = run(&fixture(""), &["validate", "paper", "recorded", "glimpses.parquet"]);
     assert_eq!(code, 0, "{stdout}");
     assert!(stdout.ends_with("0 errors, 0 notes\n"), "{stdout}");
 }

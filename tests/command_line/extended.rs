@@ -3,6 +3,7 @@
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use mirrorstats::trace::write::write_episodes;
 
+use crate::harness::traces;
 use crate::run;
 
 /// A step: action, mirror in view, reasoning, own and others' pixels in the mirror.
@@ -20,16 +21,7 @@ fn episode(id: &str, rows: &[Row]) -> Episode {
         },
         ..Step::default()
     };
-    Episode {
-        episode_id: id.into(),
-        model: "m".into(),
-        experiment: "E1".into(),
-        seed: 1,
-        run: 1,
-        body_color: "red".into(),
-        steps: rows.iter().map(step).collect(),
-        ..Episode::default()
-    }
+    traces::episode(id, rows.iter().map(step).collect())
 }
 
 #[test]

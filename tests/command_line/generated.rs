@@ -1,16 +1,12 @@
 //! The traces of benchmarks (`examples/generate`): both orders keep the rules of traces and hold the same episodes.
 
 use std::collections::BTreeSet;
-use std::fs::File;
 use std::path::Path;
 
-use arrow::array::AsArray as _;
-use arrow::compute::cast;
-use arrow::datatypes::DataType;
 use mirrorstats::trace::schema::COLUMNS;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 use crate::generation::{self, Files, Order, Study};
+use crate::harness::traces::texts;
 use crate::{contents, run};
 
 const STEPS: u64 = 10_000;
@@ -23,15 +19,9 @@ fn generate(at: &Path, name: &str, study: &Study, order: Order) {
 
 /// The models of a file in the order of its steps, each once per change, and the number of steps.
 fn models(path: &Path) -> (Vec<String>, usize) {
-    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap();
-    let (mut models, mut steps) = (Vec::new(), 0);
-    for batch in reader.with_batch_size(1024).build().unwrap() {
-        let batch = batch.unwrap();
-        let column = cast(batch.column_by_name("model").unwrap(), &DataType::Utf8).unwrap();
-        models.extend(column.as_string::<i32>().iter().flatten().map(str::to_owned));
-        models.dedup();
-        steps += batch.num_rows();
-    }
+    let mut models: Vec<String> = texts(path, "model").into_iter().flatten().collect();
+    let steps = models.len();
+    models.dedup();
     (models, steps)
 }
 

@@ -2,9 +2,9 @@
 
 use std::fs;
 use std::io::Read as _;
-use std::process::{Command as Process, Stdio};
+use std::process::Stdio;
 
-use crate::{contents, fixtures, run, run_with_input, two_files};
+use crate::{contents, fixture, program, run, run_with_input, two_files};
 
 /// A column of CSV, the header apart.
 fn column(csv: &str, name: &str) -> Vec<String> {
@@ -131,7 +131,7 @@ fn an_episode_is_explained_by_its_timesteps() {
 #[test]
 fn json_is_json_wherever_it_is_offered() {
     let folder = two_files();
-    let published = fixtures().join("published/main_table.csv").display().to_string();
+    let published = fixture("published/main_table.csv").display().to_string();
     for (arguments, code) in [
         (["info", "."].as_slice(), 0),
         (&["validate", "."], 0),
@@ -181,9 +181,9 @@ fn the_same_arguments_write_the_same_bytes() {
 #[test]
 fn a_closed_pipe_is_no_error() {
     // More than a buffer of output, and less.
-    let traces = fixtures().join("paper");
+    let traces = fixture("paper");
     let traces = traces.to_str().unwrap();
-    let published = fixtures().join("published/main_table.csv");
+    let published = fixture("published/main_table.csv");
     let folder = two_files();
     for arguments in [
         ["score", "."].as_slice(),
@@ -209,13 +209,8 @@ fn a_closed_pipe_is_no_error() {
         &["--help"],
         &["report", "--help"],
     ] {
-        let mut child = Process::new(env!("CARGO_BIN_EXE_mirrorstats"))
-            .current_dir(folder.path())
-            .args(arguments)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut command = program(folder.path());
+        let mut child = command.args(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         drop(child.stdout.take());
         let mut said = String::new();
         child.stderr.take().unwrap().read_to_string(&mut said).unwrap();
@@ -227,7 +222,7 @@ fn a_closed_pipe_is_no_error() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_behind_standard_output_is_an_error() {
-    let traces = fixtures().join("paper");
+    let traces = fixture("paper");
     let folder = two_files();
     for arguments in [
         ["score", "."].as_slice(),
@@ -244,9 +239,8 @@ fn a_full_disk_behind_standard_output_is_an_error() {
         &["definitions", "explain", "TSA"],
         &["--help"],
     ] {
-        let mut command = Process::new(env!("CARGO_BIN_EXE_mirrorstats"));
         let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
-        let output = command.current_dir(folder.path()).args(arguments).stdout(full).output().unwrap();
+        let output = program(folder.path()).args(arguments).stdout(full).output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}: {said}");
         assert!(said.contains("error: cannot write the output\n  caused by: No space left"), "{arguments:?}: {said}");

@@ -3,9 +3,9 @@
 use std::fs;
 use std::os::unix::fs::{FileTypeExt as _, symlink};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
-use super::{contents, run, two_files};
+use crate::{contents, program, run, two_files};
 
 /// Every name under which `file` can be written: itself, around a corner, a symbolic and a hard link.
 fn aliases(folder: &Path, file: &str) -> Vec<String> {
@@ -96,8 +96,7 @@ fn a_copy_is_another_file() {
 /// Draws a figure to `target` with standard output going to `stdout`.
 fn figure(folder: &Path, target: &str, stdout: Stdio) -> std::process::Output {
     let words = ["figure", "spider", "a.parquet", "--format", "svg", "-o", target];
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-    command.current_dir(folder).args(words).stdout(stdout).stdin(Stdio::null()).output().unwrap()
+    program(folder).args(words).stdout(stdout).output().unwrap()
 }
 
 #[test]

@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use crate::{contents, fixtures, run, run_with_input, two_files};
+use crate::assert_shown;
+use crate::{contents, fixture, run, run_with_input, two_files};
 
 /// Damage in columns that the paper's definitions do not read: only `validate` looks there.
 const UNREAD: [&str; 2] = ["negative-count.parquet", "unknown-reply-status.parquet"];
@@ -11,7 +12,7 @@ const UNREAD: [&str; 2] = ["negative-count.parquet", "unknown-reply-status.parqu
 /// The damaged files; the pair that is damaged only together is one case.
 fn damaged() -> Vec<Vec<String>> {
     let mut cases = Vec::new();
-    for entry in fs::read_dir(fixtures().join("damaged")).unwrap() {
+    for entry in fs::read_dir(fixture("damaged")).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         match name.strip_suffix("-1.parquet") {
             Some(pair) => cases.push(vec![name.clone(), format!("{pair}-2.parquet")]),
@@ -27,7 +28,7 @@ fn damaged() -> Vec<Vec<String>> {
 #[test]
 fn every_damaged_trace_is_refused_by_every_command_that_scores() {
     let folder = tempfile::tempdir().unwrap();
-    let damaged_folder = fixtures().join("damaged");
+    let damaged_folder = fixture("damaged");
     let mut told = String::new();
     for case in damaged() {
         let paths: Vec<String> = case.iter().map(|name| damaged_folder.join(name).display().to_string()).collect();
@@ -50,7 +51,7 @@ fn every_damaged_trace_is_refused_by_every_command_that_scores() {
         assert_eq!((checked.code, checked.stderr.as_str()), (1, ""), "{case:?}");
         assert!(!checked.stdout.contains("panicked") && checked.stdout.contains(case.last().unwrap()), "{case:?}");
     }
-    insta::assert_snapshot!("damaged", told);
+    assert_shown!("damaged", "mirrorstats score with each of fixtures/damaged, in the order of their names", told);
     assert!(contents(folder.path()).is_empty(), "something was written: {:?}", contents(folder.path()).keys());
 }
 
@@ -155,7 +156,7 @@ fn a_report_that_is_refused_leaves_the_one_before_as_it_was() {
     let folder = two_files();
     run(folder.path(), &["report", "a.parquet", "--out", "out"]).done();
     let before = contents(folder.path());
-    let damaged = fixtures().join("damaged/t-gap.parquet").display().to_string();
+    let damaged = fixture("damaged/t-gap.parquet").display().to_string();
     run(folder.path(), &["report", "a.parquet", &damaged, "--out", "out"]).refused();
     run(folder.path(), &["report", "a.parquet", "--definitions", "extended", "--out", "out"]).refused();
     assert_eq!(contents(folder.path()), before);
@@ -164,7 +165,7 @@ fn a_report_that_is_refused_leaves_the_one_before_as_it_was() {
 #[test]
 fn the_first_fault_is_the_same_for_any_number_of_threads() {
     let folder = two_files();
-    let damaged = fixtures().join("damaged").display().to_string();
+    let damaged = fixture("damaged").display().to_string();
     let told = |threads: &str, list: &str| {
         run_with_input(folder.path(), &["score", "-", "--threads", threads], list).refused()
     };

@@ -1,18 +1,16 @@
 //! The folder of a report over an older one: the old one whole or the new one whole, and nothing of others is touched.
 
-use std::collections::BTreeMap;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use mirrorstats::base::hash;
 use serde_json::{Value, json};
 
-use super::{contents, run, two_files};
-
-type Contents = BTreeMap<String, Vec<u8>>;
+use crate::harness::files::Contents;
+use crate::{contents, program, run, two_files};
 
 /// The files of others.
 const FOREIGN: [(&str, &str); 4] =
@@ -132,8 +130,8 @@ fn a_manifest_of_something_else_lists_nothing_to_remove() {
 
 /// A report that is killed after a while; whether it was done before.
 fn killed_after(folder: &Path, words: &[&str], pause: Duration) -> bool {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_mirrorstats"));
-    command.current_dir(folder).args(["report", "--out", "out"]).args(words);
+    let mut command = program(folder);
+    command.args(["report", "--out", "out"]).args(words);
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
     std::thread::sleep(pause);
     drop(child.kill());
@@ -145,12 +143,12 @@ fn pauses(whole: Duration, count: u32) -> impl Iterator<Item = Duration> {
     (0..count).map(move |at| whole / 2 + whole * (at * 37 % count) / (2 * count))
 }
 
-/// Kills reports over an older one at many moments; `is_right` judges every folder that is left.
-fn kill_often(folder: &Path, is_right: impl Fn(&Contents) -> bool) {
+/// Kills reports over an older one at so many moments; `is_right` judges every folder that is left.
+fn kill_often(folder: &Path, kills: u32, is_right: impl Fn(&Contents) -> bool) {
     let begin = Instant::now();
     run(folder, &[&["report", "--out", "out"], &SMALL[..]].concat()).done();
     let whole = begin.elapsed();
-    for (at, pause) in pauses(whole, 40).enumerate() {
+    for (at, pause) in pauses(whole, kills).enumerate() {
         let words = if at % 2 == 0 { ["a.parquet", "--no-figures", "--metrics=MCR"] } else { SMALL };
         killed_after(folder, &words, pause);
         let found = contents(&folder.join("out")).into_iter();
@@ -163,18 +161,16 @@ fn kill_often(folder: &Path, is_right: impl Fn(&Contents) -> bool) {
     assert_eq!(left, 0, "{names:?}");
 }
 
-#[test]
-fn a_killed_report_leaves_the_old_one_or_the_new_one() {
+fn check_killed_report(kills: u32) {
     let folder = two_files();
     let other = fresh(folder.path(), &["a.parquet", "--no-figures", "--metrics=MCR"]);
     let small = fresh(folder.path(), &SMALL);
     put_foreign(&folder.path().join("out"));
     let reports = [with_foreign(small), with_foreign(other)];
-    kill_often(folder.path(), |found| reports.contains(found));
+    kill_often(folder.path(), kills, |found| reports.contains(found));
 }
 
-#[test]
-fn a_killed_report_in_a_linked_folder_leaves_one_or_no_manifest() {
+fn check_killed_report_in_a_linked_folder(kills: u32) {
     let folder = two_files();
     let other = fresh(folder.path(), &["a.parquet", "--no-figures", "--metrics=MCR"]);
     let small = fresh(folder.path(), &SMALL);
@@ -182,10 +178,32 @@ fn a_killed_report_in_a_linked_folder_leaves_one_or_no_manifest() {
     symlink("there", folder.path().join("out")).unwrap();
     put_foreign(&folder.path().join("out"));
     let reports = [with_foreign(small), with_foreign(other)];
-    kill_often(folder.path(), |found| {
+    kill_often(folder.path(), kills, |found| {
         let foreign = FOREIGN.iter().all(|(path, text)| found.get(*path).is_some_and(|found| found == text.as_bytes()));
         foreign && (!found.contains_key("manifest.json") || reports.contains(found))
     });
     let found = contents(&folder.path().join("out"));
     assert!(found == reports[0], "{:#?}", found.keys());
+}
+
+#[test]
+fn a_killed_report_leaves_the_old_one_or_the_new_one() {
+    check_killed_report(10);
+}
+
+#[test]
+#[ignore = "soak: 200 kills"]
+fn soak_a_killed_report_leaves_the_old_one_or_the_new_one() {
+    check_killed_report(200);
+}
+
+#[test]
+fn a_killed_report_in_a_linked_folder_leaves_one_or_no_manifest() {
+    check_killed_report_in_a_linked_folder(10);
+}
+
+#[test]
+#[ignore = "soak: 200 kills"]
+fn soak_a_killed_report_in_a_linked_folder_leaves_one_or_no_manifest() {
+    check_killed_report_in_a_linked_folder(200);
 }

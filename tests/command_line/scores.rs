@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::{contents, fixtures, run, two_files};
+use crate::{contents, fixture, run, two_files};
 
 const FORMATS: [&str; 3] = ["parquet", "csv", "jsonl"];
 
@@ -151,7 +151,7 @@ fn truncated_scores_are_refused() {
 #[test]
 fn the_paper_s_fixture_reports_the_same_from_scores() {
     let folder = tempfile::tempdir().unwrap();
-    let paper = fixtures().join("paper").display().to_string();
+    let paper = fixture("paper").display().to_string();
     run(folder.path(), &["score", &paper, "-o", "s.csv"]).done();
     let [traces, scores] = [paper.as_str(), "s.csv"].map(|input| {
         let printed = run(folder.path(), &["report", input, "--style", "paper", "--out", "out"]).done();

@@ -1,9 +1,9 @@
 //! Tables in terminals of any width.
 
-use assert_cmd::Command;
 use mirrorstats::trace::write::write_episodes;
 
 use crate::episode;
+use crate::harness::program::{answer, program};
 
 /// How many columns a line takes: every letter here takes one.
 fn widest(text: &str) -> usize {
@@ -24,10 +24,9 @@ fn no_line_is_wider_than_the_terminal() {
         &["info", "a.parquet"],
     ] {
         let run = |width: Option<usize>| {
-            let mut command = Command::cargo_bin("mirrorstats").unwrap();
-            command.current_dir(folder.path()).args(arguments).env_remove("COLUMNS");
-            let command = command.envs(width.map(|width| ("COLUMNS", width.to_string())));
-            String::from_utf8(command.output().unwrap().stdout).unwrap()
+            let mut command = program(folder.path());
+            let width = width.map(|width| ("COLUMNS", width.to_string()));
+            answer(command.args(arguments).envs(width)).done()
         };
         let whole = run(None);
         let numbers = |text: &str| text.chars().filter(char::is_ascii_digit).count();

@@ -4,6 +4,7 @@ use mirrorstats::cells::group::group;
 use mirrorstats::metric::catalog::StandardError;
 use mirrorstats::trace::episode::{Action, Episode, Step};
 
+use crate::harness;
 use crate::traces::{score_paper, values};
 
 const METRICS: [&str; 10] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "TSA-C", "MGD", "SC", "AR_SC"];
@@ -26,14 +27,9 @@ fn case(text: &str) -> Case {
     let (steps, expected): (Vec<_>, Vec<_>) = lines.partition(|line| !line.starts_with('>'));
     let values = expected[0].split_whitespace().skip(1);
     let episode = Episode {
-        episode_id: name.into(),
-        model: "m".into(),
         experiment: experiment.into(),
-        seed: 1,
-        run: 1,
         body_color: body_color.into(),
-        steps: steps.into_iter().map(step).collect(),
-        ..Episode::default()
+        ..harness::traces::episode(name, steps.into_iter().map(step).collect())
     };
     Case { episode, expected: values.map(|value| (value != ".").then(|| value.parse().unwrap())).collect() }
 }

@@ -1,28 +1,27 @@
 //! The same bytes come out however the same rows are stored: files, order, row groups, encodings, types, threads.
 
-use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray};
-use arrow::compute::{cast, concat_batches};
+use arrow::compute::cast;
 use arrow::datatypes::DataType;
-use assert_cmd::Command;
 use mirrorstats::score::format::{self, Format};
 use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::trace::episode::Episode;
-use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use tempfile::TempDir;
 
+use crate::harness::files::{Contents, contents};
+use crate::harness::program::run;
+use crate::harness::traces::{open, rows, write_rows};
 use crate::random::episodes;
-use crate::traces::{open, write};
+use crate::traces::write;
 
 /// How a foreign writer may store the columns.
 #[derive(Clone, Copy, Debug)]
@@ -72,12 +71,6 @@ fn sample() -> Vec<Episode> {
     sample
 }
 
-fn read(path: &Path) -> RecordBatch {
-    let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path).unwrap()).unwrap().build().unwrap();
-    let batches = reader.collect::<Result<Vec<_>, _>>().unwrap();
-    concat_batches(&batches[0].schema(), &batches).unwrap()
-}
-
 /// Writes the rows again in another layout.
 fn write_as(layout: Layout, rows: &RecordBatch, path: &Path) {
     let schema = rows.schema();
@@ -103,9 +96,7 @@ fn write_as(layout: Layout, rows: &RecordBatch, path: &Path) {
         .set_max_row_group_row_count(Some(layout.row_group.min(1 << 20)))
         .set_dictionary_enabled(layout.dictionary_pages)
         .build();
-    let mut writer = ArrowWriter::try_new(File::create(path).unwrap(), rows.schema(), Some(properties)).unwrap();
-    writer.write(&rows).unwrap();
-    writer.close().unwrap();
+    write_rows(path, &[rows], Some(properties));
 }
 
 /// The episode table of these files, in all three formats.
@@ -146,7 +137,7 @@ fn scores_do_not_depend_on_the_layout() {
     let (one, many) = one_and_many(&folder);
     let expected = scores(std::slice::from_ref(&one), 1);
     assert!(expected[0].split(|byte| *byte == b'\n').count() > 30, "the condition leaves enough to compare");
-    let rows = read(&one);
+    let rows = rows(&one);
     let other = folder.path().join("other.parquet");
     for layout in layouts() {
         write_as(layout, &rows, &other);
@@ -161,33 +152,19 @@ fn scores_do_not_depend_on_the_layout() {
 }
 
 /// Every file below a folder, but for the list of inputs in its manifest.
-fn report(folder: &TempDir, out: &str, arguments: &[&str]) -> BTreeMap<PathBuf, Vec<u8>> {
-    let out = folder.path().join(out);
-    let mut command = Command::cargo_bin("mirrorstats").unwrap();
-    command.current_dir(folder.path()).arg("report").args(arguments).arg("--out").arg(&out);
-    command.assert().success();
-    let mut found = BTreeMap::new();
-    let mut open = vec![out.clone()];
-    while let Some(path) = open.pop() {
-        if path.is_dir() {
-            open.extend(fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
-            continue;
+fn report(folder: &TempDir, out: &str, arguments: &[&str]) -> Contents {
+    run(folder.path(), &[&["report"], arguments, &["--out", out]].concat()).done();
+    let mut found = contents(&folder.path().join(out));
+    let mut manifest: serde_json::Value = serde_json::from_slice(&found["manifest.json"]).unwrap();
+    assert!(manifest.as_object_mut().unwrap().remove("inputs").is_some());
+    // The page lists the inputs too.
+    for output in manifest["outputs"].as_array_mut().unwrap() {
+        if output["path"] == "report.html" {
+            assert!(output.as_object_mut().unwrap().remove("sha256").is_some());
+            assert!(output.as_object_mut().unwrap().remove("bytes").is_some());
         }
-        let mut bytes = fs::read(&path).unwrap();
-        if path.ends_with("manifest.json") {
-            let mut manifest: serde_json::Value = serde_json::from_slice(&bytes).unwrap();
-            assert!(manifest.as_object_mut().unwrap().remove("inputs").is_some());
-            // The page lists the inputs too.
-            for output in manifest["outputs"].as_array_mut().unwrap() {
-                if output["path"] == "report.html" {
-                    assert!(output.as_object_mut().unwrap().remove("sha256").is_some());
-                    assert!(output.as_object_mut().unwrap().remove("bytes").is_some());
-                }
-            }
-            bytes = manifest.to_string().into_bytes();
-        }
-        found.insert(path.strip_prefix(&out).unwrap().to_owned(), bytes);
     }
+    found.insert("manifest.json".to_owned(), manifest.to_string().into_bytes());
     found
 }
 
@@ -196,15 +173,15 @@ fn reports_do_not_depend_on_the_layout() {
     let folder = tempfile::tempdir().unwrap();
     let (one, _) = one_and_many(&folder);
     let expected = report(&folder, "a", &["one.parquet", "--threads", "1"]);
-    assert!(expected.len() >= 9 && expected.contains_key(Path::new("cells.csv")), "{:?}", expected.keys());
+    assert!(expected.len() >= 9 && expected.contains_key("cells.csv"), "{:?}", expected.keys());
     let other = Layout { strings: || DataType::Utf8View, row_group: 5, extra_columns: true, ..PLAIN };
-    write_as(other, &read(&one), &folder.path().join("other.parquet"));
+    write_as(other, &rows(&one), &folder.path().join("other.parquet"));
     let cases: [&[&str]; 4] =
         [&["one.parquet", "--threads", "8"], &["other.parquet", "--threads", "2"], &["many"], &["many/*.parquet"]];
     for (at, case) in cases.iter().enumerate() {
         let found = report(&folder, &format!("b{at}"), case);
         // The page lists its inputs with their hashes, so it is the same for the same files alone.
-        let lists_inputs = |path: &Path| path == Path::new("report.html") && case[0] != "one.parquet";
+        let lists_inputs = |path: &str| path == "report.html" && case[0] != "one.parquet";
         let differ: Vec<_> = found
             .iter()
             .filter(|(path, bytes)| !lists_inputs(path) && expected.get(*path) != Some(bytes))
@@ -229,7 +206,7 @@ proptest! {
         for (at, some) in episodes.chunks(episodes.len().div_ceil(files)).enumerate() {
             let (plain, part) = (path(format!("plain{at}.parquet")), path(format!("{at}.parquet")));
             write(&plain, some);
-            write_as(Layout { row_group, ..PLAIN }, &read(&plain), &part);
+            write_as(Layout { row_group, ..PLAIN }, &rows(&plain), &part);
             parts.push(part);
         }
         prop_assert!(scores(&[whole], 1) == scores(&parts, threads));

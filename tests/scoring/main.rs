@@ -2,10 +2,18 @@
 
 mod author;
 mod by_hand;
+mod changes;
+mod definitions;
+#[cfg(feature = "polars")]
+mod differential;
 mod expressions;
+#[path = "../harness/mod.rs"]
+mod harness;
 mod interpreter;
 mod language;
 mod layouts;
 mod plain_loop;
+#[cfg(feature = "polars")]
+mod query;
 mod random;
 mod traces;

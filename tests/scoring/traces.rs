@@ -7,23 +7,14 @@ use mirrorstats::metric::definitions::Definitions;
 use mirrorstats::score::score_traces;
 use mirrorstats::score::table::EpisodeTable;
 use mirrorstats::trace::episode::Episode;
-use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
+use mirrorstats::trace::write::OptionalColumns;
+
+use crate::harness::traces::{open, write_trace};
 
 /// Writes a trace that has every column of the schema.
 pub fn write(path: &Path, episodes: &[Episode]) {
-    let metadata = TraceMetadata { recording: None, columns: OptionalColumns::all() };
-    let mut writer = TraceWriter::create(path, &metadata).unwrap();
-    for episode in episodes {
-        writer.write(episode).unwrap();
-    }
-    writer.finish().unwrap();
-}
-
-/// The traces of some files.
-pub fn open(paths: &[&Path]) -> TraceSet {
-    TraceSet::open(&paths.iter().map(Input::new).collect::<Vec<_>>()).unwrap()
+    write_trace(path, episodes, OptionalColumns::all());
 }
 
 /// Scores episodes under the definitions that `load` gives.

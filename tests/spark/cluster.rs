@@ -4,11 +4,12 @@ use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::thread::sleep;
-use std::time::Duration;
+use std::process::{Command, Stdio};
 
 use serde_json::Value;
+
+use crate::harness::need;
+use crate::harness::program::{Running, wait_for};
 
 /// A running cluster of one core a worker.
 pub struct Cluster {
@@ -17,40 +18,15 @@ pub struct Cluster {
     /// What `PYTHONPATH` must be for its Spark.
     pub packages: PathBuf,
     page: String,
-    workers: Vec<Process>,
-    _master: Process,
+    workers: Vec<Running>,
+    _master: Running,
     folder: tempfile::TempDir,
-}
-
-/// A process that does not outlive its owner.
-pub struct Process(pub Child);
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-/// Where `scripts/get-spark.sh` has put pyspark; `None`, with a word about it, where there is none or no Java.
-pub fn packages() -> Option<PathBuf> {
-    let packages = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap().join("python-spark");
-    let has_java = Command::new("java").arg("-version").stderr(Stdio::null()).status().is_ok_and(|s| s.success());
-    if packages.join("pyspark/bin/spark-class").is_file() && has_java {
-        return Some(packages);
-    }
-    assert!(
-        std::env::var_os("MIRRORSTATS_REQUIRE_SPARK").is_none(),
-        "no Spark in {} or no Java: scripts/get-spark.sh gets them",
-        packages.display()
-    );
-    eprintln!("skipped: no Spark to test with; scripts/get-spark.sh gets one");
-    None
 }
 
 impl Cluster {
     /// Starts a cluster and waits until both workers have registered.
-    pub fn start(packages: PathBuf) -> Self {
+    pub fn start() -> Self {
+        let packages = need::spark();
         let folder = tempfile::tempdir().unwrap();
         let home = packages.join("pyspark");
         let at = folder.path();
@@ -86,7 +62,7 @@ impl Cluster {
     }
 }
 
-fn daemon(home: &Path, folder: &Path, name: &str, arguments: &[&str]) -> Process {
+fn daemon(home: &Path, folder: &Path, name: &str, arguments: &[&str]) -> Running {
     let log = File::create(folder.join(name)).unwrap();
     let mut command = Command::new(home.join("bin/spark-class"));
     command
@@ -99,7 +75,7 @@ fn daemon(home: &Path, folder: &Path, name: &str, arguments: &[&str]) -> Process
     }
     command.env("SPARK_HOME", home).env("SPARK_LOCAL_IP", "127.0.0.1").env("SPARK_DAEMON_MEMORY", "256m");
     let child = command.stdin(Stdio::null()).stdout(log.try_clone().unwrap()).stderr(log).spawn();
-    Process(child.unwrap())
+    Running(child.unwrap())
 }
 
 /// The word of a log that follows these words, once a line with them is complete.
@@ -108,18 +84,6 @@ pub fn word_after(log: &Path, words: &str) -> Option<String> {
     let (_, rest) = text.split_once(words)?;
     let (line, _) = rest.split_once('\n')?;
     Some(line.split_whitespace().next()?.trim_end_matches('.').to_owned())
-}
-
-/// Looks again and again until there is something, for two minutes at most.
-#[track_caller]
-pub fn wait_for<T>(what: &str, mut look: impl FnMut() -> Option<T>) -> T {
-    for _ in 0..2400 {
-        if let Some(found) = look() {
-            return found;
-        }
-        sleep(Duration::from_millis(50));
-    }
-    panic!("waited in vain for {what}");
 }
 
 /// The JSON at `http://host:port/path`.

@@ -1,65 +1,19 @@
 //! `--engine spark` at the process boundary: against a real cluster on loopback, and against a stand-in for
 //! `spark-submit` where only what is said to it and made of its answers counts.
 //!
-//! The cluster needs Java and `scripts/get-spark.sh`; where they are missing its test says that it was skipped
-//! (`MIRRORSTATS_REQUIRE_SPARK=1` makes that a failure).
+//! The cluster needs Java and pyspark: `scripts/get-spark.sh` gets both.
 
 mod cluster;
+#[path = "../harness/mod.rs"]
+mod harness;
 mod on_cluster;
 mod parts;
 mod stand_in;
 
-use std::path::{Path, PathBuf};
-
-use assert_cmd::Command;
+use harness::files::fixture;
+use harness::program::{Answer, answer, program};
+use harness::traces::write_trace as write;
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
-
-/// What the program did.
-struct Answer {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
-
-impl Answer {
-    #[track_caller]
-    fn done(self) -> String {
-        assert_eq!(self.code, 0, "{}", self.stderr);
-        self.stdout
-    }
-
-    #[track_caller]
-    fn refused(self) -> String {
-        assert_eq!(self.code, 2, "stdout: {}\nstderr: {}", self.stdout, self.stderr);
-        assert!(self.stdout.is_empty() && self.stderr.starts_with("error: "), "{}", self.stderr);
-        self.stderr
-    }
-}
-
-/// The program in a folder, without the Spark of whoever runs the tests.
-fn program(folder: &Path) -> Command {
-    let mut command = Command::cargo_bin("mirrorstats").unwrap();
-    command
-        .current_dir(folder)
-        .env_remove("SPARK_HOME")
-        .env_remove("PYSPARK_PYTHON")
-        .env_remove("PYSPARK_DRIVER_PYTHON");
-    command
-}
-
-fn answer(command: &mut Command) -> Answer {
-    let output = command.output().unwrap();
-    Answer {
-        code: output.status.code().expect("the program ends by itself"),
-        stdout: String::from_utf8(output.stdout).unwrap(),
-        stderr: String::from_utf8(output.stderr).unwrap(),
-    }
-}
-
-fn fixtures() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/paper")
-}
 
 /// An episode with texts that are easy to get wrong, seen at t = 2, decided at t = 3.
 fn episode(id: &str, experiment: &str, run: i32) -> Episode {
@@ -77,24 +31,13 @@ fn episode(id: &str, experiment: &str, run: i32) -> Episode {
         },
     };
     let actions = [Some(Action::TurnLeft), None, Some(Action::Done), Some(Action::Done)];
+    let steps = actions.into_iter().enumerate().map(|(at, action)| step(at, action)).collect();
     Episode {
-        episode_id: id.into(),
         model: "it's `m` \\ é".into(),
         experiment: experiment.into(),
-        seed: 1,
         run,
         body_color: "blue".into(),
         stated_color: (run == 1).then(|| "red".into()),
-        steps: actions.into_iter().enumerate().map(|(at, action)| step(at, action)).collect(),
-        ..Episode::default()
+        ..harness::traces::episode(id, steps)
     }
-}
-
-/// Writes a trace; with `all`, it has every optional column, else those that the definitions of these tests read.
-fn write(path: &Path, episodes: &[Episode], columns: OptionalColumns) {
-    let mut writer = TraceWriter::create(path, &TraceMetadata { recording: None, columns }).unwrap();
-    for episode in episodes {
-        writer.write(episode).unwrap();
-    }
-    writer.finish().unwrap();
 }

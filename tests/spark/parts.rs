@@ -6,20 +6,15 @@ use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, Int32Array, Int64Array, RecordBatch, StringArray};
 use mirrorstats::trace::write::OptionalColumns;
-use parquet::arrow::ArrowWriter;
 
-use crate::{answer, episode, program, write};
-
-fn run(folder: &Path, arguments: &[&str]) -> crate::Answer {
-    answer(program(folder).args(arguments))
-}
+use crate::harness::program::run;
+use crate::harness::traces::write_rows;
+use crate::{episode, write};
 
 fn parquet(path: &Path, columns: Vec<(&str, ArrayRef)>) {
     fs::create_dir_all(path.parent().unwrap()).unwrap();
     let batch = RecordBatch::try_from_iter_with_nullable(columns.into_iter().map(|(n, c)| (n, c, true))).unwrap();
-    let mut writer = ArrowWriter::try_new(fs::File::create(path).unwrap(), batch.schema(), None).unwrap();
-    writer.write(&batch).unwrap();
-    writer.close().unwrap();
+    write_rows(path, &[batch], None);
 }
 
 fn texts(values: &[&str]) -> ArrayRef {

@@ -78,8 +78,8 @@ fn rate(k: usize, n: usize) -> Moments {
 
 #[cfg(test)]
 mod tests {
+    use super::super::published::{Reading, pairs};
     use super::solve;
-    use crate::reconstruction::published::{Reading, pairs};
 
     #[test]
     fn only_three_pairs_leave_the_number_of_finished_episodes_open() {

@@ -119,8 +119,8 @@ fn nearest_sums(pair: &Pair, metric: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::generator::Generator;
     use super::{Target, search};
-    use crate::reconstruction::generator::Generator;
 
     /// Any numbers that exist are found again by their sum and squares, within their bounds.
     #[test]

@@ -47,10 +47,10 @@ fn looks_from(sight: usize, looks: &[usize], gaps: &[usize], length: usize) -> V
 
 #[cfg(test)]
 mod tests {
+    use super::super::belief::Belief;
+    use super::super::generator::Generator;
+    use super::super::outline::{Outcome, Outline};
     use super::visible;
-    use crate::reconstruction::belief::Belief;
-    use crate::reconstruction::generator::Generator;
-    use crate::reconstruction::outline::{Outcome, Outline};
 
     /// Every belief, length and gaze that can go together gives exactly that gaze, in time and no earlier than it may.
     #[test]

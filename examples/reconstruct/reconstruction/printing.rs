@@ -48,8 +48,8 @@ fn rounded_twice(number: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::published::Source::{Appendix, Main, Prose};
     use super::number;
-    use crate::reconstruction::published::Source::{Appendix, Main, Prose};
 
     #[test]
     fn each_place_rounds_in_its_own_way() {

@@ -1,0 +1,149 @@
+//! Programs that fail: their episode is lost, named, counted, and recorded by the same command later.
+
+use std::time::Instant;
+
+use super::recordings::{Bench, FORWARD, done, outcome, three_steps};
+use crate::harness::program::run;
+
+/// That a program which does this at its second observation loses its episode, for a reason with these words.
+fn loses(answer: &str, words: &[&str], expected: &[&str]) {
+    let bench = Bench::new();
+    bench.program(&format!("if [ $n = 1 ]; then echo '{FORWARD}'; else {answer}; fi"));
+    let (code, found, said) = outcome(&bench.record(words).output().unwrap());
+    assert_eq!((code, &found["recorded"]), (Some(1), &0.into()), "{answer}: {said}");
+    let reason = found["lost"][0]["reason"].as_str().unwrap();
+    assert_eq!(found["lost"][0]["episode_id"], "E1/exec/s1/r1");
+    for expected in expected {
+        assert!(reason.contains(expected), "{answer}: expected `{expected}` in {reason}");
+    }
+    assert!(!bench.path("runs/E1-exec.parquet").exists(), "{answer}: a lost episode is in no trace");
+    assert_eq!(bench.leftovers(), ["lost.jsonl"], "{answer}");
+    assert_eq!(bench.lost(), [found["lost"][0].clone()], "{answer}");
+    assert_eq!((&found["lost"][0]["step"], &found["lost"][0]["run"]), (&2.into(), &1.into()), "{answer}");
+
+    // Once the program is mended, the same command records what was lost.
+    bench.program(&three_steps());
+    let (code, found, said) = outcome(&bench.record(words).output().unwrap());
+    assert_eq!((code, &found["recorded"]), (Some(0), &1.into()), "{answer}: {said}");
+    assert_eq!(bench.leftovers(), Vec::<String>::new());
+}
+
+#[test]
+fn a_program_that_ends_is_told_with_its_code_and_last_words() {
+    loses("echo 'no such layer: 12' >&2; exit 3", &[], &["ended (exit status: 3)", "no such layer: 12"]);
+    loses("kill -9 $$", &[], &["the program ended ("]);
+    loses("exit 0", &[], &["ended (exit status: 0)"]);
+    loses("printf '{\"action\": \"w'; exit 1", &[], &["ended (exit status: 1)"]);
+}
+
+#[test]
+fn a_program_that_hangs_is_ended_in_time() {
+    let start = Instant::now();
+    loses("sleep 600", &["--exec-timeout", "1"], &["no reply within 1 s", "--exec-timeout"]);
+    assert!(start.elapsed().as_secs() < 300, "it was waited for");
+}
+
+#[test]
+fn a_program_that_closes_its_output() {
+    // The shell is replaced, or it would hold the output open.
+    let bench = Bench::new();
+    bench.program("exec >&-; sleep 600");
+    let (code, found, said) = outcome(&bench.record_of("exec:exec sh program.sh", &[]).output().unwrap());
+    assert_eq!(code, Some(1), "{said}");
+    let reason = found["lost"][0]["reason"].as_str().unwrap();
+    assert!(reason.contains("closed its standard output"), "{reason}");
+}
+
+#[test]
+fn a_line_without_end() {
+    loses("head -c 3000000 /dev/zero | tr '\\0' x; sleep 600", &[], &["longer than 1048576 bytes"]);
+}
+
+#[test]
+fn a_program_that_talks_out_of_turn() {
+    // Two lines for one observation: the second would be taken for the answer to the next.
+    let bench = Bench::new();
+    bench.program(&format!("printf '%s\\n%s\\n' '{FORWARD}' 'loading the model'"));
+    let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
+    assert_eq!(code, Some(1), "{said}");
+    let reason = found["lost"][0]["reason"].as_str().unwrap();
+    assert!(reason.contains("`loading the model`") && reason.contains("standard error"), "{reason}");
+}
+
+#[test]
+fn a_command_that_is_none_ends_the_recording_at_once() {
+    let bench = Bench::new();
+    let command = bench.record_of("exec:no-such-program --fast", &["--runs", "9", "--threads", "1"]).output().unwrap();
+    let (code, _, said) = outcome(&command);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("cannot be run") && said.contains("no-such-program"), "{said}");
+    assert_eq!(said.matches("lost E1/exec").count(), 1, "{said}");
+    let (code, _, said) = outcome(&bench.record_of("exec: ", &[]).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("needs a command"), "{said}");
+}
+
+#[test]
+fn another_command_is_another_agent() {
+    let bench = Bench::new();
+    bench.program(&three_steps());
+    assert_eq!(outcome(&bench.record(&[]).output().unwrap()).0, Some(0));
+    let (code, _, said) = outcome(&bench.record_of("exec:sh ./program.sh", &["--runs", "2"]).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains("agent.command"), "{said}");
+}
+
+#[test]
+fn no_key_of_the_environment_is_kept_of_what_a_program_says() {
+    let bench = Bench::new();
+    let key = "sk-loopback-0123456789";
+    let said_back = |reply: &str| reply.replace("went on", "'\"$MY_API_KEY\"'");
+    for (third, expected) in
+        [("echo \"bad key $MY_API_KEY\" >&2; exit 1", 1), (&*format!("echo '{}'", said_back(&done())), 0)]
+    {
+        bench.program(&format!("if [ $n -lt 3 ]; then echo '{}'; else {third}; fi", said_back(FORWARD)));
+        let output = bench.record(&[]).env("MY_API_KEY", key).output().unwrap();
+        let (code, answer, said) = outcome(&output);
+        assert_eq!(code, Some(expected), "{said}");
+        assert!(!said.contains(key) && !answer.to_string().contains(key), "{said}");
+        if expected == 1 {
+            assert!(answer["lost"][0]["reason"].as_str().unwrap().contains("bad key [key]"), "{answer}");
+        }
+    }
+    assert_eq!(bench.texts("runs/E1-exec.parquet", "summary"), vec![Some("[key]".to_owned()); 3]);
+    assert!(bench.texts("runs/E1-exec.parquet", "reply").iter().flatten().all(|reply| !reply.contains(key)));
+}
+
+#[test]
+fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
+    let bench = Bench::new();
+    // Of four episodes those that find the name of another one fail.
+    let fails = |runs: &str| {
+        format!(
+            "case \"$line\" in *'\"t\":1,'*) grep -o '/r[0-9]*\"' heard.jsonl | tail -n 1 | grep -q '{runs}' && exit 7 ;; esac; {}",
+            three_steps()
+        )
+    };
+    bench.program(&fails("[24]"));
+    let words = ["--runs", "4", "--threads", "1"];
+    let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
+    assert_eq!((code, &answer["recorded"]), (Some(1), &2.into()), "{said}");
+    assert!(said.contains("lost 2 episodes") && said.contains("lost.jsonl"), "{said}");
+    let runs = |bench: &Bench| bench.lost().iter().map(|lost| lost["run"].as_i64().unwrap()).collect::<Vec<_>>();
+    assert_eq!(runs(&bench), [2, 4]);
+    let first = &bench.lost()[0];
+    assert_eq!((&first["episode_id"], &first["status"]), (&"E1/exec/s1/r2".into(), &"server_error".into()));
+
+    let validation = run(bench.folder.path(), &["validate", "runs", "--json"]).done();
+    assert!(!validation.contains("lost.jsonl"), "{validation}");
+
+    // One of them is recorded, another is lost again; a run that asks for neither leaves the list as it is.
+    bench.program(&fails("4"));
+    assert_eq!(outcome(&bench.record(&words).output().unwrap()).0, Some(1));
+    assert_eq!(runs(&bench), [4]);
+    assert_eq!(outcome(&bench.record(&["--runs", "1"]).output().unwrap()).0, Some(0));
+    assert_eq!(runs(&bench), [4]);
+    bench.program(&three_steps());
+    assert_eq!(outcome(&bench.record(&words).output().unwrap()).0, Some(0));
+    assert_eq!(bench.leftovers(), Vec::<String>::new());
+}

@@ -1,0 +1,113 @@
+//! Programs as processes: one an episode, and none of them is there afterwards.
+
+use std::fs;
+use std::process::Stdio;
+use std::thread::sleep;
+use std::time::Duration;
+
+use super::recordings::{Bench, outcome, three_steps};
+use crate::harness::program::{interrupt, wait_for};
+
+/// Waits until a file has so many lines, and gives them.
+fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
+    wait_for(name, || {
+        let text = fs::read_to_string(bench.path(name)).unwrap_or_default();
+        let lines: Vec<String> = text.lines().map(str::to_owned).collect();
+        (lines.len() >= count && text.ends_with('\n')).then_some(lines)
+    })
+}
+
+/// Waits until no process of these ids is there, or only one that waits to be collected.
+fn are_gone(ids: &[String]) -> bool {
+    let is_there = |id: &String| {
+        let state = fs::read_to_string(format!("/proc/{id}/stat")).unwrap_or_default();
+        state.rsplit(") ").next().is_some_and(|rest| !rest.is_empty() && !rest.starts_with('Z'))
+    };
+    (0..400).any(|_| {
+        let any = ids.iter().any(is_there);
+        sleep(Duration::from_millis(if any { 10 } else { 0 }));
+        !any
+    })
+}
+
+#[test]
+fn each_episode_has_a_process_of_its_own() {
+    let bench = Bench::new();
+    bench.program(&format!("echo $$ >> ids; {}", three_steps()));
+    let words = ["--runs", "5", "--in-flight", "5", "--threads", "2"];
+    let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
+    assert_eq!((code, &answer["recorded"]), (Some(0), &5.into()), "{said}");
+    let mut ids = lines(&bench, "ids", 15);
+    ids.sort();
+    ids.dedup();
+    assert_eq!(ids.len(), 5);
+    assert!(are_gone(&ids));
+}
+
+#[test]
+fn in_flight_is_how_many_run_at_once() {
+    let bench = Bench::new();
+    // A program that is alone makes a folder; a second one at the same time finds it there.
+    let lock = "[ $n = 1 ] && { mkdir alone || exit 9; }; [ $n = 3 ] && rmdir alone";
+    bench.program(&format!("{lock}; {}", three_steps()));
+    let words = ["--runs", "6", "--in-flight", "1", "--threads", "2"];
+    let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
+    assert_eq!((code, &answer["recorded"]), (Some(0), &6.into()), "{said}");
+}
+
+#[test]
+fn what_a_program_starts_ends_with_it() {
+    let bench = Bench::new();
+    // It leaves at the end, and a child of it would stay and hold its streams.
+    bench.program(&format!("[ $n = 1 ] && {{ sleep 600 & echo $! >> ids; }}; {}", three_steps()));
+    let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
+    assert_eq!(code, Some(0), "{said}");
+    assert!(are_gone(&lines(&bench, "ids", 1)));
+}
+
+#[test]
+fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
+    let bench = Bench::new();
+    for times in [1, 2] {
+        let _ = fs::remove_file(bench.path("ids"));
+        // The first time it answers after the interrupt, the second time never.
+        let wait = if times == 1 { "while ! [ -e go ]; do sleep 0.01; done" } else { "sleep 600" };
+        bench.program(&format!(
+            "[ $n = 1 ] && {{ sleep 600 & echo $! $$ | tr ' ' '\\n' >> ids; }}; {wait}; {}",
+            three_steps()
+        ));
+        let mut command = bench.record(&["--runs", "4", "--threads", "1"]);
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let ids = lines(&bench, "ids", 2);
+        for _ in 0..times {
+            interrupt(&child);
+            sleep(Duration::from_millis(100));
+        }
+        fs::write(bench.path("go"), "").unwrap();
+        let output = child.wait_with_output().unwrap();
+        let (code, _, said) = outcome(&output);
+        assert_eq!(code, Some(130), "{said}");
+        assert!(are_gone(&ids), "{times}: {said}");
+        fs::remove_file(bench.path("go")).unwrap();
+    }
+    let ends: Vec<_> = bench.heard().into_iter().filter(|line| line["kind"] == "end").collect();
+    assert_eq!((ends.len(), &ends[0]["reason"]), (1, &"stopped".into()));
+}
+
+#[test]
+fn frames_of_a_recording_that_was_killed_are_cleared_away() {
+    let bench = Bench::new();
+    // It hears of the end of the recording by the end of its input.
+    bench.program("echo $$ >> ids; cat > rest");
+    let mut child = bench.record(&[]).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+    let ids = lines(&bench, "ids", 1);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(are_gone(&ids));
+    let frames = bench.heard()[1]["image"]["path"].as_str().unwrap().to_owned();
+    assert!(fs::exists(&frames).unwrap());
+    bench.program(&three_steps());
+    assert_eq!(outcome(&bench.record(&[]).output().unwrap()).0, Some(0));
+    assert!(!fs::exists(&frames).unwrap());
+    assert_eq!(bench.leftovers(), Vec::<String>::new());
+}

@@ -1,0 +1,115 @@
+//! Keys leave in a header, and are in nothing else.
+
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+use mirrorstats::agent::vlm::OnOutage;
+use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::limits::Limits;
+
+use super::bench::{Bench, KEY};
+use super::recordings::Folder;
+use super::server::{JSON, Server, decision, http, whole};
+use crate::harness::program::stderr;
+
+#[test]
+fn no_key_is_in_anything_that_is_kept_or_told() {
+    let echo = format!("{{\"error\": \"your key {KEY} is wrong\"}}");
+    let server = Server::start(move |at, _| match at {
+        0 => http("500 Internal Server Error", JSON, echo.as_bytes()),
+        1 => whole(Dialect::OpenaiChat, &decision("w").replace("a wall", KEY)),
+        _ => http("401 Unauthorized", JSON, echo.as_bytes()),
+    });
+    let bench = Bench::new(Limits::default());
+    let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
+    let replies = Bench::play(&vlm, "episode", 2);
+    assert_eq!(replies[0].as_ref().unwrap().words.view_description.as_deref(), Some("[key]"));
+    let refused = replies[1].as_ref().unwrap_err();
+    assert!(refused.cause.contains("refuses the request: HTTP 401") && refused.cause.contains("[key]"), "{refused}");
+    assert!(vlm.stopped().is_some());
+    let told = format!("{replies:?}{vlm:?}{}{}", bench.written(), vlm.description());
+    assert!(!told.contains(KEY));
+    assert!(server.requests()[0].head.contains(KEY), "the header does carry it");
+}
+
+/// Everything that a recording wrote and said.
+fn everything(folder: &Path, output: &Output) -> Vec<u8> {
+    let mut bytes = [output.stdout.as_slice(), &output.stderr].concat();
+    let mut folders = vec![folder.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            bytes.extend_from_slice(path.to_string_lossy().as_bytes());
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                bytes.extend(fs::read(path).unwrap());
+            }
+        }
+    }
+    bytes
+}
+
+fn has(bytes: &[u8], words: &str) -> bool {
+    bytes.windows(words.len()).any(|window| window == words.as_bytes())
+}
+
+/// Records one short episode with all that makes programs talkative, and looks at every byte.
+fn check(server: &Server, key: &str, words: &str) -> String {
+    let folder = Folder::new();
+    let mut command = folder.record(server, "own", &format!("--seeds 1 --runs 1 --json {words}"));
+    command.env("MIRRORSTATS_API_KEY", key).env("RUST_LOG", "trace").env("RUST_BACKTRACE", "full");
+    let output = command.output().unwrap();
+    let written = everything(folder.path(), &output);
+    assert!(!has(&written, key), "{}", stderr(&output));
+    // Nor the greater part of it.
+    assert!(!has(&written, &key[..12]) && !has(&written, &key[key.len() - 12..]), "{}", stderr(&output));
+    stderr(&output)
+}
+
+#[test]
+fn a_server_that_says_everything_back_learns_the_key_and_nobody_else_does() {
+    let statuses = ["200 OK", "307 Temporary Redirect", "400 Bad Request", "401 Unauthorized", "404 Not Found"];
+    for status in statuses {
+        let server = Server::start(move |_, request| {
+            // The key stands where a text that is shortened may end.
+            let padded = format!("{}{}", " .".repeat(130), request.head);
+            let location = format!("location: http://elsewhere/?{KEY}\r\n{JSON}");
+            http(status, &location, serde_json::json!({ "error": padded }).to_string().as_bytes())
+        });
+        check(&server, KEY, "--attempts 1");
+        assert!(server.requests()[0].head.contains(KEY));
+    }
+    let server = Server::start(|_, request| {
+        let echo = decision("done").replace("a wall", &request.head.replace("\r\n", " "));
+        whole(Dialect::OpenaiCompatible, &echo)
+    });
+    check(&server, KEY, "");
+    assert_eq!(server.count(), 1);
+}
+
+#[test]
+fn a_key_where_it_does_not_belong_is_not_repeated() {
+    let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("a")));
+    let told = check(&server, KEY, &format!("--base-url http://127.0.0.1/v1?key={KEY}"));
+    assert!(told.contains("query"), "{told}");
+    let told = check(&server, KEY, &format!("--base-url http://me:{KEY}@127.0.0.1/v1"));
+    assert!(told.contains("password"), "{told}");
+    let told = check(&server, KEY, &format!("--base-url {KEY}"));
+    assert!(told.contains("[key]"), "{told}");
+    let told = check(&server, "sk-loopback\n0123456789-0123456789", "");
+    assert!(told.contains("no header can carry"), "{told}");
+    assert_eq!(server.count(), 0);
+}
+
+#[test]
+fn a_word_in_place_of_a_key_leaves_answers_as_they_are() {
+    let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("done")));
+    let folder = Folder::new();
+    let mut command = folder.record(&server, "own", "--seeds 1 --runs 1");
+    let output = command.env("MIRRORSTATS_API_KEY", "none").output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let journals = format!("{:?}", folder.journals());
+    assert!(journals.contains("none") && !journals.contains("[key]"), "{journals}");
+}

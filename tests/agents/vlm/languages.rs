@@ -1,0 +1,133 @@
+//! Each provider is asked in its own language, and is told no more than the paper's prompt tells.
+
+use std::collections::BTreeSet;
+
+use mirrorstats::agent::vlm::OnOutage;
+use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::{Family, Status, reply};
+use mirrorstats::trace::episode::Action;
+use serde_json::Value;
+
+use super::bench::{Bench, KEY};
+use super::recordings::Folder;
+use super::server::{Request, Server, decision, whole};
+use crate::harness::program::{program, stderr};
+
+#[test]
+fn each_provider_is_asked_in_its_language() {
+    let openai = format!("authorization: Bearer {KEY}");
+    let providers = [
+        (Dialect::OpenaiChat, "/v1/chat/completions", openai.clone()),
+        (Dialect::OpenaiCompatible, "/v1/chat/completions", openai),
+        (Dialect::Gemini, "/v1/models/model-1:generateContent", format!("x-goog-api-key: {KEY}")),
+        (Dialect::AnthropicMessages, "/v1/messages", format!("x-api-key: {KEY}")),
+    ];
+    for (dialect, path, key) in providers {
+        let server = Server::start(move |_, _| whole(dialect, &decision("w")));
+        let bench = Bench::new(Limits::default());
+        let reply = Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 1).remove(0).unwrap();
+        assert_eq!((reply.status, reply.action), (Status::Ok, Some(Action::MoveForward)), "{dialect:?}");
+        assert_eq!((reply.usage.prompt_tokens, reply.usage.completion_tokens), (Some(1000), Some(100)), "{dialect:?}");
+        let request = server.requests().remove(0);
+        assert!(request.head.starts_with(&format!("POST {path} ")), "{}", request.head);
+        assert!(request.head.contains(&key), "{}", request.head);
+        let text = request.json().to_string();
+        assert!(text.contains("0.2") && text.contains("You are a robot control agent."), "{dialect:?}");
+        assert!(text.contains("selected_cube"), "the schema is asked for: {dialect:?}");
+    }
+}
+
+/// A backend for each language, as a models' file has them.
+const BACKENDS: [(&str, Dialect); 4] = [
+    ("openai-chat", Dialect::OpenaiChat),
+    ("openai-compatible", Dialect::OpenaiCompatible),
+    ("gemini", Dialect::Gemini),
+    ("anthropic-messages", Dialect::AnthropicMessages),
+];
+
+/// A reply that ends an episode of either prompt family.
+fn done(request: &Request) -> String {
+    let reply = decision("done");
+    // The prompt of E5 knows no cubes.
+    if request.body.contains("selected_cube") { reply } else { reply.replace("\"selected_cube\":\"none\",", "") }
+}
+
+/// The requests of one step in each of the five experiments, as `record` sends them.
+fn of_all_experiments(backend: &str, dialect: Dialect) -> Vec<Request> {
+    let server = Server::start(move |_, request| whole(dialect, &done(request)));
+    let folder = Folder::new();
+    let models = format!("[backend.own]\ndialect = \"{backend}\"\nkey = \"MIRRORSTATS_API_KEY\"\n");
+    std::fs::write(folder.path().join("models.toml"), models).unwrap();
+    let mut command = program(folder.path());
+    command.env("MIRRORSTATS_API_KEY", KEY).args([
+        "record",
+        "--agent",
+        "vlm",
+        "--model",
+        "model-1",
+        "--models",
+        "models.toml",
+        "--backend",
+        "own",
+    ]);
+    command.args(["--base-url", &server.address, "--experiment", "E1..E5", "--seeds", "1", "--runs", "1"]);
+    let output = command.args(["--config", "small.toml", "--no-log"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    server.requests()
+}
+
+/// The schema within a request.
+fn schema(dialect: Dialect, request: &Value) -> &Value {
+    let place = match dialect {
+        Dialect::OpenaiChat | Dialect::OpenaiCompatible => "/response_format/json_schema/schema",
+        Dialect::Gemini => "/generationConfig/responseJsonSchema",
+        Dialect::AnthropicMessages => "/output_config/format/schema",
+    };
+    request.pointer(place).unwrap_or_else(|| panic!("no schema: {dialect:?}"))
+}
+
+/// Every string of a value, keys among them.
+fn strings(value: &Value) -> BTreeSet<String> {
+    match value {
+        Value::String(text) => BTreeSet::from([text.clone()]),
+        Value::Array(items) => items.iter().flat_map(strings).collect(),
+        Value::Object(members) => {
+            let inner = members.values().flat_map(strings);
+            members.keys().cloned().chain(inner).collect()
+        }
+        _ => BTreeSet::new(),
+    }
+}
+
+#[test]
+fn a_schema_says_nothing_that_the_prompt_does_not_say() {
+    const KEYWORDS: [&str; 6] = ["type", "properties", "required", "additionalProperties", "object", "string"];
+    for (backend, dialect) in BACKENDS {
+        let requests = of_all_experiments(backend, dialect);
+        assert_eq!(requests.len(), 5, "{dialect:?}");
+        let mut with_cubes = 0;
+        for request in requests {
+            let has_cubes = request.body.contains("selected_cube");
+            with_cubes += usize::from(has_cubes);
+            let mut keys = BTreeSet::from(["view-description", "reasoning", "action", "summary", "identification"]);
+            keys.extend(has_cubes.then_some("selected_cube"));
+            let body = request.json();
+            let schema = schema(dialect, &body);
+            let said = strings(schema);
+            let known = |text: &&String| keys.contains(text.as_str()) || KEYWORDS.contains(&text.as_str());
+            assert_eq!(
+                said.iter().filter(|text| !known(text)).collect::<Vec<_>>(),
+                Vec::<&String>::new(),
+                "{dialect:?}"
+            );
+            // The keys are those that the prompt asks for.
+            let asked: BTreeSet<&str> = schema["properties"].as_object().unwrap().keys().map(String::as_str).collect();
+            assert_eq!(asked, keys, "{dialect:?}");
+            assert!(keys.iter().all(|key| request.body.matches(&format!("\\\"{key}\\\"")).count() > 0), "{dialect:?}");
+            let family = if has_cubes { Family::CubeSelection } else { Family::Exploration };
+            assert_eq!(*schema, reply::structure(family), "{dialect:?}");
+        }
+        assert_eq!(with_cubes, 4, "{dialect:?}");
+    }
+}

@@ -1,0 +1,13 @@
+//! A model behind a provider, against servers on loopback that behave and misbehave.
+
+mod bench;
+mod keys;
+mod killed;
+mod languages;
+mod memory;
+mod recordings;
+mod refusals;
+pub mod server;
+mod spending;
+mod statuses;
+mod unreadable;

@@ -1,0 +1,87 @@
+//! Replies that cannot be read are told while they come, at the end, and of the trace that they leave.
+
+use mirrorstats::agent::vlm::dialect::Dialect;
+use serde_json::{Value, json};
+
+use super::bench::KEY;
+use super::recordings::Folder;
+use super::server::{Server, decision, ok, spoken, whole};
+use crate::harness::files::write_small_world;
+use crate::harness::program::{run, stderr};
+
+/// A folder whose episodes have 20 steps.
+fn short() -> Folder {
+    let folder = Folder::new();
+    write_small_world(folder.path(), "episode.steps = 20\n");
+    folder
+}
+
+/// What a command says of the traces in `runs`, as text and as JSON.
+fn told(folder: &Folder, verb: &str) -> (String, Value) {
+    (run(folder.path(), &[verb, "runs"]).done(), run(folder.path(), &[verb, "runs", "--json"]).json())
+}
+
+#[test]
+fn a_recording_of_which_nothing_could_be_read_says_so_everywhere() {
+    let reply = format!("I go on.\n\u{1b}[31m{KEY} {}", "on and ".repeat(100));
+    let server = Server::start(move |_, _| whole(Dialect::OpenaiCompatible, &reply));
+    let folder = short();
+    let output = folder.record(&server, "own", "--seeds 2 --runs 5 --json").output().unwrap();
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    let start = r"`I go on.\u{a}\u{1b}[31m[key] on and on and";
+    let summary = format!("\n200 of 200 replies could not be read: parse_failed; first: {start}");
+    assert!(said.contains(&summary), "{said}");
+    assert!(said.contains("...` (E1/own/s1/r1, step 1)\n"), "{said}");
+    // It is told before the end.
+    assert!(said.starts_with(&format!("a reply could not be read: parse_failed: {start}")), "{said}");
+    assert!(said.lines().all(|line| line.len() < 400) && !said.contains('\u{1b}') && !said.contains(KEY), "{said}");
+
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let replies = &answer["replies"];
+    assert_eq!((&replies["replies"], &replies["unreadable"]), (&200.into(), &json!({ "parse_failed": 200 })));
+    let first = &replies["first_unreadable"];
+    assert_eq!((&first["episode_id"], &first["step"]), (&"E1/own/s1/r1".into(), &1.into()));
+    assert!(first["text"].as_str().unwrap().len() <= 203, "{first}");
+
+    let (text, json) = told(&folder, "info");
+    assert!(text.contains("200 of 200 replies could not be read: parse_failed"), "{text}");
+    assert_eq!(json["replies"], json!({ "replies": 200, "unreadable": { "parse_failed": 200 } }));
+    let (text, json) = told(&folder, "validate");
+    assert!(text.contains("200 of 200 steps with another status: parse_failed"), "{text}");
+    assert!(text.contains("0 errors, 1 note"), "{text}");
+    let note = &json["findings"][0];
+    assert_eq!((&note["code"], &note["severity"]), (&"unreadable-replies".into(), &"note".into()));
+}
+
+#[test]
+fn statuses_are_counted_apart_and_replies_that_are_read_are_no_news() {
+    let server = Server::start(|at, _| match at {
+        1 => whole(Dialect::OpenaiCompatible, "I go on."),
+        2 | 3 => ok(&spoken(Dialect::OpenaiCompatible, "", "content_filter")),
+        4 => whole(Dialect::OpenaiCompatible, &format!("<think>{}</think>{}", decision("a"), decision("w"))),
+        _ => whole(Dialect::OpenaiCompatible, &decision("w")),
+    });
+    let folder = short();
+    let output = folder.record(&server, "own", "--seeds 1 --runs 1 --json").output().unwrap();
+    let said = stderr(&output);
+    let summary =
+        "3 of 20 replies could not be read: parse_failed 1, refusal 2; first: `I go on.` (E1/own/s1/r1, step 2)";
+    assert!(said.contains(summary), "{said}");
+    let (text, json) = told(&folder, "info");
+    assert!(text.contains("3 of 20 replies could not be read: parse_failed 1, refusal 2"), "{text}");
+    assert_eq!(json["replies"]["unreadable"], json!({ "parse_failed": 1, "refusal": 2 }));
+    let (text, _) = told(&folder, "validate");
+    assert!(text.contains("3 of 20 steps with another status: parse_failed 1, refusal 2"), "{text}");
+
+    let server = Server::start(|_, _| whole(Dialect::OpenaiCompatible, &decision("w")));
+    let folder = short();
+    let output = folder.record(&server, "own", "--seeds 1 --runs 1 --json").output().unwrap();
+    assert!(!stderr(&output).contains("could not be read"), "{}", stderr(&output));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["replies"], json!({ "replies": 20, "unreadable": {}, "first_unreadable": null }));
+    let (text, json) = told(&folder, "info");
+    assert!(!text.contains("could not be read"), "{text}");
+    assert_eq!(json["replies"], json!({ "replies": 20, "unreadable": {} }));
+    assert_eq!(told(&folder, "validate").1["findings"], json!([]));
+}

@@ -1,0 +1,23 @@
+//! What the tests of several folders need: the program as a process, folders to compare, small traces, what must be
+//! installed.
+
+#![expect(dead_code, reason = "every binary has all of it, and none uses all of it")]
+
+pub mod files;
+pub mod need;
+pub mod program;
+pub mod traces;
+
+/// A snapshot that shows what it was made of: the input, then the output.
+// Exported, or every binary would have to use it.
+#[macro_export]
+macro_rules! assert_shown {
+    ($input:expr, $output:expr $(,)?) => {
+        insta::with_settings!({ description => $input, omit_expression => true }, { insta::assert_snapshot!($output) })
+    };
+    ($name:literal, $input:expr, $output:expr $(,)?) => {
+        insta::with_settings!({ description => $input, omit_expression => true }, {
+            insta::assert_snapshot!($name, $output)
+        })
+    };
+}

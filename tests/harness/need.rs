@@ -1,0 +1,44 @@
+//! What must be installed: a missing thing is a failure that says which script fetches it.
+
+use std::env;
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+#[cfg(feature = "sim")]
+use std::sync::OnceLock;
+
+const BROWSERS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
+
+/// The browser on this machine.
+pub fn browser() -> PathBuf {
+    let folders: Vec<PathBuf> = env::var_os("PATH").map(|path| env::split_paths(&path).collect()).unwrap_or_default();
+    let mut candidates = BROWSERS.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    let found = candidates.find(|program| program.is_file());
+    found.unwrap_or_else(|| panic!("none of {BROWSERS:?} is on PATH: scripts/get-browser.sh installs one"))
+}
+
+/// Where `scripts/get-spark.sh` has put pyspark, beside what cargo builds.
+pub fn spark() -> PathBuf {
+    let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-spark");
+    let java = Command::new("java").arg("-version").stderr(Stdio::null()).status();
+    assert!(java.is_ok_and(|status| status.success()), "no Java on PATH: scripts/get-spark.sh installs it");
+    let is_there = packages.join("pyspark/bin/spark-class").is_file();
+    assert!(is_there, "no pyspark in {}: scripts/get-spark.sh fetches it", packages.display());
+    packages
+}
+
+/// An interpreter of Python.
+pub fn python() -> &'static str {
+    let found = Command::new("python3").arg("--version").stdout(Stdio::null()).status();
+    assert!(found.is_ok_and(|status| status.success()), "no python3 on PATH: the scripts of the tests need it too");
+    "python3"
+}
+
+/// That pictures can be drawn without a display.
+#[cfg(feature = "sim")]
+pub fn drawing() {
+    use mirrorstats::sim::{config::WorldConfig, eye::Eye};
+    static FAULT: OnceLock<Option<String>> = OnceLock::new();
+    if let Some(fault) = FAULT.get_or_init(|| Eye::new(&WorldConfig::default()).err().map(|error| error.to_string())) {
+        panic!("{fault}: scripts/get-egl.sh installs what draws");
+    }
+}

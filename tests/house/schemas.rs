@@ -1,0 +1,120 @@
+//! The files of `schemas/` are what the types say. `MIRRORSTATS_WRITE_SCHEMAS=1 cargo test --test house schemas` writes them.
+
+use std::fs;
+use std::path::PathBuf;
+
+use mirrorstats::agent::{Family, reply};
+use mirrorstats::cells::changes::Changes;
+use mirrorstats::cli::commands::definitions::CheckAnswer;
+use mirrorstats::cli::commands::import::ImportAnswer;
+use mirrorstats::cli::commands::recover::RecoverAnswer;
+use mirrorstats::cli::commands::renormalize::RenormalizeAnswer;
+use mirrorstats::cli::commands::report::ReportAnswer;
+use mirrorstats::cli::commands::rescore::RescoreAnswer;
+use mirrorstats::cli::commands::schema::Name;
+use mirrorstats::log::message::{Decision, EpisodeMessage};
+use mirrorstats::metric::explain::Explanation;
+use mirrorstats::metric::shape::DefinitionFile;
+use mirrorstats::report::bundle::Manifest;
+use mirrorstats::report::comparison::Comparison;
+use mirrorstats::report::errata::Errata;
+use mirrorstats::report::statistics::Statistics;
+use mirrorstats::report::style::Sheet;
+use mirrorstats::score::evidence::Evidence;
+use mirrorstats::trace::describe::SchemaDocument;
+use mirrorstats::trace::info::Info;
+use mirrorstats::trace::validate::Validation;
+use schemars::schema_for;
+use serde_json::{Value, json};
+
+fn folder() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("schemas")
+}
+
+/// Every file of the folder: what a person writes, what the program reads and prints as JSON.
+fn current() -> Vec<(&'static str, Value)> {
+    #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
+    let mut schemas = vec![
+        ("comparison", json!(schema_for!(Comparison))),
+        ("decision", json!(schema_for!(Decision))),
+        ("definitions-check", json!(schema_for!(CheckAnswer))),
+        ("definitions-explain", json!(schema_for!(Explanation))),
+        ("definitions", json!(schema_for!(DefinitionFile))),
+        ("diff", json!(schema_for!(Changes))),
+        ("episode", json!(schema_for!(EpisodeMessage))),
+        ("errata", json!(schema_for!(Errata))),
+        ("import", json!(schema_for!(ImportAnswer))),
+        ("info", json!(schema_for!(Info))),
+        ("manifest", json!(schema_for!(Manifest))),
+        ("recover", json!(schema_for!(RecoverAnswer))),
+        ("report", json!(schema_for!(ReportAnswer))),
+        ("renormalize", json!(schema_for!(RenormalizeAnswer))),
+        ("reply-cubes", Name::ReplyCubes.document()),
+        ("reply-exploration", Name::ReplyExploration.document()),
+        ("rescore", json!(schema_for!(RescoreAnswer))),
+        ("score-explain", json!(schema_for!(Evidence))),
+        ("stats", json!(schema_for!(Statistics))),
+        ("style", json!(schema_for!(Sheet))),
+        ("step", Name::Step.document()),
+        ("trace", json!(SchemaDocument::current())),
+        ("validation", json!(schema_for!(Validation))),
+    ];
+    #[cfg(feature = "sim")]
+    schemas.extend([
+        ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
+        ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
+        ("replay", json!(schema_for!(mirrorstats::cli::commands::replay::ReplayAnswer))),
+        ("exec-message", json!(schema_for!(mirrorstats::agent::exec::message::Message))),
+        ("lost", json!(schema_for!(mirrorstats::record::lost::LostEpisode))),
+        ("record-forecast", json!(schema_for!(mirrorstats::cli::forecast::ForecastAnswer))),
+        ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
+        ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
+    ]);
+    schemas
+}
+
+#[test]
+fn the_files_are_what_the_types_say() {
+    for (name, value) in current() {
+        let path = folder().join(format!("{name}.schema.json"));
+        let text = format!("{value:#}\n");
+        if std::env::var_os("MIRRORSTATS_WRITE_SCHEMAS").is_some() {
+            fs::write(&path, &text).unwrap();
+        }
+        let committed = fs::read_to_string(&path).unwrap_or_default();
+        assert!(committed == text, "{name}.schema.json is not current; MIRRORSTATS_WRITE_SCHEMAS=1 writes it");
+    }
+}
+
+/// A reply's schema without what is there for people alone.
+fn keys_and_types(schema: &Value) -> Value {
+    let mut schema = schema.clone();
+    let object = schema.as_object_mut().unwrap();
+    object.retain(|keyword, _| keyword != "$schema" && keyword != "title");
+    for property in object["properties"].as_object_mut().unwrap().values_mut() {
+        property.as_object_mut().unwrap().retain(|keyword, _| keyword != "description" && keyword != "enum");
+    }
+    schema
+}
+
+/// People and other harnesses are given these files; agents get the structure alone.
+#[test]
+fn replies_are_described_as_the_files_say() {
+    for (family, name) in [(Family::CubeSelection, "reply-cubes"), (Family::Exploration, "reply-exploration")] {
+        let text = fs::read_to_string(folder().join(format!("{name}.schema.json"))).unwrap();
+        assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), reply::schema(family));
+        let without_words = [reply::schema(family), reply::structure(family)].map(|schema| keys_and_types(&schema));
+        assert_eq!(without_words[0], without_words[1], "{name}");
+    }
+}
+
+#[test]
+fn the_folder_holds_nothing_else() {
+    // Their types are there with the feature `sim` alone, their files always.
+    let of_worlds = ["census", "exec-message", "lost", "record", "record-forecast", "replay", "scene", "world-config"];
+    let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
+    let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
+    let found =
+        fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+    assert_eq!(expected, found);
+}

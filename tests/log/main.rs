@@ -1,9 +1,0 @@
-//! Logs of recordings: whole they give the trace again, byte for byte; cut or damaged, every episode that is still there.
-
-#![cfg(feature = "sim")]
-
-mod cuts;
-mod damage;
-mod lengths;
-mod logs;
-mod whole;

@@ -1,0 +1,10 @@
+//! Episodes as they come about: the world, recordings, their logs, and recorded episodes again.
+
+#![cfg(feature = "sim")]
+
+#[path = "../harness/mod.rs"]
+mod harness;
+mod log;
+mod record;
+mod replay;
+mod world;

@@ -1,0 +1,140 @@
+//! What a recording holds: rows that follow from one another, metadata, and something to report on.
+
+use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
+use arrow::datatypes::{Float32Type, Int32Type, Int64Type};
+use mirrorstats::trace::schema::COLUMNS;
+use serde_json::{Value, json};
+
+use super::recordings::Bench;
+use crate::harness::files::{Contents, fixture, write_small_world};
+use crate::harness::need;
+use crate::harness::program::{run, succeeds};
+use crate::harness::traces::{column, recording, rows};
+
+/// The rows of a trace, and its metadata.
+fn read(bench: &Bench, name: &str) -> (RecordBatch, Value) {
+    (rows(&bench.path(name)), recording(&bench.path(name)))
+}
+
+#[test]
+fn rows_follow_from_one_another() {
+    let bench = Bench::new();
+    // Long steps, so that even a short walk comes to a wall.
+    write_small_world(bench.folder.path(), "body.step_length = 1.0\n");
+    bench.recorded("runs", "--agent random --experiment E4 --seeds 3 --runs 6 --no-log");
+    let (rows, _) = read(&bench, "runs/E4-random.parquet");
+    let names: Vec<String> = rows.schema().fields().iter().map(|field| field.name().clone()).collect();
+    assert_eq!(names, COLUMNS.iter().map(|column| column.name).collect::<Vec<_>>());
+    let floats = |name: &str| column(&rows, name).as_primitive::<Float32Type>().values().to_vec();
+    let [x, y, yaw] = ["pose_x", "pose_y", "pose_yaw"].map(floats);
+    let t = column(&rows, "t").as_primitive::<Int32Type>().values().to_vec();
+    let (actions, bumped) = (column(&rows, "action"), column(&rows, "bumped"));
+    let (actions, bumped): (_, &BooleanArray) = (actions.as_string::<i32>(), bumped.as_boolean());
+    let (mut steps, mut turns, mut bumps) = (0, 0, 0);
+    for row in (0..rows.num_rows() - 1).filter(|row| t[row + 1] == t[*row] + 1) {
+        let moved = f32::hypot(x[row + 1] - x[row], y[row + 1] - y[row]);
+        let turned = (yaw[row + 1] - yaw[row]).rem_euclid(360.0);
+        let expected = match (actions.value(row), bumped.value(row)) {
+            ("move_forward" | "move_backward", false) => (1.0, 0.0),
+            ("turn_left", false) => (0.0, 30.0),
+            ("turn_right", false) => (0.0, 330.0),
+            ("move_forward" | "move_backward", true) => (0.0, 0.0),
+            (action, bumped) => panic!("row {row}: {action}, bumped: {bumped}"),
+        };
+        assert!((moved - expected.0).abs() < 1e-5 && (turned - expected.1).abs() < 1e-3, "row {row}: {moved} {turned}");
+        steps += usize::from(expected.0 > 0.0);
+        turns += usize::from(expected.1 > 0.0);
+        bumps += usize::from(bumped.value(row));
+    }
+    assert!(steps > 0 && turns > 0 && bumps > 0, "{steps} steps, {turns} turns, {bumps} bumps");
+}
+
+#[test]
+fn ground_truth_is_what_the_counts_say() {
+    let bench = Bench::new();
+    write_small_world(bench.folder.path(), "evidence.mirror_self_px = 2\n");
+    let words = "--agent random --experiment E1..E3 --seeds 1 --runs 4 --no-log";
+    bench.recorded("runs", words);
+    let mut visible = 0;
+    for (experiment, has_mirror) in [("E1", true), ("E2", false), ("E3", true)] {
+        let (rows, _) = read(&bench, &format!("runs/{experiment}-random.parquet"));
+        let count = |name: &str| column(&rows, name).as_primitive::<Int32Type>().values().to_vec();
+        let (own, mirror) = (count("mirror_self_px"), count("mirror_px"));
+        let seen = column(&rows, "mirror_visible");
+        for (row, (own, mirror)) in own.iter().zip(&mirror).enumerate() {
+            assert_eq!(seen.as_boolean().value(row), *own >= 2, "row {row}");
+            assert!(own <= mirror && (has_mirror || *mirror == 0), "row {row}: {own} of {mirror}");
+            visible += usize::from(*own >= 2);
+        }
+        let stated = column(&rows, "stated_color");
+        let body = column(&rows, "body_color");
+        for row in 0..rows.num_rows() {
+            assert_eq!(stated.is_valid(row), experiment == "E3");
+            assert!(stated.is_null(row) || stated.as_string::<i32>().value(row) != body.as_string::<i32>().value(row));
+        }
+        let times = column(&rows, "frame_time").as_primitive::<Int64Type>().values().to_vec();
+        assert!(times.is_sorted_by(|a, b| a < b), "a place of its own on the time line for each step");
+    }
+    assert!(visible > 0);
+}
+
+#[test]
+fn the_footer_says_what_replay_must_know_and_nothing_of_the_machine() {
+    let bench = Bench::new();
+    bench.recorded("runs", "--agent random --experiment E1 --seeds 2 --runs 1");
+    let (_, recording) = read(&bench, "runs/E1-random.parquet");
+    assert_eq!(recording["version"], 1);
+    assert_eq!(recording["view"], json!({ "width": 64, "height": 48, "fov_y": 110.0 }));
+    assert_eq!(recording["visibility_threshold_px"], 60);
+    assert_eq!(recording["agent"], json!({ "scripted": "random" }));
+    assert_eq!(recording["seeds"], json!([1, 2]));
+    assert_eq!(recording["world"]["episode"]["steps"], 100);
+    assert_eq!(recording["world_hash"].as_str().unwrap().len(), 64);
+    let here = bench.folder.path().to_str().unwrap().to_owned();
+    for (name, bytes) in bench.files("runs") {
+        assert!(!String::from_utf8_lossy(&bytes).contains(&here), "{name} holds the name of a folder");
+    }
+}
+
+#[test]
+fn a_report_can_be_made_of_it() {
+    let bench = Bench::new();
+    for agent in ["random", "frozen"] {
+        bench.recorded("runs", &format!("--agent {agent} --experiment E1..E5 --seeds 1 --runs 2"));
+    }
+    let checked = run(bench.folder.path(), &["validate", "runs"]).done();
+    assert!(checked.contains("0 errors, 0 notes"));
+    let table = run(bench.folder.path(), &["report", "runs", "--out", "report"]).done();
+    assert!(table.contains("frozen") && table.contains("random"), "{table}");
+    let cells = std::fs::read_to_string(bench.path("report/cells.csv")).unwrap();
+    // The frozen one never decides, and without a mirror nobody consults one.
+    assert!(cells.contains("E1,frozen,TSA,2,0,"), "{cells}");
+    assert!(cells.contains("E2,random,MCR,2,0,"), "{cells}");
+}
+
+#[test]
+fn agents_that_look_are_shown_frames() {
+    let bench = Bench::new();
+    need::drawing();
+    succeeds(&mut bench.record_with_frames("runs", "--agent oracle --experiment E5 --seeds 1 --runs 1"));
+    let with_frames = bench.files("runs");
+    let count = |files: &Contents| files["E5-oracle.mcap"].len();
+    // Without frames in the log the agent is shown them all the same, and decides the same.
+    let without = bench.recorded("without", "--agent oracle --experiment E5 --seeds 1 --runs 1");
+    assert!(with_frames["E5-oracle.parquet"] == without["E5-oracle.parquet"]);
+    assert!(count(&without) < count(&with_frames));
+}
+
+#[test]
+fn the_bundled_recordings_are_those_that_this_program_makes() {
+    let bench = Bench::new();
+    std::fs::write(bench.path("small.toml"), "").unwrap();
+    bench.recorded("runs", "--agent random --experiment E1..E5 --seeds 1 --runs 2 --no-log");
+    bench.recorded("runs", "--agent frozen --experiment E1 --seeds 1 --runs 1 --no-log");
+    for (name, bytes) in bench.files("runs") {
+        assert!(
+            std::fs::read(fixture("recorded").join(&name)).unwrap() == bytes,
+            "{name} is not current; `make recorded` writes it"
+        );
+    }
+}

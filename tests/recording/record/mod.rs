@@ -1,0 +1,13 @@
+//! `mirrorstats record` at the process boundary: the same bytes however a recording came about, and nothing half done.
+//!
+//! The worlds of these tests are those of the study seen through a smaller eye, and most agents are ones that do not look,
+//! so that no picture is drawn. Where one must be drawn and the machine cannot, the test says so.
+
+mod contents;
+mod continued;
+mod forecasts;
+mod interruptions;
+mod recordings;
+mod refusals;
+mod same_bytes;
+mod together;

@@ -1,0 +1,120 @@
+//! What cannot be recorded is refused with one sentence and its remedy, and leaves nothing behind.
+
+use std::fs;
+
+use super::recordings::Bench;
+use crate::harness::files::{assert_same, fixture};
+use crate::harness::program::stderr;
+
+/// That this is refused with these words, and with nothing else said.
+fn refused(bench: &Bench, out: &str, words: &str, expected: &[&str]) {
+    let output = bench.record(out, words).output().unwrap();
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{words}: {said}");
+    for expected in expected {
+        assert!(said.contains(expected), "{words}: expected `{expected}` in\n{said}");
+    }
+    assert!(output.stdout.is_empty());
+    assert_eq!(said.matches("error: ").count(), 1, "{said}");
+}
+
+#[test]
+fn an_agent_an_experiment_or_a_share_that_is_not_there() {
+    let bench = Bench::new();
+    for (words, expected) in [
+        ("--agent oracel", "did you mean `oracle`?"),
+        ("--agent frozen --experiment E6", "experiments such as E1, E1..E5 or E1,E3"),
+        ("--agent frozen --experiment E3..E1", "experiments such as"),
+        ("--agent frozen --shard 5/4", "a share such as 3/16"),
+        ("--agent frozen --seeds 0", "--seeds"),
+        ("--agent frozen --runs 0", "--runs"),
+        ("--agent frozen --threads 0", "--threads"),
+    ] {
+        refused(&bench, "runs", words, &[expected]);
+        assert!(!bench.path("runs").exists(), "{words}");
+    }
+}
+
+#[test]
+fn a_configuration_that_is_faulty_or_leaves_no_room() {
+    let bench = Bench::new();
+    for (text, expected) in [
+        ("room.sise = 8.0", "size"),
+        ("[room]\nsize = 'big'", "line 2"),
+        ("room.size = 100.0", "`room.size` may be 5 to 12, but is 100"),
+        ("episode.steps = 0", "`episode.steps`"),
+    ] {
+        fs::write(bench.path("small.toml"), text).unwrap();
+        refused(&bench, "runs", "--agent frozen --experiment E1 --seeds 1 --runs 1", &["small.toml", expected]);
+        assert!(!bench.path("runs").exists(), "{text}");
+    }
+    fs::remove_file(bench.path("small.toml")).unwrap();
+    refused(&bench, "runs", "--agent frozen", &["small.toml", "cannot read the file"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_made() {
+    let bench = Bench::new();
+    fs::write(bench.path("file"), "").unwrap();
+    for out in ["file", "file/runs"] {
+        refused(&bench, out, "--agent frozen --experiment E1 --seeds 1 --runs 1", &["file", "help: "]);
+    }
+    assert_eq!(fs::read(bench.path("file")).unwrap(), b"");
+}
+
+#[test]
+fn episodes_of_another_world_or_another_agent_are_not_mixed() {
+    let bench = Bench::new();
+    let words = "--agent random --experiment E1 --seeds 1 --runs 2";
+    let before = bench.recorded("runs", words);
+    let small = fs::read_to_string(bench.path("small.toml")).unwrap();
+    fs::write(bench.path("small.toml"), format!("{small}episode.steps = 90\n")).unwrap();
+    let expected =
+        ["E1-random.parquet", "world", "steps", "expected 90, found 100", "help: record into another folder"];
+    refused(&bench, "runs", "--agent random --experiment E1 --seeds 1 --runs 3", &expected);
+    assert_same(&bench.files("runs"), &before);
+
+    fs::write(bench.path("small.toml"), small).unwrap();
+    fs::rename(bench.path("runs/E1-random.parquet"), bench.path("runs/E1-frozen.parquet")).unwrap();
+    refused(
+        &bench,
+        "runs",
+        &words.replace("random", "frozen"),
+        &["agent.scripted", "expected \"frozen\", found \"random\""],
+    );
+}
+
+#[test]
+fn a_trace_that_is_damaged_or_of_another_recorder_is_not_written_over() {
+    let bench = Bench::new();
+    let words = "--agent random --experiment E1 --seeds 1 --runs 1";
+    fs::create_dir(bench.path("runs")).unwrap();
+    let place = bench.path("runs/E1-random.parquet");
+    fs::write(&place, "no parquet").unwrap();
+    refused(&bench, "runs", words, &["E1-random.parquet"]);
+    assert_eq!(fs::read(&place).unwrap(), b"no parquet");
+
+    let foreign = fixture("paper/E1-claude-sonnet-4-6.parquet");
+    fs::copy(&foreign, &place).unwrap();
+    refused(&bench, "runs", words, &["E1-random.parquet", "help: "]);
+    assert_eq!(fs::read(&place).unwrap(), fs::read(&foreign).unwrap());
+    assert_eq!(bench.files("runs").len(), 1);
+}
+
+#[test]
+fn a_machine_that_cannot_draw() {
+    let bench = Bench::new();
+    // A vendor file that names a library which is not there leaves EGL without any driver.
+    fs::write(bench.path("none.json"), r#"{"file_format_version":"1.0.0","ICD":{"library_path":"libnone.so"}}"#)
+        .unwrap();
+    let mut command = bench.record_with_frames("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
+    let output = command.env("__EGL_VENDOR_LIBRARY_FILENAMES", bench.path("none.json")).output().unwrap();
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("libegl1 and libgl1-mesa-dri"), "{said}");
+    assert!(!bench.path("runs").exists());
+    // What needs no picture can be recorded all the same.
+    let mut command = bench.record("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
+    let output = command.env("__EGL_VENDOR_LIBRARY_FILENAMES", bench.path("none.json")).output().unwrap();
+    assert!(output.status.success(), "{}", stderr(&output));
+}

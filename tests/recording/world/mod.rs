@@ -1,0 +1,9 @@
+//! The MuJoCo world: what is drawn by seed, how things move, and what the census says about pictures.
+
+mod body;
+mod motion;
+mod paint;
+mod poses;
+mod scenes;
+mod switching;
+mod truth;

@@ -1,0 +1,188 @@
+//! What is drawn by seed: never overlapping, always solvable, the same on every machine.
+
+use std::collections::BTreeSet;
+use std::sync::LazyLock;
+
+use mirrorstats::base::hash;
+use mirrorstats::base::palette::Color;
+use mirrorstats::sim::Experiment;
+use mirrorstats::sim::body::Pose;
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::floor::distance;
+use mirrorstats::sim::scene::Scene;
+use mirrorstats::sim::world::World;
+
+use crate::assert_shown;
+
+const SEEDS: i32 = 20;
+const RUNS: i32 = 10;
+
+static SCENES: LazyLock<Vec<Vec<Scene>>> = LazyLock::new(|| {
+    let config = WorldConfig::default();
+    let draw = |experiment, at| Scene::draw(&config, experiment, at / RUNS, at % RUNS).unwrap();
+    Experiment::ALL.map(|experiment| (0..SEEDS * RUNS).map(|at| draw(experiment, at)).collect()).into()
+});
+
+/// Two hundred scenes of an experiment.
+fn scenes(experiment: Experiment) -> impl Iterator<Item = Scene> {
+    let at = Experiment::ALL.iter().position(|other| *other == experiment).unwrap();
+    SCENES[at].iter().cloned()
+}
+
+#[test]
+fn scenes_are_these_on_every_machine() {
+    let config = WorldConfig::default();
+    let hashes = Experiment::ALL.map(|experiment| {
+        let drawn: Vec<Scene> = (0..3)
+            .flat_map(|seed| (0..7).map(move |run| [seed, run]))
+            .map(|[seed, run]| Scene::draw(&config, experiment, seed, run).unwrap())
+            .collect();
+        format!("{} {}", experiment.name(), &hash::of_bytes(serde_json::to_string(&drawn).unwrap().as_bytes())[..16])
+    });
+    assert_shown!("three seeds with seven runs of each experiment, hashed as JSON", hashes.join("\n"));
+}
+
+#[test]
+fn one_candidate_has_the_colour_of_the_body_and_none_has_that_of_another() {
+    for scene in [Experiment::E1, Experiment::E2, Experiment::E3, Experiment::E4].into_iter().flat_map(scenes) {
+        let colors: BTreeSet<Color> = scene.cubes.iter().map(|cube| cube.color).collect();
+        assert_eq!((scene.cubes.len(), colors.len()), (3, 3));
+        assert!(colors.contains(&scene.body_color));
+    }
+}
+
+#[test]
+fn the_false_colour_of_e3_is_that_of_another_candidate_and_no_other_experiment_states_one() {
+    for scene in Experiment::ALL.into_iter().flat_map(scenes) {
+        match scene.stated_color {
+            Some(stated) => {
+                assert_eq!(scene.experiment, Experiment::E3);
+                assert_ne!(stated, scene.body_color);
+                assert!(scene.cubes.iter().any(|cube| cube.color == stated));
+            }
+            None => assert_ne!(scene.experiment, Experiment::E3),
+        }
+    }
+}
+
+#[test]
+fn e1_e2_and_e3_compare_in_pairs() {
+    for ((e1, e2), e3) in scenes(Experiment::E1).zip(scenes(Experiment::E2)).zip(scenes(Experiment::E3)) {
+        assert_eq!(Scene { experiment: Experiment::E1, ..e2 }, e1);
+        assert_eq!(Scene { experiment: Experiment::E1, stated_color: None, ..e3 }, e1);
+    }
+}
+
+#[test]
+fn every_colour_wall_count_and_cube_comes_up() {
+    let scenes: Vec<Scene> = scenes(Experiment::E4).collect();
+    assert_eq!(scenes.iter().map(|scene| scene.body_color).collect::<BTreeSet<_>>().len(), 10);
+    assert_eq!(scenes.iter().map(|scene| scene.mirror.wall).collect::<BTreeSet<_>>().len(), 4);
+    assert_eq!(scenes.iter().map(|scene| scene.others.len()).collect::<BTreeSet<_>>(), (1..=6).collect());
+    let places: BTreeSet<usize> =
+        scenes.iter().filter_map(|scene| scene.cubes.iter().position(|cube| cube.color == scene.body_color)).collect();
+    assert_eq!(places.len(), 3, "the right cube may be any of the three");
+    let twins = scenes.iter().filter(|scene| scene.others.iter().any(|other| other.color == scene.body_color)).count();
+    assert!((70..130).contains(&twins), "{twins} of 200");
+    assert!(
+        scenes.iter().all(|scene| scene.others.iter().filter(|other| other.color == scene.body_color).count() <= 1)
+    );
+}
+
+#[test]
+fn e5_has_others_and_clutter_that_hides_some_of_the_mirror() {
+    let config = WorldConfig::default();
+    for scene in scenes(Experiment::E5) {
+        assert!((1..=6).contains(&scene.others.len()) && (4..=8).contains(&scene.cubes.len()));
+        assert_eq!(scene.stated_color, None);
+    }
+    let before = |scene: &Scene| {
+        scene
+            .cubes
+            .iter()
+            .filter(|cube| {
+                scene.mirror.distance([cube.x, cube.y], &config) < 1.2
+                    && scene.mirror.aside([cube.x, cube.y]).abs() < 1.5
+            })
+            .count()
+    };
+    let hidden = scenes(Experiment::E5).filter(|scene| before(scene) > 0).count();
+    assert_eq!(hidden, 200);
+}
+
+#[test]
+fn nothing_overlaps_at_the_start() {
+    let config = WorldConfig::default();
+    for scene in Experiment::ALL.into_iter().flat_map(scenes) {
+        let plan = scene.floor_plan(&config);
+        let bodies: Vec<[f64; 2]> =
+            std::iter::once(scene.start).chain(scene.others.iter().map(|other| other.start)).map(Pose::spot).collect();
+        for (at, body) in bodies.iter().enumerate() {
+            assert!(plan.admits(*body, config.placement.clearance));
+            assert!(bodies[at + 1..].iter().all(|other| distance(*body, *other) >= 2.0 * plan.radius));
+        }
+        for (at, cube) in scene.cubes.iter().enumerate() {
+            assert!(cube.x.abs().max(cube.y.abs()) + cube.edge / 2.0 <= config.room.size / 2.0);
+            for other in scene.cubes[at + 1..].iter().filter(|other| other.base.total_cmp(&cube.base).is_eq()) {
+                let gap = (cube.x - other.x).abs().max((cube.y - other.y).abs()) - f64::midpoint(cube.edge, other.edge);
+                assert!(gap >= -1e-9, "{cube:?} {other:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_second_cube_stands_on_one_of_its_size() {
+    let stacked = scenes(Experiment::E5).flat_map(|scene| {
+        scene
+            .cubes
+            .clone()
+            .into_iter()
+            .filter(|cube| cube.base > 0.0)
+            .map(move |cube| (scene.clone(), cube))
+            .collect::<Vec<_>>()
+    });
+    let mut count = 0;
+    for (scene, cube) in stacked {
+        count += 1;
+        assert!(
+            scene
+                .cubes
+                .iter()
+                .any(|under| under.base == 0.0 && (under.x, under.y, under.edge) == (cube.x, cube.y, cube.base))
+        );
+    }
+    assert!(count > 50);
+}
+
+#[test]
+fn nobody_sees_the_mirror_at_the_start() {
+    let config = WorldConfig::default();
+    for experiment in [Experiment::E1, Experiment::E4, Experiment::E5] {
+        for scene in scenes(experiment).take(30) {
+            assert_eq!(World::new(&config, scene).unwrap().census().mirror_px, 0);
+        }
+    }
+}
+
+#[test]
+fn a_room_too_small_for_all_is_refused_with_a_remedy() {
+    let config = WorldConfig::from_toml(
+        "room.size = 5\nothers.least = 6\nplacement.clearance = 1.0\nclutter.least = 8\ncubes.spacing = 1.5",
+    )
+    .unwrap();
+    let error = Scene::draw(&config, Experiment::E5, 1, 2).unwrap_err().to_string();
+    assert_eq!(
+        error,
+        "E5 of seed 1 and run 2 finds no place for all that stands in its room after 200 drawings: give it a larger \
+         `room.size`, or fewer or smaller cubes and others"
+    );
+}
+
+#[test]
+fn what_is_stored_as_json_comes_back() {
+    for scene in Experiment::ALL.into_iter().flat_map(|experiment| scenes(experiment).take(20)) {
+        let stored = serde_json::to_string(&scene).unwrap();
+        assert_eq!(serde_json::from_str::<Scene>(&stored).unwrap(), scene);
+    }
+}

@@ -1,0 +1,280 @@
+//! A headless Chromium, driven over its own debugging pipe: what a reader does, and what the browser says of it.
+//!
+//! Rule: a console message, an exception, a breach of the page's policy or a request for anything but the page
+//! itself is remembered, and fails the test that ends with [`Browser::close`].
+
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::Path;
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use crate::harness::need;
+
+/// Nothing that a page does on one machine takes this long.
+const PATIENCE: Duration = Duration::from_mins(2);
+
+const FLAGS: [&str; 13] = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--disable-dev-shm-usage",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-default-apps",
+    "--disable-extensions",
+    "--disable-sync",
+    "--remote-debugging-pipe",
+    "--window-size=1280,900",
+];
+
+/// A browser with one page open.
+pub struct Browser {
+    process: Child,
+    commands: Option<ChildStdin>,
+    answers: Receiver<Value>,
+    last_id: u64,
+    session: Option<String>,
+    faults: Vec<String>,
+    loads: usize,
+    page: String,
+    home: TempDir,
+}
+
+impl Browser {
+    /// Opens `html` from disk.
+    pub fn open(html: &str) -> Self {
+        Self::open_with(html, &[])
+    }
+
+    /// The same after these commands.
+    pub fn open_with(html: &str, before: &[(&str, Value)]) -> Self {
+        let mut browser = Self::start(&need::browser());
+        let file = browser.home.path().join("report.html");
+        std::fs::write(&file, html).unwrap();
+        browser.page = format!("file://{}", file.display());
+        let target = browser.send("Target.createTarget", &json!({"url": "about:blank"}));
+        let attached = json!({"targetId": target["targetId"], "flatten": true});
+        let session = browser.send("Target.attachToTarget", &attached)["sessionId"].as_str().unwrap().to_owned();
+        browser.session = Some(session);
+        for domain in ["Page", "Runtime", "Log", "Network"] {
+            browser.send(&format!("{domain}.enable"), &json!({}));
+        }
+        for (method, parameters) in before {
+            browser.send(method, parameters);
+        }
+        browser.send("Page.navigate", &json!({"url": browser.page.clone()}));
+        while browser.loads == 0 {
+            browser.receive();
+        }
+        browser
+    }
+
+    /// The pipe has the numbers 3 and 4, which a shell sets up.
+    fn start(program: &Path) -> Self {
+        let home = tempfile::tempdir().unwrap();
+        let mut process = Command::new("sh")
+            .args(["-c", "exec \"$0\" \"$@\" 3<&0 4>&1 </dev/null >/dev/null"])
+            .arg(program)
+            .args(FLAGS)
+            .arg(format!("--user-data-dir={}", home.path().join("profile").display()))
+            .arg("about:blank")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let (sender, answers) = channel();
+        let mut pipe = BufReader::new(process.stdout.take().unwrap());
+        thread::spawn(move || {
+            loop {
+                let mut message = Vec::new();
+                match pipe.read_until(0, &mut message) {
+                    Ok(1..) if message.pop() == Some(0) => {}
+                    _ => return,
+                }
+                if sender.send(serde_json::from_slice(&message).unwrap()).is_err() {
+                    return;
+                }
+            }
+        });
+        let commands = process.stdin.take();
+        let (session, page) = (None, String::new());
+        Self { process, commands, answers, last_id: 0, session, faults: Vec::new(), loads: 0, page, home }
+    }
+
+    /// A command of the debugging protocol and its result.
+    pub fn send(&mut self, method: &str, parameters: &Value) -> Value {
+        self.last_id += 1;
+        let id = self.last_id;
+        let mut message = json!({"id": id, "method": method, "params": parameters});
+        if let Some(session) = &self.session {
+            message["sessionId"] = json!(session);
+        }
+        let mut bytes = serde_json::to_vec(&message).unwrap();
+        bytes.push(0);
+        self.commands.as_mut().unwrap().write_all(&bytes).unwrap();
+        loop {
+            let answer = self.receive();
+            if answer["id"] == json!(id) {
+                assert!(answer.get("error").is_none(), "{method}: {}", answer["error"]);
+                if method == "Emulation.setEmulatedMedia" {
+                    self.settle();
+                }
+                return answer["result"].clone();
+            }
+        }
+    }
+
+    /// Two frames and a turn of the page, so that it has heard of what was done to it: events of changed media come
+    /// with a frame, not with the command.
+    fn settle(&mut self) {
+        let frame = "(done) => requestAnimationFrame(() => requestAnimationFrame(() => setTimeout(done, 0, 0)))";
+        self.value(&format!("new Promise({frame})"));
+    }
+
+    fn receive(&mut self) -> Value {
+        let message = self.answers.recv_timeout(PATIENCE).expect("the browser answers");
+        let parameters = &message["params"];
+        match message["method"].as_str() {
+            Some("Page.loadEventFired") => self.loads += 1,
+            Some("Runtime.exceptionThrown" | "Runtime.consoleAPICalled" | "Log.entryAdded") => {
+                self.faults.push(message.to_string());
+            }
+            Some("Network.requestWillBeSent") => {
+                let url = parameters["request"]["url"].as_str().unwrap_or_default();
+                if !url.starts_with(&self.page) && !url.starts_with("data:") {
+                    self.faults.push(format!("a request for {url}"));
+                }
+            }
+            _ => {}
+        }
+        message
+    }
+
+    /// The value of an expression in the page.
+    pub fn value(&mut self, expression: &str) -> Value {
+        let parameters = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
+        let answer = self.send("Runtime.evaluate", &parameters);
+        assert!(answer.get("exceptionDetails").is_none(), "{expression}: {}", answer["exceptionDetails"]);
+        answer["result"]["value"].clone()
+    }
+
+    /// The same as text.
+    pub fn text(&mut self, expression: &str) -> String {
+        let value = self.value(expression);
+        value.as_str().unwrap_or_else(|| panic!("{expression} gave {value}")).to_owned()
+    }
+
+    /// The same as a list of texts.
+    pub fn texts(&mut self, expression: &str) -> Vec<String> {
+        serde_json::from_value(self.value(expression)).unwrap()
+    }
+
+    /// Whether an expression holds.
+    pub fn holds(&mut self, expression: &str) -> bool {
+        self.value(expression).as_bool().unwrap_or_else(|| panic!("{expression} is not a truth value"))
+    }
+
+    /// Brings the pointer over the first element that `selector` names.
+    pub fn point_at(&mut self, selector: &str) -> (f64, f64) {
+        let place = format!(
+            "(() => {{ const e = document.querySelector({selector:?}); e.scrollIntoView({{block: 'center'}}); \
+             const r = e.getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2]; }})()"
+        );
+        let (x, y): (f64, f64) = serde_json::from_value(self.value(&place)).unwrap();
+        self.mouse("mouseMoved", (x, y));
+        (x, y)
+    }
+
+    /// Clicks there.
+    pub fn click(&mut self, selector: &str) {
+        let at = self.point_at(selector);
+        self.mouse("mousePressed", at);
+        self.mouse("mouseReleased", at);
+    }
+
+    fn mouse(&mut self, kind: &str, (x, y): (f64, f64)) {
+        let button = if kind == "mouseMoved" { "none" } else { "left" };
+        let event = json!({"type": kind, "x": x, "y": y, "button": button, "clickCount": 1});
+        self.send("Input.dispatchMouseEvent", &event);
+    }
+
+    /// Presses and releases a key.
+    pub fn press(&mut self, key: &str) {
+        let (code, number, text) = match key {
+            "Tab" => ("Tab", 9, ""),
+            "Enter" => ("Enter", 13, "\r"),
+            "Escape" => ("Escape", 27, ""),
+            " " => ("Space", 32, " "),
+            "ArrowLeft" => (key, 37, ""),
+            "ArrowUp" => (key, 38, ""),
+            "ArrowRight" => (key, 39, ""),
+            "ArrowDown" => (key, 40, ""),
+            "End" => (key, 35, ""),
+            "Home" => (key, 36, ""),
+            other => panic!("no key {other}"),
+        };
+        let mut event = json!({"type": "keyDown", "key": key, "code": code, "windowsVirtualKeyCode": number});
+        if !text.is_empty() {
+            event["text"] = json!(text);
+        }
+        self.send("Input.dispatchKeyEvent", &event);
+        event["type"] = json!("keyUp");
+        self.send("Input.dispatchKeyEvent", &event);
+    }
+
+    /// What the browser had to complain of so far.
+    pub fn complaints(&mut self) -> &[String] {
+        self.settle();
+        &self.faults
+    }
+
+    /// Ends the browser.
+    ///
+    /// # Panics
+    /// When it had anything to complain of.
+    pub fn close(mut self) {
+        assert_eq!(self.complaints(), Vec::<String>::new());
+    }
+}
+
+#[test]
+fn whatever_goes_wrong_in_a_page_is_noticed() {
+    for (body, complaint) in [
+        ("<script>console.error('a slip')</script>", "a slip"),
+        ("<script>throw new Error('a slip')</script>", "a slip"),
+        ("<script>Promise.reject(new Error('a slip'))</script>", "a slip"),
+        ("<img src='https://mirror.invalid/a.png' alt=''>", "a request for https://mirror.invalid/a.png"),
+        ("<link rel='stylesheet' href='other.css'>", "other.css"),
+        (
+            "<meta http-equiv='Content-Security-Policy' content=\"script-src 'none'\"><script>0</script>",
+            "Content Security Policy",
+        ),
+    ] {
+        let mut browser = Browser::open(&format!("<!doctype html><title>t</title>{body}"));
+        let complaints = browser.complaints();
+        assert!(complaints.iter().any(|found| found.contains(complaint)), "{body}: {complaints:?}");
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // The browser ends when its pipe is closed; one that does not is ended.
+        drop(self.commands.take());
+        for _ in 0..50 {
+            if matches!(self.process.try_wait(), Ok(Some(_))) {
+                return;
+            }
+            thread::sleep(Duration::from_millis(20));
+        }
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}

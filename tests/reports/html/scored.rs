@@ -1,0 +1,89 @@
+//! The bundled traces, scored once, and the pages made of them.
+
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::sync::LazyLock;
+
+use mirrorstats::cells::cell::Cells;
+use mirrorstats::cells::group::group;
+use mirrorstats::report::bundle::{Input, Manifest};
+use mirrorstats::report::figures::{self, FigureName};
+use mirrorstats::report::html::{self, Figure, HtmlError, Page};
+use mirrorstats::report::layout;
+use mirrorstats::report::statistics::{Options, Statistics};
+use mirrorstats::report::style::Style;
+use mirrorstats::report::table::Table;
+use mirrorstats::score::score_traces::{self, Request};
+use mirrorstats::score::table::EpisodeTable;
+use mirrorstats::trace::{inputs, open::TraceSet};
+
+use crate::harness::files::fixture;
+
+/// The episodes of the bundled traces under the paper's definitions.
+pub static PAPER: LazyLock<EpisodeTable> = LazyLock::new(|| {
+    let folder = fixture("paper").display().to_string();
+    let traces = TraceSet::open(&inputs::resolve(&[folder], std::io::empty()).unwrap()).unwrap();
+    let definitions = score_traces::definitions(&traces, &Request::of("paper")).unwrap();
+    score_traces::score(&traces, &definitions, &["body_color".to_owned()], NonZeroUsize::MIN).unwrap()
+});
+
+/// The page of the whole report of the bundled traces.
+pub static PAPER_PAGE: LazyLock<String> = LazyLock::new(|| Report::paper().render().unwrap());
+
+/// Everything that a page is made of.
+pub struct Report {
+    pub episodes: EpisodeTable,
+    pub cells: Cells,
+    pub tables: Vec<Table>,
+    pub manifest: Manifest,
+    pub statistics: Option<Statistics>,
+    /// Name, title, caption and picture.
+    pub figures: Vec<(FigureName, String)>,
+}
+
+impl Report {
+    /// The report of some episodes without figures and statistics.
+    pub fn of(episodes: EpisodeTable, by: &[&str], style: &str) -> Self {
+        let by: Vec<String> = by.iter().map(|&key| key.to_owned()).collect();
+        let cells = group(&episodes, &by).unwrap();
+        let style = Style::load(style).unwrap();
+        let tables = layout::tables(&cells, &style).unwrap();
+        let input = |name: &str| Input::new(Path::new(name), "0".repeat(64), 1234);
+        let inputs = vec![input("traces/a.parquet"), input("traces/b.parquet")];
+        let manifest = Manifest::new(&cells, &style, 1, None, inputs);
+        Self { episodes, cells, tables, manifest, statistics: None, figures: Vec::new() }
+    }
+
+    /// The tables of the bundled traces alone.
+    pub fn bare() -> Self {
+        Self::of(PAPER.clone(), &["experiment", "model"], "default")
+    }
+
+    /// The report of the bundled traces, with the figures that need nothing but cells and episodes.
+    pub fn paper() -> Self {
+        let mut report = Self::bare();
+        report.statistics = Some(Statistics::of(&report.episodes, &report.cells, &Options::default()).unwrap());
+        let input = figures::Input { episodes: Some(&report.episodes), ..figures::Input::of_cells(&report.cells) };
+        let drawn =
+            FigureName::ALL.into_iter().filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes));
+        let picture = |name| (name, figures::draw(name, &input).unwrap().inline_svg());
+        report.figures = drawn.map(picture).collect();
+        report
+    }
+
+    pub fn render(&self) -> Result<String, HtmlError> {
+        let figures: Vec<Figure<'_>> = self.figures.iter().map(figure).collect();
+        html::render(&Page {
+            tables: &self.tables,
+            cells: &self.cells,
+            episodes: &self.episodes,
+            manifest: &self.manifest,
+            figures: &figures,
+            statistics: self.statistics.as_ref(),
+        })
+    }
+}
+
+fn figure((name, svg): &(FigureName, String)) -> Figure<'_> {
+    Figure { name: name.name(), title: name.title(), caption: name.caption(), svg }
+}

@@ -1,0 +1,80 @@
+//! The page in dark, on a telephone, on paper.
+
+use serde_json::json;
+
+use crate::html::browser::Browser;
+use crate::html::scored::{PAPER_PAGE, Report};
+
+#[test]
+fn dark_and_light_follow_the_system_until_told_otherwise() {
+    let report = Report::bare();
+    let mut browser = Browser::open(&report.render().unwrap());
+    let ground = "getComputedStyle(document.body).backgroundColor";
+    let system = |scheme: &str| json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
+    browser.send("Emulation.setEmulatedMedia", &system("light"));
+    let light = browser.text(ground);
+    browser.send("Emulation.setEmulatedMedia", &system("dark"));
+    let dark = browser.text(ground);
+    assert_ne!(light, dark);
+    let pressed = "document.getElementById('theme').getAttribute('aria-pressed')";
+    assert_eq!(browser.text(pressed), "true");
+    browser.click("#theme");
+    assert_eq!((browser.text(ground), browser.text(pressed)), (light.clone(), "false".to_owned()));
+    browser.send("Emulation.setEmulatedMedia", &system("light"));
+    browser.click("#theme");
+    assert_eq!(browser.text(ground), dark);
+    browser.close();
+}
+
+/// The least contrast of WCAG 2.2 for running text.
+const LEAST_CONTRAST: f64 = 4.5;
+
+#[test]
+fn text_stands_out_from_its_ground_in_both_themes() {
+    let report = Report::bare();
+    let mut browser = Browser::open(&report.render().unwrap());
+    let contrast = "(() => { \
+        const light = (c) => c.match(/[0-9.]+/g).slice(0, 3).map(Number) \
+            .map((v) => v / 255).map((v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)) \
+            .reduce((sum, v, at) => sum + v * [0.2126, 0.7152, 0.0722][at], 0); \
+        const ground = (e) => { for (; e; e = e.parentElement) { const c = getComputedStyle(e).backgroundColor; \
+            if (c !== 'rgba(0, 0, 0, 0)') return c; } return 'rgb(255, 255, 255)'; }; \
+        const texts = [...document.querySelectorAll('h1, p, dt, dd, a, caption, th, td, td small, li, summary, code, legend, output')]; \
+        return Math.min(...texts.filter((e) => e.checkVisibility()).map((e) => { \
+            const [a, b] = [light(getComputedStyle(e).color), light(ground(e))]; \
+            return (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05); })); })()";
+    for theme in ["light", "dark"] {
+        browser.value(&format!("document.documentElement.dataset.theme = '{theme}'"));
+        let least = browser.value(contrast).as_f64().unwrap();
+        assert!(least >= LEAST_CONTRAST, "{theme}: {least}");
+    }
+    browser.close();
+}
+
+#[test]
+fn a_narrow_window_scrolls_tables_and_never_the_page() {
+    let mut browser = Browser::open(&PAPER_PAGE);
+    let narrow = json!({"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": false});
+    browser.send("Emulation.setDeviceMetricsOverride", &narrow);
+    let overflow = "document.documentElement.scrollWidth - document.documentElement.clientWidth";
+    assert_eq!(browser.value(overflow), 0);
+    browser.click("#table-main td[data-metric=TSA]");
+    assert!(browser.holds("document.getElementById('episodes').getBoundingClientRect().left >= 0"));
+    browser.close();
+}
+
+#[test]
+fn paper_has_everything_but_the_controls() {
+    let mut browser = Browser::open(&PAPER_PAGE);
+    browser.value("document.documentElement.dataset.theme = 'dark'");
+    browser.send("Emulation.setEmulatedMedia", &json!({"media": "print"}));
+    let controls = "[...document.querySelectorAll('button:not(thead button), nav, #filters, .skip')] \
+        .filter((c) => c.checkVisibility()).map((c) => c.outerHTML)";
+    assert_eq!(browser.texts(controls), Vec::<String>::new());
+    assert_eq!(browser.text("getComputedStyle(document.body).color"), "rgb(28, 31, 33)");
+    browser.send("Emulation.setEmulatedMedia", &json!({"media": ""}));
+    let pdf = browser.send("Page.printToPDF", &json!({}));
+    assert!(pdf["data"].as_str().unwrap().starts_with("JVBER"));
+    assert!(!browser.holds("document.querySelector('details').open"), "what was folded is folded again");
+    browser.close();
+}

@@ -1,0 +1,10 @@
+//! What people read: tables, statistics, figures, the page, and the published numbers rebuilt.
+
+#[cfg(feature = "raster")]
+mod figures;
+#[path = "../harness/mod.rs"]
+mod harness;
+mod html;
+mod reconstruction;
+mod report;
+mod statistics;

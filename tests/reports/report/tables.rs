@@ -1,0 +1,233 @@
+//! Tables at the library boundary: the published ones character for character, and what a hostile name can do.
+
+use std::fmt::Write as _;
+use std::fs;
+
+use mirrorstats::cells::cell::{Cells, Group, KeyValue};
+use mirrorstats::cells::moments::Moments;
+use mirrorstats::metric::catalog::{Better, Catalog, Kind, StandardError};
+use mirrorstats::report::layout;
+use mirrorstats::report::style::Style;
+use mirrorstats::report::table::{Emphasis, Table};
+use mirrorstats::report::tables::terminal::{self, Marks, Terminal};
+use mirrorstats::report::tables::{csv, latex, markdown};
+
+use crate::assert_shown;
+use crate::report::published::{self, metric_of};
+
+fn table(style: &str, name: &str) -> Table {
+    published::tables(style).into_iter().find(|table| table.name == name).unwrap()
+}
+
+/// Lines of `text` without comments.
+fn lines(text: &str) -> Vec<&str> {
+    text.lines().filter(|line| !line.starts_with('%')).collect()
+}
+
+/// The published LaTeX with the two slips of the paper put right.
+fn corrected(table: &str) -> String {
+    let printed = fs::read_to_string(published::path(table, "tex")).unwrap();
+    let slip = "$57.90 \\pm 10.07$";
+    let quirk = "$93.43 \\pm 4.14$ & $\\mathbf{1.00 \\pm 0.00}$ & $\\mathbf{0.00 \\pm 0.00}$";
+    let right = "$93.43 \\pm 4.14$ & $\\mathbf{1.00 \\pm 0.00}$ & $\\underline{0.00 \\pm 0.00}$";
+    if table == "main" {
+        assert_eq!((printed.matches(slip).count(), printed.matches(quirk).count()), (1, 1));
+    }
+    printed.replace(slip, "$57.91 \\pm 10.07$").replace(quirk, right)
+}
+
+#[test]
+fn the_published_tables_come_out_character_for_character() {
+    for name in ["main", "appendix"] {
+        let (ours, theirs) = (latex::render(&table("paper", name)), corrected(name));
+        for (ours, theirs) in lines(&ours).into_iter().zip(lines(&theirs)) {
+            assert_eq!(ours, theirs, "{name}");
+        }
+        assert_eq!(lines(&ours).len(), lines(&theirs).len(), "{name}");
+    }
+}
+
+#[test]
+fn the_published_csv_files_come_out_but_for_the_slips() {
+    for (name, slips) in [("main", 2), ("appendix", 0)] {
+        let (ours, theirs) =
+            (csv::render(&table("paper", name)), fs::read_to_string(published::path(name, "csv")).unwrap());
+        let differing = ours.lines().zip(theirs.lines()).filter(|(a, b)| a != b).count();
+        assert_eq!((ours.lines().count(), differing), (theirs.lines().count(), slips), "{name}");
+    }
+}
+
+/// A key, the episodes, and for each metric of the catalog its (n, sum, sum of squares).
+type RowOf<'a> = (&'a [KeyValue], u64, &'a [(u64, i128, i128)]);
+
+fn cells(by: &[&str], catalog: Catalog, groups: &[RowOf]) -> Cells {
+    let moments = |&(n, sum, sum_sq): &(u64, i128, i128)| Moments { n, sum, sum_sq };
+    Cells {
+        by: by.iter().map(|&key| key.to_owned()).collect(),
+        metrics: catalog.metric.keys().cloned().collect(),
+        groups: groups
+            .iter()
+            .map(|&(key, episodes, of)| Group {
+                key: key.to_vec(),
+                episodes,
+                moments: of.iter().map(moments).collect(),
+            })
+            .collect(),
+        catalog,
+    }
+}
+
+fn text(text: &str) -> KeyValue {
+    KeyValue::Text(text.to_owned())
+}
+
+/// A rate, a conditional rate, a quantity to be low and a conditional quantity that is neither good nor bad.
+fn small_catalog() -> Catalog {
+    let conditional = Some("some condition".to_owned());
+    let mut catalog = published::catalog();
+    catalog.metric.clear();
+    for (name, metric) in [
+        ("TSA", metric_of(Kind::Rate, Better::Higher, None, StandardError::Sample)),
+        ("MTATO", metric_of(Kind::Rate, Better::Higher, conditional.clone(), StandardError::Sample)),
+        ("TTD", metric_of(Kind::Quantity, Better::Lower, None, StandardError::Sample)),
+        ("GAZE", metric_of(Kind::Quantity, Better::Neither, conditional, StandardError::Sample)),
+    ] {
+        catalog.metric.insert(name.to_owned(), metric);
+    }
+    catalog
+}
+
+/// Every format of every table of some cells under a style.
+fn everything(cells: &Cells, style: &str) -> String {
+    let mut all = String::new();
+    for table in layout::tables(cells, &Style::load(style).unwrap()).unwrap() {
+        for (format, text) in [
+            ("terminal", terminal::render(&table, Terminal::default())),
+            ("narrow terminal", terminal::render(&table, Terminal { width: Some(50), emphasis: Marks::Ansi })),
+            ("markdown", markdown::render(&table)),
+            ("csv", csv::render(&table)),
+            ("latex", latex::render(&table)),
+        ] {
+            writeln!(all, "######## {} as {format}\n{text}", table.name).unwrap();
+        }
+    }
+    all.replace('\x1b', "␛")
+}
+
+/// The cells themselves: the key of each group, then n, sum and sum of squares of each metric.
+fn counts(cells: &Cells) -> String {
+    let group = |group: &Group| {
+        let moments =
+            group.moments.iter().zip(&cells.metrics).map(|(m, name)| format!("{name} {} {} {}", m.n, m.sum, m.sum_sq));
+        format!("{:?}: {}", group.key, moments.collect::<Vec<_>>().join(", "))
+    };
+    cells.groups.iter().map(group).collect::<Vec<_>>().join("\n")
+}
+
+fn hostile() -> Cells {
+    let rows: &[RowOf] = &[
+        (&[text("E1"), text("a|b")], 3, &[(3, 3, 3), (3, 1, 1), (3, 30, 302), (3, 6, 12)]),
+        (&[text("E1"), text("=HYPERLINK(\"x\")")], 3, &[(3, 2, 2), (2, 2, 2), (3, 30, 300), (1, 4, 16)]),
+        (&[text("E1"), text("\\input{x}%$&#_^~")], 3, &[(3, 1, 1), (1, 1, 1), (3, 33, 400), (0, 0, 0)]),
+        (&[text("E1"), text("\x1b[31m<b>\n[x](y)`")], 3, &[(3, 0, 0), (0, 0, 0), (3, 36, 500), (2, 4, 10)]),
+        (
+            &[text("unknown & new"), text("日本語 model, with a name of forty letters")],
+            9,
+            &[(9, 9, 9), (9, 0, 0), (9, 900, 90000), (9, 9, 21)],
+        ),
+    ];
+    cells(&["experiment", "model"], small_catalog(), rows)
+}
+
+#[test]
+fn hostile_names_stay_names() {
+    assert_shown!("hostile_default", counts(&hostile()), everything(&hostile(), "default"));
+    assert_shown!("hostile_paper", counts(&hostile()), everything(&hostile(), "paper"));
+}
+
+#[test]
+fn one_model_is_not_the_best() {
+    let row: RowOf = (&[text("E1"), text("GPT")], 1, &[(1, 0, 0), (0, 0, 0), (1, 7, 49), (1, 1, 1)]);
+    let one = cells(&["experiment", "model"], small_catalog(), &[row]);
+    assert_shown!(counts(&one), everything(&one, "default"));
+}
+
+#[test]
+fn no_episodes_give_a_table_without_rows() {
+    for style in ["default", "paper"] {
+        let none = cells(&["experiment", "model"], small_catalog(), &[]);
+        for table in layout::tables(&none, &Style::load(style).unwrap()).unwrap() {
+            assert!(table.groups.is_empty());
+            assert!(latex::render(&table).contains("\\bottomrule"));
+            assert!(markdown::render(&table).ends_with('\n') && csv::render(&table).lines().count() == 1);
+            assert!(terminal::render(&table, Terminal::default()).contains("Model"));
+        }
+    }
+}
+
+#[test]
+fn every_metric_is_in_some_table() {
+    let mut catalog = small_catalog();
+    let names = |catalog: Catalog| -> Vec<(String, Vec<String>)> {
+        let tables = layout::tables(&cells(&["model"], catalog, &[]), &Style::load("default").unwrap()).unwrap();
+        let columns = |table: &Table| table.columns.iter().map(|column| column.metric.clone()).collect();
+        tables.iter().map(|table| (table.name.clone(), columns(table))).collect()
+    };
+    let of =
+        |name: &str, columns: &[&str]| (name.to_owned(), columns.iter().map(|&c| c.to_owned()).collect::<Vec<_>>());
+    assert_eq!(
+        names(catalog.clone()),
+        [of("main", &["TSA", "TTD", "MTATO"]), of("appendix", &["TSA"]), of("other", &["GAZE"])]
+    );
+    catalog.metric.retain(|name, _| name == "GAZE");
+    assert_eq!(names(catalog), [of("main", &["GAZE"])]);
+}
+
+#[test]
+fn other_keys_head_groups_and_name_rows() {
+    let one: &[(u64, i128, i128)] = &[(3, 2, 2), (2, 1, 1), (3, 30, 302), (3, 6, 12)];
+    let int = KeyValue::Int;
+    let outline = |by: &[&str], keys: &[&[KeyValue]]| {
+        let rows: Vec<RowOf> = keys.iter().map(|&key| (key, 3, one)).collect();
+        let table =
+            layout::tables(&cells(by, small_catalog(), &rows), &Style::load("paper").unwrap()).unwrap().remove(0);
+        let mut lines = vec![format!("by {} -> {}", by.join(","), table.row_heading)];
+        for group in &table.groups {
+            let rows: Vec<&str> = group.rows.iter().map(|row| row.name.as_str()).collect();
+            let is_plain = group.rows.iter().flat_map(|row| &row.cells).all(|cell| cell.emphasis == Emphasis::Plain);
+            lines.push(format!("  {:?}: {rows:?}{}", group.heading, if is_plain { "" } else { ", emphasised" }));
+        }
+        lines.join("\n")
+    };
+    let outlines = [
+        outline(&["model"], &[&[text("Claude Sonnet 4.6")], &[text("Another")], &[text("Ministral 3 14B")]]),
+        outline(&["seed"], &[&[int(9)], &[int(10)], &[int(100)]]),
+        outline(&["experiment"], &[&[text("A0")], &[text("E2")], &[text("E1")]]),
+        outline(
+            &["experiment", "model", "seed"],
+            &[
+                &[text("E1"), text("a"), int(2)],
+                &[text("E1"), text("a"), int(10)],
+                &[text("E1"), text("b"), int(2)],
+                &[text("E1"), text("b"), int(10)],
+            ],
+        ),
+        outline(
+            &["model", "experiment"],
+            &[&[text("a"), text("E2")], &[text("b"), text("E1")], &[text("b"), text("E2")]],
+        ),
+        outline(
+            &["body_color", "seed"],
+            &[&[KeyValue::Missing, int(1)], &[text("red"), int(1)], &[text("red"), int(2)]],
+        ),
+        outline(&["seed", "body_color"], &[&[int(1), KeyValue::Missing], &[int(1), text("red")]]),
+    ];
+    assert_shown!("tables by these keys, as the groups and the rows that they get", outlines.join("\n"));
+}
+
+#[test]
+fn a_rate_of_nothing_never_looks_certain() {
+    let spelled = |style: &str| everything(&hostile(), style);
+    assert!(spelled("default").contains("0/9 [.00, .30]"));
+    assert!(spelled("default").contains("(all equal)"));
+}

@@ -1,0 +1,330 @@
+//! What `stats` says of tables of episodes whose answers are known.
+
+use std::collections::BTreeSet;
+
+use indexmap::IndexMap;
+use mirrorstats::cells::cell::{Cells, Group, KeyValue};
+use mirrorstats::cells::interval::Interval;
+use mirrorstats::cells::moments::Moments;
+use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use mirrorstats::report::statistics::{Intervals, Options, Statistics, Verdict, text};
+use mirrorstats::score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+
+use crate::assert_shown;
+
+fn metric(kind: Kind, better: Better, when: Option<&str>) -> Metric {
+    Metric {
+        title: String::new(),
+        kind,
+        unit: "steps".into(),
+        better,
+        section: String::new(),
+        help: String::new(),
+        value: String::new(),
+        when: when.map(str::to_owned),
+        se: StandardError::Sample,
+        chance: None,
+    }
+}
+
+fn experiment(order: i64, chance: &[(&str, &str)], reference: &[(&str, &[&str])]) -> Experiment {
+    Experiment {
+        title: String::new(),
+        order,
+        chance: chance.iter().map(|(name, level)| ((*name).into(), Some(level.parse().unwrap()))).collect(),
+        reference: reference
+            .iter()
+            .map(|(name, levels)| ((*name).into(), levels.iter().map(|level| level.parse().unwrap()).collect()))
+            .collect(),
+    }
+}
+
+/// TSA (1/3 by chance in E1 and E2, references in E5), TTD in steps, TSA-C where finished, MTATO where solved.
+fn catalog() -> Catalog {
+    let metric = IndexMap::from([
+        ("TSA".to_owned(), metric(Kind::Rate, Better::Higher, None)),
+        ("TTD".to_owned(), metric(Kind::Quantity, Better::Lower, None)),
+        ("TSA-C".to_owned(), metric(Kind::Rate, Better::Higher, Some("finished"))),
+        ("MTATO".to_owned(), metric(Kind::Rate, Better::Higher, Some("TSA = 1"))),
+    ]);
+    let experiment = IndexMap::from([
+        ("E1".to_owned(), experiment(1, &[("TSA", "1/3")], &[])),
+        ("E2".to_owned(), experiment(2, &[("TSA", "1/3")], &[])),
+        ("E5".to_owned(), experiment(5, &[], &[("TSA", &["1/10", "1/11"])])),
+    ]);
+    Catalog { name: "test".into(), hash: "0".repeat(64), open: false, lets: IndexMap::new(), metric, experiment }
+}
+
+/// An episode: where it belongs, whether it was solved, and its steps; negative ones never finished.
+type Row<'a> = (&'a str, &'a str, i32, i32, bool, i64);
+
+fn table(rows: &[Row]) -> EpisodeTable {
+    let mut rows = rows.to_vec();
+    rows.sort_unstable();
+    let key = |(at, &(experiment, model, seed, run, ..)): (usize, &Row)| EpisodeKey {
+        experiment: experiment.into(),
+        model: model.into(),
+        seed,
+        run,
+        episode_id: format!("{experiment}/{model}/{seed}/{run}/{at}"),
+    };
+    let column = |name: &str, value: fn(&Row) -> Option<i64>| MetricColumn::new(name, rows.iter().map(value));
+    EpisodeTable {
+        catalog: catalog(),
+        keys: rows.iter().enumerate().map(key).collect(),
+        labels: Vec::new(),
+        metrics: vec![
+            column("TSA", |row| Some(i64::from(row.4))),
+            column("TTD", |row| Some(row.5.abs())),
+            column("TSA-C", |row| (row.5 > 0).then_some(i64::from(row.4))),
+            column("MTATO", |row| row.4.then_some(1)),
+        ],
+    }
+}
+
+/// Cells by experiment and model.
+fn cells(table: &EpisodeTable) -> Cells {
+    let mut groups: std::collections::BTreeMap<Vec<KeyValue>, Group> = std::collections::BTreeMap::new();
+    for (row, key) in table.keys.iter().enumerate() {
+        let key = vec![KeyValue::Text(key.experiment.to_owned()), KeyValue::Text(key.model.to_owned())];
+        let moments = vec![Moments::default(); table.metrics.len()];
+        let group = groups.entry(key.clone()).or_insert(Group { key, episodes: 0, moments });
+        group.episodes += 1;
+        for (moments, column) in group.moments.iter_mut().zip(&table.metrics) {
+            *moments = column.get(row).map_or(*moments, |value| moments.with(value).unwrap());
+        }
+    }
+    Cells {
+        catalog: table.catalog.clone(),
+        by: vec!["experiment".into(), "model".into()],
+        metrics: table.metrics.iter().map(|column| column.name.clone()).collect(),
+        groups: groups.into_values().collect(),
+    }
+}
+
+fn statistics(rows: &[Row]) -> Statistics {
+    let table = table(rows);
+    Statistics::of(&table, &cells(&table), &Options::default()).unwrap()
+}
+
+/// Three seeds of seven runs, of which the first `solved` are solved in `steps` steps, the others never.
+fn block<'a>(experiment: &'a str, model: &'a str, solved: i32, steps: i64) -> Vec<Row<'a>> {
+    let row = |at: i32| (experiment, model, at / 7, at % 7, at < solved, if at < solved { steps } else { -100 });
+    (0..21).map(row).collect()
+}
+
+/// Experiment, model, episodes that are solved, and in how many steps.
+const STUDY: [(&str, &str, i32, i64); 7] = [
+    ("E1", "strong", 21, 12),
+    ("E1", "middle", 14, 30),
+    ("E1", "weak", 5, 60),
+    ("E2", "strong", 7, 20),
+    ("E2", "middle", 6, 20),
+    ("E2", "weak", 5, 60),
+    ("E5", "strong", 9, 40),
+];
+
+fn study() -> Vec<Row<'static>> {
+    STUDY.map(|(experiment, model, solved, steps)| block(experiment, model, solved, steps)).concat()
+}
+
+#[test]
+fn cells_carry_counts_and_the_intervals_of_their_kind() {
+    let found = statistics(&study());
+    let cell = |experiment: &str, model: &str, metric: &str| {
+        let key = [("experiment", experiment), ("model", model)];
+        let is_it = |cell: &&mirrorstats::report::statistics::CellRow| {
+            cell.metric == metric && key.iter().all(|(name, value)| cell.key[*name] == KeyValue::Text((*value).into()))
+        };
+        found.cells.iter().find(is_it).unwrap()
+    };
+    let weak = cell("E1", "weak", "TSA");
+    assert_eq!((weak.sum, weak.n, weak.episodes), (5, 21, 21));
+    let Intervals::Rate { wilson: Some(wilson), clopper_pearson: Some(exact), jeffreys: Some(jeffreys) } =
+        weak.intervals
+    else {
+        panic!("a rate has the intervals of a rate: {weak:?}")
+    };
+    // For n = 21 at 95 %: k = 5.
+    let three = |Interval { low, high }: Interval| (format!("{low:.3}"), format!("{high:.3}"));
+    assert_eq!(three(wilson), ("0.106".into(), "0.451".into()));
+    assert_eq!(three(exact), ("0.082".into(), "0.472".into()));
+    assert_eq!(three(jeffreys), ("0.097".into(), "0.446".into()));
+
+    let strong = cell("E1", "strong", "TTD");
+    assert!(matches!(strong.intervals, Intervals::Quantity { student_t: Some(_), bootstrap: Some(_) }));
+    assert!(!cell("E1", "weak", "MTATO").few, "five are enough");
+}
+
+#[test]
+fn a_conditional_metric_of_few_episodes_is_marked_and_an_undefined_one_has_no_interval() {
+    let found = statistics(&[block("E1", "a", 4, 9), block("E1", "b", 0, 9)].concat());
+    let few: Vec<_> = found.cells.iter().filter(|cell| cell.few).map(|cell| (cell.metric.as_str(), cell.n)).collect();
+    assert_eq!(few, [("TSA-C", 4), ("MTATO", 4), ("TSA-C", 0), ("MTATO", 0)]);
+    let undefined = found.cells.last().unwrap();
+    assert_eq!((undefined.mean, undefined.se), (None, None));
+    assert_eq!(undefined.intervals, Intervals::Rate { wilson: None, clopper_pearson: None, jeffreys: None });
+    assert!(found.warnings.iter().any(|warning| warning.starts_with("4 of 8 cells")), "{:?}", found.warnings);
+}
+
+#[test]
+fn chance_comes_from_the_definitions_and_references_where_there_is_none() {
+    let found = statistics(&study());
+    let row = |experiment: &str, model: &str| {
+        found.chance.iter().filter(|row| row.experiment == experiment && row.model == model).collect::<Vec<_>>()
+    };
+    let strong = row("E1", "strong");
+    assert_eq!((strong.len(), strong[0].level.to_string(), strong[0].verdict), (1, "1/3".into(), Verdict::Above));
+    assert!((strong[0].p - 9.559_906_635_974_805e-11).abs() < 1e-22);
+    assert!((strong[0].p_adjusted - 3.0 * strong[0].p).abs() < 1e-20);
+    assert_eq!(row("E2", "strong")[0].verdict, Verdict::NotSeparated);
+    let levels: Vec<String> = row("E5", "strong").iter().map(|row| row.level.to_string()).collect();
+    assert_eq!(levels, ["1/10", "1/11"]);
+}
+
+#[test]
+fn models_are_paired_and_tied_rather_than_ranked() {
+    let found = statistics(&study());
+    let family = found.models.iter().find(|family| family.experiment == "E1" && family.metric == "TSA").unwrap();
+    assert_eq!(family.models, ["strong", "middle", "weak"]);
+    // strong - middle 7:0, p = 2/2^7, times 2 as the third but held up by 9:0; middle - weak 9:0; strong - weak 16:0
+    let p: Vec<f64> = family.tests.iter().map(|test| test.p.unwrap()).collect();
+    assert_eq!(p, [2.0 / 128.0, 2.0 / 65536.0, 2.0 / 512.0]);
+    let adjusted: Vec<f64> = family.tests.iter().map(|test| test.p_adjusted.unwrap()).collect();
+    assert_eq!(adjusted, [2.0 / 128.0, 6.0 / 65536.0, 4.0 / 512.0]);
+    assert_eq!(family.tied, [["strong"], ["middle"], ["weak"]]);
+    let other = found.models.iter().find(|family| family.experiment == "E2" && family.metric == "TSA").unwrap();
+    assert_eq!(other.tied, [["strong", "middle", "weak"]]);
+    let reach = family.detectable;
+    assert_eq!((reach.n, reach.tests, reach.single.unwrap().pairs, reach.family.unwrap().pairs), (21, 3, 6, 7));
+    assert!(found.models.iter().all(|family| family.experiment != "E5"), "one model has no rival");
+}
+
+#[test]
+fn episodes_without_a_partner_are_counted_and_named() {
+    let mut rows = [block("E1", "a", 21, 9), block("E1", "b", 0, 9)].concat();
+    rows.retain(|row| !(row.1 == "b" && row.2 == 2 && row.3 == 6));
+    rows.push(("E1", "b", 0, 0, false, -100));
+    let found = statistics(&rows);
+    let gaps: Vec<_> = found.gaps.iter().map(|gap| (gap.model.as_str(), gap.seed, gap.run, gap.episodes)).collect();
+    assert_eq!(gaps, [("b", 0, 0, 2), ("b", 2, 6, 0)]);
+    let test = &found.models[0].tests[0];
+    assert_eq!((test.n, test.missing, test.undefined), (19, 2, 0));
+    let undefined = &found.models.iter().find(|family| family.metric == "TSA-C").unwrap().tests[0];
+    assert_eq!((undefined.n, undefined.missing, undefined.undefined, undefined.p), (0, 2, 19, None));
+    assert!(
+        found.warnings.iter().any(|warning| warning.contains("E1 b seed 2 run 6 (missing)")),
+        "{:?}",
+        found.warnings
+    );
+}
+
+#[test]
+fn conditions_are_subtracted_from_the_first_experiment() {
+    let found = statistics(&study());
+    let of = |metric: &str| {
+        let is_it = |contrast: &&mirrorstats::report::statistics::Contrast| {
+            contrast.model == "strong" && contrast.metric == metric && contrast.against == "E2"
+        };
+        found.conditions.iter().find(is_it).unwrap()
+    };
+    let rate = of("TSA");
+    assert_eq!((rate.baseline.as_str(), rate.difference), ("E1", Some(1.0 - 7.0 / 21.0)));
+    assert!(rate.interval.unwrap().low > 0.0);
+    assert_eq!(of("TTD").difference, Some(12.0 - (7.0 * 20.0 + 14.0 * 100.0) / 21.0));
+    assert_eq!(of("MTATO").n_against, 7);
+}
+
+#[test]
+fn three_seeds_are_not_enough_for_a_claim_about_seeds_and_six_are() {
+    let warns = |found: &Statistics| {
+        found.warnings.iter().any(|warning| warning.contains("too few for a claim about new seeds"))
+    };
+    let three = statistics(&block("E1", "a", 10, 9));
+    assert_eq!(three.clusters[0].by_seed.unwrap().clusters, 3);
+    assert!(warns(&three));
+    let six: Vec<Row> = (0..12).map(|at| ("E1", "a", at / 2, at % 2, at % 3 == 0, 9)).collect();
+    assert!(!warns(&statistics(&six)));
+    let one: Vec<Row> = (0..3).map(|run| ("E1", "a", 0, run, true, 9)).collect();
+    assert_eq!(statistics(&one).clusters[0].by_seed, None);
+}
+
+#[test]
+fn unfinished_episodes_are_censored_and_models_share_a_horizon() {
+    let found = statistics(&study());
+    let row = |model: &str| found.durations.iter().find(|row| row.experiment == "E1" && row.model == model).unwrap();
+    assert_eq!((row("strong").median, row("strong").finished), (Some(12), 21));
+    assert_eq!((row("middle").median, row("weak").median), (Some(30), None));
+    assert_eq!(row("weak").restricted.unwrap().horizon, 100);
+    let weak = (5.0 * 60.0 + 16.0 * 100.0) / 21.0;
+    assert!((row("weak").restricted.unwrap().mean - weak).abs() < 1e-12);
+    assert!(
+        found.conclusions.iter().any(|line| line.starts_with("TTD: 80 of 147 episodes never finished")),
+        "{:?}",
+        found.conclusions
+    );
+}
+
+#[test]
+fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
+    let table = table(&block("E1", "a", 10, 9));
+    let lost: BTreeSet<String> = table.keys.iter().skip(18).map(|key| key.episode_id.to_owned()).collect();
+    let options = Options { lost: Some(lost), ..Options::default() };
+    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    let row = &found.losses.rows[0];
+    assert_eq!((row.metric.as_str(), row.lossy.n, row.lossy.successes, row.lossy.lost), ("TSA", 18, 10, 3));
+    assert_eq!(row.lossy.bounds, Interval { low: 10.0 / 21.0, high: 13.0 / 21.0 });
+    assert!(found.warnings.iter().any(|warning| warning.starts_with("3 episodes ended by the infrastructure")));
+    let unknown = statistics(&block("E1", "a", 10, 9));
+    assert!(!unknown.losses.recorded && unknown.warnings.iter().any(|warning| warning.contains("reply_status")));
+}
+
+#[test]
+fn nothing_at_all_is_no_fault() {
+    let found = statistics(&[]);
+    assert_eq!((found.episodes, found.cells.len(), found.models.len()), (0, 0, 0));
+    assert!(text::render(&found, &found.headline, None).starts_with("0 episodes"));
+}
+
+#[test]
+fn json_reads_back_to_the_same_rows() {
+    let found = statistics(&study());
+    let read: Statistics = serde_json::from_str(&serde_json::to_string(&found).unwrap()).unwrap();
+    assert_eq!((&read.conclusions, &read.warnings, &read.gaps), (&found.conclusions, &found.warnings, &found.gaps));
+    for (read, found) in read.cells.iter().zip(&found.cells) {
+        assert_eq!((&read.key, &read.metric, read.n, read.sum), (&found.key, &found.metric, found.n, found.sum));
+        assert_eq!(std::mem::discriminant(&read.intervals), std::mem::discriminant(&found.intervals));
+    }
+}
+
+#[test]
+fn a_rate_without_failure_is_never_certain() {
+    let text = text::render(&statistics(&block("E1", "a", 21, 9)), &["TSA".into()], None);
+    assert!(text.contains("[0.845, 1.000]") && !text.contains("[1.000, 1.000]") && !text.contains(" 0.000"), "{text}");
+}
+
+#[test]
+fn values_too_large_to_square_are_refused() {
+    let table = table(&[
+        ("E1", "a", 0, 0, true, i64::MAX),
+        ("E1", "a", 0, 1, true, i64::MAX),
+        ("E1", "a", 0, 2, true, i64::MAX),
+    ]);
+    let none = Cells { groups: Vec::new(), catalog: table.catalog.clone(), by: Vec::new(), metrics: Vec::new() };
+    let refused = Statistics::of(&table, &none, &Options::default()).unwrap_err();
+    assert!(refused.to_string().contains("smaller unit"));
+}
+
+#[test]
+fn the_text_begins_with_what_can_be_concluded() {
+    let found = statistics(&study());
+    let blocks = STUDY.map(|(experiment, model, solved, steps)| format!("{experiment} {model} {solved}/21 in {steps}"));
+    assert_shown!(blocks.join("\n"), text::render(&found, &found.headline, None));
+}
+
+#[test]
+fn names_from_traces_cannot_write_to_the_terminal() {
+    let found = statistics(&[block("E1", "evil\u{1b}[2J", 21, 9), block("E1", "b\nc", 0, 9)].concat());
+    let text = text::render(&found, &found.headline, None);
+    assert!(!text.contains('\u{1b}') && text.contains("evil\\u{1b}[2J") && text.contains("b\\u{a}c"));
+}

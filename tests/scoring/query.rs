@@ -1,0 +1,140 @@
+//! `query` and `--engine polars` at the process boundary.
+
+use std::path::Path;
+
+use crate::harness::files::repository;
+use crate::harness::program::{self, Answer};
+
+const FIXTURE: &str = "fixtures/paper";
+
+/// Exit code, standard output and standard error of the program.
+fn run(arguments: &[&str]) -> (i32, String, String) {
+    let Answer { code, stdout, stderr } = program::run(&repository(), arguments);
+    (code, stdout, stderr)
+}
+
+fn rows(query: &str) -> String {
+    let (code, out, err) = run(&["query", query, FIXTURE, "--format", "csv"]);
+    assert_eq!((code, err.as_str()), (0, ""), "{query}");
+    out
+}
+
+fn refusal(query: &str) -> String {
+    let (code, out, err) = run(&["query", query, FIXTURE]);
+    assert_eq!((code, out.as_str()), (2, ""), "{query}");
+    err
+}
+
+#[test]
+fn the_three_tables_agree_with_each_other() {
+    let counted = rows("SELECT COUNT(*) AS n, COUNT(DISTINCT episode_id) AS episodes FROM steps");
+    assert_eq!(counted, "n,episodes\n57314,840\n");
+    assert_eq!(rows("SELECT COUNT(*) AS n FROM steps"), "n\n57314\n");
+    assert_eq!(rows("SELECT COUNT(*) AS n FROM episodes"), "n\n840\n");
+    let sums = "SELECT e.experiment, SUM(e.TSA) AS s FROM episodes e GROUP BY e.experiment ORDER BY e.experiment";
+    let cells =
+        "SELECT experiment, SUM(\"sum\") AS s FROM cells WHERE metric = 'TSA' GROUP BY experiment ORDER BY experiment";
+    assert_eq!(rows(sums), rows(cells));
+}
+
+#[test]
+fn undefined_is_null_in_every_format() {
+    let query = "SELECT episode_id, TTD, MTATO FROM episodes WHERE MTATO IS NULL ORDER BY episode_id LIMIT 1";
+    assert!(rows(query).ends_with(",\n"), "{}", rows(query));
+    let (_, table, _) = run(&["query", query, FIXTURE]);
+    assert!(table.contains("NULL") && table.ends_with("1 row\n"), "{table}");
+    let (_, lines, _) = run(&["query", query, FIXTURE, "--format", "jsonl"]);
+    assert!(lines.contains("\"MTATO\":null") && lines.lines().count() == 1, "{lines}");
+}
+
+#[test]
+fn a_table_shows_both_ends_and_says_how_much_it_leaves_out() {
+    let (_, table, _) = run(&["query", "SELECT t FROM steps ORDER BY t", FIXTURE, "--rows", "3"]);
+    assert!(table.ends_with("57314 rows (3 shown)\n"), "{table}");
+    assert!(table.contains(" 1") && table.contains(" 100"), "{table}");
+}
+
+#[test]
+fn a_parquet_answer_reads_back_and_a_failed_one_leaves_no_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("answer.parquet");
+    let name = path.to_str().unwrap();
+    let (code, out, _) = run(&["query", "SELECT * FROM steps WHERE t = 1", FIXTURE, "-o", name]);
+    assert_eq!((code, out.as_str()), (0, ""));
+    let (_, counted, _) = run(&["query", "SELECT COUNT(*) AS n FROM steps", name, "--format", "csv"]);
+    assert_eq!(counted, "n\n840\n");
+    let none = folder.path().join("none.csv");
+    let (code, _, _) = run(&["query", "SELECT nothing FROM steps", FIXTURE, "-o", none.to_str().unwrap()]);
+    assert_eq!((code, none.exists()), (2, false));
+}
+
+#[test]
+fn a_column_that_one_file_lacks_is_null_there() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, columns) in [("a", "episode_id, model"), ("b", "episode_id, model, t AS extra")] {
+        let path = folder.path().join(format!("{name}.parquet"));
+        let rest = "experiment, seed, run, body_color, t, action, self_color, selected_cube, mirror_visible";
+        let query = format!("SELECT {columns}, {rest} FROM steps WHERE experiment = 'E1'");
+        assert_eq!(run(&["query", &query, FIXTURE, "-o", path.to_str().unwrap()]).0, 0);
+    }
+    let query = "SELECT COUNT(*) AS n, COUNT(extra) AS extra FROM steps";
+    let (_, out, err) = run(&["query", query, folder.path().to_str().unwrap(), "--format", "csv"]);
+    let (n, extra) = out.lines().nth(1).unwrap_or_else(|| panic!("{err}")).split_once(',').unwrap();
+    assert_eq!(n.parse::<u64>().unwrap(), 2 * extra.parse::<u64>().unwrap());
+}
+
+#[test]
+fn a_query_reads_the_named_traces_alone() {
+    for query in [
+        "SELECT * FROM read_parquet('fixtures/paper/x.parquet')",
+        "SELECT * FROM read_csv('Cargo.toml')",
+        "CREATE TABLE a AS SELECT * FROM steps",
+        "DROP TABLE steps",
+        "SELECT 1; SELECT 2",
+    ] {
+        assert!(refusal(query).starts_with("error: "), "{query}");
+    }
+}
+
+#[test]
+fn a_bad_query_is_told_with_its_place_and_the_nearest_name() {
+    assert!(refusal("SELECT modell FROM steps").contains("did you mean `model`?"));
+    assert!(refusal("SELECT s.modell FROM steps s").contains("did you mean `model`?"));
+    assert!(refusal("SELECT model FROM step").contains("did you mean `steps`?"));
+    assert!(refusal("SELECT model FROM").contains("not a query"));
+    assert!(refusal("SELECT nosuch(model) FROM steps").contains("nosuch"));
+}
+
+#[test]
+fn polars_gives_the_bytes_of_the_native_engine() {
+    let scores = |more: &[&str]| {
+        let (code, out, err) = run(&[&["score", FIXTURE][..], more].concat());
+        assert_eq!(code, 0, "{err}");
+        out
+    };
+    assert!(!Path::new(FIXTURE).is_file());
+    for more in [&[][..], &["--where", "seed <> 2 and TSA = 1"], &["--metrics", "TSA,SC"]] {
+        assert_eq!(scores(&[more, &["--engine", "polars"]].concat()), scores(more));
+    }
+}
+
+#[test]
+fn evidence_is_not_said_to_be_of_another_engine() {
+    let (code, out, err) = run(&["score", FIXTURE, "--engine", "polars", "--explain", "E1/gpt-5-1/s1/r2"]);
+    assert_eq!((code, out.as_str()), (2, ""));
+    assert!(err.contains("--explain shows what the native engine decided by"), "{err}");
+}
+
+#[test]
+fn polars_refuses_damaged_traces_in_the_same_words() {
+    let damaged = std::fs::read_dir("fixtures/damaged").unwrap().map(|entry| entry.unwrap().path());
+    let mut seen = 0;
+    for path in damaged.filter(|path| path.extension().is_some_and(|ending| ending == "parquet")) {
+        let name = path.to_str().unwrap();
+        let (code, _, native) = run(&["score", name]);
+        let (other, _, polars) = run(&["score", name, "--engine", "polars"]);
+        assert_eq!((code, native), (other, polars), "{name}");
+        seen += 1;
+    }
+    assert!(seen > 0);
+}

@@ -1,0 +1,180 @@
+//! `mirrorstats import` at the process boundary: what becomes a trace, and that nothing else does.
+
+mod refusals;
+mod round_trip;
+
+use std::borrow::Borrow;
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+use crate::harness::program::run_with_input as run;
+
+/// A step of an episode of E1 with the required keys alone.
+fn step(episode: &str, t: i64) -> Value {
+    json!({
+        "episode_id": episode, "model": "mine", "experiment": "E1", "seed": 1, "run": 1, "body_color": "red", "t": t,
+        "action": "turn_left", "self_color": null, "selected_cube": "none", "mirror_visible": false,
+    })
+}
+
+/// A step with other values for some keys.
+fn step_with(episode: &str, t: i64, values: impl Borrow<Value>) -> Value {
+    let mut step = step(episode, t);
+    for (key, value) in values.borrow().as_object().unwrap() {
+        step[key] = value.clone();
+    }
+    step
+}
+
+fn lines(steps: &[Value]) -> String {
+    steps.iter().flat_map(|step| [step.to_string(), "\n".to_owned()]).collect()
+}
+
+/// The trace that these lines on standard input become, and the answer as JSON.
+fn imported(text: impl Into<Vec<u8>>) -> (Vec<u8>, Value) {
+    let folder = tempfile::tempdir().unwrap();
+    let answer = run(folder.path(), &["import", "-", "-o", "x.parquet", "--json"], text);
+    assert_eq!(answer.code, 0, "{}", answer.stderr);
+    let checked = run(folder.path(), &["validate", "x.parquet"], "");
+    assert_eq!(checked.code, 0, "{}", checked.stdout);
+    (fs::read(folder.path().join("x.parquet")).unwrap(), serde_json::from_str(&answer.stdout).unwrap())
+}
+
+/// The scores of a trace, or of a folder of them.
+fn scores(folder: &Path, trace: &str) -> String {
+    let answer = run(folder, &["score", trace], "");
+    assert_eq!(answer.code, 0, "{}", answer.stderr);
+    answer.stdout
+}
+
+#[test]
+fn steps_become_a_trace_that_scores() {
+    let folder = tempfile::tempdir().unwrap();
+    let steps = [
+        step("a", 1),
+        step_with("a", 2, json!({ "mirror_visible": true, "self_color": "red" })),
+        step_with("a", 3, json!({ "action": "done", "self_color": "red", "selected_cube": "red" })),
+    ];
+    fs::write(folder.path().join("steps.jsonl"), lines(&steps)).unwrap();
+    let answer = run(folder.path(), &["import", "steps.jsonl", "--out", "runs.parquet"], "");
+    assert_eq!((answer.code, answer.stderr.as_str()), (0, ""));
+    assert_eq!(answer.stdout, "imported 1 episode, 3 steps into runs.parquet\n");
+    let scores = scores(folder.path(), "runs.parquet");
+    assert_eq!(
+        scores.lines().nth(1).unwrap().split(',').take(8).collect::<Vec<_>>(),
+        ["a", "mine", "E1", "1", "1", "1", "3", "1"]
+    );
+}
+
+#[test]
+fn the_way_the_lines_come_does_not_matter() {
+    let a: Vec<Value> = (1..=5).map(|t| step("a", t)).collect();
+    let b: Vec<Value> = (1..=4).map(|t| step_with("b", t, json!({ "run": 2 }))).collect();
+    let plain = lines(&a) + &lines(&b);
+    let (bytes, _) = imported(plain.clone());
+    assert_eq!(imported(plain.clone()).0, bytes, "equal input, other bytes");
+    let rows = |text: &str| {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("x.parquet"), imported(text).0).unwrap();
+        scores(folder.path(), "x.parquet")
+    };
+    let expected = rows(&plain);
+    let mut mixed: Vec<Value> = a.iter().chain(&b).cloned().collect();
+    mixed.reverse();
+    for other in [
+        lines(&mixed),
+        plain.replace('\n', "\r\n"),
+        plain.replace('\n', "\n\n  \n"),
+        format!("\u{feff}{plain}"),
+        plain.trim_end().to_owned(),
+    ] {
+        assert_eq!(rows(&other), expected);
+    }
+}
+
+#[test]
+fn an_episode_may_lie_in_several_files() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("late.jsonl"), lines(&[step("a", 3), step("b", 1)])).unwrap();
+    fs::write(folder.path().join("early.jsonl"), lines(&[step("a", 2), step("a", 1)])).unwrap();
+    let answer =
+        run(folder.path(), &["import", "late.jsonl", "-", "early.jsonl", "-o", "x.parquet"], lines(&[step("b", 2)]));
+    assert_eq!(answer.code, 0, "{}", answer.stderr);
+    assert_eq!(answer.stdout, "imported 2 episodes, 5 steps into x.parquet\n");
+    assert_eq!(run(folder.path(), &["validate", "x.parquet"], "").code, 0);
+}
+
+#[test]
+fn a_pipe_of_any_kind_is_read() {
+    let (from_input, _) = imported(lines(&[step("a", 1)]));
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("a.jsonl"), lines(&[step("a", 1)])).unwrap();
+    assert_eq!(run(folder.path(), &["import", "a.jsonl", "-o", "x.parquet"], "").code, 0);
+    assert_eq!(fs::read(folder.path().join("x.parquet")).unwrap(), from_input);
+}
+
+#[test]
+fn other_keys_become_columns_of_their_own() {
+    let steps = [
+        step_with(
+            "a",
+            1,
+            json!({ "note": null, "gain": 1, "tries": 3, "warm": true, "never": null, "words": "é\u{0}\"" }),
+        ),
+        step_with("a", 2, json!({ "note": "x", "gain": 0.5, "warm": false, "tries": -9_007_199_254_740_993_i64 })),
+        step("a", 3),
+    ];
+    let (bytes, answer) = imported(lines(&steps));
+    let own = json!([
+        { "name": "note", "type": "string" }, { "name": "gain", "type": "float" }, { "name": "tries", "type": "int" },
+        { "name": "warm", "type": "bool" }, { "name": "never", "type": null }, { "name": "words", "type": "string" },
+    ]);
+    // The order of keys is that of the lines, which `json!` keeps.
+    assert_eq!(answer["own_columns"], own);
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("x.parquet"), bytes).unwrap();
+    let definitions = r#"
+        open = true
+        [metric.OWN]
+        title = "Own"
+        value = "count(warm) + 10 * count(tries = -9007199254740993) + 100 * count(gain > 0.7) + 1000 * count(note = 'x')"
+    "#;
+    fs::write(folder.path().join("own.toml"), definitions).unwrap();
+    let answer = run(folder.path(), &["score", "x.parquet", "--definitions", "own.toml"], "");
+    assert!(answer.stdout.ends_with(",1111\n"), "{}{}", answer.stdout, answer.stderr);
+}
+
+#[test]
+fn every_column_of_the_schema_is_taken_at_its_limits() {
+    let folder = tempfile::tempdir().unwrap();
+    let limits = json!({
+        "seed": i32::MIN, "run": i32::MAX, "distractors": 127, "pose_x": 3, "pose_y": -3.4e38, "cost_usd": 0,
+        "frame_time": i64::MIN, "latency_ms": 0, "reply_status": "rate_limited", "reply": "", "stated_color": "blue",
+    });
+    let text = lines(&[step_with("a", 1, limits)]);
+    let (bytes, answer) = imported(text);
+    fs::write(folder.path().join("x.parquet"), bytes).unwrap();
+    assert_eq!(answer["columns"].as_array().unwrap().len(), 11 + 9);
+    assert_eq!(answer["own_columns"], json!([]));
+    assert!(scores(folder.path(), "x.parquet").contains(&format!(",{},{},", i32::MIN, i32::MAX)));
+}
+
+#[test]
+fn many_episodes_fill_several_row_groups_and_none_is_split() {
+    let mut text = String::new();
+    for episode in 0..1320 {
+        for t in 1..=100 {
+            let line = r#"{"episode_id":"e@","model":"m","experiment":"E5","seed":1,"run":@,"body_color":"red","t":#,"action":null,"self_color":"red","selected_cube":null,"mirror_visible":true}"#;
+            text.push_str(&line.replace('@', &episode.to_string()).replace('#', &t.to_string()));
+            text.push('\n');
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("x.parquet"), imported(text).0).unwrap();
+    let info: Value = serde_json::from_str(&run(folder.path(), &["info", "x.parquet", "--json"], "").stdout).unwrap();
+    let checked = run(folder.path(), &["validate", "x.parquet"], "").stdout;
+    assert!(checked.contains("1320 episodes, 132000 steps checked: 0 errors, 0 notes"), "{checked}");
+    assert!(info.to_string().contains("132000"), "{info}");
+}

@@ -1,0 +1,12 @@
+//! Traces: written, imported, read, checked, damaged.
+
+mod damaged;
+#[path = "../harness/mod.rs"]
+mod harness;
+mod import;
+mod renormalize;
+mod trace_bytes;
+mod trace_commands;
+mod trace_scan;
+mod trace_validate;
+mod trace_write;

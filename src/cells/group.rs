@@ -130,7 +130,9 @@ impl Membership {
         // Groups are numbered as they appear, and then by their keys.
         let mut places = vec![0; seen.len()];
         seen.values().zip(0..).for_each(|(seen, place)| places[*seen] = place);
-        of_row.iter_mut().for_each(|group| *group = places[*group]);
+        for group in &mut of_row {
+            *group = places[*group];
+        }
         let key = |ranks: &Vec<usize>| -> Vec<KeyValue> {
             columns.iter().zip(ranks).map(|(column, rank)| column.values[*rank].clone()).collect()
         };
@@ -158,7 +160,9 @@ impl Ranks {
         values.dedup();
         let place = |value: &KeyValue| values.binary_search(value).unwrap_or_default();
         let places: Vec<usize> = of_code.iter().map(|value| value.as_ref().map_or(0, place)).collect();
-        of_row.iter_mut().for_each(|code| *code = places[*code]);
+        for code in &mut of_row {
+            *code = places[*code];
+        }
         Self { values, of_row }
     }
 

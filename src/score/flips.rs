@@ -43,7 +43,9 @@ pub fn score_pair(
     let [old, new] = definitions.map(|definitions| candidates.alone(definitions));
     let readers = [Reader::of(&old), Reader::of(&new)];
     let mut wide = plan.clone();
-    readers.iter().for_each(|reader| reader.add_to(&mut wide));
+    for reader in &readers {
+        reader.add_to(&mut wide);
+    }
     let projection = projection(traces, &definitions, &wide, labels)?;
     let headers = definitions.map(|definitions| header(definitions, labels));
     let mut evidence = [BTreeMap::new(), BTreeMap::new()];

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 
+use mirrorstats::trace::diagnostic::Code;
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use mirrorstats::trace::schema::COLUMNS;
 use mirrorstats::trace::write::write_episodes;

@@ -41,15 +41,15 @@ pub(super) struct Places {
 impl<'a> Study<'a> {
     pub fn of(table: &'a EpisodeTable) -> Result<Self, MomentOverflow> {
         // A table is ordered by experiment, then by model.
-        let mut rows: BTreeMap<(usize, &str), Vec<(&str, Range<usize>)>> = BTreeMap::new();
+        let mut rows: BTreeMap<(usize, &str), Vec<Range<usize>>> = BTreeMap::new();
         for block in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
             let key = table.keys.get(block.start);
             let rank = table.catalog.experiment_rank(key.experiment);
-            rows.entry((rank, key.experiment)).or_default().push((key.model, block));
+            rows.entry((rank, key.experiment)).or_default().push(block);
         }
         let mut experiments = Vec::with_capacity(rows.len());
-        for ((_, name), models) in rows {
-            let blocks = models.into_iter().map(|(model, rows)| Block::of(table, name, model, rows));
+        for ((_, name), blocks) in rows {
+            let blocks = blocks.into_iter().map(|rows| Block::of(table, name, table.keys.get(rows.start).model, rows));
             experiments.push(Experiment { name, blocks: blocks.collect::<Result<_, _>>()? });
         }
         Ok(Self { table, experiments })

@@ -11,15 +11,15 @@ use std::path::Path;
 use super::error::StudyError;
 use super::inputs::{ScoreFile, Source, Stamp};
 use super::{Question, Study, scores};
-use crate::base::near::nearest;
-use crate::cells::changes::{Changes, Flip, Overlap};
-use crate::cells::group::DEFAULT_BY;
+use crate::base::suggest::nearest;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::report::order::TableOrder;
 use crate::report::style::Style;
 use crate::score::evidence;
 use crate::score::score_traces::{self, Outputs, ScoreError};
 use crate::score::table::EpisodeTable;
+use crate::stats::diff::{Changes, Flip, Overlap};
+use crate::stats::group::DEFAULT_BY;
 use crate::trace::inputs::{self, Input};
 use crate::trace::open::TraceSet;
 

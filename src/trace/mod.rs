@@ -3,6 +3,7 @@
 //! Rule: only this room opens traces. It knows no metric.
 
 mod ahead;
+pub mod bits;
 mod bounds;
 pub mod colors;
 mod column;

@@ -22,8 +22,8 @@ use super::finding::{Code, Finding, TraceError};
 use super::footer::{Extent, footer, plain, readable, rows_of};
 use super::inputs::Input;
 use super::schema::{self, COLUMNS, Kind};
-use crate::base::near::nearest;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
+use crate::base::suggest::nearest;
 
 /// Traces that are open: every footer is read and good, no row is read yet.
 #[derive(Debug)]

@@ -13,8 +13,8 @@ use super::layout::{EPISODE_ID, EXPERIMENT, Layout, LayoutColumn, T};
 use super::open::TraceFile;
 use super::pass::Episodes;
 use super::schema::{Column, Kind};
-use crate::base::near::nearest;
-use crate::base::visible::exact;
+use crate::base::escape::exact;
+use crate::base::suggest::nearest;
 
 /// A finding and its row among the episodes'.
 pub(super) struct Located {

@@ -10,7 +10,7 @@ use arrow::datatypes::{DataType, Field};
 use super::colors;
 use super::episode::{Action, Episode};
 use super::schema::{Column, Stored};
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 
 /// How to get a column's value in an episode at the step of an index (0-based).
 #[derive(Clone, Copy)]

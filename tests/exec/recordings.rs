@@ -6,8 +6,8 @@ use std::process::{Command, Output};
 
 use arrow::array::{AsArray as _, RecordBatch};
 use arrow::compute::concat_batches;
+use mirrorstats::sim::camera::Camera;
 use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::eye::Eye;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use serde_json::Value;
 use tempfile::TempDir;
@@ -37,7 +37,7 @@ impl Bench {
     /// `None`, said on standard error, where the machine cannot draw.
     pub fn new() -> Option<Self> {
         let config = WorldConfig::from_toml(SMALL).unwrap();
-        if let Err(error) = Eye::new(&config) {
+        if let Err(error) = Camera::new(&config) {
             eprintln!("skipped: {error}");
             return None;
         }

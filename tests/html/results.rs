@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mirrorstats::cells::cell::KeyValue;
+use mirrorstats::stats::cell::KeyValue;
 
 use crate::browser::Browser;
 use crate::scored::Report;

@@ -4,10 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use crate::published;
-use mirrorstats::cells::cell::Cells;
 use mirrorstats::report::bundle::{Bundle, BundleError, Input, Manifest, OutputFile, cells_csv, write};
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::Table;
+use mirrorstats::stats::cell::Cells;
 
 struct Report {
     cells: Cells,

@@ -5,14 +5,14 @@ use std::fs;
 
 use crate::published;
 use crate::published::metric_of;
-use mirrorstats::cells::cell::{Cells, Group, KeyValue};
-use mirrorstats::cells::moments::Moments;
 use mirrorstats::metric::catalog::{Better, Catalog, Kind, StandardError};
 use mirrorstats::report::layout;
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::{Emphasis, Table};
 use mirrorstats::report::tables::terminal::{self, Marks, Terminal};
 use mirrorstats::report::tables::{csv, latex, markdown};
+use mirrorstats::stats::cell::{Cells, Group, KeyValue};
+use mirrorstats::stats::moments::Moments;
 
 fn table(style: &str, name: &str) -> Table {
     published::tables(style).into_iter().find(|table| table.name == name).unwrap()

@@ -3,7 +3,7 @@
 use std::fs;
 use std::process::Command;
 
-use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::{Value, json};
 
 use super::bench::KEY;

@@ -14,7 +14,7 @@ use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
 use sqlparser::tokenizer::{Location, Span, Token, Tokenizer};
 
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 use crate::metric::fault::{Fault, Faults, Place, Source};
 
 /// A table that a query may name.

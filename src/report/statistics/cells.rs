@@ -7,11 +7,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Study, counts};
-use crate::cells::bootstrap;
-use crate::cells::cell::{Cells, Group, KeyValue};
-use crate::cells::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
 use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::EpisodeTable;
+use crate::stats::bootstrap;
+use crate::stats::cell::{Cells, Group, KeyValue};
+use crate::stats::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
 
 /// Conditional metrics with fewer defined episodes than this are marked.
 pub const FEW: u64 = 5;
@@ -81,7 +81,7 @@ impl CellRow {
         let texts: Vec<String> = group.key.iter().map(ToString::to_string).collect();
         let rows = rows.get(&texts).map_or(&[][..], Vec::as_slice);
         let of_metric = |(metric, moments)| {
-            let moments: &crate::cells::moments::Moments = moments;
+            let moments: &crate::stats::moments::Moments = moments;
             let metric: &String = metric;
             let kind = study.kind(metric);
             let definition = study.metric(metric);

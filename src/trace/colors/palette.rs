@@ -8,8 +8,8 @@ use serde_json::Value;
 use super::super::finding::{Code, Finding};
 use super::super::schema::RECORDING_KEY;
 use super::spelling::{WORDS, is_well_spelled, most_like};
+use crate::base::escape::visible;
 use crate::base::palette::Color;
-use crate::base::visible::visible;
 
 /// The colours of a recording; never empty.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,7 +9,7 @@ use super::super::colors;
 use super::super::schema::{self, COLUMNS, Column, Kind, Stored};
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 
 /// A column that the schema does not know.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use super::super::finding::TraceError;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 
 /// A line of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use super::super::schema::{COLUMNS, Column};
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
 use super::text::Line;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 
 /// Where a step lies.
 #[derive(Clone, Copy, Debug)]

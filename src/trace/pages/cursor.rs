@@ -17,7 +17,7 @@ use super::reader::Pages;
 use super::spread::{spread_bits, spread_keys};
 use super::verified::FaultSlot;
 use super::{Place, Unfit};
-use crate::base::bits::Bits;
+use crate::trace::bits::Bits;
 
 /// How rows are to be held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

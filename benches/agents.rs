@@ -17,16 +17,17 @@ use std::sync::atomic::AtomicBool;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Account;
 use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
 use mirrorstats::agent::vlm::provider::{Patience, Provider};
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use mirrorstats::agent::vlm::{OnOutage, Vlm};
 use mirrorstats::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
 use mirrorstats::record::metadata;
 use mirrorstats::record::plan::{Key, Plan, Shard};
 use mirrorstats::record::queue::Held;
-use mirrorstats::record::run::{Progress, Recording, Settings, Shares, Spent};
+use mirrorstats::record::run::{Progress, Recording, Settings};
+use mirrorstats::record::shares::{Shares, Spent};
 use mirrorstats::record::store::Store;
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::config::WorldConfig;
@@ -188,10 +189,10 @@ fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: No
 }
 
 fn print(name: &str, (rate, spent): (f64, Spent)) {
-    let parts = [spent.rendering, spent.census, spent.writing, spent.agent].map(|part| part.as_secs_f64());
-    let [rendering, census, writing, agent] = parts.map(|part| 100.0 * part / parts.iter().sum::<f64>());
+    let parts = [spent.rendering, spent.visibility, spent.writing, spent.agent].map(|part| part.as_secs_f64());
+    let [rendering, visibility, writing, agent] = parts.map(|part| 100.0 * part / parts.iter().sum::<f64>());
     println!(
-        "  {name:<20} {rate:6.1} steps/s   (rendering {rendering:.0} %, census {census:.0} %, writing {writing:.0} %, agents and waiting {agent:.0} %)"
+        "  {name:<20} {rate:6.1} steps/s   (rendering {rendering:.0} %, census {visibility:.0} %, writing {writing:.0} %, agents and waiting {agent:.0} %)"
     );
 }
 

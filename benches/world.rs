@@ -8,8 +8,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use mirrorstats::sim::Experiment;
+use mirrorstats::sim::camera::Camera;
 use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::eye::Eye;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::world::World;
 use mirrorstats::trace::episode::Action;
@@ -22,13 +22,13 @@ const STEPS: i32 = 100;
 struct Spent {
     steps: u32,
     motion: Duration,
-    census: Duration,
+    visibility: Duration,
     drawing: Duration,
 }
 
 impl Spent {
     fn all(&self) -> Duration {
-        self.motion + self.census + self.drawing
+        self.motion + self.visibility + self.drawing
     }
 
     fn per_second(&self) -> f64 {
@@ -49,7 +49,7 @@ fn timed<T>(spent: &mut Duration, work: impl FnOnce() -> T) -> T {
 }
 
 /// Some episodes of E5 with six others; with an eye, every step is drawn.
-fn walk(config: &WorldConfig, first: i32, mut eye: Option<Eye>) -> Spent {
+fn walk(config: &WorldConfig, first: i32, mut eye: Option<Camera>) -> Spent {
     let mut spent = Spent::default();
     for seed in first..first + EPISODES {
         let scene = Scene::draw(config, Experiment::E5, seed, 0).expect("the default has room for all");
@@ -58,7 +58,7 @@ fn walk(config: &WorldConfig, first: i32, mut eye: Option<Eye>) -> Spent {
             if let Some(eye) = &mut eye {
                 timed(&mut spent.drawing, || eye.frame(&world)).expect("there is something to draw with");
             }
-            std::hint::black_box(timed(&mut spent.census, || world.census()));
+            std::hint::black_box(timed(&mut spent.visibility, || world.visibility()));
             let action = if t % 4 == 3 { Action::TurnLeft } else { Action::MoveForward };
             timed(&mut spent.motion, || world.act(Some(action)));
             spent.steps += 1;
@@ -70,7 +70,7 @@ fn walk(config: &WorldConfig, first: i32, mut eye: Option<Eye>) -> Spent {
 /// What switching between worlds costs an eye: the same frames of one world and of eight by turns.
 fn switching(config: &WorldConfig) -> [Duration; 2] {
     const FRAMES: usize = 64;
-    let mut eye = Eye::new(config).expect("there is something to draw with");
+    let mut eye = Camera::new(config).expect("there is something to draw with");
     let worlds: Vec<World> = (0..8)
         .map(|_| Scene::draw(config, Experiment::E5, 1, 0).expect("the default has room for all"))
         .map(|scene| World::new(config, scene).expect("the default is a world"))
@@ -95,10 +95,11 @@ fn main() {
     let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
 
     let alone = walk(&config, 0, None);
-    let [motion, census] = [alone.motion, alone.census].map(|part| part.as_secs_f64() * 1e3 / f64::from(alone.steps));
+    let [motion, visibility] =
+        [alone.motion, alone.visibility].map(|part| part.as_secs_f64() * 1e3 / f64::from(alone.steps));
     println!("E5, seven humanoids, 640 x 480, one thread");
     println!(
-        "  census, no frames   {:6.0} steps/s   ({census:.2} ms census, {motion:.3} ms motion a step)",
+        "  census, no frames   {:6.0} steps/s   ({visibility:.2} ms census, {motion:.3} ms motion a step)",
         alone.per_second()
     );
 
@@ -112,7 +113,7 @@ fn main() {
     });
     println!("  the same on {threads} threads {:6.0} steps/s", f64::from(steps) / start.elapsed().as_secs_f64());
 
-    match Eye::new(&config) {
+    match Camera::new(&config) {
         Err(error) => println!("  frames: {error}"),
         Ok(eye) => {
             let drawn = walk(&config, 0, Some(eye));

@@ -7,8 +7,8 @@
 //! # Code map
 //!
 //! ```text
-//!          trace ──────► score ───────► cells ───────► report
-//!        (steps of      (one row        (exact         (tables, statistics,
+//!          trace ──────► score ───────► stats ───────► report, figures
+//!        (steps of      (one row        (cells:        (tables, statistics,
 //!         episodes)      per episode)    moments)       the folder)
 //!                          ▲
 //!                       metric
@@ -22,11 +22,12 @@
 //! | `record` | runs episodes: a world, an agent; a trace and a log (feature `sim`) |
 //! | [`replay`] | a recorded episode again: re-simulated, as frames, as a film strip |
 //! | [`agent`] | who decides the next action: scripted, a model behind a provider, a program |
-//! | `sim` | the MuJoCo world: scene, bodies, eye, ground truth from rays (feature `sim`) |
+//! | `sim` | the MuJoCo world: scene, bodies, camera, visibility from rays (feature `sim`) |
 //! | [`log`] | MCAP logs: in, out, and what can be saved of a cut one |
 //! | [`report`] | styles, tables, statistics for people, the folder of a report |
+//! | [`figures`] | one figure per file, and the kit that draws them |
 //! | [`engine`] | other engines for the SQL lowering: Polars, Spark |
-//! | [`cells`] | grouping, exact moments, intervals, tests |
+//! | [`stats`] | grouping, exact moments, intervals, tests |
 //! | [`score`] | logical plan to physical plan to kernels over Arrow batches; the episode table |
 //! | [`metric`] | definition files: TOML, SQL expressions, types, plans |
 //! | [`trace`] | what an episode is: schema, writer, reader, validation |
@@ -34,7 +35,7 @@
 //!
 //! # Invariants
 //!
-//! - A room imports from the rooms below it alone; a test reads the `use` lines.
+//! - A room imports only from rooms below it; a test resolves every path of the sources.
 //! - Only [`trace`] opens traces, only [`cli`] prints, only [`base`] rounds.
 //! - An episode's value is an integer, a cell keeps n, Σx, Σx² as integers: results do not depend on
 //!   threads, on the order of files, or on how rows are divided among them.
@@ -50,7 +51,7 @@
 //! 3. a vector per step of the physical plan: truth values as bits ([`score::physical`], [`score::evaluate`])
 //! 4. a value per episode: the vector of an aggregate or of a metric
 //! 5. a column of the episode table, sorted once by a permutation ([`score::builder`], [`score::table`])
-//! 6. exact moments of a cell ([`cells::moments`])
+//! 6. exact moments of a cell ([`stats::moments`])
 //! 7. a decimal, rounded once ([`base::number`])
 //! 8. text ([`report`])
 //!
@@ -136,11 +137,11 @@ pub mod agent;
 #[doc(hidden)]
 pub mod base;
 #[doc(hidden)]
-pub mod cells;
-#[doc(hidden)]
 pub mod cli;
 #[doc(hidden)]
 pub mod engine;
+#[doc(hidden)]
+pub mod figures;
 #[doc(hidden)]
 pub mod log;
 #[doc(hidden)]
@@ -158,21 +159,23 @@ pub mod score;
 #[doc(hidden)]
 pub mod sim;
 #[doc(hidden)]
+pub mod stats;
+#[doc(hidden)]
 pub mod study;
 #[doc(hidden)]
 pub mod trace;
 
 // The library. What is reachable besides is for this project's own tests and examples, and may change at any time.
-pub use cells::cell::{Cells, Group, KeyValue};
-pub use cells::changes::{CellChange, Changes, Flip};
-pub use cells::columns::record_batch;
-pub use cells::moments::Moments;
+pub use figures::{Figure, FigureFormat, FigureName};
 pub use report::bundle::Manifest;
-pub use report::figures::{Figure, FigureFormat, FigureName};
 pub use report::statistics::{Options as StatisticsOptions, Statistics};
 pub use report::table::Table;
 pub use score::evidence::Evidence;
 pub use score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+pub use stats::cell::{Cells, Group, KeyValue};
+pub use stats::columns::record_batch;
+pub use stats::diff::{CellChange, Changes, Flip};
+pub use stats::moments::Moments;
 pub use study::{
     Backend, Diff, DiffRequest, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side, Study,
     StudyError, diff, resolve,

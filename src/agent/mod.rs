@@ -7,12 +7,12 @@
 
 #[cfg(feature = "sim")]
 pub mod exec;
+#[cfg(feature = "sim")]
+pub mod perception;
 pub mod prompt;
 pub mod reply;
 #[cfg(feature = "sim")]
 pub mod scripted;
-#[cfg(feature = "sim")]
-pub mod sight;
 #[cfg(feature = "sim")]
 pub mod vlm;
 
@@ -21,6 +21,7 @@ use std::pin::Pin;
 use std::sync::Arc;
 
 use crate::base::frame::Frame;
+use crate::base::names::names;
 use crate::trace::episode::Action;
 use reply::Repair;
 
@@ -139,42 +140,18 @@ pub enum Status {
     Timeout,
 }
 
-impl Status {
-    /// All of them, in the order of the schema.
-    pub const ALL: [Self; 10] = [
-        Self::Ok,
-        Self::Repaired,
-        Self::ParseFailed,
-        Self::SchemaInvalid,
-        Self::Refusal,
-        Self::Truncated,
-        Self::Empty,
-        Self::RateLimited,
-        Self::ServerError,
-        Self::Timeout,
-    ];
-
-    /// The status of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|status| status.name() == name)
-    }
-
-    /// The name in the `reply_status` column.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Repaired => "repaired",
-            Self::ParseFailed => "parse_failed",
-            Self::SchemaInvalid => "schema_invalid",
-            Self::Refusal => "refusal",
-            Self::Truncated => "truncated",
-            Self::Empty => "empty",
-            Self::RateLimited => "rate_limited",
-            Self::ServerError => "server_error",
-            Self::Timeout => "timeout",
-        }
-    }
-}
+names!(Status {
+    Ok: "ok",
+    Repaired: "repaired",
+    ParseFailed: "parse_failed",
+    SchemaInvalid: "schema_invalid",
+    Refusal: "refusal",
+    Truncated: "truncated",
+    Empty: "empty",
+    RateLimited: "rate_limited",
+    ServerError: "server_error",
+    Timeout: "timeout",
+});
 
 /// The episode cannot go on, and that is not the agent's doing: the infrastructure failed. Such an episode is counted
 /// apart and recorded again by the next run of the command; it is never scored.

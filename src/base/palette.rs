@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::names::names;
+
 /// A colour of the palette.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -20,37 +22,20 @@ pub enum Color {
     Yellow,
 }
 
+names!(Color {
+    Blue: "blue",
+    Brown: "brown",
+    Cyan: "cyan",
+    Green: "green",
+    Orange: "orange",
+    Pink: "pink",
+    Purple: "purple",
+    Red: "red",
+    White: "white",
+    Yellow: "yellow",
+});
+
 impl Color {
-    /// All ten, by name.
-    pub const ALL: [Self; 10] = [
-        Self::Blue,
-        Self::Brown,
-        Self::Cyan,
-        Self::Green,
-        Self::Orange,
-        Self::Pink,
-        Self::Purple,
-        Self::Red,
-        Self::White,
-        Self::Yellow,
-    ];
-
-    /// The name in traces and prompts.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Blue => "blue",
-            Self::Brown => "brown",
-            Self::Cyan => "cyan",
-            Self::Green => "green",
-            Self::Orange => "orange",
-            Self::Pink => "pink",
-            Self::Purple => "purple",
-            Self::Red => "red",
-            Self::White => "white",
-            Self::Yellow => "yellow",
-        }
-    }
-
     /// What paint of this colour is: red, green and blue. In a picture it is darker by the light that falls on it.
     pub const fn rgb(self) -> [u8; 3] {
         match self {
@@ -65,10 +50,5 @@ impl Color {
             Self::White => [255, 255, 255],
             Self::Yellow => [250, 225, 0],
         }
-    }
-
-    /// The colour of this name, as [`Color::name`] writes it.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|color| color.name() == name)
     }
 }

@@ -25,7 +25,7 @@ pub struct ThreadArgs {
 }
 
 impl ThreadArgs {
-    /// The number asked for, or one a core.
+    /// The number asked for, or one per core.
     pub fn count(self) -> NonZeroUsize {
         self.threads.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN)
     }

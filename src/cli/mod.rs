@@ -1,24 +1,22 @@
 //! The command line: the only room with clap, standard output and exit codes.
 //!
-//! `args` is what was typed and what several verbs share; `commands/<verb>.rs` is one thin file a verb;
+//! `args` is what was typed and what several verbs share; `commands/<verb>.rs` is one thin file per verb;
 //! `outcome` maps what happened to an exit code, in one place.
 
 pub mod args;
 pub mod commands;
 #[cfg(feature = "sim")]
-pub mod exec;
+pub mod dry_run;
 #[cfg(feature = "sim")]
-pub mod forecast;
-mod listing;
+pub mod exec;
 pub mod outcome;
 pub mod output;
-#[cfg(feature = "polars")]
-pub mod querying;
 #[cfg(feature = "sim")]
 pub mod recording;
 pub mod scoring;
 pub mod spark;
 mod terminal;
+mod text_table;
 #[cfg(feature = "sim")]
 pub mod vlm;
 

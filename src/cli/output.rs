@@ -12,8 +12,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::outcome::{Failure, Outcome};
+use crate::base::escape::visible_lines;
 use crate::base::replace::{self, NewFile};
-use crate::base::visible::visible_lines;
 
 /// Prints an answer, as text for people or as JSON for programs.
 ///

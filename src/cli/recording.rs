@@ -10,16 +10,18 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::listing::counted;
+use super::text_table::counted;
 use crate::agent::Player;
 use crate::agent::vlm::limits::Spend;
+use crate::base::escape::visible;
+use crate::base::format::fixed;
 use crate::base::number::Decimal;
-use crate::base::visible::visible;
-use crate::record::lost::LostEpisode;
+use crate::record::failures::LostEpisode;
 use crate::record::plan::Key;
 use crate::record::queue::Held;
 use crate::record::replies::{Replies, RepliesAnswer, UnreadableReply};
-use crate::record::run::{Progress, Spent};
+use crate::record::run::Progress;
+use crate::record::shares::Spent;
 use crate::trace::episode::Step;
 use crate::trace::replies::ReplyCounts;
 
@@ -126,7 +128,8 @@ impl<'a> Bar<'a> {
         *told = Instant::now();
         let (steps, rate, left) = (self.line.position(), self.line.per_sec(), self.line.eta().as_secs().div_ceil(60));
         // With standard error closed there is nobody left to tell.
-        let _ = writeln!(io::stderr(), "{}, {steps} steps, {rate:.1} a second, about {left} min left", self.message());
+        let (message, rate) = (self.message(), fixed(Some(rate), 1));
+        let _ = writeln!(io::stderr(), "{message}, {steps} steps, {rate} a second, about {left} min left");
     }
 }
 
@@ -210,9 +213,9 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
     let rate = if seconds > 0.0 { answer.steps as f64 / seconds } else { 0.0 };
     let (episodes, steps) = (counted(answer.recorded as u64, "episode"), counted(answer.steps, "step"));
-    write!(out, "{}: recorded {episodes}, {steps} in {seconds:.1} s", visible(&answer.model))?;
+    write!(out, "{}: recorded {episodes}, {steps} in {} s", visible(&answer.model), fixed(Some(seconds), 1))?;
     if answer.recorded > 0 {
-        write!(out, " ({rate:.0} steps a second)")?;
+        write!(out, " ({} steps a second)", fixed(Some(rate), 0))?;
     }
     match answer.found {
         0 => writeln!(out)?,
@@ -251,12 +254,12 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
 fn shares(times: Spent) -> Option<String> {
     let parts = [
         ("rendering", times.rendering),
-        ("world and census", times.census),
+        ("world and census", times.visibility),
         ("agents and waiting for them", times.agent),
         ("writing", times.writing),
     ];
     let total: f64 = parts.iter().map(|(_, time)| time.as_secs_f64()).sum();
-    let words = parts.map(|(name, time)| format!("{name} {:.0} %", 100.0 * time.as_secs_f64() / total));
+    let words = parts.map(|(name, time)| format!("{name} {} %", fixed(Some(100.0 * time.as_secs_f64() / total), 0)));
     (total > 0.0).then(|| words.join(", "))
 }
 
@@ -269,7 +272,8 @@ mod tests {
     use crate::agent::vlm::limits::Spend;
     use crate::record::plan::Key;
     use crate::record::queue::Held;
-    use crate::record::run::{Progress as _, Spent};
+    use crate::record::run::Progress as _;
+    use crate::record::shares::Spent;
     use crate::sim::Experiment;
     use crate::trace::episode::{Extra, Step};
 
@@ -316,7 +320,7 @@ mod tests {
     fn shares_are_of_the_whole_and_need_one() {
         let spent = Spent {
             rendering: Duration::from_secs(7),
-            census: Duration::from_secs(2),
+            visibility: Duration::from_secs(2),
             agent: Duration::ZERO,
             writing: Duration::from_secs(1),
         };

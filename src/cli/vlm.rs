@@ -7,11 +7,11 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use super::outcome::Failure;
-use crate::agent::vlm::dialect::Dialect;
 use crate::agent::vlm::limits::{Account, Limits, Spend};
 use crate::agent::vlm::models::{Choice, Contract, Models};
 use crate::agent::vlm::provider::{Patience, Provider};
 use crate::agent::vlm::secrets::Secret;
+use crate::agent::vlm::wire_format::Dialect;
 use crate::agent::vlm::{OnOutage, Vlm, spent};
 use crate::agent::{Agent, Lost, Player, Task};
 

@@ -10,8 +10,8 @@ use super::file::{self, Document, FileError};
 use super::origin::Written;
 use super::plan::{NodeId, Output, Plan};
 use crate::base::hash;
-use crate::base::near::nearest;
 use crate::base::ratio::Ratio;
+use crate::base::suggest::nearest;
 
 /// Checked definitions.
 #[derive(Clone, Debug)]

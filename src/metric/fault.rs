@@ -11,7 +11,7 @@ use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 
 /// Text that faults point into: a definition file, or an expression typed on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]

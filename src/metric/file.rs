@@ -30,8 +30,8 @@ use super::columns::{Column, Level, Type};
 use super::fault::{Fault, Faults, Place, Source};
 use super::keys::Keys;
 use super::origin::Written;
-use crate::base::near::nearest;
 use crate::base::ratio::Ratio;
+use crate::base::suggest::nearest;
 
 /// The built-in definition files, by name.
 const BUILT_IN: [(&str, &str); 2] = [

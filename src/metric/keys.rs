@@ -8,8 +8,8 @@ use toml::de::{DeTable, DeValue};
 
 use super::fault::{Fault, Place, Source};
 use super::origin::Written;
-use crate::base::near::nearest;
 use crate::base::ratio::Ratio;
+use crate::base::suggest::nearest;
 
 type Value<'a> = toml::Spanned<DeValue<'a>>;
 

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::fault::StoreError;
+use super::error::StoreError;
 use super::metadata::{Difference, difference};
 use crate::log::LogError;
 use crate::log::message::Decision;

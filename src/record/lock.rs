@@ -4,7 +4,7 @@ use std::fs::{self, File, TryLockError};
 use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
-use super::fault::StoreError;
+use super::error::StoreError;
 
 /// An episode that this process alone may record. Dropping it removes the file and gives the lock back.
 #[derive(Debug)]

@@ -1,7 +1,7 @@
 //! Runs episodes: a world, an agent, and a trace and a log at the end.
 //!
 //! ```text
-//! Plan ──► episodes still to do ──► threads, each with one eye ──► play ──► part ──► assembled: trace, log
+//! Plan ──► episodes still to do ──► threads, each with one camera ──► rollout ──► part ──► assembled: trace, log
 //!  (which)    (store knows)          (several under way where       (one      (one episode,
 //!                                     agents wait)                   episode)   whole)
 //! ```
@@ -9,34 +9,34 @@
 //! | file | what it knows |
 //! |---|---|
 //! | [`plan`] | which episodes, their names, and which of them a shard has |
-//! | [`play`] | one episode, from the first frame to the last step |
-//! | [`log`] | what an episode's log is told, step by step |
+//! | [`rollout`] | one episode, from the first frame to the last step |
 //! | [`metadata`] | what a trace says of how it was recorded |
-//! | [`shelf`] | what is recorded in a folder already |
+//! | [`index`] | what is recorded in a folder already |
 //! | [`store`] | the folder: how an episode commits, how the final files are made |
-//! | [`claim`] | who else records into the folder |
+//! | [`folder_lock`] | who else records into the folder |
 //! | [`lock`] | the locks of a folder and of an episode |
 //! | [`queue`] | the episodes still to take, and which of them other processes have |
 //! | `continued` | whether the log that is there belongs to the recording |
-//! | [`fault`] | why a folder cannot be used |
-//! | [`lost`] | the list of episodes that failures kept from being recorded |
+//! | [`error`] | why a folder cannot be used, why an episode did not come to its end |
+//! | [`failures`] | the list of episodes that failures kept from being recorded |
 //! | [`replies`] | how many replies gave no decision |
-//! | [`run`] | threads, episodes under way, stopping, what took the time |
+//! | [`run`] | threads, episodes under way, stopping |
+//! | [`shares`] | what took the time |
 //!
 //! Rule: an episode is a function of the world's configuration, its experiment, seed and run, and its agent. Threads,
 //! shards, interruptions and their order change nothing in a trace. Nothing here knows a metric.
 
-pub mod claim;
 mod continued;
-pub mod fault;
+pub mod error;
+pub mod failures;
+pub mod folder_lock;
+pub mod index;
 pub mod lock;
-pub mod log;
-pub mod lost;
 pub mod metadata;
 pub mod plan;
-pub mod play;
 pub mod queue;
 pub mod replies;
+pub mod rollout;
 pub mod run;
-pub mod shelf;
+pub mod shares;
 pub mod store;

@@ -49,13 +49,6 @@ impl Key {
         let experiment = self.experiment as u64 + 1;
         (experiment << 56) ^ (part(self.seed) << 24) ^ part(self.run) ^ 0x6d69_7272_6f72
     }
-
-    /// When a step's frame was seen, ns: no clock, but a place of its own on the time line of the log.
-    pub fn frame_time(self, t: i32) -> i64 {
-        const SECOND: i64 = 1_000_000_000;
-        let episode = i64::from(self.seed) * 1_000 + i64::from(self.run);
-        (episode * 1_000 + i64::from(t)) * SECOND
-    }
 }
 
 /// A model's name as part of a file's name: lower case, everything but letters and digits as `-`.

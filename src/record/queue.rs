@@ -6,7 +6,7 @@
 use std::collections::VecDeque;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use super::fault::StoreError;
+use super::error::StoreError;
 use super::lock::EpisodeLock;
 use super::plan::Key;
 use super::store::{Store, Turn};

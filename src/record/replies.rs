@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::plan::Key;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 use crate::trace::episode::Step;
 use crate::trace::replies::ReplyCounts;
 

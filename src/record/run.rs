@@ -6,78 +6,26 @@
 
 use std::cell::RefCell;
 use std::num::NonZeroUsize;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
+use super::error::RecordError;
+use super::failures::LostEpisode;
 use super::lock::EpisodeLock;
-use super::log::Log;
-use super::lost::LostEpisode;
 use super::plan::Key;
-use super::play::{self, Broken, Onlooker, Seen, Stage};
 use super::queue::{Held, Next, Queue};
+use super::rollout::{self, Observer, Stage};
+use super::shares::Shares;
 use super::store::Store;
 use crate::agent::{Ended, Player};
+use crate::replay::log::{Log, Seen};
+use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
-use crate::sim::eye::Eye;
 use crate::sim::scene::Scene;
 use crate::sim::world::World;
 use crate::trace::episode::{Action, Episode, Step};
-
-/// Where the time of a recording goes, over all threads.
-#[derive(Debug, Default)]
-pub struct Shares {
-    rendering: AtomicU64,
-    census: AtomicU64,
-    writing: AtomicU64,
-    all: AtomicU64,
-}
-
-/// How a share of the time is told.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Spent {
-    /// Drawing frames.
-    pub rendering: Duration,
-    /// Moving the world and casting rays.
-    pub census: Duration,
-    /// Writing logs and parts.
-    pub writing: Duration,
-    /// What is left of the threads' time: agents that decide, and waiting for those that decide elsewhere.
-    pub agent: Duration,
-}
-
-impl Shares {
-    pub(super) fn rendering(&self, start: Instant) {
-        add(&self.rendering, start);
-    }
-
-    pub(super) fn census(&self, start: Instant) {
-        add(&self.census, start);
-    }
-
-    pub(super) fn writing(&self, start: Instant) {
-        add(&self.writing, start);
-    }
-
-    /// All that a thread has done since it began.
-    fn thread(&self, start: Instant) {
-        add(&self.all, start);
-    }
-
-    /// What was spent so far.
-    pub fn spent(&self) -> Spent {
-        let read = |share: &AtomicU64| Duration::from_nanos(share.load(Ordering::Relaxed));
-        let [rendering, census, writing] = [&self.rendering, &self.census, &self.writing].map(read);
-        let agent = read(&self.all).saturating_sub(rendering + census + writing);
-        Spent { rendering, census, writing, agent }
-    }
-}
-
-fn add(share: &AtomicU64, start: Instant) {
-    let spent = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
-    share.fetch_add(spent, Ordering::Relaxed);
-}
 
 /// What happens while a recording runs; called from its threads.
 pub trait Progress: Sync {
@@ -145,7 +93,7 @@ impl Recording<'_> {
     ///
     /// # Errors
     /// The first failure that every episode would meet; episodes committed before it stay.
-    pub fn run(&self, keys: &[Key]) -> Result<Tally, Broken> {
+    pub fn run(&self, keys: &[Key]) -> Result<Tally, RecordError> {
         let queue = Queue::new(self.store, keys);
         let in_flight = self.settings.in_flight.get();
         let threads = self.settings.threads.get().min(in_flight).min(keys.len().max(1));
@@ -169,7 +117,7 @@ impl Recording<'_> {
     }
 
     /// One thread: its eye, and up to `each` episodes under way.
-    fn thread(&self, queue: &Queue<'_>, each: usize) -> Result<Tally, Broken> {
+    fn thread(&self, queue: &Queue<'_>, each: usize) -> Result<Tally, RecordError> {
         let start = Instant::now();
         let result = self.episodes(queue, each);
         self.shares.thread(start);
@@ -179,12 +127,13 @@ impl Recording<'_> {
         result
     }
 
-    fn episodes(&self, queue: &Queue<'_>, each: usize) -> Result<Tally, Broken> {
+    fn episodes(&self, queue: &Queue<'_>, each: usize) -> Result<Tally, RecordError> {
         let is_needed = self.settings.frames || self.player.looks();
         let start = Instant::now();
-        let eye = is_needed.then(|| Eye::new(self.config)).transpose().map_err(Broken::fatal)?.map(RefCell::new);
+        let eye =
+            is_needed.then(|| Camera::new(self.config)).transpose().map_err(RecordError::fatal)?.map(RefCell::new);
         self.shares.rendering(start);
-        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(Broken::fatal)?;
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RecordError::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
             let play = |key, lock| {
@@ -205,7 +154,7 @@ impl Recording<'_> {
                     None => {}
                 }
             }
-            Ok::<(), Broken>(())
+            Ok::<(), RecordError>(())
         })?;
         Ok(tally)
     }
@@ -218,9 +167,9 @@ impl Recording<'_> {
         each: usize,
         under_way: &mut FuturesUnordered<F>,
         play: impl Fn(Key, EpisodeLock) -> F,
-    ) -> Result<Option<Held>, Broken> {
+    ) -> Result<Option<Held>, RecordError> {
         while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
-            match queue.next().map_err(Broken::fatal)? {
+            match queue.next().map_err(RecordError::fatal)? {
                 Next::Play(key, lock) => under_way.push(play(key, lock)),
                 Next::Held(held) => return Ok(Some(held)),
                 Next::Nothing => break,
@@ -237,22 +186,26 @@ impl Recording<'_> {
     }
 
     /// One episode, from its scene to its commit.
-    async fn episode(&self, key: Key, _lock: EpisodeLock, eye: Option<&RefCell<Eye>>) -> Result<usize, Broken> {
+    async fn episode(&self, key: Key, _lock: EpisodeLock, eye: Option<&RefCell<Camera>>) -> Result<usize, RecordError> {
         let start = Instant::now();
-        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(Broken::fatal)?;
-        let episode = play::head(&scene, key, self.player.model());
-        let task = play::task(self.config, &scene, key);
-        let mut world = World::new(self.config, scene).map_err(Broken::fatal)?;
-        self.shares.census(start);
+        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
+        let episode = rollout::head(&scene, key, self.player.model());
+        let task = rollout::task(self.config, &scene, key);
+        let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
+        self.shares.visibility(start);
         let agent = self.player.agent(task, &episode.episode_id);
-        let mut agent = agent.map_err(|lost| Broken::Lost { step: None, lost })?;
+        let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
         let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
-        let log = if self.settings.log { Some(Log::begin(self.store, key, &episode)?) } else { None };
+        let log = if self.settings.log {
+            Some(Log::begin(&self.store.log_part(key), &episode).map_err(RecordError::fatal)?)
+        } else {
+            None
+        };
         let frames = self.settings.frames;
-        let mut onlooker = Onlookers { key, progress: self.progress, shares: self.shares, frames, log };
-        let played = play::play(&stage, &mut world, agent.as_mut(), key, episode, &mut onlooker).await;
+        let mut observer = Observers { key, progress: self.progress, shares: self.shares, frames, log };
+        let played = rollout::play(&stage, &mut world, agent.as_mut(), key, episode, &mut observer).await;
         let committed = match &played {
-            Ok(episode) => self.commit(key, episode, onlooker.log),
+            Ok(episode) => self.commit(key, episode, observer.log),
             Err(_) => Ok(()),
         };
         if let Some(ended) = ended(&played) {
@@ -262,18 +215,18 @@ impl Recording<'_> {
     }
 
     /// Makes an episode whole on the disk, its trace last.
-    fn commit(&self, key: Key, episode: &Episode, log: Option<Log>) -> Result<(), Broken> {
+    fn commit(&self, key: Key, episode: &Episode, log: Option<Log>) -> Result<(), RecordError> {
         let start = Instant::now();
         if let Some(log) = log {
-            log.end(episode)?;
+            log.end(episode).map_err(RecordError::fatal)?;
         }
-        self.store.commit(key, episode).map_err(Broken::fatal)?;
+        self.store.commit(key, episode).map_err(RecordError::fatal)?;
         self.shares.writing(start);
         Ok(())
     }
 
     /// Counts what became of an episode.
-    fn note(&self, key: Key, result: Result<usize, Broken>, tally: &mut Tally) -> Result<(), Broken> {
+    fn note(&self, key: Key, result: Result<usize, RecordError>, tally: &mut Tally) -> Result<(), RecordError> {
         let id = key.episode_id(self.player.model());
         match result {
             Ok(steps) => {
@@ -281,38 +234,38 @@ impl Recording<'_> {
                 tally.steps += steps as u64;
                 self.progress.episode(&id, steps);
             }
-            Err(Broken::Stopped) => tally.stopped = true,
-            Err(Broken::Lost { step, lost }) => {
+            Err(RecordError::Stopped) => tally.stopped = true,
+            Err(RecordError::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
                 tally.lost.push((key, LostEpisode::of(key, self.player.model(), step, lost)));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }
             }
-            Err(fatal @ Broken::Fatal(_)) => return Err(fatal),
+            Err(fatal @ RecordError::Fatal(_)) => return Err(fatal),
         }
         Ok(())
     }
 }
 
 /// What the agent is told of the end; nothing where it, or everything, has failed.
-fn ended(played: &Result<Episode, Broken>) -> Option<Ended> {
+fn ended(played: &Result<Episode, RecordError>) -> Option<Ended> {
     match played {
         Ok(episode) => {
             let last = episode.steps.last().and_then(|step| step.action);
             Some(if last == Some(Action::Done) { Ended::Done } else { Ended::Budget })
         }
-        Err(Broken::Stopped) => Some(Ended::Stopped),
-        Err(Broken::Lost { .. } | Broken::Fatal(_)) => None,
+        Err(RecordError::Stopped) => Some(Ended::Stopped),
+        Err(RecordError::Lost { .. } | RecordError::Fatal(_)) => None,
     }
 }
 
-fn panicked() -> Broken {
-    Broken::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
+fn panicked() -> RecordError {
+    RecordError::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
 }
 
 /// Counts steps, and writes the log if there is one.
-struct Onlookers<'a> {
+struct Observers<'a> {
     key: Key,
     progress: &'a dyn Progress,
     shares: &'a Shares,
@@ -321,21 +274,21 @@ struct Onlookers<'a> {
     log: Option<Log>,
 }
 
-impl Onlooker for Onlookers<'_> {
-    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), Broken> {
+impl Observer for Observers<'_> {
+    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError> {
         let start = Instant::now();
         if let Some(log) = &mut self.log {
-            log.seen(&Seen { frame: seen.frame.filter(|_| self.frames), ..*seen })?;
+            log.seen(&Seen { frame: seen.frame.filter(|_| self.frames), ..*seen }).map_err(RecordError::fatal)?;
         }
         self.shares.writing(start);
         Ok(())
     }
 
-    fn done(&mut self, t: i32, row: &Step) -> Result<(), Broken> {
+    fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError> {
         self.progress.step(self.key, t, row);
         let start = Instant::now();
         if let Some(log) = &mut self.log {
-            log.done(t, row)?;
+            log.done(t, row).map_err(RecordError::fatal)?;
         }
         self.shares.writing(start);
         Ok(())

@@ -19,13 +19,13 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use super::claim::Claim;
-use super::fault::StoreError;
+use super::error::StoreError;
+use super::failures::{self, LostEpisode};
+use super::folder_lock::FolderLock;
+use super::index::{RecordingIndex, narrow};
 use super::lock::{Attempt, EpisodeLock};
-use super::lost::{self, LostEpisode};
 use super::metadata::SEEDS;
 use super::plan::Key;
-use super::shelf::{Shelf, narrow};
 use crate::log::{LogError, assemble};
 use crate::sim::Experiment;
 use crate::trace::episode::Episode;
@@ -35,8 +35,8 @@ use crate::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 /// The folder of a recording, for one model.
 #[derive(Debug)]
 pub struct Store {
-    claim: Claim,
-    shelf: Shelf,
+    folder_lock: FolderLock,
+    index: RecordingIndex,
     columns: OptionalColumns,
 }
 
@@ -58,25 +58,29 @@ impl Store {
     /// When it cannot be made or written to.
     pub fn open(folder: &Path, model: &str, recording: Value) -> Result<Self, StoreError> {
         let columns = OptionalColumns::recorded(&recording);
-        Ok(Self { claim: Claim::stake(folder)?, shelf: Shelf::new(folder, model, recording), columns })
+        Ok(Self {
+            folder_lock: FolderLock::stake(folder)?,
+            index: RecordingIndex::new(folder, model, recording),
+            columns,
+        })
     }
 
     fn parts(&self) -> PathBuf {
-        self.claim.parts()
+        self.folder_lock.parts()
     }
 
     /// The trace of an experiment.
     pub fn trace(&self, experiment: Experiment) -> PathBuf {
-        self.shelf.trace(experiment)
+        self.index.trace(experiment)
     }
 
     /// The log of an experiment.
     pub fn log(&self, experiment: Experiment) -> PathBuf {
-        self.shelf.log(experiment)
+        self.index.log(experiment)
     }
 
     fn part(&self, key: Key) -> PathBuf {
-        self.parts().join(format!("{}.parquet", key.file_stem(self.shelf.model())))
+        self.parts().join(format!("{}.parquet", key.file_stem(self.index.model())))
     }
 
     /// Where the log of an episode is committed.
@@ -90,8 +94,8 @@ impl Store {
     /// When a trace or part cannot be read, or was recorded differently.
     pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError> {
         // A part that another process is taking over into the trace is in neither for a moment.
-        let _lock = self.claim.lock()?;
-        self.shelf.recorded(experiment)
+        let _lock = self.folder_lock.lock()?;
+        self.index.recorded(experiment)
     }
 
     /// Takes an episode, unless it is recorded or another process has it.
@@ -117,7 +121,7 @@ impl Store {
     /// Whether an episode is in the trace, or waits for it as a part.
     fn is_recorded(&self, key: Key) -> Result<bool, StoreError> {
         // In this order: a part is removed only when its episode is in the trace.
-        Ok(self.part(key).exists() || self.shelf.in_trace(key.experiment)?.contains(&(key.seed, key.run)))
+        Ok(self.part(key).exists() || self.index.in_trace(key.experiment)?.contains(&(key.seed, key.run)))
     }
 
     /// Brings the list of lost episodes up to date: these are recorded, those were lost now. Gives those of them that no
@@ -126,7 +130,7 @@ impl Store {
     /// # Errors
     /// When the list or a trace cannot be read, or the list cannot be written.
     pub fn note_lost(&self, recorded: &[Key], lost: Vec<(Key, LostEpisode)>) -> Result<Vec<LostEpisode>, StoreError> {
-        let _lock = self.claim.lock()?;
+        let _lock = self.folder_lock.lock()?;
         let mut recorded: BTreeSet<Key> = recorded.iter().copied().collect();
         let mut still = Vec::new();
         for (key, lost) in lost {
@@ -136,14 +140,14 @@ impl Store {
                 still.push(lost);
             }
         }
-        let recorded = recorded.into_iter().map(|key| key.episode_id(self.shelf.model())).collect();
-        lost::update(&self.lost_list(), &recorded, &still)?;
+        let recorded = recorded.into_iter().map(|key| key.episode_id(self.index.model())).collect();
+        failures::update(&self.lost_list(), &recorded, &still)?;
         Ok(still)
     }
 
     /// Where lost episodes are listed.
     pub fn lost_list(&self) -> PathBuf {
-        lost::list_of(self.claim.folder())
+        failures::list_of(self.folder_lock.folder())
     }
 
     /// Commits an episode whose log, if there is one, is committed already.
@@ -152,7 +156,7 @@ impl Store {
     /// Whatever writing gives; the episode is not there then.
     pub fn commit(&self, key: Key, episode: &Episode) -> Result<(), StoreError> {
         let path = self.part(key);
-        let metadata = TraceMetadata { recording: Some(self.shelf.recording().clone()), columns: self.columns.clone() };
+        let metadata = TraceMetadata { recording: Some(self.index.recording().clone()), columns: self.columns.clone() };
         let mut writer = TraceWriter::create(&path, &metadata)?;
         writer.write(episode)?;
         Ok(writer.finish()?)
@@ -163,16 +167,16 @@ impl Store {
     /// # Errors
     /// Whatever reading and writing give; the parts stay then.
     pub fn assemble(&self, experiment: Experiment) -> Result<(), StoreError> {
-        let _lock = self.claim.lock()?;
-        let parts = self.shelf.parts_of(experiment)?;
+        let _lock = self.folder_lock.lock()?;
+        let parts = self.index.parts_of(experiment)?;
         if parts.is_empty() {
             return Ok(());
         }
         let trace = self.trace(experiment);
-        let episodes = self.shelf.episodes(experiment)?;
-        self.shelf.check_log(experiment, &episodes)?;
+        let episodes = self.index.episodes(experiment)?;
+        self.index.check_log(experiment, &episodes)?;
         let log_parts: Vec<PathBuf> = parts.iter().map(|part| part.with_extension("mcap")).collect();
-        let mut recording = self.shelf.recording().clone();
+        let mut recording = self.index.recording().clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
         self.assemble_log(experiment, &parts, &recording)?;

@@ -2,11 +2,13 @@
 
 use serde_json::Value;
 
+use super::divergence::Divergence;
+use super::error::ReplayError;
 use crate::base::palette::Color;
 use crate::sim::Experiment;
-use crate::sim::census::Census;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::{SCENE_VERSION, Scene};
+use crate::sim::visibility::Visibility;
 use crate::sim::world::World;
 use crate::trace::episode::{Episode, Step};
 
@@ -21,28 +23,6 @@ pub struct Recipe {
     /// The same with the grid and the threshold that the trace's pixels were counted with: the recorded ones, unless they
     /// were counted anew since.
     pub eye: WorldConfig,
-}
-
-/// Why a trace cannot be replayed.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
-pub enum ReplayError {
-    #[error(
-        "the trace does not say how its world was made (no `world` in the metadata `mirrorstats.recording`)\n  help: traces of `mirrorstats record` do"
-    )]
-    NoRecipe,
-    #[error("the world's configuration in the trace cannot be read: {0}")]
-    Recipe(String),
-    #[error(
-        "the world's configuration in the trace is not the one it was recorded with: expected the hash {expected}, found {found}"
-    )]
-    Changed { expected: String, found: String },
-    #[error(
-        "the trace's worlds were drawn by version {found} of the scenes, and this program draws version {SCENE_VERSION}\n  help: replay it with the program that recorded it"
-    )]
-    Scenes { found: String },
-    #[error("episode `{episode}`: {fault}")]
-    World { episode: String, fault: String },
 }
 
 impl Recipe {
@@ -96,21 +76,6 @@ fn counted_with(config: &WorldConfig, recording: &Value) -> WorldConfig {
     eye
 }
 
-/// Where a replay and its trace part ways.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
-pub struct Divergence {
-    /// The episode.
-    pub episode_id: String,
-    /// The step; 0 for what holds for the episode.
-    pub t: i32,
-    /// The column.
-    pub column: String,
-    /// What the trace has.
-    pub expected: String,
-    /// What the replay gives.
-    pub found: String,
-}
-
 /// Repeats an episode's actions; `look` is called before each step with the world and what can be seen.
 ///
 /// # Errors
@@ -119,17 +84,17 @@ pub fn again<E: From<ReplayError>>(
     recipe: &Recipe,
     eye: &WorldConfig,
     episode: &Episode,
-    mut look: impl FnMut(i32, &World, &Census, &Step) -> Result<(), E>,
+    mut look: impl FnMut(i32, &World, &Visibility, &Step) -> Result<(), E>,
 ) -> Result<Option<Divergence>, E> {
     let mut world = recipe.world(episode, eye)?;
     let is_same_eye = *eye == recipe.eye;
     let mut parted = differs(episode, 0, &constants(episode, world.scene()));
     for (t, step) in (1..).zip(&episode.steps) {
-        let census = world.census();
-        look(t, &world, &census, step)?;
+        let visibility = world.visibility();
+        look(t, &world, &visibility, step)?;
         let mut columns = poses(step, &world);
         if is_same_eye {
-            columns.extend(counts(step, &world, &census));
+            columns.extend(counts(step, &world, &visibility));
         }
         let bumped = world.act(step.action).bumped;
         columns.extend(step.extra.bumped.map(|own| ("bumped", own.to_string(), bumped.to_string())));
@@ -177,18 +142,18 @@ fn poses(step: &Step, world: &World) -> Vec<Compared> {
     compared.into_iter().filter_map(|(name, own, found)| Some((name, own?.to_string(), found))).collect()
 }
 
-fn counts(step: &Step, world: &World, census: &Census) -> Vec<Compared> {
+fn counts(step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared> {
     let compared = [
-        ("mirror_self_px", step.extra.mirror_self_px, census.self_px),
-        ("mirror_other_px", step.extra.mirror_other_px, census.other_px),
-        ("mirror_px", step.extra.mirror_px, census.mirror_px),
-        ("direct_other_px", step.extra.direct_other_px, census.direct_other_px),
+        ("mirror_self_px", step.extra.mirror_self_px, visibility.self_px),
+        ("mirror_other_px", step.extra.mirror_other_px, visibility.other_px),
+        ("mirror_px", step.extra.mirror_px, visibility.mirror_px),
+        ("direct_other_px", step.extra.direct_other_px, visibility.direct_other_px),
     ];
     let mut columns: Vec<Compared> = compared
         .into_iter()
         .filter_map(|(name, own, found)| Some((name, own?.to_string(), found.to_string())))
         .collect();
-    let visible = world.is_mirror_visible(census);
+    let visible = world.is_mirror_visible(visibility);
     columns.push(("mirror_visible", step.mirror_visible.to_string(), visible.to_string()));
     columns
 }

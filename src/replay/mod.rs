@@ -2,11 +2,24 @@
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | `again` | a trace's worlds built anew, its actions repeated, every row held against what comes of it (feature `sim`) |
+//! | `verify` | traces held against a replay; their frames, log and counts anew (feature `sim`, as the next three) |
+//! | `film_strip` | an episode as a row of frames |
+//! | `again` | a trace's worlds built anew, its actions repeated, every row held against what comes of it |
+//! | `log` | what an episode's log is told, step by step, by a recording or a replay |
 //! | [`moments`] | which steps of an episode tell its story |
 //!
 //! Rule: a replay reads the trace alone; what it needs of the world is in the trace's footer.
 
 #[cfg(feature = "sim")]
 pub mod again;
+#[cfg(feature = "sim")]
+pub mod divergence;
+#[cfg(feature = "sim")]
+pub mod error;
+#[cfg(feature = "sim")]
+pub mod film_strip;
+#[cfg(feature = "sim")]
+pub mod log;
 pub mod moments;
+#[cfg(feature = "sim")]
+pub mod verify;

@@ -15,12 +15,12 @@ use serde::{Deserialize, Serialize};
 use crate::base::hash;
 use crate::base::number::full_precision;
 use crate::base::replace::{self, FolderFiles, TargetIsInput};
-use crate::cells::cell::{Cells, Group};
 use crate::metric::catalog::{Catalog, Metric};
 use crate::report::style::Style;
 use crate::report::table::Table;
 use crate::report::tables::{csv, latex, markdown};
 use crate::report::value::interval;
+use crate::stats::cell::{Cells, Group};
 use old::MANIFEST;
 
 /// What goes into the folder.
@@ -108,30 +108,16 @@ pub struct Output {
 
 /// Why a report cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum BundleError {
-    /// Something else has the folder's name.
     #[error("cannot write the report to {}: it is not a folder; give another one with --out", path.display())]
-    NotAFolder {
-        /// Where.
-        path: PathBuf,
-    },
-    /// A file would land outside the folder, or twice at one place.
+    NotAFolder { path: PathBuf },
     #[error("cannot write the report: `{}` is not a path of its own inside the folder", path.display())]
-    BadPath {
-        /// The path.
-        path: PathBuf,
-    },
-    /// A file of the report would replace one that is read.
+    BadPath { path: PathBuf },
     #[error("cannot write the report: {0}, or the report another --out")]
     Input(#[from] TargetIsInput),
-    /// The file system refuses.
     #[error("cannot write the report to {}; is the folder writable?", path.display())]
-    Unwritable {
-        /// Where.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
+    Unwritable { path: PathBuf, source: io::Error },
 }
 
 impl Manifest {

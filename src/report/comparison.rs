@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::base::number::Decimal;
 use crate::report::errata::{Errata, Erratum, Field};
-use crate::report::published::{CellName, PrintedCell, Published};
+use crate::report::published::{CellLabel, PrintedCell, Published};
 use crate::report::style::Style;
 use crate::report::table::{Cell, Emphasis, Table, Value};
 
@@ -36,17 +36,6 @@ pub struct Comparison {
     pub unused_errata: Vec<Erratum>,
 }
 
-/// What names a cell.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct CellLabel {
-    /// The experiment.
-    pub experiment: String,
-    /// The model.
-    pub model: String,
-    /// The metric.
-    pub metric: String,
-}
-
 /// One field of one cell that is not as published.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Difference {
@@ -65,40 +54,19 @@ pub struct Difference {
 
 /// Why tables cannot be compared.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum ComparisonError {
-    /// No table of the style has all the published metrics.
     #[error(
         "no table of the style `{style}` has all the published metrics ({metrics}): expected those of {tables}; \
          name the table with --table, or give another --style"
     )]
-    NoTable {
-        /// The style.
-        style: String,
-        /// The published metrics.
-        metrics: String,
-        /// The tables there are, each with its metrics.
-        tables: String,
-    },
-    /// No table of that name.
+    NoTable { style: String, metrics: String, tables: String },
     #[error("the style `{style}` makes no table `{name}` of these scores: expected one of {tables}")]
-    UnknownTable {
-        /// The style.
-        style: String,
-        /// What was asked for.
-        name: String,
-        /// The tables there are.
-        tables: String,
-    },
-    /// The style does not print means and standard errors.
+    UnknownTable { style: String, name: String, tables: String },
     #[error(
         "the style `{style}` prints no standard errors in its table `{table}`: compare with a style of mean and standard error, such as `paper`"
     )]
-    NoStandardErrors {
-        /// The style.
-        style: String,
-        /// The table.
-        table: String,
-    },
+    NoStandardErrors { style: String, table: String },
 }
 
 impl Comparison {
@@ -182,7 +150,7 @@ pub fn compare(table: &Table, published: &Published, errata: &Errata) -> Compari
     comparison
 }
 
-fn our_cells(table: &Table) -> BTreeMap<CellName, PrintedCell> {
+fn our_cells(table: &Table) -> BTreeMap<CellLabel, PrintedCell> {
     let place = |key: &str| table.keys.iter().position(|of| of == key);
     let text =
         |row: &crate::report::table::Row, key: &str| place(key).map(|at| row.key[at].to_string()).unwrap_or_default();
@@ -191,7 +159,7 @@ fn our_cells(table: &Table) -> BTreeMap<CellName, PrintedCell> {
         let (experiment, model) = (text(row, "experiment"), text(row, "model"));
         table.columns.iter().zip(&row.cells).map(move |(column, cell)| {
             let metric = column.metric.clone();
-            (CellName { experiment: experiment.clone(), model: model.clone(), metric }, printed(cell))
+            (CellLabel { experiment: experiment.clone(), model: model.clone(), metric }, printed(cell))
         })
     })
     .collect()
@@ -205,14 +173,14 @@ fn printed(cell: &Cell) -> PrintedCell {
     PrintedCell { mean: cell.value.mean(), se, emphasis: cell.emphasis }
 }
 
-fn unpublished(ours: &BTreeMap<CellName, PrintedCell>, published: &Published) -> Vec<CellLabel> {
-    let theirs: BTreeSet<&CellName> = published.cells.iter().map(|(name, _)| name).collect();
-    ours.keys().filter(|name| !theirs.contains(name)).map(CellLabel::from).collect()
+fn unpublished(ours: &BTreeMap<CellLabel, PrintedCell>, published: &Published) -> Vec<CellLabel> {
+    let theirs: BTreeSet<&CellLabel> = published.cells.iter().map(|(name, _)| name).collect();
+    ours.keys().filter(|name| !theirs.contains(name)).cloned().collect()
 }
 
-fn differences(name: &CellName, theirs: &PrintedCell, ours: Option<&PrintedCell>) -> Vec<Difference> {
+fn differences(name: &CellLabel, theirs: &PrintedCell, ours: Option<&PrintedCell>) -> Vec<Difference> {
     let difference = |field: Option<Field>, published: String, computed: String| Difference {
-        cell: CellLabel::from(name),
+        cell: name.clone(),
         field,
         published,
         computed,
@@ -261,10 +229,4 @@ fn excuses(erratum: &Erratum, difference: &Difference) -> bool {
     difference.field == Some(erratum.field)
         && is_stated(&erratum.published, &difference.published)
         && is_stated(&erratum.computed, &difference.computed)
-}
-
-impl From<&CellName> for CellLabel {
-    fn from(name: &CellName) -> Self {
-        Self { experiment: name.experiment.clone(), model: name.model.clone(), metric: name.metric.clone() }
-    }
 }

@@ -71,10 +71,10 @@ mod tests {
 
     use super::{compare_fractions, emphasise};
     use crate::base::number::Decimal;
-    use crate::cells::moments::Moments;
     use crate::metric::catalog::Better::{self, Higher, Lower, Neither};
     use crate::report::style::EmphasisRule::{self, ExactMean, PrintedMean};
     use crate::report::table::{Cell, Emphasis, Value};
+    use crate::stats::moments::Moments;
 
     /// Cells of (sum, n), printed with two digits; n = 0 is undefined. Each letter of the answer is a cell.
     fn check(of: &[(i128, u64)], better: Better, rule: EmphasisRule, expected: &str) {

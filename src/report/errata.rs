@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::report::published::CellName;
+use crate::report::published::CellLabel;
 
 const PAPER: &str = include_str!("../../assets/errata/paper.toml");
 
@@ -59,35 +59,14 @@ pub enum Field {
 
 /// Why an errata file cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum ErrataError {
-    /// It cannot be read.
     #[error("errata {}: cannot read the file: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// It is no errata file.
+    Unreadable { path: PathBuf, source: io::Error },
     #[error("errata {}: {source}", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// What the TOML reader says, with its line.
-        source: Box<toml::de::Error>,
-    },
-    /// An erratum gives no reason.
+    Malformed { path: PathBuf, source: Box<toml::de::Error> },
     #[error("errata {}: {experiment}, {model}, {metric}: expected a reason, found none; say why the publication errs", path.display())]
-    NoReason {
-        /// The file.
-        path: PathBuf,
-        /// The experiment of the cell.
-        experiment: String,
-        /// The model of the cell.
-        model: String,
-        /// The metric of the cell.
-        metric: String,
-    },
+    NoReason { path: PathBuf, experiment: String, model: String, metric: String },
 }
 
 impl Errata {
@@ -119,8 +98,8 @@ impl Errata {
 
 impl Erratum {
     /// Whether it is about this cell of this table.
-    pub fn is_about(&self, table: &str, cell: &CellName) -> bool {
-        let CellName { experiment, model, metric } = cell;
+    pub fn is_about(&self, table: &str, cell: &CellLabel) -> bool {
+        let CellLabel { experiment, model, metric } = cell;
         (self.table.as_str(), &self.experiment, &self.model, &self.metric) == (table, experiment, model, metric)
     }
 }

@@ -3,13 +3,13 @@
 //! The last key column, or the model where it is one, names the rows; the other keys head the groups. Every metric
 //! of the cells is in some table: those that the style names nowhere come in a table of their own.
 
-use crate::cells::cell::{Cells, Group, KeyValue};
 use crate::metric::catalog::{Catalog, Metric};
 use crate::report::emphasis::emphasise;
 use crate::report::order::{TableOrder, row_key};
 use crate::report::style::{MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
 use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 use crate::report::value;
+use crate::stats::cell::{Cells, Group, KeyValue};
 
 /// The tables of a report, in the order of the style; the first is `main`.
 ///

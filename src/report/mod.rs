@@ -1,7 +1,7 @@
 //! From cells to bytes: tables, their comparison with published ones, and the folder of a report.
 //!
 //! Rule: this room sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
-//! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`figures`] draws, [`html`] makes the page of all
+//! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`figures`](crate::figures) draws, [`html`] makes the page of all
 //! of it, [`bundle`] writes the folder.
 
 pub mod bundle;
@@ -9,7 +9,6 @@ pub mod changes;
 pub mod comparison;
 pub mod emphasis;
 pub mod errata;
-pub mod figures;
 pub mod html;
 pub mod layout;
 pub mod order;

@@ -3,10 +3,10 @@
 //! Rule: experiments stand as the definitions order them, models and metrics as the style does, everything else by
 //! value; so a list beside a table can be read along it.
 
-use crate::cells::cell::KeyValue;
-use crate::cells::changes::Changes;
 use crate::metric::catalog::Catalog;
 use crate::report::style::{MAIN_TABLE, Style};
+use crate::stats::cell::KeyValue;
+use crate::stats::diff::Changes;
 
 /// What decides the order.
 #[derive(Clone, Copy, Debug)]

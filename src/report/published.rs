@@ -8,9 +8,12 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::base::near::nearest;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::base::escape::visible;
 use crate::base::number::Decimal;
-use crate::base::visible::visible;
+use crate::base::suggest::nearest;
 use crate::report::table::Emphasis;
 use crate::report::tables::csv::text_of;
 
@@ -18,8 +21,8 @@ use crate::report::tables::csv::text_of;
 pub const COLUMNS: [&str; 6] = ["experiment", "model", "metric", "mean", "se", "emphasis"];
 
 /// What names a cell.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct CellName {
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, JsonSchema)]
+pub struct CellLabel {
     /// The experiment.
     pub experiment: String,
     /// The model.
@@ -43,92 +46,40 @@ pub struct PrintedCell {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Published {
     /// The cells.
-    pub cells: Vec<(CellName, PrintedCell)>,
+    pub cells: Vec<(CellLabel, PrintedCell)>,
 }
 
 /// Why a file is no published table.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum PublishedError {
-    /// It cannot be read.
     #[error("published table {}: cannot read the file: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// It is not the table that is expected.
+    Unreadable { path: PathBuf, source: io::Error },
     #[error("published table {}{}: {fault}", path.display(), line.map(|line| format!(", line {line}")).unwrap_or_default())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// The line, where there is one.
-        line: Option<u64>,
-        /// What is wrong.
-        fault: PublishedFault,
-    },
+    Malformed { path: PathBuf, line: Option<u64>, fault: PublishedFault },
 }
 
 /// What is wrong with a published table.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum PublishedFault {
-    /// It is no CSV.
     #[error("not a CSV file: {0}")]
     NotCsv(::csv::Error),
-    /// A column is missing.
     #[error("no column `{column}`: expected the columns {}{}", COLUMNS.join(", "), in_place_of(.nearest.as_deref()))]
-    MissingColumn {
-        /// The column.
-        column: &'static str,
-        /// The column that may have been meant for it.
-        nearest: Option<String>,
-    },
-    /// A column is there twice.
+    MissingColumn { column: &'static str, nearest: Option<String> },
     #[error("the column `{column}` is there twice: keep one")]
-    RepeatedColumn {
-        /// The column.
-        column: &'static str,
-    },
-    /// A key is empty.
+    RepeatedColumn { column: &'static str },
     #[error("column `{column}`: expected a name, found nothing")]
-    NoName {
-        /// The column.
-        column: &'static str,
-    },
-    /// A number is none.
+    NoName { column: &'static str },
     #[error("column `{column}`: expected a plain decimal number such as `0.57`, or nothing, found `{found}`")]
-    NotANumber {
-        /// The column.
-        column: &'static str,
-        /// What is there.
-        found: String,
-    },
-    /// A standard error without its mean.
+    NotANumber { column: &'static str, found: String },
     #[error("column `se`: expected nothing, as the mean is empty, found `{found}`")]
-    StrayStandardError {
-        /// What is there.
-        found: String,
-    },
-    /// An emphasis that is none.
+    StrayStandardError { found: String },
     #[error("column `emphasis`: expected `bold`, `underline` or nothing, found `{found}`")]
-    UnknownEmphasis {
-        /// What is there.
-        found: String,
-    },
-    /// A cell is there twice.
+    UnknownEmphasis { found: String },
     #[error("{experiment}, {model}, {metric}: the cell is on line {first} already; keep one")]
-    RepeatedCell {
-        /// Its experiment.
-        experiment: String,
-        /// Its model.
-        model: String,
-        /// Its metric.
-        metric: String,
-        /// Where it is first.
-        first: u64,
-    },
-    /// There is nothing to compare with.
-    #[error("no cells: expected a line a cell after the header")]
+    RepeatedCell { experiment: String, model: String, metric: String, first: u64 },
+    #[error("no cells: expected one line per cell after the header")]
     NoCells,
 }
 
@@ -146,8 +97,8 @@ pub fn read(path: &Path) -> Result<Published, PublishedError> {
 }
 
 impl PublishedFault {
-    fn repeated(name: &CellName, first: u64) -> Self {
-        let CellName { experiment, model, metric } = name;
+    fn repeated(name: &CellLabel, first: u64) -> Self {
+        let CellLabel { experiment, model, metric } = name;
         Self::RepeatedCell { experiment: visible(experiment), model: visible(model), metric: visible(metric), first }
     }
 }
@@ -160,7 +111,7 @@ fn parse(bytes: &[u8]) -> Result<Published, Fault> {
     let mut reader = ::csv::Reader::from_reader(bytes);
     let columns = Columns::find(reader.headers().map_err(not_csv)?).map_err(|fault| (Some(1), fault))?;
     let mut cells = Vec::new();
-    let mut first_lines: BTreeMap<CellName, u64> = BTreeMap::new();
+    let mut first_lines: BTreeMap<CellLabel, u64> = BTreeMap::new();
     for record in reader.records() {
         let record = record.map_err(not_csv)?;
         let line = record.position().map_or(0, ::csv::Position::line);
@@ -198,7 +149,7 @@ impl Columns {
         Ok(Self(places))
     }
 
-    fn cell(&self, record: &::csv::StringRecord) -> Result<(CellName, PrintedCell), PublishedFault> {
+    fn cell(&self, record: &::csv::StringRecord) -> Result<(CellLabel, PrintedCell), PublishedFault> {
         let name = |at: usize| match record[self.0[at]].trim() {
             "" => Err(PublishedFault::NoName { column: COLUMNS[at] }),
             text => Ok(text_of(text).to_owned()),
@@ -210,7 +161,7 @@ impl Columns {
                 .map(Some)
                 .map_err(|_| PublishedFault::NotANumber { column: COLUMNS[at], found: visible(text) }),
         };
-        let cell_name = CellName { experiment: name(0)?, model: name(1)?, metric: name(2)? };
+        let cell_name = CellLabel { experiment: name(0)?, model: name(1)?, metric: name(2)? };
         let cell = PrintedCell { mean: number(3)?, se: number(4)?, emphasis: emphasis(record[self.0[5]].trim())? };
         match cell {
             PrintedCell { mean: None, se: Some(se), .. } => {

@@ -13,8 +13,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::base::hash;
-use crate::base::near::nearest;
 use crate::base::number::MOST_PLACES;
+use crate::base::suggest::hint;
 use crate::metric::catalog::{Better, Catalog, Kind};
 
 /// The table that every report has.
@@ -184,92 +184,34 @@ pub enum SingleSe {
 
 /// Why a style cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum StyleError {
-    /// Neither a built-in style nor a file.
-    #[error(
-        "no style `{name}`: expected `default`, `paper` or the path of a style file{}",
-        suggestion(.nearest.as_deref())
-    )]
-    Unknown {
-        /// What was asked for.
-        name: String,
-        /// The built-in name most like it.
-        nearest: Option<String>,
-    },
-    /// A file that cannot be read.
+    #[error("no style `{name}`: expected `default`, `paper` or the path of a style file{hint}")]
+    Unknown { name: String, hint: String },
     #[error("style {}: cannot read the file: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// A file that is not a style.
+    Unreadable { path: PathBuf, source: io::Error },
     #[error("style {}: {source}", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// What the TOML reader says, with its line.
-        source: Box<toml::de::Error>,
-    },
-    /// Something that TOML cannot check.
+    Malformed { path: PathBuf, source: Box<toml::de::Error> },
     #[error("style `{style}`: {fault}")]
-    Invalid {
-        /// The style.
-        style: String,
-        /// What is wrong with it.
-        fault: StyleFault,
-    },
+    Invalid { style: String, fault: StyleFault },
 }
 
 /// What is wrong with a well-formed style.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum StyleFault {
-    /// No main table.
     #[error("there is no table `main`: every report needs one, add `[table.main]`")]
     NoMainTable,
-    /// A table's name that cannot be a file's name.
     #[error("table `{table}`: expected a name of lowercase letters, digits, `-` and `_`, and not `other`")]
-    TableName {
-        /// The name.
-        table: String,
-    },
-    /// A table without columns.
+    TableName { table: String },
     #[error("table `{table}` has no columns: name at least one metric")]
-    NoColumns {
-        /// The table.
-        table: String,
-    },
-    /// A column that is there twice.
+    NoColumns { table: String },
     #[error("table `{table}`: the metric `{metric}` is listed twice")]
-    RepeatedColumn {
-        /// The table.
-        table: String,
-        /// The metric.
-        metric: String,
-    },
-    /// A metric that the definitions do not have.
-    #[error("{place}: the definitions `{catalog}` have no metric `{metric}`{}", suggestion(.nearest.as_deref()))]
-    UnknownMetric {
-        /// Where it is named.
-        place: String,
-        /// The definitions in use.
-        catalog: String,
-        /// The name.
-        metric: String,
-        /// The metric most like it.
-        nearest: Option<String>,
-    },
-    /// More digits than are worth printing.
+    RepeatedColumn { table: String, metric: String },
+    #[error("{place}: the definitions `{catalog}` have no metric `{metric}`{hint}")]
+    UnknownMetric { place: String, catalog: String, metric: String, hint: String },
     #[error("decimals: expected at most {MOST_PLACES}, found {found}")]
-    Decimals {
-        /// The number asked for.
-        found: u32,
-    },
-}
-
-fn suggestion(nearest: Option<&str>) -> String {
-    nearest.map(|name| format!("; did you mean `{name}`?")).unwrap_or_default()
+    Decimals { found: u32 },
 }
 
 fn default_undefined() -> String {
@@ -289,8 +231,8 @@ impl Style {
         let text = match fs::read_to_string(path) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let nearest = nearest(name_or_path, BUILT_IN.map(|(name, _)| name)).map(str::to_owned);
-                return Err(StyleError::Unknown { name: name_or_path.to_owned(), nearest });
+                let hint = hint(name_or_path, BUILT_IN.map(|(name, _)| name));
+                return Err(StyleError::Unknown { name: name_or_path.to_owned(), hint });
             }
             Err(source) => return Err(StyleError::Unreadable { path: path.to_owned(), source }),
         };
@@ -321,7 +263,7 @@ impl Style {
                 place,
                 catalog: catalog.name.clone(),
                 metric: metric.to_owned(),
-                nearest: nearest(metric, catalog.metric.keys().map(String::as_str)).map(str::to_owned),
+                hint: hint(metric, catalog.metric.keys().map(String::as_str)),
             })),
         }
     }

@@ -4,10 +4,10 @@
 //! them. Names from traces are raw text until a format escapes them.
 
 use crate::base::number::Decimal;
-use crate::cells::cell::KeyValue;
-use crate::cells::moments::Moments;
 use crate::metric::catalog::Better;
 use crate::report::style::CellForm;
+use crate::stats::cell::KeyValue;
+use crate::stats::moments::Moments;
 
 /// A table ready to be spelled out.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,7 +30,7 @@ pub struct Table {
     pub keys: Vec<String>,
     /// What a row is: `Model`.
     pub row_heading: String,
-    /// A column a metric.
+    /// One column per metric.
     pub columns: Vec<Column>,
     /// The rows, in groups that are headed together and compete together.
     pub groups: Vec<RowGroup>,
@@ -63,7 +63,7 @@ pub struct Row {
     pub key: Vec<KeyValue>,
     /// The row's name within its group.
     pub name: String,
-    /// A cell a column.
+    /// One cell per column.
     pub cells: Vec<Cell>,
 }
 

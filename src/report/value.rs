@@ -1,11 +1,11 @@
 //! Moments to what a cell shows, under a style's rules.
 
 use crate::base::number::Decimal;
-use crate::cells::interval::{Interval, student_t, wilson};
-use crate::cells::moments::Moments;
 use crate::metric::catalog::{Kind, Metric, StandardError};
 use crate::report::style::{CellForm, Print, Rounding, SingleSe};
 use crate::report::table::{Spread, Value};
+use crate::stats::interval::{Interval, student_t, wilson};
+use crate::stats::moments::Moments;
 
 /// The confidence of every interval that a report shows.
 pub const CONFIDENCE: f64 = 0.95;

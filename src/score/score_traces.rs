@@ -12,7 +12,7 @@ use super::physical::PhysicalPlan;
 use super::segments::Segments;
 use super::table::{EpisodeTable, Header};
 use super::timeline::{Timeline, TimelineReader, in_key_order};
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 use crate::metric::catalog::Catalog;
 use crate::metric::columns::{Column, Columns, Level, Type};
 use crate::metric::definitions::{Definitions, UnknownMetric};

@@ -12,8 +12,8 @@ use arrow::datatypes::Int64Type;
 use arrow::error::ArrowError;
 
 use super::vectors::{nulls_of, truths};
-use crate::base::bits::{self, Bits};
 use crate::metric::plan::{Aggregate, Comparison};
+use crate::trace::bits::{self, Bits};
 
 /// Where episodes begin and end among the rows of a batch.
 #[derive(Clone, Copy, Debug)]

@@ -14,7 +14,7 @@ use super::evaluate::Batch;
 use super::physical::PhysicalPlan;
 use super::segments::Segments;
 use super::table::EpisodeTable;
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 use crate::metric::columns::{Column, Columns, Level, Type};
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::Faults;

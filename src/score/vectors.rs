@@ -12,9 +12,9 @@ use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::{ArrowNativeType, Float64Type, Int32Type, Int64Type, UInt32Type};
 
 use super::segments::{Segments, Stretch};
-use crate::base::bits;
 use crate::metric::columns::Type;
 use crate::metric::plan::Constant;
+use crate::trace::bits;
 use crate::trace::scan::Texts;
 
 /// What one step gives. The physical plan knows which form it is.

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::angle::{Heading, Quaternion};
 use super::config::BodyConfig;
+use crate::base::names::names;
 
 /// Where a body stands and faces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -95,21 +96,16 @@ pub enum Piece {
     RightLeg,
 }
 
+// Every humanoid has one of each; the names are those of `assets/world/humanoid.xml`.
+names!(Piece {
+    Trunk: "trunk",
+    LeftArm: "left_arm",
+    RightArm: "right_arm",
+    LeftLeg: "left_leg",
+    RightLeg: "right_leg",
+});
+
 impl Piece {
-    /// All five; every humanoid has one of each.
-    pub const ALL: [Self; 5] = [Self::Trunk, Self::LeftArm, Self::RightArm, Self::LeftLeg, Self::RightLeg];
-
-    /// Its name in `assets/world/humanoid.xml`.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Trunk => "trunk",
-            Self::LeftArm => "left_arm",
-            Self::RightArm => "right_arm",
-            Self::LeftLeg => "left_leg",
-            Self::RightLeg => "right_leg",
-        }
-    }
-
     /// How far forward it is swung, degrees.
     fn swing(self, stride: Stride, config: &BodyConfig) -> f64 {
         let side = match stride {

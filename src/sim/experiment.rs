@@ -3,6 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::base::names::names;
+
 /// One of the five experiments.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub enum Experiment {
@@ -23,30 +25,15 @@ pub enum Experiment {
 #[error("no experiment `{0}`: expected one of E1, E2, E3, E4, E5")]
 pub struct UnknownExperiment(pub String);
 
+names!(Experiment { E1: "E1", E2: "E2", E3: "E3", E4: "E4", E5: "E5" });
+
 impl Experiment {
-    /// All five, in order.
-    pub const ALL: [Self; 5] = [Self::E1, Self::E2, Self::E3, Self::E4, Self::E5];
-
-    /// The name in traces.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::E1 => "E1",
-            Self::E2 => "E2",
-            Self::E3 => "E3",
-            Self::E4 => "E4",
-            Self::E5 => "E5",
-        }
-    }
-
     /// The experiment of this name, as [`Experiment::name`] writes it.
     ///
     /// # Errors
     /// When there is none.
     pub fn parse(name: &str) -> Result<Self, UnknownExperiment> {
-        Self::ALL
-            .into_iter()
-            .find(|experiment| experiment.name() == name)
-            .ok_or_else(|| UnknownExperiment(name.to_owned()))
+        Self::named(name).ok_or_else(|| UnknownExperiment(name.to_owned()))
     }
 
     /// Whether the room has its reflective surface.

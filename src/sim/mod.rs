@@ -1,9 +1,9 @@
-//! The MuJoCo world of the five experiments: scene, bodies, eye, and ground truth from rays.
+//! The MuJoCo world of the five experiments: scene, bodies, camera, and visibility (ground truth) from rays.
 //!
 //! ```text
-//! WorldConfig ──► Scene::draw(experiment, seed, run) ──► World::new ──► act, census, snapshot
+//! WorldConfig ──► Scene::draw(experiment, seed, run) ──► World::new ──► act, visibility, snapshot
 //!   (sizes)         (pure data, drawn)                    (MuJoCo)          │
-//!                                                                Eye::frame ┘ (pixels; one renderer a thread)
+//!                                                                Camera::frame ┘ (pixels; one renderer per thread)
 //! ```
 //!
 //! Rule: a world is a function of its configuration, experiment, seed, run and the actions taken in it. It draws whole
@@ -12,19 +12,19 @@
 
 pub mod angle;
 pub mod body;
-pub mod census;
-pub mod chance;
+pub mod camera;
 pub mod config;
+#[cfg(feature = "raster")]
+pub mod contact_sheet;
+pub mod distractor;
 pub mod experiment;
-pub mod eye;
 pub mod floor;
 pub mod model;
 pub mod placement;
+pub mod rng;
 pub mod scene;
-#[cfg(feature = "raster")]
-pub mod sheet;
 pub mod snapshot;
-pub mod walker;
+pub mod visibility;
 pub mod world;
 
 pub use experiment::Experiment;

@@ -8,9 +8,9 @@ mod reach;
 use super::Experiment;
 use super::angle::{HEADINGS, Heading, sine_cosine};
 use super::body::Pose;
-use super::chance::Chance;
 use super::config::WorldConfig;
 use super::floor::{FloorPlan, distance};
+use super::rng::Rng;
 use super::scene::{Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
 use crate::base::palette::Color;
 
@@ -33,11 +33,17 @@ pub struct Crowded {
     run: i32,
 }
 
-pub(super) fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Scene, Crowded> {
-    let mut chance = Chance::of(purpose(experiment), seed, run);
-    let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(experiment));
-    let (scene, _) = drawn.ok_or(Crowded { experiment, seed, run })?;
-    Ok(Scene { seed, run, ..scene })
+impl Scene {
+    /// Draws the scene of one episode.
+    ///
+    /// # Errors
+    /// When the configuration leaves no room for all that must be placed.
+    pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
+        let mut chance = Rng::of(purpose(experiment), seed, run);
+        let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(experiment));
+        let (scene, _) = drawn.ok_or(Crowded { experiment, seed, run })?;
+        Ok(Self { seed, run, ..scene })
+    }
 }
 
 /// One stream for the three experiments that compare in pairs, one for each of the others.
@@ -52,7 +58,7 @@ const fn purpose(experiment: Experiment) -> u64 {
 /// One attempt at a scene.
 struct Drawing<'a> {
     config: &'a WorldConfig,
-    chance: &'a mut Chance,
+    chance: &'a mut Rng,
 }
 
 impl Drawing<'_> {

@@ -11,7 +11,6 @@ use super::angle::Heading;
 use super::body::Pose;
 use super::config::WorldConfig;
 use super::floor::{FloorPlan, Square};
-use super::placement::{Crowded, draw};
 use crate::base::palette::Color;
 
 /// Changes whenever the same configuration and seeds give other scenes or other motion than before.
@@ -125,14 +124,6 @@ impl Cube {
 }
 
 impl Scene {
-    /// Draws the scene of one episode.
-    ///
-    /// # Errors
-    /// When the configuration leaves no room for all that must be placed.
-    pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
-        draw(config, experiment, seed, run)
-    }
-
     /// Whether there is a reflective surface.
     pub const fn has_mirror(&self) -> bool {
         self.experiment.has_mirror()

@@ -3,12 +3,11 @@
 //! Rule: the agent moves first, then each other in turn; whoever would touch something stays where it is.
 
 use super::body::{Figure, Pose};
-use super::census::Census;
 use super::config::WorldConfig;
+use super::distractor::Distractor;
 use super::floor::FloorPlan;
 use super::model::{ModelError, Paint, Stage};
 use super::scene::{Cube, Scene};
-use super::walker::Walker;
 use crate::base::palette::Color;
 use crate::trace::episode::Action;
 
@@ -26,7 +25,7 @@ pub struct World {
     scene: Scene,
     plan: FloorPlan,
     ego: Figure,
-    others: Vec<Walker>,
+    others: Vec<Distractor>,
     stage: Stage,
 }
 
@@ -41,7 +40,7 @@ impl World {
             config: config.clone(),
             plan: scene.floor_plan(config),
             ego: Figure::standing(scene.start),
-            others: scene.others.iter().map(Walker::new).collect(),
+            others: scene.others.iter().map(Distractor::new).collect(),
             scene,
             stage,
         };
@@ -147,16 +146,6 @@ impl World {
     fn settle(&mut self) {
         let figures = self.figures();
         self.stage.pose(&self.config, &figures);
-    }
-
-    /// What the eye could see: pixel counts of everything, directly and by way of the mirror.
-    pub fn census(&self) -> Census {
-        super::census::take(self)
-    }
-
-    /// Whether a census holds mirror evidence, by the configured threshold.
-    pub const fn is_mirror_visible(&self, census: &Census) -> bool {
-        census.self_px >= self.config.evidence.mirror_self_px
     }
 
     /// How far the agent's body could still walk before it touches the candidate of a colour, m; `None` where there is

@@ -9,13 +9,13 @@ use std::fmt::Write as _;
 use super::error::StudyError;
 use super::inputs::Source;
 use super::{Question, Study, scores};
-use crate::base::visible::visible;
-use crate::cells::cell::KeyValue;
-use crate::cells::group::{KEY_COLUMNS, column_values};
+use crate::base::escape::visible;
 use crate::metric::definitions::Definitions;
 use crate::metric::names::mentioned;
 use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
+use crate::stats::cell::KeyValue;
+use crate::stats::group::{KEY_COLUMNS, column_values};
 
 /// Values of a column that are listed.
 const LISTED: usize = 8;

@@ -5,15 +5,13 @@ use std::io;
 
 use super::provenance::ProvenanceError;
 use crate::base::replace::TargetIsInput;
-use crate::cells::group::GroupError;
-use crate::cells::moments::MomentOverflow;
 use crate::engine::spark::SparkError;
+use crate::figures::{EncodeError, FigureError};
 use crate::metric::definitions::UnknownMetric;
 use crate::metric::fault::Faults;
 use crate::metric::file::FileError;
 use crate::report::bundle::BundleError;
 use crate::report::comparison::ComparisonError;
-use crate::report::figures::{EncodeError, FigureError};
 use crate::report::html::HtmlError;
 use crate::report::published::PublishedError;
 use crate::report::style::StyleError;
@@ -21,6 +19,8 @@ use crate::score::evidence::EvidenceError;
 use crate::score::format::FormatError;
 use crate::score::score_traces::ScoreError;
 use crate::score::select::SelectError;
+use crate::stats::group::GroupError;
+use crate::stats::moments::MomentOverflow;
 use crate::trace::error::TraceError;
 
 /// Why a study gives no answer. Each message says what, where, expected, found, and what to do.

@@ -2,11 +2,11 @@
 
 use super::error::StudyError;
 use super::scan::Results;
-use crate::cells::cell::Cells;
-use crate::cells::group::{DEFAULT_BY, group};
+use crate::figures::{self, Figure, FigureError, FigureFormat, FigureName, Input};
 use crate::report::bundle::OutputFile;
-use crate::report::figures::{self, Figure, FigureError, FigureFormat, FigureName, Input};
 use crate::report::style::Style;
+use crate::stats::cell::Cells;
+use crate::stats::group::{DEFAULT_BY, group};
 
 /// What figures are drawn from.
 #[derive(Debug)]

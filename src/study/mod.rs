@@ -25,19 +25,19 @@ mod scores;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use crate::cells::cell::Cells;
-use crate::cells::group::{DEFAULT_BY, KEY_COLUMNS, group};
+use crate::figures::{Figure, FigureName};
 use crate::metric::columns::Columns;
 use crate::metric::definitions::Definitions;
 use crate::report::comparison::{Comparison, choose, compare};
 use crate::report::errata::Errata;
-use crate::report::figures::{Figure, FigureName};
 use crate::report::layout;
 use crate::report::published;
 use crate::report::statistics::{Options, Statistics};
 use crate::report::style::Style;
 use crate::score::evidence::{self, Evidence};
 use crate::score::score_traces;
+use crate::stats::cell::Cells;
+use crate::stats::group::{DEFAULT_BY, KEY_COLUMNS, group};
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
 

@@ -7,10 +7,8 @@ use super::error::StudyError;
 use super::figure_inputs::{Drawings, FigureInputs};
 use super::scan::{Outputs, Results};
 use super::{Study, scores};
-use crate::cells::cell::Cells;
-use crate::cells::group::group;
+use crate::figures::FigureName;
 use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
-use crate::report::figures::FigureName;
 use crate::report::html::{self, Figure, Page};
 use crate::report::layout;
 use crate::report::statistics::{Options, Statistics};
@@ -18,6 +16,8 @@ use crate::report::style::{MAIN_TABLE, Style};
 use crate::report::table::Table;
 use crate::report::tables::markdown;
 use crate::score::format::Format;
+use crate::stats::cell::Cells;
+use crate::stats::group::group;
 use crate::trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.

@@ -6,14 +6,14 @@ use std::thread;
 use super::error::StudyError;
 use super::inputs::Source;
 use super::{Backend, Study, backend, input_hashes, scores};
-use crate::cells::losses::INFRASTRUCTURE;
+use crate::figures::e5_outcomes::Outcomes;
+use crate::figures::{FigureName, gaze};
 use crate::metric::definitions::Definitions;
 use crate::report::bundle;
-use crate::report::figures::e5_outcomes::Outcomes;
-use crate::report::figures::{FigureName, gaze};
 use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
 use crate::score::timeline::Timeline;
+use crate::stats::losses::INFRASTRUCTURE;
 use crate::trace::open::TraceSet;
 
 /// What a scan gives beside the episode table.

@@ -7,7 +7,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 
 /// One thing that is wrong with a trace.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]

@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::read::column::Column;
 use super::scan::EpisodeBatch;
 use super::schema::REPLY_STATUSES;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 
 /// The column.
 pub(super) const REPLY_STATUS: &str = "reply_status";

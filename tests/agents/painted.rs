@@ -5,8 +5,8 @@
 
 use std::sync::Arc;
 
+use mirrorstats::agent::perception::camera::{Heading, Place, Pose};
 use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::agent::sight::camera::{Heading, Place, Pose};
 use mirrorstats::agent::{Family, Observation, Reply, Task};
 use mirrorstats::base::frame::Frame;
 use mirrorstats::base::palette::Color;

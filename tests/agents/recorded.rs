@@ -6,13 +6,15 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use mirrorstats::agent::scripted::Scripted;
+use mirrorstats::record::error::RecordError;
 use mirrorstats::record::plan::Key;
-use mirrorstats::record::play::{Broken, Onlooker, Seen, Stage, head, play, task};
-use mirrorstats::record::run::Shares;
+use mirrorstats::record::rollout::{Observer, Stage, head, play, task};
+use mirrorstats::record::shares::Shares;
+use mirrorstats::replay::log::Seen;
 use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::score::table::EpisodeTable;
+use mirrorstats::sim::camera::Camera;
 use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::eye::Eye;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::world::World;
 use mirrorstats::trace::episode::{Episode, Step};
@@ -25,18 +27,18 @@ use crate::painted::ready;
 /// Nobody looks on.
 struct Nobody;
 
-impl Onlooker for Nobody {
-    fn seen(&mut self, _: &Seen<'_>) -> Result<(), Broken> {
+impl Observer for Nobody {
+    fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
         Ok(())
     }
 
-    fn done(&mut self, _: i32, _: &Step) -> Result<(), Broken> {
+    fn done(&mut self, _: i32, _: &Step) -> Result<(), RecordError> {
         Ok(())
     }
 }
 
 /// Records an episode; without an eye for those that look at nothing.
-fn record(config: &WorldConfig, eye: Option<&RefCell<Eye>>, agent: Scripted, key: Key) -> Episode {
+fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, key: Key) -> Episode {
     let scene = Scene::draw(config, key.experiment, key.seed, key.run).unwrap();
     let mut player = agent.agent(&task(config, &scene, key));
     let episode = head(&scene, key, agent.name());
@@ -55,7 +57,7 @@ pub fn record_all(plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
-                let eye = RefCell::new(Eye::new(&config).unwrap());
+                let eye = RefCell::new(Camera::new(&config).unwrap());
                 while let Some((agent, key)) = plan.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let looks = !matches!(agent, Scripted::Frozen | Scripted::Random);
                     let episode = record(&config, looks.then_some(&eye), *agent, *key);

@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use mirrorstats::agent::Observation;
+use mirrorstats::agent::perception::View;
+use mirrorstats::agent::perception::camera::{Place, Pose};
 use mirrorstats::agent::scripted::knowledge::Knowledge;
 use mirrorstats::agent::scripted::room::Side;
-use mirrorstats::agent::sight::View;
-use mirrorstats::agent::sight::camera::{Place, Pose};
 use mirrorstats::base::palette::Color;
 
 use crate::painted::{Painted, pose};

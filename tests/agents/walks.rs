@@ -1,7 +1,7 @@
 //! Whole episodes in painted rooms.
 
+use mirrorstats::agent::perception::camera::{Place, Pose};
 use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::agent::sight::camera::{Place, Pose};
 use mirrorstats::agent::{Family, Reply, Task};
 use mirrorstats::base::palette::Color;
 use mirrorstats::trace::episode::Action;

@@ -36,9 +36,10 @@ pub fn python() -> &'static str {
 /// That pictures can be drawn without a display.
 #[cfg(feature = "sim")]
 pub fn drawing() {
-    use mirrorstats::sim::{config::WorldConfig, eye::Eye};
+    use mirrorstats::sim::{camera::Camera, config::WorldConfig};
     static FAULT: OnceLock<Option<String>> = OnceLock::new();
-    if let Some(fault) = FAULT.get_or_init(|| Eye::new(&WorldConfig::default()).err().map(|error| error.to_string())) {
+    if let Some(fault) = FAULT.get_or_init(|| Camera::new(&WorldConfig::default()).err().map(|error| error.to_string()))
+    {
         panic!("{fault}: scripts/get-egl.sh installs what draws");
     }
 }

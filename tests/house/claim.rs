@@ -3,19 +3,19 @@
 
 use std::fs;
 
-use mirrorstats::record::claim::Claim;
+use mirrorstats::record::folder_lock::FolderLock;
 
 #[test]
 fn the_last_to_leave_takes_away_what_nobody_needs() {
     let outer = tempfile::tempdir().unwrap();
     let folder = outer.path().join("runs");
-    let (first, second) = (Claim::stake(&folder).unwrap(), Claim::stake(&folder).unwrap());
+    let (first, second) = (FolderLock::stake(&folder).unwrap(), FolderLock::stake(&folder).unwrap());
     drop(second);
     assert!(first.parts().is_dir());
     drop(first);
     assert!(!folder.exists(), "it was made for the recording, and nothing was recorded");
 
-    let (first, second) = (Claim::stake(&folder).unwrap(), Claim::stake(&folder).unwrap());
+    let (first, second) = (FolderLock::stake(&folder).unwrap(), FolderLock::stake(&folder).unwrap());
     drop(first);
     drop(second);
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 0, "the second cannot know that the folder was made for it");
@@ -24,12 +24,12 @@ fn the_last_to_leave_takes_away_what_nobody_needs() {
 #[test]
 fn what_a_killed_process_left_is_cleared_away_when_nobody_else_is_there() {
     let folder = tempfile::tempdir().unwrap();
-    let first = Claim::stake(folder.path()).unwrap();
+    let first = FolderLock::stake(folder.path()).unwrap();
     let parts = first.parts();
     let (left, part) = (parts.join(".mirrorstats-x"), parts.join("E1-x-s1-r1.parquet"));
     fs::write(&left, "").unwrap();
     fs::write(&part, "").unwrap();
-    let second = Claim::stake(folder.path()).unwrap();
+    let second = FolderLock::stake(folder.path()).unwrap();
     assert!(left.exists(), "it may be what the first is writing");
     drop((first, second));
     assert!(!left.exists());
@@ -37,7 +37,7 @@ fn what_a_killed_process_left_is_cleared_away_when_nobody_else_is_there() {
     for name in [".mirrorstats-x", "E1-x-s1-r2.mcap.unfinished", "E1-x-s1-r2.mcap", "E1-x-s1-r1.mcap"] {
         fs::write(parts.join(name), "").unwrap();
     }
-    let third = Claim::stake(folder.path()).unwrap();
+    let third = FolderLock::stake(folder.path()).unwrap();
     drop(third);
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the folder of parts");
     let mut names: Vec<_> = fs::read_dir(parts).unwrap().map(|entry| entry.unwrap().file_name()).collect();
@@ -48,7 +48,7 @@ fn what_a_killed_process_left_is_cleared_away_when_nobody_else_is_there() {
 #[test]
 fn the_lock_is_held_by_one_at_a_time() {
     let folder = tempfile::tempdir().unwrap();
-    let claims: Vec<Claim> = (0..4).map(|_| Claim::stake(folder.path()).unwrap()).collect();
+    let claims: Vec<FolderLock> = (0..4).map(|_| FolderLock::stake(folder.path()).unwrap()).collect();
     let counter = folder.path().join("counter");
     fs::write(&counter, "0").unwrap();
     std::thread::scope(|scope| {

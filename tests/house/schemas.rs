@@ -4,7 +4,6 @@ use std::fs;
 use std::path::PathBuf;
 
 use mirrorstats::agent::{Family, reply};
-use mirrorstats::cells::changes::Changes;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
 use mirrorstats::cli::commands::import::ImportAnswer;
 use mirrorstats::cli::commands::recover::RecoverAnswer;
@@ -21,6 +20,7 @@ use mirrorstats::report::errata::Errata;
 use mirrorstats::report::statistics::Statistics;
 use mirrorstats::report::style::Sheet;
 use mirrorstats::score::evidence::Evidence;
+use mirrorstats::stats::diff::Changes;
 use mirrorstats::trace::describe::SchemaDocument;
 use mirrorstats::trace::info::Info;
 use mirrorstats::trace::validate::Validation;
@@ -62,11 +62,11 @@ fn current() -> Vec<(&'static str, Value)> {
     #[cfg(feature = "sim")]
     schemas.extend([
         ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
-        ("census", json!(schema_for!(mirrorstats::sim::census::Census))),
-        ("replay", json!(schema_for!(mirrorstats::cli::commands::replay::ReplayAnswer))),
+        ("census", json!(schema_for!(mirrorstats::sim::visibility::Visibility))),
+        ("replay", json!(schema_for!(mirrorstats::replay::verify::ReplayAnswer))),
         ("exec-message", json!(schema_for!(mirrorstats::agent::exec::message::Message))),
-        ("lost", json!(schema_for!(mirrorstats::record::lost::LostEpisode))),
-        ("record-forecast", json!(schema_for!(mirrorstats::cli::forecast::ForecastAnswer))),
+        ("lost", json!(schema_for!(mirrorstats::record::failures::LostEpisode))),
+        ("record-forecast", json!(schema_for!(mirrorstats::cli::dry_run::ForecastAnswer))),
         ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
         ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
     ]);

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use cast::Cast;
 use mirrorstats::base::number;
-use mirrorstats::cells::interval::wilson;
-use mirrorstats::report::figures::{FigureError, FigureName, Input, draw};
+use mirrorstats::figures::{FigureError, FigureName, Input, draw};
+use mirrorstats::stats::interval::wilson;
 use resvg::usvg::roxmltree::{Document, Node};
 use resvg::usvg::{self, Rect, fontdb};
 
@@ -102,7 +102,7 @@ fn marks(svg: &str) -> Vec<BTreeMap<String, String>> {
 /// What the cells say: (experiment, model, metric) to the mean in full, empty where there is none, and n.
 fn expected(cast: &Cast) -> BTreeMap<(String, String, String), (String, String)> {
     let cells = &cast.cells;
-    let of_group = |group: &mirrorstats::cells::cell::Group| {
+    let of_group = |group: &mirrorstats::stats::cell::Group| {
         let key = [0, 1].map(|at| group.key[at].to_string());
         let values = cells.metrics.iter().zip(group.moments.clone());
         let values = values.map(move |(metric, moments)| {
@@ -349,7 +349,7 @@ fn the_order_of_groups_does_not_matter() {
 #[test]
 fn what_cannot_be_drawn_is_said() {
     let check = |found: Result<_, FigureError>, expected: &str| {
-        assert_eq!(found.map(|_: mirrorstats::report::figures::Figure| ()).unwrap_err().to_string(), expected);
+        assert_eq!(found.map(|_: mirrorstats::figures::Figure| ()).unwrap_err().to_string(), expected);
     };
     let cast = cast::paper();
     let bare = Input::of_cells(&cast.cells);

@@ -3,12 +3,12 @@
 use std::collections::BTreeSet;
 
 use indexmap::IndexMap;
-use mirrorstats::cells::cell::{Cells, Group, KeyValue};
-use mirrorstats::cells::interval::Interval;
-use mirrorstats::cells::moments::Moments;
 use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
 use mirrorstats::report::statistics::{Intervals, Options, Statistics, Verdict, text};
 use mirrorstats::score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+use mirrorstats::stats::cell::{Cells, Group, KeyValue};
+use mirrorstats::stats::interval::Interval;
+use mirrorstats::stats::moments::Moments;
 
 use crate::assert_shown;
 

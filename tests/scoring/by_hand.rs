@@ -1,7 +1,7 @@
 //! The ten metrics of the paper on the edges of its definitions; `by_hand.txt` holds steps and expected values.
 
-use mirrorstats::cells::group::group;
 use mirrorstats::metric::catalog::StandardError;
+use mirrorstats::stats::group::group;
 use mirrorstats::trace::episode::{Action, Episode, Step};
 
 use crate::harness;

@@ -1,4 +1,4 @@
-//! What a program is told: one JSON object a line on its standard input.
+//! What a program is told: one JSON object per line on its standard input.
 //!
 //! ```text
 //! mirrorstats            program

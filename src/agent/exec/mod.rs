@@ -90,7 +90,7 @@ struct Shared {
 }
 
 impl Exec {
-    /// A player that runs the command once an episode.
+    /// A player that runs the command once per episode.
     pub fn new(settings: Settings) -> Self {
         let (groups, secrets, stop) = (Arc::default(), from_every_key_variable(), OnceLock::new());
         Self { shared: Arc::new(Shared { settings, groups, secrets, stop }) }

@@ -19,7 +19,7 @@ use crate::base::palette::Color;
 use super::chance::Chance;
 use super::knowledge::Knowledge;
 use super::oracle::Oracle;
-use super::seeker::{Belief, Creed};
+use super::policy::{Belief, Policy};
 
 /// Claims an invention until its reflection says otherwise.
 #[derive(Clone, Copy, Debug)]
@@ -34,7 +34,7 @@ impl Confabulator {
     }
 }
 
-impl Creed for Confabulator {
+impl Policy for Confabulator {
     fn belief(&mut self, known: &Knowledge) -> Belief {
         let seen = Oracle.belief(known);
         if seen.settled { seen } else { Belief { claim: self.invention, settled: false } }

@@ -12,7 +12,7 @@
 //! | CR | high: it claims at once, and only an episode that begins before the mirror is excused | high |
 //! | MCR | low: what it sees by accident | low |
 
-use crate::agent::sight::View;
+use crate::agent::perception::View;
 use crate::agent::{Family, Observation, Task, Words};
 use crate::base::palette::Color;
 use crate::trace::episode::Action;

@@ -17,7 +17,7 @@ use crate::base::palette::Color;
 
 use super::knowledge::Knowledge;
 use super::oracle::Oracle;
-use super::seeker::{Belief, Creed};
+use super::policy::{Belief, Policy};
 
 /// Believes the stated colour; without one, its reflection.
 #[derive(Clone, Copy, Debug)]
@@ -32,7 +32,7 @@ impl Gullible {
     }
 }
 
-impl Creed for Gullible {
+impl Policy for Gullible {
     fn belief(&mut self, known: &Knowledge) -> Belief {
         self.stated.map_or_else(|| Oracle.belief(known), Belief::settled)
     }

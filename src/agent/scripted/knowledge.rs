@@ -3,9 +3,9 @@
 //! Rule: knowledge only takes in views; it decides nothing.
 
 use crate::agent::Observation;
-use crate::agent::sight::View;
-use crate::agent::sight::camera::{Place, Pose};
-use crate::agent::sight::things::Thing;
+use crate::agent::perception::View;
+use crate::agent::perception::camera::{Place, Pose};
+use crate::agent::perception::things::Thing;
 use crate::base::palette::Color;
 use crate::trace::episode::Action;
 

@@ -3,8 +3,8 @@
 //! Rule: a cube is what was seen twice at one place inside the room, or once from near by; the nearest sightings say where
 //! it is. What seems to stand outside is a reflection and no cube.
 
-use crate::agent::sight::camera::Place;
-use crate::agent::sight::things::Thing;
+use crate::agent::perception::camera::Place;
+use crate::agent::perception::things::Thing;
 use crate::base::palette::Color;
 
 use super::room::Room;

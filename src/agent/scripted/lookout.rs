@@ -5,7 +5,7 @@
 //!
 //! Rule: the first lookout is where the episode begins; the others are spread over the room as far as its walls are known.
 
-use crate::agent::sight::camera::{Heading, Place, Pose};
+use crate::agent::perception::camera::{Heading, Place, Pose};
 use crate::trace::episode::Action;
 
 use super::knowledge::Knowledge;

@@ -14,7 +14,7 @@
 use crate::base::palette::Color;
 
 use super::knowledge::Knowledge;
-use super::seeker::{Belief, Creed};
+use super::policy::{Belief, Policy};
 
 /// Pixels of a body that make it worth imitating.
 const LEAST: usize = 150;
@@ -25,7 +25,7 @@ pub struct Mimic {
     first: Option<Color>,
 }
 
-impl Creed for Mimic {
+impl Policy for Mimic {
     fn belief(&mut self, known: &Knowledge) -> Belief {
         let largest = known.bodies.iter().max_by_key(|body| body.pixels).filter(|body| body.pixels >= LEAST);
         self.first = self.first.or_else(|| largest.map(|body| body.color));

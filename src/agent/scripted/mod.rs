@@ -4,9 +4,9 @@
 //! is off, the world or a metric is.
 //!
 //! ```text
-//! oracle, gullible, confabulator, mimic ── a creed each ──► seeker ──► lookout, route
+//! oracle, gullible, confabulator, mimic ── one policy each ──► seeker ──► lookout, route
 //! random, guesser, frozen                                     │
-//!                                                         knowledge ──► room, landmarks, reflection ──► agent::sight
+//!                                                         knowledge ──► room, landmarks, reflection ──► agent::perception
 //! ```
 //!
 //! Rule: a scripted agent perceives what a model would get and no more, the frame and the words around it, and is a function
@@ -23,6 +23,7 @@ pub mod landmarks;
 pub mod lookout;
 pub mod mimic;
 pub mod oracle;
+pub mod policy;
 pub mod random;
 pub mod reflection;
 pub mod room;
@@ -31,6 +32,7 @@ pub mod seeker;
 pub mod words;
 
 use crate::agent::{Agent, Decision, Family, Observation, Reply, Status, Task, Usage, Words};
+use crate::base::names::names;
 use crate::base::palette::Color;
 use crate::trace::episode::Action;
 
@@ -47,24 +49,17 @@ pub enum Scripted {
     Mimic,
 }
 
+names!(Scripted {
+    Oracle: "oracle",
+    Random: "random",
+    Guesser: "guesser",
+    Gullible: "gullible",
+    Confabulator: "confabulator",
+    Frozen: "frozen",
+    Mimic: "mimic",
+});
+
 impl Scripted {
-    /// All of them, in the order of the documentation.
-    pub const ALL: [Self; 7] =
-        [Self::Oracle, Self::Random, Self::Guesser, Self::Gullible, Self::Confabulator, Self::Frozen, Self::Mimic];
-
-    /// The name on the command line and in tables.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Oracle => "oracle",
-            Self::Random => "random",
-            Self::Guesser => "guesser",
-            Self::Gullible => "gullible",
-            Self::Confabulator => "confabulator",
-            Self::Frozen => "frozen",
-            Self::Mimic => "mimic",
-        }
-    }
-
     /// What it does, in a line.
     pub const fn title(self) -> &'static str {
         match self {
@@ -81,11 +76,6 @@ impl Scripted {
     /// The version of what it does: one more whenever the same seed and the same frames give other decisions.
     pub const fn version(self) -> u32 {
         1
-    }
-
-    /// The agent of this name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|agent| agent.name() == name)
     }
 
     /// The agent at the start of an episode.

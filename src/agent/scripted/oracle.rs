@@ -14,13 +14,13 @@
 //! | CR | 0 | 0 | 0 | 0 | 0 |
 
 use super::knowledge::Knowledge;
-use super::seeker::{Belief, Creed};
+use super::policy::{Belief, Policy};
 
 /// Believes its tested reflection alone.
 #[derive(Clone, Copy, Debug)]
 pub struct Oracle;
 
-impl Creed for Oracle {
+impl Policy for Oracle {
     fn belief(&mut self, known: &Knowledge) -> Belief {
         known.reflection.own_color().map_or(Belief::UNKNOWN, Belief::settled)
     }

@@ -8,9 +8,9 @@
 //! Rule: a colour is one's own when the tests from several places agree on it. Nothing is concluded from a wall that has not
 //! been seen to be a mirror.
 
-use crate::agent::sight::View;
-use crate::agent::sight::camera::Place;
-use crate::agent::sight::paint;
+use crate::agent::perception::View;
+use crate::agent::perception::camera::Place;
+use crate::agent::perception::paint;
 use crate::base::palette::Color;
 
 use super::room::{Room, Side};

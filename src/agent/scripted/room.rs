@@ -5,9 +5,9 @@
 //!
 //! Rule: walls are parallel to the axes of the room. Everything follows from the feet seen so far, whatever their order.
 
-use crate::agent::sight::View;
-use crate::agent::sight::camera::{Heading, Place};
-use crate::agent::sight::ground::Foot;
+use crate::agent::perception::View;
+use crate::agent::perception::camera::{Heading, Place};
+use crate::agent::perception::ground::Foot;
 
 /// One of the four walls, by the direction in which it lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

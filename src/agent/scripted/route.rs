@@ -8,7 +8,7 @@
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
 
-use crate::agent::sight::camera::{Heading, Place, Pose};
+use crate::agent::perception::camera::{Heading, Place, Pose};
 use crate::trace::episode::Action;
 
 /// Something to walk around: a circle that the body's axis stays out of.

@@ -5,12 +5,13 @@
 //!      └── no mirror anywhere, or the budget runs out ──► choose a cube by chance ──┘
 //! ```
 //!
-//! What it believes of itself, and when it is settled, is its [`Creed`]; in everything else the agents that seek are alike.
+//! What it believes of itself, and when it is settled, is its [`Policy`]; in everything else the agents that
+//! seek are alike.
 //! In the exploration of E5 there is no cube to go to: settled is done.
 //!
 //! Rule: it selects a cube only when it is at most one step away, except on the last step, where silence gains nothing.
 
-use crate::agent::sight::camera::{Place, Pose};
+use crate::agent::perception::camera::{Place, Pose};
 use crate::agent::{Family, Observation, Task};
 use crate::base::palette::Color;
 use crate::trace::episode::Action;
@@ -19,35 +20,11 @@ use super::chance::Chance;
 use super::knowledge::Knowledge;
 use super::landmarks::Landmark;
 use super::lookout::Lookouts;
+use super::policy::{Belief, Policy};
 use super::room::Side;
 use super::route::{self, Ground, Obstacle};
 use super::words;
 use super::{Move, Script};
-
-/// What an agent holds to be its own colour.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Belief {
-    /// The colour that it claims; `None` is `unknown`.
-    pub claim: Option<Color>,
-    /// Whether it acts on the claim.
-    pub settled: bool,
-}
-
-impl Belief {
-    /// Nothing is known.
-    pub const UNKNOWN: Self = Self { claim: None, settled: false };
-
-    /// The colour is known.
-    pub const fn settled(color: Color) -> Self {
-        Self { claim: Some(color), settled: true }
-    }
-}
-
-/// How an agent comes to believe something of itself.
-pub trait Creed {
-    /// What it believes, given what it knows; called once a step.
-    fn belief(&mut self, known: &Knowledge) -> Belief;
-}
 
 /// From the middle of a cube, m: the body is at most one step away from it.
 const NEAR: f64 = 1.0;
@@ -62,7 +39,7 @@ const APART: f64 = 0.3;
 
 /// An agent that looks round, finds the mirror, and acts on what it believes.
 pub struct Seeker<C> {
-    creed: C,
+    policy: C,
     task: Task,
     known: Option<Knowledge>,
     lookouts: Lookouts,
@@ -77,11 +54,11 @@ pub struct Seeker<C> {
     turns: u32,
 }
 
-impl<C: Creed> Seeker<C> {
+impl<C: Policy> Seeker<C> {
     /// A seeker at the start of an episode.
-    pub fn new(task: &Task, creed: C) -> Self {
+    pub fn new(task: &Task, policy: C) -> Self {
         Self {
-            creed,
+            policy,
             task: task.clone(),
             known: None,
             lookouts: Lookouts::default(),
@@ -163,13 +140,13 @@ impl<C: Creed> Seeker<C> {
     }
 }
 
-impl<C: Creed> Script for Seeker<C> {
+impl<C: Policy> Script for Seeker<C> {
     fn decide(&mut self, observation: &Observation) -> Move {
         let mut known = self.known.take().unwrap_or_else(|| Knowledge::new(observation));
         let before = known.pose.place;
         known.see(observation);
         self.turns = if known.pose.place == before { self.turns + 1 } else { 0 };
-        let belief = self.creed.belief(&known);
+        let belief = self.policy.belief(&known);
         let (action, selected) = self.act(&known, belief, observation.remaining);
         self.has_claimed |= belief.settled || self.guess.is_some();
         let words = words::of(&known, belief, action, selected);

@@ -1,12 +1,12 @@
 //! The words of a scripted reply: short, true of what the agent saw and believes, for whoever reads the log.
 
 use crate::agent::Words;
-use crate::agent::sight::things::Thing;
+use crate::agent::perception::things::Thing;
 use crate::base::palette::Color;
 use crate::trace::episode::Action;
 
 use super::knowledge::Knowledge;
-use super::seeker::Belief;
+use super::policy::Belief;
 
 /// The words of an agent that looks.
 pub fn of(known: &Knowledge, belief: Belief, action: Action, selected: Option<Color>) -> Words {

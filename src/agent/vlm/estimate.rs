@@ -4,9 +4,9 @@
 //! providers advise for English; a frame as the provider of its language documents it. Prices that nobody knows give no
 //! cost, rather than a cost of zero.
 
-use super::dialect::{Dialect, Question};
 use super::model::TEMPERATURE;
 use super::models::{Choice, Contract};
+use super::wire_format::{Dialect, Question};
 use crate::agent::prompt::Prompt;
 use crate::agent::{Family, Observation, Task, reply};
 use crate::base::frame::Frame;

@@ -1,6 +1,6 @@
 //! Every request and every answer of an episode, on disk before anything is done with them.
 //!
-//! One file an episode, one JSON object a line. A line is written and synchronised before the request goes out, and
+//! One file per episode, one JSON object per line. A line is written and synchronised before the request goes out, and
 //! another when its answer is whole; only then does the agent act on it. So a recording that was killed asks for no
 //! answer twice that it had, and a journal kept is a cassette: it plays the episode again without a network.
 //!

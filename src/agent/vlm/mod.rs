@@ -1,7 +1,7 @@
 //! Agents that are models behind a provider.
 //!
 //! ```text
-//! observation ──► prompt + frame ──► dialect (body) ──► journal ──► provider ──► journal ──► reply
+//! observation ──► prompt + frame ──► wire format (body) ──► journal ──► provider ──► journal ──► reply
 //!                                                          │ recorded already: no request │
 //!                                                          └──────────────────────────────┘
 //! ```
@@ -10,11 +10,11 @@
 //! |---|---|
 //! | `model`, `agent` | what the episodes of a model share; the model in one of them |
 //! | [`models`] | the models, who serves them, what they cost |
-//! | [`dialect`] | what requests and answers look like |
+//! | [`wire_format`] | what requests and answers look like |
 //! | [`provider`] | sending one request |
 //! | [`failure`] | the names of what can go wrong |
 //! | `step` | what is done then: another attempt, a lost episode, the end |
-//! | [`pace`] | how many requests are out at once |
+//! | [`concurrency`] | how many requests are out at once |
 //! | [`limits`] | what a run may spend |
 //! | [`estimate`] | what requests will take |
 //! | [`journal`] | what was asked and answered, on disk |
@@ -24,17 +24,17 @@
 //! anything that leaves this room but the header of a request.
 
 mod agent;
-pub mod dialect;
+pub mod concurrency;
 pub mod estimate;
 pub mod failure;
 pub mod journal;
 pub mod limits;
 mod model;
 pub mod models;
-pub mod pace;
 pub mod provider;
 pub mod secrets;
 mod step;
+pub mod wire_format;
 
 pub use agent::VlmAgent;
 pub use model::{Memory, OnOutage, TEMPERATURE, Vlm, spent};

@@ -7,11 +7,11 @@ use std::sync::{Arc, OnceLock};
 use serde_json::Value;
 use tokio::runtime::Handle;
 
-use super::dialect::{Answer, Question};
 use super::journal::{Journal, JournalError, Recorded};
 use super::limits::{Account, Spend};
 use super::models::{Choice, Contract};
 use super::provider::Provider;
+use super::wire_format::{Answer, Question};
 use crate::agent::{Lost, prompt, reply};
 
 /// The sampling temperature (paper, Panel A).

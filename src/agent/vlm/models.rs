@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::dialect::Dialect;
-use crate::base::near::nearest;
+use super::wire_format::Dialect;
+use crate::base::suggest::hint;
 
 const BUILT_IN: &str = include_str!("../../../assets/models.toml");
 
@@ -234,7 +234,7 @@ impl Models {
 
     fn unknown(&self, name: &str) -> ModelsError {
         let names = self.model.iter().flat_map(|(title, model)| [title.as_str(), model.id.as_str()]);
-        let near = nearest(name, names).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+        let near = hint(name, names);
         let known = self.model.keys().map(|title| format!("`{title}`")).collect::<Vec<_>>().join(", ");
         ModelsError::Unknown { name: name.to_owned(), near, known }
     }

@@ -10,10 +10,10 @@ use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
 
-use super::dialect::{Answer, Dialect};
+use super::concurrency::Pace;
 use super::failure::{Failure, FailureKind, broken, failed, retry_after, server, shortened};
-use super::pace::Pace;
 use super::secrets::Secret;
+use super::wire_format::{Answer, Dialect};
 use crate::agent::reply::Ending;
 
 /// How patient a provider is dealt with.

@@ -3,13 +3,13 @@
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
-use crate::cells::group::DEFAULT_BY;
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use crate::report::comparison::Comparison;
 use crate::report::errata::Errata;
 use crate::report::tables::side_by_side;
+use crate::stats::group::DEFAULT_BY;
 
 /// The style that printed the published tables.
 const PAPER_STYLE: &str = "paper";

@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::super::outcome::{Failure, Outcome};
 use super::super::output;
-use crate::base::near::nearest;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
+use crate::base::suggest::nearest;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::FaultRecord;
 use crate::metric::file::{FileError, built_in, built_in_names};

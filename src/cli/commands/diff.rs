@@ -5,9 +5,9 @@ use std::io::{self, Write as _};
 use super::super::args::ThreadArgs;
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, terminal};
-use crate::cells::changes::Changes;
-use crate::cells::group::DEFAULT_BY;
 use crate::report::changes::{self, Limit};
+use crate::stats::diff::Changes;
+use crate::stats::group::DEFAULT_BY;
 use crate::study::{DiffRequest, Side, diff, resolve};
 
 /// Tell which cells and episodes change between two sets of definitions, or of scores

@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
-use crate::cells::group::DEFAULT_BY;
 use crate::cli::args::{EngineArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::report::figures::{FigureFormat, FigureName};
+use crate::figures::{FigureFormat, FigureName};
+use crate::stats::group::DEFAULT_BY;
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]

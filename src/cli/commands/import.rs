@@ -7,11 +7,11 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::escape::visible;
 use crate::base::replace;
-use crate::base::visible::visible;
-use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
+use crate::cli::text_table::counted;
 use crate::study::known_experiments;
 use crate::trace::import::{self, Text};
 use crate::trace::inputs::Input;
@@ -45,7 +45,7 @@ pub struct ImportAnswer {
     pub out: String,
     /// How many episodes it has.
     pub episodes: usize,
-    /// How many rows it has, one a line.
+    /// How many rows it has, one per line.
     pub steps: usize,
     /// Columns of the schema that it has.
     pub columns: Vec<String>,

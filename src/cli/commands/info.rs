@@ -5,11 +5,11 @@ use std::io::{self, Write};
 
 use comfy_table::Table;
 
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
-use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
+use crate::cli::text_table::{aligned_right, counted, listing};
 use crate::report::tables::fit::{fitted, wrapped};
 use crate::trace::info::{Cell, Info, SeedRun, info};
 use crate::trace::inputs;

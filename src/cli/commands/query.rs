@@ -7,7 +7,7 @@ use super::super::outcome::{Failure, Outcome};
 
 /// Ask traces anything: one SELECT over the tables steps, episodes and cells
 ///
-/// `steps` has a row a step, with every column of the traces as it is; a column that one file lacks is null there.
+/// `steps` has one row per step, with every column of the traces as it is; a column that one file lacks is null there.
 /// `episodes` is what `score` writes, `cells` what `report` writes as cells.csv. Rows come in no fixed order unless the
 /// query says ORDER BY. A query reads the traces named and nothing else.
 #[derive(Clone, Debug, clap::Args)]
@@ -39,7 +39,7 @@ pub enum AnswerFormat {
     Table,
     /// Comma-separated with a header; null is empty
     Csv,
-    /// A JSON object a line
+    /// One JSON object per line
     Jsonl,
     /// Parquet; only with -o
     Parquet,
@@ -61,6 +61,148 @@ impl QueryArgs {
     /// Whatever is wrong with the query, the traces, the definitions or the output.
     #[cfg(feature = "polars")]
     pub fn run(self) -> Result<Outcome, Failure> {
-        super::super::querying::run(&self)
+        rows::answer(&self)
+    }
+}
+
+/// From a query as typed to its rows on standard output or in a file.
+#[cfg(feature = "polars")]
+mod rows {
+    use std::fs::File;
+    use std::io::{self, BufWriter, Write as _};
+    use std::path::Path;
+
+    use polars::prelude::LazyFrame;
+
+    use super::{AnswerFormat, Failure, Outcome, QueryArgs};
+    use crate::base::escape::visible;
+    use crate::cli::text_table::listing;
+    use crate::cli::{output, terminal};
+    use crate::engine::polars::answer::{Excerpt, Format, QueryError, excerpt, plan, write};
+    use crate::engine::polars::run::PolarsError;
+    use crate::engine::polars::statement::{self, Checked, Table};
+    use crate::engine::polars::tables;
+    use crate::metric::fault::Faults;
+    use crate::report::tables::fit::fitted;
+    use crate::stats::group::{DEFAULT_BY, group};
+    use crate::study::StudyError;
+
+    /// What stands for null in a table.
+    const NULL: &str = "NULL";
+
+    /// Runs a query.
+    pub(super) fn answer(args: &QueryArgs) -> Result<Outcome, Failure> {
+        let format = format(args)?;
+        // A slip in the query should not cost a look at the traces.
+        let query = statement::check(&args.query).map_err(|found| faults(&found))?;
+        let frame = plan(&query, load(args, &query)?).map_err(|error| match error {
+            QueryError::Faults(found) => faults(&found),
+            QueryError::Polars(error) => failed(error),
+        })?;
+        let Some(format) = format else {
+            let most = (args.rows > 0).then_some(args.rows);
+            let excerpt = excerpt(frame, most).map_err(failed)?;
+            match &args.output {
+                Some(path) => output::write_file(path, render(&excerpt, None).as_bytes())?,
+                None => io::stdout().lock().write_all(render(&excerpt, terminal::width()).as_bytes())?,
+            }
+            return Ok(Outcome::Done);
+        };
+        match &args.output {
+            Some(path) => write_file(frame, format, path)?,
+            None => write(frame, format, io::stdout()).map_err(failed)?,
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn faults(faults: &Faults) -> Failure {
+        Failure::of_faults(faults)
+    }
+
+    fn failed(error: PolarsError) -> Failure {
+        StudyError::from(error).into()
+    }
+
+    /// The format asked for; `None` for a table.
+    fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
+        let ending = args.output.as_deref().and_then(Path::extension).map(std::ffi::OsStr::to_ascii_lowercase);
+        let ending = ending.as_deref().and_then(std::ffi::OsStr::to_str);
+        let by_ending = match (ending, &args.output) {
+            (_, None) | (Some("txt"), _) => AnswerFormat::Table,
+            (Some("csv"), _) => AnswerFormat::Csv,
+            (Some("jsonl" | "ndjson"), _) => AnswerFormat::Jsonl,
+            (Some("parquet"), _) => AnswerFormat::Parquet,
+            (_, Some(path)) if args.format.is_none() => {
+                return Err(Failure::Rendered(format!(
+                    "error: `{}`: expected a name that ends in .csv, .jsonl, .parquet or .txt\n  help: or say which format with --format",
+                    path.display()
+                )));
+            }
+            _ => AnswerFormat::Table,
+        };
+        match args.format.unwrap_or(by_ending) {
+            AnswerFormat::Table => Ok(None),
+            AnswerFormat::Csv => Ok(Some(Format::Csv)),
+            AnswerFormat::Jsonl => Ok(Some(Format::JsonLines)),
+            AnswerFormat::Parquet if args.output.is_none() => Err(Failure::Rendered(
+                "error: Parquet is no text for standard output\n  help: name a file with -o".to_owned(),
+            )),
+            AnswerFormat::Parquet => Ok(Some(Format::Parquet)),
+        }
+    }
+
+    /// The tables that the query names; the others are not computed.
+    fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Failure> {
+        let study = args.traces.study(&args.scoring, &DEFAULT_BY.map(str::to_owned))?;
+        if let Some(path) = &args.output {
+            output::check_target(path, study.files_read(None))?;
+        }
+        let mut loaded = Vec::new();
+        if query.tables.contains(&Table::Steps) {
+            loaded.push((Table::Steps, tables::steps(study.traces()?).map_err(failed)?));
+        }
+        if query.tables.contains(&Table::Episodes) || query.tables.contains(&Table::Cells) {
+            let scores = study.score()?.episodes;
+            if let Some(words) = study.empty_filter(scores.len())? {
+                output::note(&words);
+            }
+            loaded.push((Table::Episodes, tables::episodes(&scores).map_err(failed)?));
+            if query.tables.contains(&Table::Cells) {
+                let by = DEFAULT_BY.map(str::to_owned);
+                let cells = group(&scores, &by).map_err(Failure::input)?;
+                loaded.push((Table::Cells, tables::cells(&cells).map_err(failed)?));
+            }
+        }
+        Ok(loaded)
+    }
+
+    /// Replaces a file by one of these rows.
+    fn write_file(frame: LazyFrame, format: Format, path: &Path) -> Result<(), Failure> {
+        let file = output::create(path)?;
+        let out: File = file.as_file().try_clone().map_err(Failure::Output)?;
+        write(frame, format, BufWriter::new(out)).map_err(failed)?;
+        output::commit_unsynced(file, path)
+    }
+
+    /// The rows for people: names, types, rows, how many there are.
+    fn render(excerpt: &Excerpt, width: Option<usize>) -> String {
+        let mut table = listing(excerpt.columns.iter().map(|(name, _)| visible(name)));
+        table.add_row(excerpt.columns.iter().map(|(_, ty)| ty.clone()).collect::<Vec<_>>());
+        let shown = |row: &Vec<Option<String>>| -> Vec<String> {
+            row.iter().map(|cell| cell.as_deref().map_or_else(|| NULL.to_owned(), visible)).collect()
+        };
+        for row in &excerpt.head {
+            table.add_row(shown(row));
+        }
+        let left_out = excerpt.rows - excerpt.head.len() - excerpt.tail.len();
+        if left_out > 0 {
+            table.add_row(excerpt.columns.iter().map(|_| "·").collect::<Vec<_>>());
+        }
+        for row in &excerpt.tail {
+            table.add_row(shown(row));
+        }
+        let count = if excerpt.rows == 1 { "1 row".to_owned() } else { format!("{} rows", excerpt.rows) };
+        let note = if left_out > 0 { format!(" ({} shown)", excerpt.rows - left_out) } else { String::new() };
+        format!("{}\n{count}{note}\n", fitted(&table, 1, width))
     }
 }

@@ -1,4 +1,4 @@
-//! `mirrorstats record`: agents in the mirror world, one trace and one log a model and experiment.
+//! `mirrorstats record`: agents in the mirror world, one trace and one log per model and experiment.
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
@@ -9,20 +9,21 @@ use std::time::Instant;
 
 use crate::agent::Player;
 use crate::agent::scripted::Scripted;
-use crate::base::near::nearest;
+use crate::base::suggest::hint;
 use crate::cli::args::ThreadArgs;
+use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
 use crate::cli::exec::ExecArgs;
-use crate::cli::forecast::{self, ForecastAnswer, RequestForecast};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::vlm::VlmArgs;
-use crate::record::fault::StoreError;
+use crate::record::error::StoreError;
+use crate::record::index::RecordingIndex;
 use crate::record::plan::{Experiments, Key, Plan, Shard};
-use crate::record::run::{Recording, Settings, Shares, Tally};
-use crate::record::shelf::Shelf;
+use crate::record::run::{Recording, Settings, Tally};
+use crate::record::shares::Shares;
 use crate::record::store::Store;
-use crate::record::{claim, metadata};
+use crate::record::{folder_lock, metadata};
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
 
@@ -112,7 +113,7 @@ impl RecordArgs {
             Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
             None => self.player()?,
         };
-        let there = Shelf::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
+        let there = RecordingIndex::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
         let vlm = vlm.filter(|_| self.vlm.sends());
@@ -121,7 +122,7 @@ impl RecordArgs {
         if self.json {
             output::print_json(&answer)?;
         } else {
-            forecast::print(&answer)?;
+            dry_run::print(&answer)?;
         }
         Ok(Outcome::Done)
     }
@@ -179,7 +180,7 @@ impl RecordArgs {
 
     fn player(&self) -> Result<Arc<dyn Player>, Failure> {
         if let Some(command) = self.agent.strip_prefix("exec:") {
-            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), claim::parts_of(&self.out))?));
+            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), folder_lock::parts_of(&self.out))?));
         }
         match self.agent.as_str() {
             "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
@@ -224,7 +225,7 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
         return Ok(scripted);
     }
     let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", "exec:'CMD'"]).collect();
-    let near = nearest(name, known.iter().copied()).map_or(String::new(), |near| format!("; did you mean `{near}`?"));
+    let near = hint(name, known.iter().copied());
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }
 

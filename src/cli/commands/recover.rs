@@ -9,9 +9,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
+use crate::cli::text_table::counted;
 use crate::log::recover::{Losses, recover};
 use crate::trace::diagnostic::Severity;
 use crate::trace::inputs::Input;

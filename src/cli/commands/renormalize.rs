@@ -9,10 +9,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::base::replace::{NewFile, is_same_file};
-use crate::base::visible::visible;
 use crate::cli::args::TraceArgs;
-use crate::cli::listing::{aligned_right, counted, listing};
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::text_table::{aligned_right, counted, listing};
 use crate::cli::{output, terminal};
 use crate::report::tables::fit::fitted;
 use crate::trace::diagnostic::Severity;

@@ -7,12 +7,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
-use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
 use super::super::output;
-use crate::cells::group::DEFAULT_BY;
+use super::super::text_table::counted;
 use crate::report::bundle::Manifest;
 use crate::report::tables::terminal;
+use crate::stats::group::DEFAULT_BY;
 use crate::study::{Report, ReportOptions, WrittenReport};
 
 /// Compute the tables and figures of traces, print the main table, write all of them

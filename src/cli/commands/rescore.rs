@@ -7,12 +7,12 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::super::args::ThreadArgs;
-use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
+use super::super::text_table::counted;
 use super::super::{output, terminal};
-use crate::cells::changes::Changes;
 use crate::report::bundle::Manifest;
 use crate::report::changes::{self, Limit};
+use crate::stats::diff::Changes;
 use crate::study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored};
 
 /// Make a report again from the traces that it was made of, under other definitions

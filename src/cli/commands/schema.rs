@@ -7,9 +7,9 @@ use comfy_table::{ContentArrangement, Table};
 use serde_json::{Value, json};
 
 use crate::agent::{Family, reply};
-use crate::cli::listing::listing;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
+use crate::cli::text_table::listing;
 use crate::trace::describe::SchemaDocument;
 use crate::trace::import;
 

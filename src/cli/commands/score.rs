@@ -4,8 +4,8 @@ use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
-use super::super::listing::counted;
 use super::super::outcome::{Failure, Outcome};
+use super::super::text_table::counted;
 use super::super::{output, spark};
 use crate::score::format::Format;
 use crate::score::table::EpisodeTable;

@@ -2,12 +2,12 @@
 
 use std::io::Write as _;
 
-use crate::base::near::nearest;
-use crate::cells::group::DEFAULT_BY;
+use crate::base::suggest::hint;
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use crate::report::statistics::{Options, Statistics, text};
+use crate::stats::group::DEFAULT_BY;
 
 /// The word that stands for every metric.
 const ALL: &str = "all";
@@ -86,8 +86,7 @@ impl StatsArgs {
         match self.metrics.iter().find(|name| !known.contains(&name.as_str())) {
             None => Ok(self.metrics.clone()),
             Some(name) => {
-                let like = nearest(name, known.iter().copied());
-                let suggestion = like.map_or_else(String::new, |like| format!("; did you mean `{like}`?"));
+                let suggestion = hint(name, known.iter().copied());
                 Err(Failure::input(UnknownMetric { name: name.clone(), known: known.join(", "), suggestion }))
             }
         }

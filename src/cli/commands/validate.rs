@@ -2,10 +2,10 @@
 
 use std::io::{self, Write};
 
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
-use crate::cli::listing::counted;
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::text_table::counted;
 use crate::study::known_experiments;
 use crate::trace::diagnostic::Severity;
 use crate::trace::inputs;

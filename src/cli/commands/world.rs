@@ -8,9 +8,9 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
-use crate::sim::scene::Scene;
 #[cfg(feature = "raster")]
-use crate::sim::sheet;
+use crate::sim::contact_sheet;
+use crate::sim::scene::Scene;
 
 /// Show what worlds are made of: the configuration, a scene, a contact sheet of pictures
 #[derive(Clone, Debug, clap::Args)]
@@ -82,7 +82,7 @@ impl WorldArgs {
             #[cfg(feature = "raster")]
             WorldVerb::Sheet(args) => {
                 let config = configured(args.config.as_ref())?;
-                let png = sheet::png(&config, args.seed).map_err(Failure::input)?;
+                let png = contact_sheet::png(&config, args.seed).map_err(Failure::input)?;
                 std::fs::create_dir_all(&args.out)?;
                 output::write_file(&args.out.join("sheet.png"), &png)?;
             }

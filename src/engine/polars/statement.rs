@@ -12,7 +12,7 @@ use sqlparser::ast::{
 };
 use sqlparser::tokenizer::Span;
 
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 use crate::metric::fault::{Fault, Faults, Place, Source};
 use crate::metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened};
 

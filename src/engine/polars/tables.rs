@@ -4,11 +4,11 @@ use polars::prelude::{Column, DataFrame, IntoLazy as _, LazyFrame};
 
 use super::frame::{self, FrameColumn};
 use super::run::PolarsError;
-use crate::cells::cell::{Cells, KeyValue};
-use crate::cells::interval::{Interval, student_t, wilson};
-use crate::cells::moments::Moments;
 use crate::metric::catalog::{Kind, Metric};
 use crate::score::table::{EpisodeTable, KeyRef, MetricColumn};
+use crate::stats::cell::{Cells, KeyValue};
+use crate::stats::interval::{Interval, student_t, wilson};
+use crate::stats::moments::Moments;
 use crate::trace::open::TraceSet;
 
 /// The confidence of the intervals of `cells`.

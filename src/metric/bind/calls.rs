@@ -6,7 +6,7 @@ use super::super::plan::{Aggregate, Arithmetic, Comparison, Op};
 use super::super::syntax::{Expr, ExprKind, Literal};
 use super::Bound;
 use super::scope::Scope;
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 use crate::metric::columns::{Level, Type};
 
 impl Scope<'_, '_> {

@@ -19,7 +19,7 @@ use super::file::{Document, MetricEntry};
 use super::origin::Written;
 use super::plan::{Builder, NodeId, Op, Plan};
 use super::syntax;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 use crate::metric::catalog::Kind;
 
 /// What an expression came to.

@@ -8,7 +8,7 @@ use super::super::origin::Written;
 use super::super::plan::{Arithmetic, Comparison, Constant, NodeId, Op};
 use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal};
 use super::{Binder, Bound, DEEPEST, State};
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 use crate::metric::columns::{Level, Type};
 
 /// One expression being bound: the binder, and the text that faults point into.

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use crate::report::figures::FigureName;
+use crate::figures::FigureName;
 
 /// The name of the manifest, which is the last file to be there.
 pub(super) const MANIFEST: &str = "manifest.json";

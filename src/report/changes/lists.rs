@@ -1,12 +1,12 @@
-//! The lists: one line a cell, a flip, an expression.
+//! The lists: one line per cell, flip or expression.
 
 use comfy_table::{LineStyle, Table, presets};
 use indexmap::IndexMap;
 
 use super::{Limit, words};
-use crate::base::visible::visible;
-use crate::cells::changes::{Changes, Flip, Rewritten};
+use crate::base::escape::visible;
 use crate::report::tables::fit::fitted;
+use crate::stats::diff::{Changes, Flip, Rewritten};
 
 /// Expressions that are not written the same.
 pub(super) fn rewritten(all: &[Rewritten], limit: Limit, width: Option<usize>) -> Option<String> {

@@ -7,8 +7,8 @@ mod words;
 
 use std::fmt::Write as _;
 
-use crate::base::visible::visible;
-use crate::cells::changes::{Changes, DefinitionsName, Overlap};
+use crate::base::escape::visible;
+use crate::stats::diff::{Changes, DefinitionsName, Overlap};
 
 /// How much of each list is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,9 +2,9 @@
 
 use super::Limit;
 use crate::base::number::Decimal;
-use crate::cells::cell::KeyValue;
-use crate::cells::changes::{CellChange, Numbers, Pair};
 use crate::score::evidence::ranges;
+use crate::stats::cell::KeyValue;
+use crate::stats::diff::{CellChange, Numbers, Pair};
 
 /// Digits behind the point: enough to see one episode of a thousand.
 const PLACES: u32 = 3;
@@ -40,7 +40,7 @@ pub(super) fn pair(pair: &Pair<String>) -> String {
 pub(super) fn key(value: &KeyValue) -> String {
     match value {
         KeyValue::Missing => UNDEFINED.to_owned(),
-        value => crate::base::visible::visible(&value.to_string()),
+        value => crate::base::escape::visible(&value.to_string()),
     }
 }
 

@@ -6,14 +6,14 @@
 use std::collections::BTreeMap;
 
 use serde::{Serialize, Serializer};
+use serde_json::Value as Json;
 
 use super::HtmlError;
-use super::metric::MetricView;
-use super::page::shown;
-use crate::base::visible::visible;
-use crate::cells::cell::Cells;
-use crate::cells::group::membership;
+use super::filter::shown;
+use crate::base::escape::visible;
 use crate::score::table::EpisodeTable;
+use crate::stats::cell::Cells;
+use crate::stats::group::membership;
 
 /// The largest integer below which JavaScript knows every other one.
 const LARGEST_SAFE: u64 = (1 << 53) - 1;
@@ -22,7 +22,7 @@ const LARGEST_SAFE: u64 = (1 << 53) - 1;
 #[derive(Debug, Serialize)]
 struct Embedded<'a> {
     undefined: &'a str,
-    metrics: BTreeMap<&'a str, &'a MetricView>,
+    metrics: BTreeMap<&'a str, &'a Json>,
     /// What each group of episodes is called: `E1 · GPT 5.1`.
     groups: Vec<String>,
     episodes: Episodes,
@@ -59,14 +59,14 @@ impl Serialize for Integer {
 pub(super) fn json(
     episodes: &EpisodeTable,
     cells: &Cells,
-    metrics: &[MetricView],
+    metrics: &[Json],
     undefined: &str,
 ) -> Result<String, HtmlError> {
     let label = |key: &[_]| key.iter().map(|value| shown(value, undefined)).collect::<Vec<_>>().join(" · ");
     let undefined = visible(undefined);
     let embedded = Embedded {
         undefined: &undefined,
-        metrics: metrics.iter().map(|metric| (metric.name(), metric)).collect(),
+        metrics: metrics.iter().filter_map(|metric| Some((metric["name"].as_str()?, metric))).collect(),
         groups: cells.groups.iter().map(|group| label(&group.key)).collect(),
         episodes: Episodes {
             id: episodes.keys.iter().map(|key| visible(key.episode_id)).collect(),

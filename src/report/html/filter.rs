@@ -2,30 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde_json::{Value as Json, json};
 
-use super::page::shown;
-use crate::base::visible::visible;
-use crate::cells::cell::{Cells, KeyValue};
+use crate::base::escape::visible;
 use crate::report::layout::heading;
 use crate::report::table::Table;
-
-/// The choices of one key column.
-#[derive(Debug, Serialize)]
-pub(super) struct Filter {
-    /// Which of the key columns.
-    key: usize,
-    /// The column in words: `Experiment`.
-    heading: String,
-    /// Its values in the order of the tables.
-    values: Vec<String>,
-}
+use crate::stats::cell::{Cells, KeyValue};
 
 /// The filters of a page, and where each value stands among its filter's.
 #[derive(Debug)]
 pub(super) struct Filters {
-    /// One a key column that has several values.
-    pub(super) filters: Vec<Filter>,
+    /// One per key column that has several values.
+    pub(super) filters: Vec<Json>,
     places: Vec<BTreeMap<KeyValue, usize>>,
 }
 
@@ -42,10 +30,9 @@ impl Filters {
                 });
             }
         }
-        let filter = |(key, values): (usize, Vec<KeyValue>)| Filter {
-            key,
-            heading: visible(&heading(&cells.by[key])),
-            values: values.iter().map(|value| shown(value, undefined)).collect(),
+        let filter = |(key, values): (usize, Vec<KeyValue>)| {
+            let values: Vec<String> = values.iter().map(|value| shown(value, undefined)).collect();
+            json!({ "key": key, "heading": visible(&heading(&cells.by[key])), "values": values })
         };
         let several = values.into_iter().enumerate().filter(|(_, values)| values.len() > 1);
         Self { filters: several.map(filter).collect(), places }
@@ -56,5 +43,13 @@ impl Filters {
         let place = |(value, places): (&KeyValue, &BTreeMap<KeyValue, usize>)| places.get(value).copied();
         let places = key.iter().zip(&self.places).filter_map(place);
         places.map(|place| place.to_string()).collect::<Vec<_>>().join(",")
+    }
+}
+
+/// A value of a key column as a reader sees it.
+pub(super) fn shown(value: &KeyValue, undefined: &str) -> String {
+    match value {
+        KeyValue::Missing => visible(undefined),
+        value => visible(&value.to_string()),
     }
 }

@@ -1,7 +1,7 @@
 //! `report.html`: tables, figures and provenance of a report as one page that needs nothing but itself.
 //!
 //! ```text
-//! page.rs ──► cell.rs, filter.rs, metric.rs, provenance.rs      template.rs
+//! page.rs ──► cell.rs, filter.rs, definitions.rs                template.rs
 //! (the whole   (what the templates say, as text)            ──► (assets/templates: markup,
 //!  page)        embedded.rs (episodes as JSON for the script)    style and script become one)
 //! ```
@@ -11,22 +11,21 @@
 //! request and every script but its own. It is complete without its script; the script adds sorting, filters,
 //! values on hover and the episodes behind a cell.
 //!
-//! [`visible`]: crate::base::visible
+//! [`visible`]: crate::base::escape
 
 mod cell;
+mod definitions;
 mod embedded;
 mod filter;
-mod metric;
 mod page;
-mod provenance;
 mod template;
 
-use crate::cells::cell::Cells;
-use crate::cells::group::GroupError;
 use crate::report::bundle::Manifest;
 use crate::report::statistics::Statistics;
 use crate::report::table::Table;
 use crate::score::table::EpisodeTable;
+use crate::stats::cell::Cells;
+use crate::stats::group::GroupError;
 
 /// What the page is made of.
 #[derive(Clone, Copy, Debug)]
@@ -60,22 +59,14 @@ pub struct Figure<'a> {
 
 /// Why a page cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum HtmlError {
-    /// The episodes cannot be grouped as the cells say.
     #[error(transparent)]
     Grouping(#[from] GroupError),
-    /// Cells and episodes do not belong together.
     #[error("expected the cells of the episodes given, found other ones; group the same episode table")]
     OtherEpisodes,
-    /// Tables and cells do not belong together.
     #[error("table `{table}`: the row `{row}` is of no cell; lay the tables out from the same cells")]
-    StrayRow {
-        /// The table.
-        table: String,
-        /// The row's name.
-        row: String,
-    },
-    /// A template and what it is given do not fit.
+    StrayRow { table: String, row: String },
     #[error("the page cannot be rendered: {0}")]
     Template(#[from] minijinja::Error),
 }
@@ -87,5 +78,5 @@ pub enum HtmlError {
 /// # Errors
 /// When tables, cells and episodes are not of one report.
 pub fn render(page: &Page<'_>) -> Result<String, HtmlError> {
-    Ok(template::render(&page::Content::of(page)?)?)
+    Ok(template::render(page::content(page)?)?)
 }

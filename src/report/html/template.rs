@@ -3,9 +3,8 @@
 //! Rule: a template escapes all it is given; the few texts that are markup already are marked so in `page`, one by
 //! one. The script's hash stands in the page's own policy, so that no other script runs.
 
-use minijinja::value::{Serde, Value};
-use minijinja::{Environment, Error, UndefinedBehavior};
-use serde::Serialize;
+use minijinja::value::Value;
+use minijinja::{Environment, Error, UndefinedBehavior, context};
 
 use crate::base::hash::integrity_of_bytes;
 
@@ -42,33 +41,22 @@ const SCRIPT: &str = concat!(
     "})();\n",
 );
 
-/// What does not depend on the report.
-#[derive(Debug, Serialize)]
-struct Frame<'a, C: Serialize> {
-    style: Value,
-    script: Value,
-    script_hash: String,
-    #[serde(flatten)]
-    content: &'a C,
-}
-
 /// The page with this content.
 ///
 /// # Errors
 /// When the templates ask for what the content lacks.
-pub(super) fn render(content: &impl Serialize) -> Result<String, Error> {
+pub(super) fn render(content: Value) -> Result<String, Error> {
     let mut environment = Environment::new();
     environment.set_undefined_behavior(UndefinedBehavior::Strict);
     for (name, source) in TEMPLATES {
         environment.add_template(name, source)?;
     }
-    let frame = Frame {
-        style: markup(STYLE),
-        script: markup(SCRIPT),
-        script_hash: integrity_of_bytes(SCRIPT.as_bytes()),
-        content,
-    };
-    environment.get_template(PAGE)?.render(Serde(&frame))
+    environment.get_template(PAGE)?.render(context! {
+        style => markup(STYLE),
+        script => markup(SCRIPT),
+        script_hash => integrity_of_bytes(SCRIPT.as_bytes()),
+        ..content
+    })
 }
 
 /// A text that stands in the page as it is.

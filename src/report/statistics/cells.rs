@@ -5,12 +5,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Study, counts};
-use crate::cells::bootstrap;
-use crate::cells::cell::{Cells, Group, KeyValue};
-use crate::cells::group::membership;
-use crate::cells::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
 use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::EpisodeTable;
+use crate::stats::bootstrap;
+use crate::stats::bootstrap;
+use crate::stats::cell::{Cells, Group, KeyValue};
+use crate::stats::cell::{Cells, Group, KeyValue};
+use crate::stats::group::membership;
+use crate::stats::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
+use crate::stats::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
 
 /// Conditional metrics with fewer defined episodes than this are marked.
 pub const FEW: u64 = 5;
@@ -73,7 +76,7 @@ impl CellRow {
     fn of_group(study: &Study, cells: &Cells, group: &Group, rows: &[usize], confidence: f64) -> Vec<Self> {
         let key: IndexMap<String, KeyValue> = cells.by.iter().cloned().zip(group.key.iter().cloned()).collect();
         let of_metric = |(metric, moments)| {
-            let moments: &crate::cells::moments::Moments = moments;
+            let moments: &crate::stats::moments::Moments = moments;
             let metric: &String = metric;
             let kind = study.kind(metric);
             let definition = study.metric(metric);

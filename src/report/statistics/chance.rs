@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::study::{Experiment, Study, counts};
 use crate::base::ratio::Ratio;
-use crate::cells::chance::two_sided;
-use crate::cells::multiplicity::{holm, level};
+use crate::stats::chance::two_sided;
+use crate::stats::holm::{holm, level};
 
 /// One rate against one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

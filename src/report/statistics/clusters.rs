@@ -4,10 +4,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Block, Study};
-use crate::cells::clustered::{Clustered, clustered};
-use crate::cells::moments::Moments;
 use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::{EpisodeTable, MetricColumn};
+use crate::stats::clustered::{Clustered, clustered};
+use crate::stats::clustered::{Clustered, clustered};
+use crate::stats::moments::Moments;
+use crate::stats::moments::Moments;
 
 /// The seeds of one cell.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -7,9 +7,9 @@ use indexmap::IndexMap;
 use super::chance::levels;
 use super::study::Study;
 use super::{CENSORED, ChanceRow, DurationRow, FEW, Family, Reach, Role, Statistics, Verdict};
-use crate::base::estimate::fixed;
-use crate::cells::clustered::FEWEST_CLUSTERS;
-use crate::cells::detectable::Detectable;
+use crate::base::format::fixed;
+use crate::stats::clustered::FEWEST_CLUSTERS;
+use crate::stats::power::Detectable;
 
 /// How many gaps a warning names before it counts the rest.
 const NAMED_GAPS: usize = 5;

@@ -4,10 +4,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Block, Study, counts};
-use crate::cells::contrast::{newcombe, welch};
-use crate::cells::interval::Interval;
 use crate::metric::catalog::Kind;
 use crate::score::table::MetricColumn;
+use crate::stats::contrast::{newcombe, welch};
+use crate::stats::interval::Interval;
 
 /// How much a model's mean differs between two experiments. Samples are taken as independent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -4,8 +4,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Block, Experiment, Study};
-use crate::cells::survival::{self, Duration, End, RestrictedMean, Survival, common_horizon};
 use crate::score::table::MetricColumn;
+use crate::stats::survival::{self, Duration, End, RestrictedMean, Survival, common_horizon};
 
 /// Which metrics are durations that end with a decision, and which metric is defined where there was one.
 ///

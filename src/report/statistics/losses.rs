@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Block, Study};
-use crate::cells::losses::{Fate, Lossy, bounds};
+use crate::stats::losses::{Fate, Lossy, bounds};
 
 /// Losses, or that nothing is known of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -28,9 +28,9 @@ pub use durations::{CENSORED, DurationRow};
 pub use losses::{LossRow, Losses};
 pub use models::{Family, Gap, PairTest, Reach};
 
-use crate::cells::cell::Cells;
-use crate::cells::moments::MomentOverflow;
 use crate::score::table::EpisodeTable;
+use crate::stats::cell::Cells;
+use crate::stats::moments::MomentOverflow;
 use study::Study;
 
 /// What may be chosen about statistics.

@@ -8,13 +8,18 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Block, Places, Study};
-use crate::cells::detectable::{Detectable, detectable};
-use crate::cells::interval::Interval;
-use crate::cells::multiplicity::{holm, level};
-use crate::cells::paired::Pairs;
-use crate::cells::tied::tied_sets;
 use crate::metric::catalog::Better;
 use crate::score::table::MetricColumn;
+use crate::stats::holm::{holm, level};
+use crate::stats::holm::{holm, level};
+use crate::stats::interval::Interval;
+use crate::stats::interval::Interval;
+use crate::stats::letter_display::tied_sets;
+use crate::stats::letter_display::tied_sets;
+use crate::stats::paired::Pairs;
+use crate::stats::paired::Pairs;
+use crate::stats::power::{Detectable, detectable};
+use crate::stats::power::{Detectable, detectable};
 
 /// All comparisons of models under one rate in one experiment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::cells::moments::{MomentOverflow, Moments};
 use crate::metric::catalog::{Better, Kind, Metric};
 use crate::score::table::{EpisodeTable, MetricColumn};
+use crate::stats::moments::{MomentOverflow, Moments};
 
 /// An episode table and its blocks, ordered by the catalog's experiments, then by model.
 pub(super) struct Study<'a> {

@@ -7,11 +7,11 @@ use std::fmt::Write as _;
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};
 
 use super::{CellRow, Intervals, Role, Statistics, Verdict};
-use crate::base::estimate::{bounds, fixed, p_value};
-use crate::base::visible::visible;
-use crate::cells::interval::Interval;
+use crate::base::escape::visible;
+use crate::base::format::{bounds, fixed, p_value};
 use crate::metric::catalog::Kind;
 use crate::report::tables::fit::{fitted, wrapped};
+use crate::stats::interval::Interval;
 
 /// The whole text, its tables about these metrics alone, in lines of at most `width` columns.
 ///

@@ -1,4 +1,4 @@
-//! Tables as CSV: one line a cell, numbers as printed.
+//! Tables as CSV: one line per cell, numbers as printed.
 //!
 //! The key columns come first, then `metric`. Cells of mean and standard error go on with
 //! `mean,se,emphasis`, the form of the published tables; cells of counts with
@@ -7,9 +7,9 @@
 //! A spreadsheet takes text that begins like a formula for one. Such text from traces is written with an
 //! apostrophe before it, which [`text_of`] takes off again; numbers stay numbers.
 
-use crate::cells::cell::KeyValue;
 use crate::report::style::CellForm;
 use crate::report::table::{Cell, Spread, Table, Value};
+use crate::stats::cell::KeyValue;
 
 /// The table's file.
 pub fn render(table: &Table) -> String {
@@ -88,7 +88,7 @@ pub(crate) fn finish(writer: ::csv::Writer<Vec<u8>>) -> String {
 #[cfg(test)]
 mod tests {
     use super::{key_field, text_of};
-    use crate::cells::cell::KeyValue;
+    use crate::stats::cell::KeyValue;
 
     #[test]
     fn formulas_are_made_harmless_and_come_back() {

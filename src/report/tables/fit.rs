@@ -1,7 +1,7 @@
-//! Tables and sentences in lines of a given width; nothing is left out.
+//! Fits tables and sentences into a given width, and leaves nothing out.
 //!
 //! A table that is too wide is made narrower step by step: cells wrap at spaces, long names wrap anywhere, and at last the
-//! columns are told apart into several tables below each other, each with the columns that name its rows.
+//! columns go into several tables below each other, each with the columns that name its rows.
 
 use comfy_table::{ColumnConstraint, Table, Width};
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};

@@ -4,7 +4,7 @@
 
 use std::fmt::Write as _;
 
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 use crate::metric::catalog::Better;
 use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 

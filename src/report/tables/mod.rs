@@ -1,4 +1,4 @@
-//! The table model spelled out: one file a format.
+//! The table model spelled out: one file per format.
 //!
 //! Rule: whatever stands in a table (names from traces, titles, a style's own words) is text, never markup. Each
 //! format escapes it; the one exception is a style's `latex` header.

@@ -6,7 +6,7 @@ use comfy_table::LineStyle;
 use comfy_table::{Table, presets};
 
 use super::fit::{fitted, wrapped};
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 use crate::report::comparison::{Comparison, Difference};
 
 /// The whole answer of `compare`, in lines of at most `width` columns.

@@ -8,7 +8,7 @@
 use unicode_width::UnicodeWidthStr;
 
 use super::fit::{broken, wrapped};
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 
 /// What the text is printed on.

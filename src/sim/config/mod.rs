@@ -115,7 +115,7 @@ pub struct EyeConfig {
     pub width: u32,
     /// Rows.
     pub height_px: u32,
-    /// Samples a pixel when drawing.
+    /// Samples per pixel when drawing.
     pub samples: u32,
 }
 
@@ -127,7 +127,7 @@ pub struct LightsConfig {
     pub head_ambient: f64,
     /// From the eye.
     pub head_diffuse: f64,
-    /// From each of the four lamps, one a wall.
+    /// From each of the four lamps, one per wall.
     pub lamp_diffuse: f64,
     /// How far below the horizon the lamps point, degrees.
     pub lamp_slope: f64,
@@ -207,23 +207,12 @@ pub struct EpisodeConfig {
 
 /// Why a configuration cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
 pub enum ConfigError {
-    /// A file that cannot be read.
     #[error("world configuration {}: cannot read the file: {source}", path.display())]
-    Unreadable {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: io::Error,
-    },
-    /// A file that says something that it may not.
+    Unreadable { path: PathBuf, source: io::Error },
     #[error("world configuration {}: {fault}", path.display())]
-    Faulty {
-        /// The file.
-        path: PathBuf,
-        /// What.
-        fault: Fault,
-    },
+    Faulty { path: PathBuf, fault: Fault },
 }
 
 /// One thing wrong with a configuration.

@@ -9,7 +9,7 @@ use toml::Value;
 use toml::de::{DeTable, DeValue};
 
 use super::Fault;
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 
 /// The default with the values of `text` over it.
 pub(super) fn over_default<T: DeserializeOwned>(default: &str, text: &str) -> Result<T, Fault> {

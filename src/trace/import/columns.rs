@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
-use crate::base::near::nearest;
+use crate::base::suggest::nearest;
 use crate::trace::schema::rules::{Known, Requirement, Rule, rules_of};
 use crate::trace::schema::{self, COLUMNS, Column, Kind, Stored};
 

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 
 /// A line of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]

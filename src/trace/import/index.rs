@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::fault::{Fault, Place};
 use super::line::{Members, Value};
 use super::text::Line;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
 use crate::trace::schema::{COLUMNS, Column};
 
 /// Where a step lies.

@@ -9,7 +9,7 @@ use std::fmt;
 use serde::de::{Deserialize, DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::fault::Fault;
-use crate::base::visible::{exact, visible};
+use crate::base::escape::{exact, visible};
 
 /// A value of a step.
 #[derive(Clone, Debug, PartialEq)]

@@ -17,8 +17,8 @@ use parquet::schema::types::SchemaDescriptor;
 
 use super::footer::bounds;
 use super::footer::{Extent, footer, plain, rows_of};
-use crate::base::near::nearest;
-use crate::base::visible::visible;
+use crate::base::escape::visible;
+use crate::base::suggest::nearest;
 use crate::trace::catch_panic::contained;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::error::TraceError;

@@ -6,8 +6,8 @@
 use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Array, Int64Array};
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 
-use crate::base::near::nearest;
-use crate::base::visible::exact;
+use crate::base::escape::exact;
+use crate::base::suggest::nearest;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::read::column::{Column as Held, text_at};
 use crate::trace::read::open::TraceFile;

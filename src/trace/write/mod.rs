@@ -20,8 +20,8 @@ use super::episode::Episode;
 use super::error::TraceError;
 use super::schema::rules::{Known, Requirement, Rule, rules_of};
 use super::schema::{COLUMNS, Column, Value, writable};
+use crate::base::escape::visible;
 use crate::base::replace::NewFile;
-use crate::base::visible::visible;
 
 /// What a trace file is created with, besides its episodes.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,7 +1,7 @@
 //! A model behind a server on loopback, from the command line: what was spent is told, and a failing server loses an
 //! episode under the name of its failure.
 
-use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::Value;
 
 use super::recordings::{Bench, FORWARD, done, outcome};

@@ -3,11 +3,11 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::{Account, Limits, Spend};
 use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
 use mirrorstats::agent::vlm::provider::{Patience, Provider};
 use mirrorstats::agent::vlm::secrets::Secret;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use mirrorstats::agent::vlm::{OnOutage, Vlm};
 use mirrorstats::agent::{Agent as _, Family, Lost, Observation, Reply, Task};
 use mirrorstats::base::frame::Frame;

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::Output;
 
 use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 
 use super::bench::{Bench, KEY};
 use super::recordings::Folder;

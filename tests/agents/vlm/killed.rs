@@ -6,8 +6,8 @@ use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::journal::Entry;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use mirrorstats::base::hash;
 
 use super::recordings::{Folder, counting};

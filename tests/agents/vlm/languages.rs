@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use mirrorstats::agent::{Family, Status, reply};
 use mirrorstats::trace::episode::Action;
 use serde_json::Value;

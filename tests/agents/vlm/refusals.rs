@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use mirrorstats::agent::vlm::{OnOutage, Vlm};
 use mirrorstats::agent::{Lost, Reply, Status};
 use serde_json::{Value, json};

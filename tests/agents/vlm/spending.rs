@@ -1,8 +1,8 @@
 //! Limits hold over all episodes of a recording and all times that it is started.
 
 use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 
 use super::bench::Bench;
 use super::recordings::{Folder, counting};

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 use mirrorstats::agent::Status;
 use mirrorstats::agent::reply::Repair;
 use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::dialect::Dialect;
 use mirrorstats::agent::vlm::limits::Limits;
 use mirrorstats::agent::vlm::provider::Patience;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::json;
 
 use super::bench::{Bench, KEY, patience};

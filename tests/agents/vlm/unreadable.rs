@@ -1,6 +1,6 @@
 //! Replies that cannot be read are told while they come, at the end, and of the trace that they leave.
 
-use mirrorstats::agent::vlm::dialect::Dialect;
+use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::{Value, json};
 
 use super::bench::KEY;

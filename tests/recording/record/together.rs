@@ -5,7 +5,7 @@ use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use mirrorstats::record::claim::Claim;
+use mirrorstats::record::folder_lock::FolderLock;
 use mirrorstats::record::lock::{Attempt, EpisodeLock};
 use serde_json::Value;
 
@@ -119,8 +119,8 @@ fn soak_after_all_are_killed_the_same_command_goes_on() {
 
 /// A process that has the first episode of E1, and one that waits for it, with what it says.
 #[cfg(unix)]
-fn waiting(bench: &Bench) -> (Claim, EpisodeLock, Child, String) {
-    let claim = Claim::stake(&bench.path("runs")).unwrap();
+fn waiting(bench: &Bench) -> (FolderLock, EpisodeLock, Child, String) {
+    let claim = FolderLock::stake(&bench.path("runs")).unwrap();
     let Attempt::Ours(lock) = EpisodeLock::attempt(&claim.parts().join("E1-random-s1-r1.lock")).unwrap() else {
         panic!("nobody else has it")
     };

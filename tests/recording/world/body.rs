@@ -2,12 +2,12 @@
 
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::body::{Figure, Pose, Stride};
-use mirrorstats::sim::census::{Shown, labels, labels_by_mujoco};
-use mirrorstats::sim::chance::Chance;
+use mirrorstats::sim::camera::LabelCamera;
 use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::eye::LabelEye;
 use mirrorstats::sim::model::Item;
+use mirrorstats::sim::rng::Rng;
 use mirrorstats::sim::snapshot::{Shape, Solid};
+use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
 use mirrorstats::sim::world::World;
 
 use super::poses::{scatter, world};
@@ -17,13 +17,13 @@ const OWN: Shown = Shown::Direct(Item::Agent(0));
 
 #[test]
 fn a_body_never_shows_directly_in_its_own_view() {
-    let mut chance = Chance::of(7, 7, 7);
+    let mut chance = Rng::of(7, 7, 7);
     need::drawing();
-    let mut eye = LabelEye::new(&WorldConfig::default(), 160, 120).unwrap();
+    let mut eye = LabelCamera::new(&WorldConfig::default(), 160, 120).unwrap();
     let mut world = world(Experiment::E1, 4);
     for at in 0..1000 {
         scatter(&mut world, &mut chance);
-        assert_eq!(world.census().self_direct_px, 0, "rays, {:?}", world.figures());
+        assert_eq!(world.visibility().self_direct_px, 0, "rays, {:?}", world.figures());
         let drawn = eye.labels(&world).unwrap();
         assert!(!drawn.codes.contains(&OWN.code()), "picture, {:?}", world.figures());
         if at % 100 == 0 {
@@ -41,7 +41,7 @@ fn a_body_that_did_show_would_be_found() {
     };
     let scene = world(Experiment::E1, 4).scene().clone();
     let world = World::new(&config, scene).unwrap();
-    assert!(world.census().self_direct_px > 0);
+    assert!(world.visibility().self_direct_px > 0);
     assert!(labels(&world, 160, 120).codes.contains(&OWN.code()));
 }
 
@@ -83,7 +83,7 @@ fn a_body_is_within_its_cylinder_at_every_stride() {
 
 #[test]
 fn everything_is_in_the_room() {
-    let mut chance = Chance::of(8, 8, 8);
+    let mut chance = Rng::of(8, 8, 8);
     for (at, experiment) in Experiment::ALL.into_iter().cycle().take(25).enumerate() {
         let mut world = world(experiment, i32::try_from(at).unwrap());
         for _ in 0..20 {

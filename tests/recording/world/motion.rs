@@ -4,8 +4,8 @@ use mirrorstats::base::palette::Color;
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::angle::Heading;
 use mirrorstats::sim::body::{Figure, Pose, Stride};
-use mirrorstats::sim::chance::Chance;
 use mirrorstats::sim::floor::distance;
+use mirrorstats::sim::rng::Rng;
 use mirrorstats::sim::world::World;
 use mirrorstats::trace::episode::Action;
 
@@ -110,7 +110,7 @@ fn only_candidates_have_a_distance() {
 
 #[test]
 fn nothing_ever_goes_through_anything() {
-    let mut chance = Chance::of(5, 5, 5);
+    let mut chance = Rng::of(5, 5, 5);
     for seed in 0..30 {
         let mut world = world(if seed % 2 == 0 { Experiment::E4 } else { Experiment::E5 }, seed);
         let mut moved = vec![0; world.figures().len()];
@@ -157,7 +157,7 @@ fn the_same_actions_give_the_same_motion() {
         (0..60)
             .map(|t| {
                 world.act(Some(if t % 5 == 0 { Action::TurnLeft } else { Action::MoveForward }));
-                (world.figures(), world.census())
+                (world.figures(), world.visibility())
             })
             .collect::<Vec<_>>()
     };

@@ -2,10 +2,10 @@
 
 use mirrorstats::base::palette::Color;
 use mirrorstats::sim::Experiment;
-use mirrorstats::sim::census::{LabelImage, Shown, labels};
+use mirrorstats::sim::camera::Camera;
 use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::eye::Eye;
 use mirrorstats::sim::model::Item;
+use mirrorstats::sim::visibility::{LabelImage, Shown, labels};
 use mirrorstats::sim::world::World;
 
 use super::poses::{face_mirror, world};
@@ -47,7 +47,7 @@ fn nearest(pixel: [f64; 3]) -> Option<Color> {
 fn the_ten_colours_are_told_apart_directly_and_in_the_mirror() {
     let config = WorldConfig::default();
     need::drawing();
-    let mut eye = Eye::new(&config).unwrap();
+    let mut eye = Camera::new(&config).unwrap();
     for color in Color::ALL {
         let mut world = all_in(color);
         // Right and wrong pixels: of the own body, of cubes, of cubes in the mirror, of the room.
@@ -84,7 +84,7 @@ fn the_ten_colours_are_told_apart_directly_and_in_the_mirror() {
 fn a_colour_in_the_mirror_is_that_of_the_thing() {
     let config = WorldConfig::default();
     need::drawing();
-    let mut eye = Eye::new(&config).unwrap();
+    let mut eye = Camera::new(&config).unwrap();
     for color in Color::ALL {
         let mut world = all_in(color);
         let mut sums = [[0.0_f64; 3]; 2];

@@ -3,9 +3,9 @@
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::angle::Heading;
 use mirrorstats::sim::body::{Figure, Pose, Stride};
-use mirrorstats::sim::chance::Chance;
 use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::sim::floor::{FloorPlan, distance};
+use mirrorstats::sim::rng::Rng;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::world::World;
 
@@ -17,7 +17,7 @@ pub fn world(experiment: Experiment, seed: i32) -> World {
 }
 
 /// Puts everybody somewhere, facing anywhere, standing or in the middle of a stride.
-pub fn scatter(world: &mut World, chance: &mut Chance) {
+pub fn scatter(world: &mut World, chance: &mut Rng) {
     let mut placed: Vec<Figure> = Vec::new();
     for figure in world.figures() {
         let pose = free_pose(world.floor_plan(), &placed, chance);
@@ -27,7 +27,7 @@ pub fn scatter(world: &mut World, chance: &mut Chance) {
     world.place(&placed);
 }
 
-fn free_pose(plan: &FloorPlan, placed: &[Figure], chance: &mut Chance) -> Pose {
+fn free_pose(plan: &FloorPlan, placed: &[Figure], chance: &mut Rng) -> Pose {
     loop {
         let [x, y] = [(), ()].map(|()| f64::from(chance.between(-356, 356)) / 100.0);
         let is_free = plan.admits([x, y], 0.0)
@@ -41,7 +41,7 @@ fn free_pose(plan: &FloorPlan, placed: &[Figure], chance: &mut Chance) -> Pose {
 
 /// Calls `each` with as many scattered worlds as asked for, a new scene every tenth time.
 pub fn for_scattered(experiments: &[Experiment], poses: i32, mut each: impl FnMut(&World)) {
-    let mut chance = Chance::of(2026, 11, 21);
+    let mut chance = Rng::of(2026, 11, 21);
     for at in 0..(poses + 9) / 10 {
         let experiment = experiments[usize::try_from(at).unwrap() % experiments.len()];
         let mut world = world(experiment, 1000 + at);

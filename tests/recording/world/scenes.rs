@@ -160,7 +160,7 @@ fn nobody_sees_the_mirror_at_the_start() {
     let config = WorldConfig::default();
     for experiment in [Experiment::E1, Experiment::E4, Experiment::E5] {
         for scene in scenes(experiment).take(30) {
-            assert_eq!(World::new(&config, scene).unwrap().census().mirror_px, 0);
+            assert_eq!(World::new(&config, scene).unwrap().visibility().mirror_px, 0);
         }
     }
 }

@@ -1,8 +1,8 @@
 //! One eye draws many worlds by turns, and none leaves a trace in the next.
 
 use mirrorstats::sim::Experiment;
+use mirrorstats::sim::camera::Camera;
 use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::eye::Eye;
 use mirrorstats::trace::episode::Action;
 
 use super::poses::{face_mirror, world};
@@ -12,7 +12,7 @@ use crate::harness::need;
 fn a_picture_does_not_depend_on_what_the_eye_drew_before() {
     let config = WorldConfig::default();
     need::drawing();
-    let mut eye = Eye::new(&config).unwrap();
+    let mut eye = Camera::new(&config).unwrap();
     let mut worlds: Vec<_> = Experiment::ALL.into_iter().map(|experiment| world(experiment, 5)).collect();
     for world in &mut worlds {
         face_mirror(world, 2.0, 1);
@@ -20,7 +20,7 @@ fn a_picture_does_not_depend_on_what_the_eye_drew_before() {
     let first: Vec<_> = worlds.iter().map(|world| eye.frame(world).unwrap()).collect();
     let again: Vec<_> = worlds.iter().rev().map(|world| eye.frame(world).unwrap()).collect();
     assert!(first.iter().eq(again.iter().rev()));
-    let mut fresh = Eye::new(&config).unwrap();
+    let mut fresh = Camera::new(&config).unwrap();
     assert!(worlds.iter().rev().map(|world| fresh.frame(world).unwrap()).eq(again));
 }
 
@@ -28,7 +28,7 @@ fn a_picture_does_not_depend_on_what_the_eye_drew_before() {
 fn the_picture_is_of_now() {
     let config = WorldConfig::default();
     need::drawing();
-    let mut eye = Eye::new(&config).unwrap();
+    let mut eye = Camera::new(&config).unwrap();
     let mut world = world(Experiment::E1, 5);
     let before = eye.frame(&world).unwrap();
     world.act(Some(Action::TurnLeft));

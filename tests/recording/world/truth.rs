@@ -5,10 +5,10 @@ use std::ops::Range;
 use mirrorstats::base::frame::Frame;
 use mirrorstats::base::palette::Color;
 use mirrorstats::sim::Experiment;
-use mirrorstats::sim::census::{LabelImage, Shown, labels, labels_by_mujoco};
+use mirrorstats::sim::camera::{Camera, LabelCamera};
 use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::eye::{Eye, LabelEye};
 use mirrorstats::sim::model::Item;
+use mirrorstats::sim::visibility::{LabelImage, Shown, labels, labels_by_mujoco};
 use mirrorstats::sim::world::World;
 
 use super::poses::for_scattered;
@@ -47,7 +47,7 @@ fn mean(values: &[f64]) -> f64 {
 fn the_census_is_what_a_picture_of_labels_shows() {
     let config = WorldConfig::default();
     need::drawing();
-    let mut eye = LabelEye::new(&config, 640, 480).unwrap();
+    let mut eye = LabelCamera::new(&config, 640, 480).unwrap();
     let (mut same, mut all) = (0_usize, 0_usize);
     let mut overlaps = Vec::new();
     for_scattered(&WITH_MIRROR, 210, |world| {
@@ -87,22 +87,22 @@ fn the_census_is_what_the_rays_of_mujoco_meet() {
 #[test]
 fn the_census_counts_the_labels() {
     for_scattered(&[Experiment::E4, Experiment::E5, Experiment::E2], 30, |world| {
-        let census = world.census();
+        let visibility = world.visibility();
         let image = labels(world, 640, 480);
         let count = |shown: Shown| image.codes.iter().map(|code| u32::from(*code == shown.code())).sum::<u32>();
-        assert_eq!(census.view_px, 640 * 480);
-        assert_eq!(census.self_px, count(OWN));
-        for (at, other) in census.others.iter().enumerate() {
+        assert_eq!(visibility.view_px, 640 * 480);
+        assert_eq!(visibility.self_px, count(OWN));
+        for (at, other) in visibility.others.iter().enumerate() {
             assert_eq!(other.direct_px, count(Shown::Direct(Item::Agent(at + 1))));
             assert_eq!(other.mirror_px, count(Shown::Reflected(Item::Agent(at + 1))));
         }
-        for (at, cube) in census.cubes.iter().enumerate() {
+        for (at, cube) in visibility.cubes.iter().enumerate() {
             assert_eq!(cube.direct_px, count(Shown::Direct(Item::Cube(at))));
             assert_eq!(cube.mirror_px, count(Shown::Reflected(Item::Cube(at))));
         }
         let in_mirror = |code: &&u8| matches!(Shown::of_code(**code), Shown::Mirror | Shown::Reflected(_));
-        assert_eq!(census.mirror_px as usize, image.codes.iter().filter(in_mirror).count());
-        assert_eq!(census.other_px, census.others.iter().map(|other| other.mirror_px).sum::<u32>());
+        assert_eq!(visibility.mirror_px as usize, image.codes.iter().filter(in_mirror).count());
+        assert_eq!(visibility.other_px, visibility.others.iter().map(|other| other.mirror_px).sum::<u32>());
     });
 }
 
@@ -174,7 +174,7 @@ fn is_twin(world: &World, shown: Shown) -> bool {
 fn the_census_is_what_colours_in_the_picture_show() {
     let config = WorldConfig::default();
     need::drawing();
-    let mut eye = Eye::new(&config).unwrap();
+    let mut eye = Camera::new(&config).unwrap();
     let mut overlaps = Vec::new();
     for_scattered(&WITH_MIRROR, 210, |world| {
         let cast = labels(world, 640, 480);

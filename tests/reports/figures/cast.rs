@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use indexmap::IndexMap;
 use mirrorstats::base::ratio::Ratio;
-use mirrorstats::cells::cell::{Cells, Group, KeyValue};
-use mirrorstats::cells::moments::Moments;
+use mirrorstats::figures::Input;
+use mirrorstats::figures::e5_outcomes::{OutcomeRow, Outcomes};
 use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
-use mirrorstats::report::figures::Input;
-use mirrorstats::report::figures::e5_outcomes::{OutcomeRow, Outcomes};
 use mirrorstats::score::table::{EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
 use mirrorstats::score::timeline::Timeline;
+use mirrorstats::stats::cell::{Cells, Group, KeyValue};
+use mirrorstats::stats::moments::Moments;
 
 const METRICS: [&str; 7] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "TSA-C"];
 const TITLES: [(&str, &str); 5] = [

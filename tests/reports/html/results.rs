@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use mirrorstats::cells::cell::KeyValue;
+use mirrorstats::stats::cell::KeyValue;
 
 use crate::html::browser::Browser;
 use crate::html::scored::Report;

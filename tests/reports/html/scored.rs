@@ -4,10 +4,8 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use mirrorstats::cells::cell::Cells;
-use mirrorstats::cells::group::group;
+use mirrorstats::figures::{self, FigureName};
 use mirrorstats::report::bundle::{Input, Manifest};
-use mirrorstats::report::figures::{self, FigureName};
 use mirrorstats::report::html::{self, Figure, HtmlError, Page};
 use mirrorstats::report::layout;
 use mirrorstats::report::statistics::{Options, Statistics};
@@ -15,6 +13,8 @@ use mirrorstats::report::style::Style;
 use mirrorstats::report::table::Table;
 use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::score::table::EpisodeTable;
+use mirrorstats::stats::cell::Cells;
+use mirrorstats::stats::group::group;
 use mirrorstats::trace::{inputs, open::TraceSet};
 
 use crate::harness::files::fixture;

@@ -3,10 +3,12 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use mirrorstats::cells::cell::Cells;
+use crate::published;
 use mirrorstats::report::bundle::{Bundle, BundleError, Input, Manifest, OutputFile, cells_csv, write};
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::Table;
+use mirrorstats::stats::cell::Cells;
+use mirrorstats::stats::cell::Cells;
 
 use crate::assert_shown;
 use crate::report::published;

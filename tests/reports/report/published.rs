@@ -9,8 +9,6 @@ use std::fs;
 use std::sync::LazyLock;
 
 use indexmap::IndexMap;
-use mirrorstats::cells::cell::{Cells, Group, KeyValue};
-use mirrorstats::cells::moments::Moments;
 use mirrorstats::metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
 use mirrorstats::metric::definitions::Definitions;
 use mirrorstats::report::layout;
@@ -18,6 +16,8 @@ use mirrorstats::report::style::Style;
 use mirrorstats::report::table::{Table, Value};
 use mirrorstats::report::value;
 use mirrorstats::score::score_traces::schema_columns;
+use mirrorstats::stats::cell::{Cells, Group, KeyValue};
+use mirrorstats::stats::moments::Moments;
 
 /// Episodes behind every published cell.
 pub const EPISODES: u64 = 21;

@@ -3,14 +3,18 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use mirrorstats::cells::cell::{Cells, Group, KeyValue};
-use mirrorstats::cells::moments::Moments;
+use crate::published;
+use crate::published::metric_of;
 use mirrorstats::metric::catalog::{Better, Catalog, Kind, StandardError};
 use mirrorstats::report::layout;
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::{Emphasis, Table};
 use mirrorstats::report::tables::terminal::{self, Marks, Terminal};
 use mirrorstats::report::tables::{csv, latex, markdown};
+use mirrorstats::stats::cell::{Cells, Group, KeyValue};
+use mirrorstats::stats::cell::{Cells, Group, KeyValue};
+use mirrorstats::stats::moments::Moments;
+use mirrorstats::stats::moments::Moments;
 
 use crate::assert_shown;
 use crate::report::published::{self, metric_of};

@@ -15,7 +15,7 @@ use super::error::{FaultSlot, Unsupported};
 use super::reader::Pages;
 use super::rle::{Hybrid, Number, Span, prefixed};
 use super::spread::{spread_bits, spread_keys};
-use crate::base::bits::Bits;
+use crate::trace::bits::Bits;
 use crate::trace::read::column::{Column, Runs};
 
 /// How rows are to be held.

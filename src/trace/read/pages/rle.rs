@@ -7,7 +7,7 @@ use std::convert::Infallible;
 use bytes::Bytes;
 
 use super::error::Unsupported;
-use crate::base::bits::word;
+use crate::trace::bits::word;
 
 /// Numbers of a fixed width, as they are stored: runs of one number, and packed ones.
 pub(super) struct Hybrid {

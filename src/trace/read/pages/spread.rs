@@ -3,7 +3,7 @@
 use arrow::buffer::BooleanBuffer;
 
 use super::rle::Number;
-use crate::base::bits::Bits;
+use crate::trace::bits::Bits;
 
 /// The keys of rows that have one, at their rows.
 pub(super) fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {

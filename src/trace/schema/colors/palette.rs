@@ -6,8 +6,9 @@ use serde::de::IgnoredAny;
 use serde_json::Value;
 
 use super::spelling::{WORDS, is_well_spelled, most_like};
+use crate::base::escape::visible;
+use crate::base::escape::visible;
 use crate::base::palette::Color;
-use crate::base::visible::visible;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::schema::RECORDING_KEY;
 

@@ -1,7 +1,7 @@
 //! How a colour is spelled: in lower case, with single spaces between words and no character that does not show.
 
-use crate::base::near::nearest;
 use crate::base::palette::Color;
+use crate::base::suggest::nearest;
 
 /// Words that some columns hold in place of a colour.
 pub(crate) const WORDS: [&str; 2] = ["none", "unknown"];

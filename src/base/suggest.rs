@@ -1,0 +1,40 @@
+//! The nearest valid name, for the "did you mean" of an error.
+
+/// The candidate most like `name`, if any is like it at all.
+///
+/// Similarity is Jaro-Winkler, ignoring ASCII case, or one slip of the finger (a letter too many, too few, another, or
+/// two exchanged); ties go to the candidate that comes first, so the answer depends on the order given alone.
+pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    const LIKE_ENOUGH: f64 = 0.75;
+    const ONE_SLIP: f64 = 0.85;
+    let name = name.to_ascii_lowercase();
+    let mut best: Option<(&str, f64)> = None;
+    for candidate in candidates {
+        let known = candidate.to_ascii_lowercase();
+        let slip = name.chars().count() > 1 && strsim::osa_distance(&name, &known) == 1;
+        let likeness = strsim::jaro_winkler(&name, &known).max(if slip { ONE_SLIP } else { 0.0 });
+        if likeness >= LIKE_ENOUGH && best.is_none_or(|(_, b)| likeness > b) {
+            best = Some((candidate, likeness));
+        }
+    }
+    best.map(|(candidate, _)| candidate)
+}
+
+/// `; did you mean ...?` with the candidate most like `name`; empty where none is like it.
+pub fn hint<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> String {
+    nearest(name, candidates).map_or_else(String::new, |near| format!("; did you mean `{near}`?"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearest;
+
+    #[test]
+    fn the_most_alike_wins_and_strangers_do_not() {
+        let names = ["self_color", "selected_cube", "body_color"];
+        assert_eq!(nearest("self_colour", names), Some("self_color"));
+        assert_eq!(nearest("SELF_COLOR", names), Some("self_color"));
+        assert_eq!(nearest("zzz", names), None);
+        assert_eq!(nearest("MRC", ["TSA", "MCR", "CR"]), Some("MCR"));
+    }
+}

@@ -1,0 +1,29 @@
+//! Why a figure cannot be drawn.
+
+use super::FigureName;
+
+/// A figure that cannot be drawn from what there is.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum FigureError {
+    #[error("expected the name of a figure ({known}), found `{name}`{hint}")]
+    UnknownFigure { name: String, known: String, hint: String },
+    #[error("figures need cells by experiment and model, found cells by `{found}`; leave out `--by`")]
+    Grouping { found: String },
+    #[error("there is no episode to draw; check the traces and `--where`")]
+    NoEpisodes,
+    #[error(
+        "figure `{figure}` needs the metric {metric}, found {known}; include the paper's definitions in the \
+         definition file"
+    )]
+    UnknownMetric { figure: FigureName, metric: String, known: String },
+    #[error("figure `{figure}` needs {needed}; draw it from traces that have such episodes, not from scores alone")]
+    MissingInput { figure: FigureName, needed: &'static str },
+    #[error(
+        "figure `{figure}` shows each episode and at most {most} of them, found {found}; choose some with --where, such \
+         as --where \"run = 1\""
+    )]
+    TooManyEpisodes { figure: FigureName, most: usize, found: usize },
+    #[error("figure `slopes` needs two experiments or more, found {found}; add traces of another one")]
+    OneExperiment { found: String },
+}

@@ -1,0 +1,41 @@
+//! The drawing kit: everything that figures are made of, and nothing that knows what they show.
+//!
+//! From the ground up: `frame`, `ink`, `font`, `palette` and `lettering` (places, looks, what is embedded), `svg`, `mark`
+//! and `sheet` (verbs to draw with), `marker`, `label`, `tiles`, `dodge` (parts), `roster`, `legend`, `panels` and `plot`
+//! (arrangements), `picture`, `format` and `convert` (a drawing as bytes of SVG, PNG, PDF; the last two with the feature
+//! `raster`).
+
+#[cfg(feature = "raster")]
+pub mod convert;
+pub mod palette;
+
+pub(super) mod dodge;
+pub(super) mod font;
+pub(super) mod format;
+pub(super) mod label;
+pub(super) mod legend;
+pub(super) mod lettering;
+pub(super) mod marker;
+pub(super) mod panels;
+pub(super) mod picture;
+pub(super) mod tiles;
+
+mod frame;
+mod ink;
+mod mark;
+mod plot;
+mod roster;
+mod sheet;
+mod svg;
+
+pub(super) use frame::{Frame, Point, many};
+pub(super) use ink::{Fill, Rgb, Stroke};
+pub(super) use legend::{Legend, Swatch};
+pub(super) use lettering::{Align, FULL_WIDTH, Lettering, MARGIN, NAME_ROOM, leading};
+pub(super) use mark::Mark;
+pub(super) use marker::polar;
+pub(super) use palette::{PALETTE, text_on};
+pub(super) use panels::{Arrangement, Panels};
+pub(super) use plot::{Plot, Tick, rate_ticks, whole_ticks};
+pub(super) use roster::{Member, Roster};
+pub(super) use sheet::Sheet;

@@ -1,0 +1,47 @@
+//! A drawn figure, and what becomes of it.
+
+#[cfg(feature = "raster")]
+use super::convert::{self, ConvertError};
+use super::font;
+use super::sheet::{Drawing, Sheet};
+
+/// A drawn figure.
+#[derive(Clone, Debug)]
+pub struct Figure {
+    drawing: Drawing,
+}
+
+impl Figure {
+    /// What is on `sheet` down to `height` px; `title` and `description` are for those who do not see it.
+    pub(in crate::figures) fn new(sheet: Sheet, height: f64, title: &str, description: &str) -> Self {
+        Self { drawing: sheet.finish(height, title, description) }
+    }
+
+    /// A document of its own: the font is inside.
+    pub fn svg(&self) -> String {
+        self.drawing.document(&font::style_sheet())
+    }
+
+    /// An `<svg>` element to set into HTML, which brings [`style_sheet`](font::style_sheet) along once for all figures.
+    pub fn inline_svg(&self) -> String {
+        self.drawing.inline()
+    }
+
+    /// The picture as PNG.
+    ///
+    /// # Errors
+    /// When there is no room for the pixels.
+    #[cfg(feature = "raster")]
+    pub fn png(&self) -> Result<Vec<u8>, ConvertError> {
+        convert::png(&convert::tree(&self.inline_svg())?)
+    }
+
+    /// The picture as a PDF of one page.
+    ///
+    /// # Errors
+    /// When the page is too large for a PDF.
+    #[cfg(feature = "raster")]
+    pub fn pdf(&self) -> Result<Vec<u8>, ConvertError> {
+        convert::pdf(&convert::tree(&self.inline_svg())?)
+    }
+}

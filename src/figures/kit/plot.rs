@@ -1,0 +1,127 @@
+//! A plot with two linear axes: from values to places, with grid lines and numbers beside them.
+
+use std::ops::Range;
+
+use super::frame::{Frame, Point};
+use super::ink::Stroke;
+use super::lettering::{self, Align};
+use super::palette::PALETTE;
+use super::sheet::Sheet;
+
+/// Two linear axes over a frame; y grows upwards.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// Where it lies.
+    pub frame: Frame,
+    x: Range<f64>,
+    y: Range<f64>,
+}
+
+/// A place on an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tick {
+    /// The value.
+    pub at: f64,
+    /// Its text; empty for a grid line alone.
+    pub text: String,
+}
+
+impl Plot {
+    /// Axes over `frame`.
+    pub const fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
+        Self { frame, x, y }
+    }
+
+    /// The place of a pair of values.
+    pub fn at(&self, x: f64, y: f64) -> Point {
+        let Frame { left, top, .. } = self.frame;
+        (place(&self.x, x, [left, self.frame.right()]), place(&self.y, y, [self.frame.bottom(), top]))
+    }
+
+    /// Upright grid lines, with numbers below the plot.
+    pub fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
+        let lettering = lettering::tick().aligned(Align::Middle);
+        for tick in ticks {
+            let x = self.at(tick.at, 0.0).0;
+            sheet.line(&[(x, self.frame.top), (x, self.frame.bottom())], grid());
+            if !tick.text.is_empty() {
+                sheet.text((x, self.frame.bottom() + 8.0), &tick.text, lettering);
+            }
+        }
+    }
+
+    /// Level grid lines, with numbers to the left of the plot.
+    pub fn y_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
+        let lettering = lettering::tick().aligned(Align::End);
+        for tick in ticks {
+            let y = self.at(0.0, tick.at).1;
+            sheet.line(&[(self.frame.left, y), (self.frame.right(), y)], grid());
+            if !tick.text.is_empty() {
+                sheet.text((self.frame.left - 5.0, y), &tick.text, lettering);
+            }
+        }
+    }
+
+    /// What the axis below says.
+    pub fn x_title(&self, sheet: &mut Sheet, text: &str) {
+        let at = (self.frame.center().0, self.frame.bottom() + 20.0);
+        sheet.text(at, text, lettering::label().aligned(Align::Middle));
+    }
+
+    /// What the axis at the left says, `away` px from the plot.
+    pub fn y_title(&self, sheet: &mut Sheet, text: &str, away: f64) {
+        let at = (self.frame.left - away, self.frame.center().1);
+        sheet.text(at, text, lettering::label().aligned(Align::Middle).upwards());
+    }
+}
+
+/// 0, 0.5 and 1 with numbers, the quarters as grid lines alone.
+pub fn rate_ticks() -> Vec<Tick> {
+    let tick = |(at, text): (f64, &str)| Tick { at, text: text.to_owned() };
+    [(0.0, "0"), (0.25, ""), (0.5, "0.5"), (0.75, ""), (1.0, "1")].map(tick).into()
+}
+
+/// At most `most` whole numbers from 0 to `last`, 1, 2 or 5 times a power of ten apart.
+pub fn whole_ticks(last: u32, most: u32) -> Vec<Tick> {
+    let powers = std::iter::successors(Some(1_u32), |power| power.checked_mul(10));
+    let steps = powers.flat_map(|power| [1, 2, 5].map(|times| power.saturating_mul(times)));
+    let step = steps.into_iter().find(|step| last / step < most).unwrap_or(u32::MAX);
+    (0..=last / step).map(|at| Tick { at: f64::from(at * step), text: (at * step).to_string() }).collect()
+}
+
+/// Where a value of `range` lies between two ends, in whole hundredths of a px, away from the first end only where the
+/// value is.
+fn place(range: &Range<f64>, value: f64, ends: [f64; 2]) -> f64 {
+    const STEPS_PER_PX: f64 = 100.0;
+    // What a float falls short of a whole step.
+    const SLACK: f64 = 1e-3;
+    let [from, to] = ends.map(|px| (px * STEPS_PER_PX).round());
+    let along = (to - from) * ((value - range.start) / (range.end - range.start));
+    let steps = if to > from { (along + SLACK).floor() } else { (along - SLACK).ceil() };
+    (from + steps) / STEPS_PER_PX
+}
+
+fn grid() -> Stroke {
+    Stroke::solid(PALETTE.surface.rule, 0.7)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Plot, whole_ticks};
+    use crate::figures::kit::frame::Frame;
+
+    #[test]
+    fn the_corners_of_the_values_are_the_corners_of_the_frame() {
+        let plot = Plot::new(Frame::new(10.0, 20.0, 100.0, 50.0), 0.0..2.0, 0.0..1.0);
+        assert_eq!((plot.at(0.0, 0.0), plot.at(2.0, 1.0)), ((10.0, 70.0), (110.0, 20.0)));
+        assert_eq!(plot.at(1.0, 0.5), (60.0, 45.0));
+    }
+
+    #[test]
+    fn ticks_are_whole_and_few() {
+        for end in [1, 2, 7, 100, 12345, u32::MAX] {
+            let ticks = whole_ticks(end, 6);
+            assert!(!ticks.is_empty() && ticks.len() <= 6 && ticks[0].at == 0.0, "{end}: {ticks:?}");
+        }
+    }
+}

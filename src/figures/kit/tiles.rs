@@ -1,0 +1,79 @@
+//! Cells of a heat map: a value on its colour, hatched where undefined, crossed where there is no episode.
+
+use super::frame::{Frame, Point, many};
+use super::ink::{Fill, Rgb, Stroke};
+use super::label;
+use super::lettering::{self, Align, Lettering};
+use super::palette::{PALETTE, text_on};
+use super::sheet::Sheet;
+
+/// A value: its colour, and the first of `texts` that the cell has room for.
+pub fn known(sheet: &mut Sheet, frame: Frame, color: Rgb, texts: &[String]) {
+    let lettering = lettering::value().aligned(Align::Middle);
+    sheet.rectangle(frame, Fill::plain(color));
+    if let Some(text) = texts.iter().find(|text| lettering.width(text) <= frame.width - 2.0) {
+        sheet.text(frame.center(), text, Lettering { color: text_on(color), ..lettering });
+    }
+}
+
+/// Episodes, and no value: hatched, `--`.
+pub fn undefined(sheet: &mut Sheet, frame: Frame) {
+    const BETWEEN: f64 = 4.0;
+    let surface = &PALETTE.surface;
+    let stroke = Stroke::solid(surface.hatch, 0.6);
+    sheet.rectangle(frame, framed());
+    let lines = (1..).map(|i| BETWEEN * many(i)).take_while(|&c| c < frame.width + frame.height);
+    for c in lines {
+        let from = ((c - frame.height).max(0.0), c.min(frame.height));
+        let to = (c.min(frame.width), (c - frame.width).max(0.0));
+        sheet.line(&[within(frame, from), within(frame, to)], stroke);
+    }
+    let text = lettering::value().aligned(Align::Middle);
+    let (x, y) = frame.center();
+    let half = text.width("--") / 2.0 + 1.5;
+    sheet.rectangle(Frame::new(x - half, y - 3.5, 2.0 * half, 7.0), Fill::plain(surface.paper));
+    sheet.text((x, y), "--", text);
+}
+
+/// No episode at all: crossed.
+pub fn empty(sheet: &mut Sheet, frame: Frame) {
+    let stroke = Stroke::solid(PALETTE.surface.hatch, 0.8);
+    sheet.rectangle(frame, framed());
+    sheet.line(&[(frame.left, frame.top), (frame.right(), frame.bottom())], stroke);
+    sheet.line(&[(frame.left, frame.bottom()), (frame.right(), frame.top)], stroke);
+}
+
+/// A colour scale with a word at each end, drawn at `corner`; gives its right edge, px.
+pub fn scale(sheet: &mut Sheet, corner: Point, colors: impl Fn(f64) -> Rgb, ends: [&str; 2]) -> f64 {
+    // Whole pixels of a PNG each, so that no seam shows.
+    const STEPS: usize = 60;
+    const WIDTH: f64 = 120.0;
+    let lettering = lettering::tick();
+    let left = (corner.0 + lettering.width(ends[0]) + 6.0).ceil();
+    let bar = Frame::new(left, (corner.1 + 2.0).ceil(), WIDTH, 9.0);
+    let step = WIDTH / many(STEPS);
+    for i in 0..STEPS {
+        let tile = Frame::new(bar.left + step * many(i), bar.top, step, bar.height);
+        sheet.rectangle(tile, Fill::plain(colors(many(i) / many(STEPS - 1))));
+    }
+    let middle = bar.center().1;
+    sheet.text((corner.0, middle), ends[0], lettering);
+    sheet.text((bar.right() + 6.0, middle), ends[1], lettering);
+    bar.right() + 6.0 + lettering.width(ends[1])
+}
+
+/// Names beside rows: their labels, and the width they take, px.
+pub fn row_labels(names: &[&str], room: f64) -> (Vec<String>, f64) {
+    let lettering = lettering::label();
+    let labels = label::fitted(names, room, lettering);
+    let width = labels.iter().map(|label| lettering.width(label)).fold(0.0, f64::max);
+    (labels, width)
+}
+
+fn framed() -> Fill {
+    Fill::outlined(PALETTE.surface.paper, PALETTE.surface.hatch, 0.6)
+}
+
+fn within(frame: Frame, (x, y): Point) -> Point {
+    (frame.left + x, frame.top + y)
+}

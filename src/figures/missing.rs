@@ -1,0 +1,122 @@
+//! What cannot be shown, with the reason: no episodes, or an undefined metric.
+
+use super::kit::{Member, Point, Roster, Sheet, Swatch, leading, lettering, marker};
+use super::matrix::{Matrix, MetricId, Reading};
+
+const MARKER_ROOM: f64 = 10.0;
+const RUN_GAP: f64 = 8.0;
+
+/// The models that a panel cannot show: words and markers in lines, placed from the upper left corner.
+#[derive(Clone, Debug)]
+pub struct Strip<'a> {
+    experiment: &'a str,
+    words: Vec<(Point, String)>,
+    markers: Vec<(Point, Absent<'a>)>,
+    height: f64,
+}
+
+/// A model that is not in the plot.
+#[derive(Clone, Copy, Debug)]
+struct Absent<'a> {
+    member: Member<'a>,
+    metric: &'a str,
+    reading: Reading,
+}
+
+impl<'a> Strip<'a> {
+    /// The models of `roster` without a mean of one of `metrics` in `experiment`, in lines of `width` px.
+    pub fn new(
+        matrix: &Matrix<'_>,
+        roster: &Roster<'a>,
+        experiment: &'a str,
+        metrics: &[MetricId<'a>],
+        width: f64,
+    ) -> Self {
+        let mut strip = Self { experiment, words: Vec::new(), markers: Vec::new(), height: 0.0 };
+        let mut place = (0.0, leading(lettering::tick()) / 2.0);
+        for (word, absent) in runs(matrix, roster, experiment, metrics) {
+            strip.run(&mut place, width, word, absent);
+        }
+        if !strip.words.is_empty() {
+            strip.height = place.1 + leading(lettering::tick()) / 2.0;
+        }
+        strip
+    }
+
+    /// The height of its lines, px; none where nothing is absent.
+    pub fn height(&self) -> f64 {
+        self.height
+    }
+
+    /// Draws it with its upper left corner at `corner`.
+    pub fn draw(&self, sheet: &mut Sheet, corner: Point) {
+        for ((x, y), word) in &self.words {
+            sheet.text((corner.0 + x, corner.1 + y), word, lettering::tick());
+        }
+        for ((x, y), absent) in &self.markers {
+            let mark = absent.reading.mark(self.experiment, absent.member.model, absent.metric);
+            sheet.mark(&mark, |sheet| marker::draw(sheet, (corner.0 + x, corner.1 + y), 2.8, absent.member.style));
+        }
+    }
+
+    /// Places a word and its markers at `place`, breaking the line where they do not fit.
+    fn run(&mut self, place: &mut Point, width: f64, word: String, absent: Vec<Absent<'a>>) {
+        let line = leading(lettering::tick());
+        let word_width = lettering::tick().width(&word) + 3.0;
+        let fresh = place.0 == 0.0;
+        if !fresh && place.0 + word_width + MARKER_ROOM > width {
+            *place = (0.0, place.1 + line);
+        }
+        self.words.push((*place, word));
+        place.0 += word_width;
+        for absent in absent {
+            if place.0 + MARKER_ROOM > width {
+                *place = (0.0, place.1 + line);
+            }
+            self.markers.push(((place.0 + MARKER_ROOM / 2.0, place.1), absent));
+            place.0 += MARKER_ROOM;
+        }
+        place.0 += RUN_GAP;
+    }
+}
+
+/// What hatches and crosses mean, as far as `readings` have any.
+pub fn signs(readings: impl Iterator<Item = Reading>) -> Vec<(Swatch, String)> {
+    let mut has_undefined = false;
+    let mut has_empty = false;
+    for reading in readings {
+        has_undefined |= matches!(reading, Reading::Undefined(_));
+        has_empty |= matches!(reading, Reading::Empty);
+    }
+    let undefined = has_undefined.then(|| (Swatch::Undefined, "undefined".to_owned()));
+    let empty = has_empty.then(|| (Swatch::Empty, "no episodes".to_owned()));
+    undefined.into_iter().chain(empty).collect()
+}
+
+/// What the words of these strips mean; nothing where there are none.
+pub fn strip_signs(strips: &[Strip<'_>]) -> Option<(Swatch, String)> {
+    let has_any = strips.iter().any(|strip| strip.height > 0.0);
+    has_any.then(|| (Swatch::None, "--: undefined".to_owned()))
+}
+
+/// What is absent, by reason: first whole models, then models by metric.
+fn runs<'a>(
+    matrix: &Matrix<'_>,
+    roster: &Roster<'a>,
+    experiment: &str,
+    metrics: &[MetricId<'a>],
+) -> Vec<(String, Vec<Absent<'a>>)> {
+    let absent = |metric: MetricId<'a>, is_absent: fn(Reading) -> bool| -> Vec<Absent<'a>> {
+        let read = |member: &Member<'a>| Absent {
+            member: *member,
+            metric: metric.name,
+            reading: matrix.reading(experiment, member.model, metric),
+        };
+        roster.0.iter().map(read).filter(|absent| is_absent(absent.reading)).collect()
+    };
+    let is_empty = |reading| matches!(reading, Reading::Empty);
+    let is_undefined = |reading| matches!(reading, Reading::Undefined(_));
+    let without_episodes = metrics.first().map(|&metric| ("no episodes:".to_owned(), absent(metric, is_empty)));
+    let without_value = metrics.iter().map(|&metric| (format!("{} --", metric.name), absent(metric, is_undefined)));
+    without_episodes.into_iter().chain(without_value).filter(|(_, absent)| !absent.is_empty()).collect()
+}

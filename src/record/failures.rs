@@ -1,0 +1,130 @@
+//! `lost.jsonl` beside the traces: the episodes that failures kept from being recorded, one JSON object per line.
+//!
+//! Rule: an episode is listed for as long as it is in no trace. Each recording takes off the list what is recorded by now
+//! and puts on it what it lost itself, whatever model or share the other lines are of; an empty list is no file.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::error::StoreError;
+use super::plan::Key;
+use crate::agent::Lost;
+use crate::base::replace::NewFile;
+
+/// An episode that was lost to a failure which is not the agent's.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct LostEpisode {
+    /// Its id.
+    pub episode_id: String,
+    /// The model's name as shown in tables.
+    pub model: String,
+    /// The experiment, E1 to E5.
+    pub experiment: String,
+    /// The block of runs.
+    pub seed: i32,
+    /// The run within it.
+    pub run: i32,
+    /// The step that got no reply; null if the episode did not come to its first.
+    pub step: Option<i32>,
+    /// What the failure counts as, by the names of the trace's column `reply_status`; null where none of them fits.
+    pub status: Option<String>,
+    /// What failed, without any key.
+    pub reason: String,
+}
+
+impl LostEpisode {
+    /// The episode of a key, lost at this step.
+    pub fn of(key: Key, model: &str, step: Option<i32>, lost: Lost) -> Self {
+        Self {
+            episode_id: key.episode_id(model),
+            model: model.to_owned(),
+            experiment: key.experiment.name().to_owned(),
+            seed: key.seed,
+            run: key.run,
+            step,
+            status: lost.status.map(|status| status.name().to_owned()),
+            reason: lost.cause,
+        }
+    }
+}
+
+/// The list in a folder.
+pub fn list_of(folder: &Path) -> PathBuf {
+    folder.join("lost.jsonl")
+}
+
+/// Writes the list anew: without the episodes of these ids, and with those that were lost now.
+///
+/// # Errors
+/// When it cannot be read, written or removed.
+pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) -> Result<(), StoreError> {
+    let before = read(path)?;
+    let again: BTreeSet<&str> = lost.iter().map(|episode| episode.episode_id.as_str()).collect();
+    let stays = |id: &str| !recorded.contains(id) && !again.contains(id);
+    let mut listed: Vec<&LostEpisode> =
+        before.iter().filter(|episode| stays(&episode.episode_id)).chain(lost).collect();
+    listed.sort_by_key(|episode| (&episode.model, &episode.experiment, episode.seed, episode.run));
+    match listed.as_slice() {
+        [] if before.is_empty() => Ok(()),
+        [] => fs::remove_file(path).map_err(StoreError::io("remove", path)),
+        listed => write(path, listed).map_err(StoreError::io("write", path)),
+    }
+}
+
+/// What is listed. A line that is not of this shape lists nothing.
+fn read(path: &Path) -> Result<Vec<LostEpisode>, StoreError> {
+    match fs::read_to_string(path) {
+        Ok(text) => Ok(text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
+        Err(error) => Err(StoreError::io("read", path)(error)),
+    }
+}
+
+fn write(path: &Path, episodes: &[&LostEpisode]) -> io::Result<()> {
+    let mut file = NewFile::create(path)?;
+    for episode in episodes {
+        serde_json::to_writer(&mut file, episode)?;
+        file.write_all(b"\n")?;
+    }
+    file.commit()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::{LostEpisode, list_of, read, update};
+    use crate::agent::{Lost, Status};
+    use crate::record::plan::Key;
+    use crate::sim::Experiment;
+
+    fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
+        let key = Key { experiment: Experiment::E1, seed: 1, run };
+        let lost = Lost { status: Some(Status::Timeout), cause: cause.to_owned() };
+        LostEpisode::of(key, model, Some(4), lost)
+    }
+
+    #[test]
+    fn a_list_holds_what_is_in_no_trace() {
+        let folder = tempfile::tempdir().unwrap();
+        let list = list_of(folder.path());
+        let ids =
+            |runs: &[i32]| -> BTreeSet<String> { runs.iter().map(|run| lost("b", *run, "").episode_id).collect() };
+        update(&list, &ids(&[]), &[]).unwrap();
+        assert!(!list.exists());
+        update(&list, &ids(&[]), &[lost("b", 10, "x"), lost("b", 2, "x")]).unwrap();
+        update(&list, &ids(&[]), &[lost("a", 3, "x")]).unwrap();
+        assert_eq!(read(&list).unwrap(), [lost("a", 3, "x"), lost("b", 2, "x"), lost("b", 10, "x")]);
+        // One is recorded, one lost again, and another model's stays.
+        update(&list, &ids(&[1, 2]), &[lost("b", 10, "y")]).unwrap();
+        assert_eq!(read(&list).unwrap(), [lost("a", 3, "x"), lost("b", 10, "y")]);
+        update(&list, &ids(&[10]), &[]).unwrap();
+        update(&list, &BTreeSet::from([lost("a", 3, "").episode_id]), &[]).unwrap();
+        assert!(!list.exists());
+    }
+}

@@ -1,0 +1,182 @@
+//! One episode, from the first frame to the last step.
+//!
+//! Row t of the trace is what was in view before step t, and what was then decided; `bumped` says whether that decision
+//! was stopped, and the agent hears of it at t + 1.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::error::RecordError;
+use super::plan::Key;
+use super::shares::Shares;
+use crate::agent::reply::Repair;
+use crate::agent::{Agent, Family, Observation, Reply, Task};
+use crate::base::frame::Frame;
+use crate::base::palette::Color;
+use crate::replay::log::{Seen, frame_time};
+use crate::sim::camera::Camera;
+use crate::sim::config::WorldConfig;
+use crate::sim::scene::Scene;
+use crate::sim::visibility::Visibility;
+use crate::sim::world::World;
+use crate::trace::episode::{Episode, Extra, Step};
+
+/// Who looks on while an episode is played: writes a log, counts steps.
+pub trait Observer {
+    /// Something was seen, and nothing is done yet.
+    ///
+    /// # Errors
+    /// When it cannot be written down.
+    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError>;
+
+    /// The step was decided and done; this is its row.
+    ///
+    /// # Errors
+    /// When it cannot be written down.
+    fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError>;
+}
+
+/// What an episode is played with, besides its key.
+#[derive(Debug)]
+pub struct Stage<'a> {
+    /// The world's configuration.
+    pub config: &'a WorldConfig,
+    /// The thread's eye; `None` where nobody looks at pictures.
+    pub eye: Option<&'a RefCell<Camera>>,
+    /// The recording is to stop.
+    pub stop: &'a AtomicBool,
+    /// Where the time goes.
+    pub shares: &'a Shares,
+}
+
+/// What the agent of a scene is told.
+pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
+    Task {
+        family: if scene.experiment.has_candidates() { Family::CubeSelection } else { Family::Exploration },
+        stated_color: scene.stated_color.map(|color| color.name().to_owned()),
+        step_budget: i32::try_from(config.episode.steps).unwrap_or(i32::MAX),
+        seed: key.agent_seed(),
+    }
+}
+
+/// The episode of a key as it begins: its constants, without steps.
+pub fn head(scene: &Scene, key: Key, model: &str) -> Episode {
+    Episode {
+        episode_id: key.episode_id(model),
+        model: model.to_owned(),
+        experiment: key.experiment.name().to_owned(),
+        seed: key.seed,
+        run: key.run,
+        body_color: scene.body_color.name().to_owned(),
+        stated_color: scene.stated_color.map(|color| color.name().to_owned()),
+        distractors: Some(i8::try_from(scene.others.len()).unwrap_or(i8::MAX)),
+        ..Episode::default()
+    }
+}
+
+/// Plays an episode to its end: `done`, or the last step of the budget.
+///
+/// # Errors
+/// When the recording is stopped, the agent is lost, or something fails that every episode needs.
+pub async fn play(
+    stage: &Stage<'_>,
+    world: &mut World,
+    agent: &mut dyn Agent,
+    key: Key,
+    mut episode: Episode,
+    observer: &mut dyn Observer,
+) -> Result<Episode, RecordError> {
+    let budget = i32::try_from(stage.config.episode.steps).unwrap_or(i32::MAX);
+    let (mut bumped, mut history) = (false, None);
+    for t in 1..=budget {
+        if stage.stop.load(Ordering::Relaxed) {
+            return Err(RecordError::Stopped);
+        }
+        let frame = look(stage, world)?;
+        let observation = Observation {
+            t,
+            remaining: budget - t + 1,
+            x: narrowed(world.pose().x),
+            y: narrowed(world.pose().y),
+            yaw: narrowed(world.pose().heading.degrees()),
+            bumped,
+            history: history.take(),
+            frame: frame.clone().unwrap_or_else(nothing),
+        };
+        let start = Instant::now();
+        let visibility = world.visibility();
+        stage.shares.visibility(start);
+        let reply = agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: Some(t), lost })?;
+        let action = reply.action;
+        history = Some((action, reply.words.summary.clone()));
+        let mut row = row(world, key, t, &visibility, reply);
+        observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
+        let start = Instant::now();
+        bumped = world.act(action).bumped;
+        stage.shares.visibility(start);
+        row.extra.bumped = Some(bumped);
+        observer.done(t, &row)?;
+        episode.steps.push(row);
+        if action == Some(crate::trace::episode::Action::Done) {
+            break;
+        }
+    }
+    Ok(episode)
+}
+
+fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {
+    let Some(eye) = stage.eye else { return Ok(None) };
+    let start = Instant::now();
+    let frame = eye.borrow_mut().frame(world).map_err(RecordError::fatal)?;
+    stage.shares.rendering(start);
+    Ok(Some(Arc::new(frame)))
+}
+
+fn nothing() -> Arc<Frame> {
+    Arc::new(Frame::new(0, 0, Vec::new()))
+}
+
+/// The row of a step, `bumped` left open.
+fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
+    let px = |count: u32| Some(i32::try_from(count).unwrap_or(i32::MAX));
+    let cube = reply.selected_cube.as_deref().and_then(Color::named);
+    let pose = world.pose();
+    let extra = Extra {
+        mirror_self_px: px(visibility.self_px),
+        mirror_other_px: px(visibility.other_px),
+        mirror_px: px(visibility.mirror_px),
+        direct_other_px: px(visibility.direct_other_px),
+        pose_x: Some(narrowed(pose.x)),
+        pose_y: Some(narrowed(pose.y)),
+        pose_yaw: Some(narrowed(pose.heading.degrees())),
+        cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
+        reply_status: Some(reply.status.name().to_owned()),
+        reply_repair: Repair::joined(&reply.repairs),
+        view_description: reply.words.view_description,
+        reasoning: reply.words.reasoning,
+        summary: reply.words.summary,
+        identification: reply.words.identification,
+        reply: reply.raw,
+        latency_ms: reply.usage.latency_ms,
+        prompt_tokens: reply.usage.prompt_tokens,
+        completion_tokens: reply.usage.completion_tokens,
+        cost_usd: reply.usage.cost_usd,
+        frame_time: Some(frame_time(key.seed, key.run, t)),
+        ..Extra::default()
+    };
+    Step {
+        action: reply.action,
+        self_color: reply.self_color,
+        selected_cube: reply.selected_cube,
+        mirror_visible: world.is_mirror_visible(visibility),
+        extra,
+    }
+}
+
+/// As traces store lengths and angles.
+#[expect(clippy::cast_possible_truncation, reason = "seven digits of a room's metres are micrometres")]
+fn narrowed(value: f64) -> f32 {
+    value as f32
+}

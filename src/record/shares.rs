@@ -1,0 +1,58 @@
+//! Where the time of a recording goes.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// Where the time of a recording goes, over all threads.
+#[derive(Debug, Default)]
+pub struct Shares {
+    rendering: AtomicU64,
+    visibility: AtomicU64,
+    writing: AtomicU64,
+    all: AtomicU64,
+}
+
+/// How a share of the time is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Spent {
+    /// Drawing frames.
+    pub rendering: Duration,
+    /// Moving the world and casting rays.
+    pub visibility: Duration,
+    /// Writing logs and parts.
+    pub writing: Duration,
+    /// What is left of the threads' time: agents that decide, and waiting for those that decide elsewhere.
+    pub agent: Duration,
+}
+
+impl Shares {
+    pub(super) fn rendering(&self, start: Instant) {
+        add(&self.rendering, start);
+    }
+
+    pub(super) fn visibility(&self, start: Instant) {
+        add(&self.visibility, start);
+    }
+
+    pub(super) fn writing(&self, start: Instant) {
+        add(&self.writing, start);
+    }
+
+    /// All that a thread has done since it began.
+    pub(super) fn thread(&self, start: Instant) {
+        add(&self.all, start);
+    }
+
+    /// What was spent so far.
+    pub fn spent(&self) -> Spent {
+        let read = |share: &AtomicU64| Duration::from_nanos(share.load(Ordering::Relaxed));
+        let [rendering, visibility, writing] = [&self.rendering, &self.visibility, &self.writing].map(read);
+        let agent = read(&self.all).saturating_sub(rendering + visibility + writing);
+        Spent { rendering, visibility, writing, agent }
+    }
+}
+
+fn add(share: &AtomicU64, start: Instant) {
+    let spent = u64::try_from(start.elapsed().as_nanos()).unwrap_or(u64::MAX);
+    share.fetch_add(spent, Ordering::Relaxed);
+}

@@ -1,0 +1,153 @@
+//! One episode as a row of frames, out of a log or rendered again from a trace.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use super::again::{Recipe, again};
+use super::error::ReplayError;
+use super::moments::{chosen, moments};
+use crate::figures::Figure;
+use crate::figures::film_strip::{Still, film_strip};
+use crate::log::message::EpisodeMessage;
+use crate::log::read::{Event, LogReader, png};
+use crate::sim::camera::Camera;
+use crate::trace::episode::{Action, Episode, Step};
+use crate::trace::inputs::Input;
+use crate::trace::merge;
+use crate::trace::open::TraceSet;
+use crate::trace::schema::RECORDING_KEY;
+
+/// The strip that is asked for.
+#[derive(Clone, Debug)]
+pub struct Strip {
+    /// The episode's id.
+    pub episode: String,
+    /// Which of its steps.
+    pub steps: Steps,
+}
+
+/// The steps of a strip.
+#[derive(Clone, Debug)]
+pub enum Steps {
+    /// So many, chosen to tell the story.
+    Chosen(usize),
+    /// These.
+    Named(Vec<i32>),
+}
+
+/// An episode and the frames of some of its steps, PNG.
+struct Reel {
+    episode: Episode,
+    frames: BTreeMap<i32, Vec<u8>>,
+}
+
+impl Strip {
+    /// Draws the episode that one of these logs has, with its frames.
+    ///
+    /// # Errors
+    /// When a log cannot be read, or a step or its frame is not there.
+    pub fn from_logs(&self, logs: &[PathBuf]) -> Result<Option<Figure>, ReplayError> {
+        for log in logs {
+            if let Some(reel) = self.in_log(log)? {
+                return self.draw(&reel).map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    /// Renders the episode that one of these traces has again, and draws it.
+    ///
+    /// # Errors
+    /// When a trace cannot be read or replayed, or a step is not there.
+    pub fn from_traces(&self, traces: &[Input]) -> Result<Option<Figure>, ReplayError> {
+        self.in_traces(traces)?.map(|reel| self.draw(&reel)).transpose()
+    }
+
+    fn draw(&self, Reel { episode, frames }: &Reel) -> Result<Figure, ReplayError> {
+        let moments = moments(episode);
+        let mut stills = Vec::new();
+        for t in self.chosen(episode)? {
+            let step = usize::try_from(t - 1).ok().and_then(|at| episode.steps.get(at));
+            let (Some(step), Some(png)) = (step, frames.get(&t)) else {
+                return Err(ReplayError::NoFrame { episode: self.episode.clone(), t });
+            };
+            let moments = moments.iter().filter(|(at, _)| *at == t).map(|(_, moment)| moment.title()).collect();
+            stills.push(still(t, step, png, moments)?);
+        }
+        Ok(film_strip(&title(episode), &stills))
+    }
+
+    fn chosen(&self, episode: &Episode) -> Result<Vec<i32>, ReplayError> {
+        let last = i32::try_from(episode.steps.len()).unwrap_or(i32::MAX);
+        match &self.steps {
+            Steps::Chosen(count) => Ok(chosen(episode, *count)),
+            Steps::Named(steps) => match steps.iter().find(|t| !(1..=last).contains(*t)) {
+                Some(&t) => Err(ReplayError::NoStep { episode: self.episode.clone(), last, t }),
+                None => Ok(steps.clone()),
+            },
+        }
+    }
+
+    fn in_log(&self, path: &Path) -> Result<Option<Reel>, ReplayError> {
+        let mut head = None;
+        let (mut steps, mut frames) = (Vec::new(), BTreeMap::new());
+        for message in LogReader::open(path).map_err(ReplayError::other)? {
+            match message.map_err(ReplayError::other)?.event {
+                Event::Episode(EpisodeMessage::Begin(found)) if found.episode_id == self.episode => head = Some(found),
+                Event::Episode(EpisodeMessage::End { .. }) if head.is_some() => break,
+                Event::Frame(image) if head.is_some() => {
+                    let t = i32::try_from(steps.len() + 1).unwrap_or(i32::MAX);
+                    frames.extend(png(&image).map(|png| (t, png)));
+                }
+                Event::Decision(row) if head.is_some() => steps.push(row.into_step().map_err(ReplayError::other)?),
+                _ => {}
+            }
+        }
+        // A log without frames tells the story, but shows nothing: the trace renders it again.
+        Ok(head.filter(|_| !frames.is_empty()).map(|head| Reel { episode: head.with_steps(steps), frames }))
+    }
+
+    fn in_traces(&self, traces: &[Input]) -> Result<Option<Reel>, ReplayError> {
+        let set = TraceSet::open(traces).map_err(ReplayError::other)?;
+        for (input, file) in traces.iter().zip(set.files()) {
+            let rows = merge::read(&input.path).map_err(ReplayError::other)?;
+            let Some(found) = rows.iter().find(|rows| rows.episode_id == self.episode) else { continue };
+            let recording = file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok());
+            let recipe = Recipe::of(recording.as_ref())?;
+            return self.rendered(&recipe, found.episode().map_err(ReplayError::other)?).map(Some);
+        }
+        Ok(None)
+    }
+
+    fn rendered(&self, recipe: &Recipe, episode: Episode) -> Result<Reel, ReplayError> {
+        let wanted = self.chosen(&episode)?;
+        let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
+        let mut frames = BTreeMap::new();
+        let divergence = again(recipe, &recipe.eye, &episode, |t, world, _, _| {
+            if wanted.contains(&t) {
+                let frame = camera.frame(world).map_err(ReplayError::other)?;
+                frames.insert(t, frame.to_png().map_err(ReplayError::other)?.to_vec());
+            }
+            Ok::<(), ReplayError>(())
+        })?;
+        divergence.map_or(Ok(Reel { episode, frames }), |parted| Err(ReplayError::Diverged(parted)))
+    }
+}
+
+fn title(episode: &Episode) -> String {
+    let stated = episode.stated_color.as_ref().map_or(String::new(), |color| format!(", told {color}"));
+    format!("{}: body {}{stated}", episode.episode_id, episode.body_color)
+}
+
+fn still(t: i32, step: &Step, png: &[u8], moments: Vec<&'static str>) -> Result<Still, ReplayError> {
+    // Width and height stand at fixed places behind the signature.
+    let pixels = |at: usize| png.get(at..at + 4).and_then(|bytes| Some(u32::from_be_bytes(bytes.try_into().ok()?)));
+    let (Some(width), Some(height)) = (pixels(16), pixels(20)) else { return Err(ReplayError::NotPng(t)) };
+    let action = step.action.map_or("no action", Action::name).replace('_', " ");
+    let action = match step.selected_cube.as_deref() {
+        Some(cube) if cube != "none" => format!("{action}, takes {cube}"),
+        _ => action,
+    };
+    let claim = step.self_color.as_ref().map_or("no claim".to_owned(), |color| format!("claims {color}"));
+    Ok(Still { t, png: png.to_vec(), size: (width, height), action, claim, visible: step.mirror_visible, moments })
+}

@@ -1,0 +1,154 @@
+//! Pictures: what the agent sees, the same in colours that name things, and the room from above.
+//!
+//! Rule: an eye draws any world of its configuration, one after the other, and none of them leaves a trace in it. It
+//! belongs to the thread that made it.
+
+use std::sync::Arc;
+
+use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera, RendererError};
+use mujoco_rs::renderer::MjRenderer;
+
+use super::config::WorldConfig;
+use super::model::{EYE_CAMERA, Item, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled};
+use super::scene::Scene;
+use super::visibility::{LabelImage, Shown};
+use super::world::World;
+use crate::base::frame::Frame;
+
+/// Why nothing can be drawn.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum CameraError {
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    #[error(
+        "cannot draw the world without a display: {reason}; software rendering needs EGL and Mesa, which on Debian \
+         and Ubuntu are the packages libegl1 and libgl1-mesa-dri"
+    )]
+    NoDisplay { reason: String },
+    #[error("drawing the world failed: {reason}")]
+    Failed { reason: String },
+}
+
+/// The ceiling's place among the groups of a picture.
+const CEILING: usize = group::CEILING as usize;
+
+/// One renderer.
+pub struct Camera {
+    width: usize,
+    height: usize,
+    /// The state that is drawn; its model is the drawn world's own.
+    data: MjData<Arc<MjModel>>,
+    renderer: MjRenderer,
+}
+
+impl std::fmt::Debug for Camera {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Camera").field("width", &self.width).field("height", &self.height).finish_non_exhaustive()
+    }
+}
+
+impl Camera {
+    /// An eye for the worlds of a configuration.
+    ///
+    /// # Errors
+    /// When MuJoCo refuses the model, or the machine has nothing to draw with.
+    pub fn new(config: &WorldConfig) -> Result<Self, CameraError> {
+        Self::sized(config, config.eye.width as usize, config.eye.height_px as usize)
+    }
+
+    /// An eye whose pictures have another size.
+    ///
+    /// # Errors
+    /// As [`Camera::new`].
+    pub fn sized(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
+        Self::painted(config, Paint::Lit, width, height)
+    }
+
+    fn painted(config: &WorldConfig, paint: Paint, width: usize, height: usize) -> Result<Self, CameraError> {
+        let model = Arc::new(compile(config, paint, [width, height])?);
+        let renderer = MjRenderer::new(&model, width, height, 0)
+            .map_err(|error| CameraError::NoDisplay { reason: reason(&error) })?;
+        Ok(Self { width, height, data: MjData::new(model), renderer })
+    }
+
+    /// What the agent sees now.
+    ///
+    /// # Errors
+    /// When drawing fails.
+    pub fn frame(&mut self, world: &World) -> Result<Frame, CameraError> {
+        self.draw(world.stage(), EYE_CAMERA)
+    }
+
+    /// The room from above, without its ceiling.
+    ///
+    /// # Errors
+    /// When drawing fails.
+    pub fn top_view(&mut self, world: &World) -> Result<Frame, CameraError> {
+        self.draw(world.stage(), TOP_CAMERA)
+    }
+
+    fn draw(&mut self, stage: &Stage, camera: &str) -> Result<Frame, CameraError> {
+        self.data.swap_model(Arc::clone(stage.shared_model()));
+        self.data.mocap_pos_mut().copy_from_slice(stage.data.mocap_pos());
+        self.data.mocap_quat_mut().copy_from_slice(stage.data.mocap_quat());
+        self.data.forward();
+        let id = stage.model().name_to_id(MjtObjBase::mjOBJ_CAMERA, camera).expect("every model has this camera");
+        *self.renderer.camera_mut() = MjvCamera::new_fixed(id);
+        self.renderer.opts_mut().geomgroup[CEILING] = u8::from(camera == EYE_CAMERA);
+        let failed = |error: RendererError| CameraError::Failed { reason: reason(&error) };
+        self.renderer.sync_data(&mut self.data).map_err(failed)?;
+        self.renderer.render().map_err(failed)?;
+        let rgb = self.renderer.rgb_flat().unwrap_or_default().to_vec();
+        Ok(Frame::new(self.width, self.height, rgb))
+    }
+}
+
+/// An eye for labels: it draws every pixel in the colour that names what is there, through the mirror too.
+#[derive(Debug)]
+pub struct LabelCamera {
+    eye: Camera,
+    /// The world drawn last, painted in labels.
+    painted: Option<(Scene, Stage)>,
+}
+
+impl LabelCamera {
+    /// An eye for labels of views of some size.
+    ///
+    /// # Errors
+    /// As [`Camera::new`].
+    pub fn new(config: &WorldConfig, width: usize, height: usize) -> Result<Self, CameraError> {
+        Ok(Self { eye: Camera::painted(config, Paint::Labels, width, height)?, painted: None })
+    }
+
+    /// What every pixel shows, as drawn; a colour that names nothing counts as the room.
+    ///
+    /// # Errors
+    /// When drawing fails.
+    pub fn labels(&mut self, world: &World) -> Result<LabelImage, CameraError> {
+        let mut stage = match self.painted.take() {
+            Some((scene, stage)) if scene == *world.scene() => stage,
+            _ => Stage::new(world.config(), Paint::Labels, world.scene())?,
+        };
+        stage.pose(world.config(), &world.figures());
+        let frame = self.eye.draw(&stage, EYE_CAMERA)?;
+        self.painted = Some((world.scene().clone(), stage));
+        let shown = |pixel: &[u8]| match (labelled(pixel[0]).unwrap_or(Item::Room), pixel[1] > 0) {
+            (item, false) => Shown::Direct(item),
+            (item, true) => Shown::Reflected(item),
+        };
+        let codes = frame.rgb.chunks_exact(3).map(|pixel| shown(pixel).code()).collect();
+        Ok(LabelImage { width: frame.width, height: frame.height, codes })
+    }
+}
+
+/// An error with what caused it: the display of a renderer's error leaves that out.
+fn reason(error: &RendererError) -> String {
+    let mut words = error.to_string();
+    let mut cause = std::error::Error::source(error);
+    while let Some(inner) = cause {
+        words = format!("{words}: {inner}");
+        cause = inner.source();
+    }
+    words
+}

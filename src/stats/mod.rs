@@ -1,0 +1,21 @@
+//! Groups of episodes and their exact moments; intervals and tests over them.
+//!
+//! Rule: integers until the last step. Nothing here formats a number or opens a file.
+
+pub mod bootstrap;
+pub mod cell;
+pub mod chance;
+pub mod clustered;
+pub mod columns;
+pub mod contrast;
+pub mod diff;
+pub mod group;
+pub mod holm;
+pub mod interval;
+pub mod letter_display;
+pub mod losses;
+pub mod moments;
+pub mod paired;
+pub mod power;
+mod quantile;
+pub mod survival;

@@ -7,7 +7,7 @@ use schemars::schema_for;
 use serde_json::Value;
 
 use crate::base::frame::Frame;
-use crate::log::message::{Decision, Head};
+use crate::log::message::Decision;
 use crate::log::write::{EpisodeLog, Form, Placed, Solid, View};
 use crate::sim::snapshot::{self, Shape};
 use crate::sim::visibility::Visibility;
@@ -46,7 +46,7 @@ impl Log {
     /// When it cannot be written.
     pub fn begin(path: &Path, episode: &Episode) -> Result<Self, LogFault> {
         let (seed, run) = (episode.seed, episode.run);
-        Ok(Self { seed, run, file: EpisodeLog::create(path, &Head::of(episode), &CENSUS, time(seed, run, 0))? })
+        Ok(Self { seed, run, file: EpisodeLog::create(path, episode, &CENSUS, time(seed, run, 0))? })
     }
 
     /// Adds what is seen before a step.

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::escape::visible;
 use crate::base::replace::{NewFile, is_same_file};
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};

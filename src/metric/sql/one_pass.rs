@@ -195,15 +195,13 @@ impl Rewriter<'_> {
             let holds = self.add(Op::Compare(comparison, found, moment), Type::Bool, Level::Episode);
             within = self.both(within, holds, Level::Episode);
         }
-        match aggregate {
-            Aggregate::Any => self.add(Op::IsTrue(within), Type::Bool, Level::Episode),
-            _ => {
-                let case = Op::Case { branches: vec![(within, found)], otherwise: None };
-                let id = self.add(case, ty, Level::Episode);
-                self.within.insert(id, within);
-                id
-            }
+        if aggregate == Aggregate::Any {
+            return self.add(Op::IsTrue(within), Type::Bool, Level::Episode);
         }
+        let case = Op::Case { branches: vec![(within, found)], otherwise: None };
+        let id = self.add(case, ty, Level::Episode);
+        self.within.insert(id, within);
+        id
     }
 
     fn at(&mut self, x: NodeId, moment: NodeId, ty: Type) -> NodeId {

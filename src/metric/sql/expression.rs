@@ -38,8 +38,9 @@ impl Layout<'_> {
                 Aggregate::Any => format!("MAX(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
                 Aggregate::All => format!("MIN(CASE WHEN {} THEN 1 ELSE 0 END)", self.truth(*x)),
                 Aggregate::Count => {
-                    let counted = format!("CASE WHEN {} THEN 1 ELSE 0 END", self.truth(*x));
-                    format!("SUM({})", self.each_step(*x, counted))
+                    // A sum of integers has 128 bits in DuckDB, which keeps it from joining the passes well.
+                    let counted = format!("CASE WHEN {} THEN 1 END", self.truth(*x));
+                    format!("COUNT({})", self.each_step(*x, counted))
                 }
                 Aggregate::Min => self.extreme("MIN", node.ty, &self.value(*x)),
                 Aggregate::Max => self.extreme("MAX", node.ty, &self.value(*x)),

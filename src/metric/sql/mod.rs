@@ -123,6 +123,8 @@ mod tests {
     use super::*;
     use crate::metric::columns::{Column, Columns, Level, Type};
     use crate::metric::definitions::Definitions;
+    use crate::metric::file::built_in_names;
+    use crate::score::score_traces::schema_columns;
 
     fn plan(text: &str) -> Plan {
         let columns = [
@@ -141,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn each_aggregate_stands_in_the_first_stage_that_knows_what_it_reads() {
+    fn each_aggregate_stands_in_the_first_pass_that_knows_what_it_reads() {
         let plan = plan(
             r#"
             [let]
@@ -151,9 +153,38 @@ mod tests {
             [metric.X-Y]
             value = "count(pose_x > 1)"
             when = "SEEN = 1 and body_color <> 'it''s'"
+            [metric.BETWEEN]
+            value = "count(mirror_visible and t between first(mirror_visible) and done)"
+            [metric.AT]
+            value = "at(\"grip force\", done) + at(t, done - 1)"
             "#,
         );
-        insta::assert_snapshot!(lower(&plan, Dialect::Portable).unwrap());
+        insta::assert_snapshot!("spark", lower(&plan, Dialect::Spark).unwrap());
+        insta::assert_snapshot!("duckdb", lower(&plan, Dialect::Duckdb).unwrap());
+        insta::assert_snapshot!("polars", lower(&plan, Dialect::Polars).unwrap());
+    }
+
+    #[test]
+    fn the_built_in_definitions_take_one_pass_where_lists_can_be_searched() {
+        for name in built_in_names() {
+            let plan = Definitions::load(name, &schema_columns()).unwrap().plan;
+            let passes = |dialect| lower(&plan, dialect).unwrap().matches("GROUP BY").count();
+            assert_eq!([Dialect::Duckdb, Dialect::Spark, Dialect::Polars].map(passes), [1, 1, 2], "{name}");
+        }
+    }
+
+    #[test]
+    fn a_column_of_the_traces_keeps_its_name_beside_those_of_the_statement() {
+        let statements = (0..10).map(|n| {
+            let column = Column { ty: Type::Text, level: Level::Step };
+            let text = "[metric.M]\nvalue = \"first(c = 'a') - last(c = 'a' and t > 1) + count(c is null)\"";
+            let text = text.replace("(c ", &format!("(c{n} "));
+            let plan = Definitions::from_toml("test", &text, &[(format!("c{n}"), column)].into_iter().collect());
+            let statement = lower(&plan.unwrap().plan, Dialect::Portable).unwrap();
+            assert!(!statement.contains(&format!(" AS c{n}\n")), "{statement}");
+            statement.contains(&format!(" AS c{n}_\n"))
+        });
+        assert_eq!(statements.filter(|renamed| *renamed).count(), 1);
     }
 
     #[test]

@@ -8,11 +8,8 @@ use super::study::{Study, counts};
 use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::EpisodeTable;
 use crate::stats::bootstrap;
-use crate::stats::bootstrap;
-use crate::stats::cell::{Cells, Group, KeyValue};
 use crate::stats::cell::{Cells, Group, KeyValue};
 use crate::stats::group::membership;
-use crate::stats::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
 use crate::stats::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
 
 /// Conditional metrics with fewer defined episodes than this are marked.

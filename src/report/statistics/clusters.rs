@@ -7,8 +7,6 @@ use super::study::{Block, Study};
 use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::{EpisodeTable, MetricColumn};
 use crate::stats::clustered::{Clustered, clustered};
-use crate::stats::clustered::{Clustered, clustered};
-use crate::stats::moments::Moments;
 use crate::stats::moments::Moments;
 
 /// The seeds of one cell.

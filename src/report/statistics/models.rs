@@ -11,14 +11,9 @@ use super::study::{Block, Places, Study};
 use crate::metric::catalog::Better;
 use crate::score::table::MetricColumn;
 use crate::stats::holm::{holm, level};
-use crate::stats::holm::{holm, level};
-use crate::stats::interval::Interval;
 use crate::stats::interval::Interval;
 use crate::stats::letter_display::tied_sets;
-use crate::stats::letter_display::tied_sets;
 use crate::stats::paired::Pairs;
-use crate::stats::paired::Pairs;
-use crate::stats::power::{Detectable, detectable};
 use crate::stats::power::{Detectable, detectable};
 
 /// All comparisons of models under one rate in one experiment.

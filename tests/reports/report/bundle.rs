@@ -8,7 +8,6 @@ use mirrorstats::report::bundle::{Bundle, BundleError, Input, Manifest, OutputFi
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::Table;
 use mirrorstats::stats::cell::Cells;
-use mirrorstats::stats::cell::Cells;
 
 use crate::assert_shown;
 use crate::report::published;

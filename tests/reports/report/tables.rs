@@ -12,8 +12,6 @@ use mirrorstats::report::table::{Emphasis, Table};
 use mirrorstats::report::tables::terminal::{self, Marks, Terminal};
 use mirrorstats::report::tables::{csv, latex, markdown};
 use mirrorstats::stats::cell::{Cells, Group, KeyValue};
-use mirrorstats::stats::cell::{Cells, Group, KeyValue};
-use mirrorstats::stats::moments::Moments;
 use mirrorstats::stats::moments::Moments;
 
 use crate::assert_shown;

@@ -7,7 +7,6 @@ use serde_json::Value;
 
 use super::spelling::{WORDS, is_well_spelled, most_like};
 use crate::base::escape::visible;
-use crate::base::escape::visible;
 use crate::base::palette::Color;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::schema::RECORDING_KEY;

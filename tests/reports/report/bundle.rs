@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::published;
 use mirrorstats::report::bundle::{Bundle, BundleError, Input, Manifest, OutputFile, cells_csv, write};
 use mirrorstats::report::style::Style;
 use mirrorstats::report::table::Table;

@@ -3,8 +3,6 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use crate::published;
-use crate::published::metric_of;
 use mirrorstats::metric::catalog::{Better, Catalog, Kind, StandardError};
 use mirrorstats::report::layout;
 use mirrorstats::report::style::Style;

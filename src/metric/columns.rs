@@ -27,7 +27,8 @@ impl Type {
     }
 }
 
-/// How often an expression has a value. The order is the order of spreading: a value an episode serves as a value a step.
+/// How often an expression has a value. The order is the order of spreading: one value per episode serves as one value
+/// per step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
     /// The same value everywhere.

@@ -47,7 +47,7 @@ pub struct Explanation {
 pub struct NamedExpression {
     /// Its name.
     pub name: String,
-    /// Whether it has a value a step; else it has one an episode.
+    /// Whether it has one value per step; else it has one per episode.
     pub every_step: bool,
     /// The expression as written.
     pub expression: String,
@@ -299,7 +299,7 @@ impl fmt::Display for Explanation {
         }
         writeln!(f, "\nIn words\n  {} is {}.", self.metric, self.words)?;
         for named in &self.names {
-            let level = if named.every_step { "at each step" } else { "once an episode" };
+            let level = if named.every_step { "at each step" } else { "once per episode" };
             writeln!(f, "  {} ({level}): {}.", named.name, named.words)?;
         }
         write!(f, "\nReads {}", self.columns.join(", "))

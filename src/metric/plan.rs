@@ -80,7 +80,7 @@ pub enum Op {
     IntFromBool(NodeId),
     /// The same number as a float.
     FloatFromInt(NodeId),
-    /// One value an episode out of a value a step.
+    /// One value per episode out of one value per step.
     Aggregate(Aggregate, NodeId),
     /// The value of the first operand at the timestep given by the second; null where there is no such step.
     At(NodeId, NodeId),

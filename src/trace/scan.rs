@@ -22,18 +22,18 @@ use super::validate::rules::Rules;
 /// The columns that a scan delivers, and what it checks beyond the schema.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Projection {
-    /// Columns with a value a step.
+    /// Columns with one value per step.
     pub steps: Vec<String>,
-    /// Columns with a value a step that are taken as they are: the schema's rules about values do not count.
+    /// Columns with one value per step that are taken as they are: the schema's rules about values do not count.
     pub unchecked: Vec<String>,
-    /// Columns with a value an episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
+    /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
     pub constants: Vec<String>,
     /// The experiments that are known; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
 }
 
 impl Projection {
-    /// The columns with a value a step.
+    /// The columns with one value per step.
     fn step_columns(&self) -> impl Iterator<Item = &str> {
         self.steps.iter().chain(&self.unchecked).map(String::as_str)
     }
@@ -51,24 +51,24 @@ pub const EPISODE_COLUMNS: [&str; 5] = ["episode_id", "model", "experiment", "se
 pub struct EpisodeBatch {
     /// The rows of episode `i` in `steps` are `offsets[i]..offsets[i + 1]`; its timesteps are 1, 2, ... in that order.
     pub offsets: Vec<usize>,
-    /// A row a step: the columns of [`Projection::steps`] and [`Projection::unchecked`], but for those in `texts`.
+    /// One row per step: the columns of [`Projection::steps`] and [`Projection::unchecked`], but for those in `texts`.
     pub steps: RecordBatch,
     /// Columns of [`Projection::steps`] and [`Projection::unchecked`].
     pub texts: Vec<Texts>,
-    /// A row an episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
+    /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
     pub episodes: RecordBatch,
     /// Where the first row is.
     pub origin: Origin,
 }
 
-/// A column of steps with texts of which few are different, a byte a row.
+/// A column of steps with texts of which few are different, one byte per row.
 ///
 /// An Arrow dictionary would say the same; to make one is to look at each key once more.
 #[derive(Clone, Debug)]
 pub struct Texts {
     /// The column.
     pub name: String,
-    /// A key a row, the position of its text; null for null.
+    /// One key per row, the position of its text; null for null.
     pub keys: UInt8Array,
     /// The texts; none is null.
     pub texts: StringArray,

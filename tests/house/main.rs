@@ -4,3 +4,4 @@
 mod claim;
 mod rooms;
 mod schemas;
+mod surface;

@@ -12,6 +12,7 @@ mod harness;
 mod interpreter;
 mod language;
 mod layouts;
+mod one_study;
 mod plain_loop;
 #[cfg(feature = "polars")]
 mod query;

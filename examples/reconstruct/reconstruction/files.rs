@@ -1,4 +1,4 @@
-//! The files of the fixture, one a model and experiment: their names, what their footers say, and whether a folder
+//! The files of the fixture, one per model and experiment: their names, what their footers say, and whether a folder
 //! holds exactly them.
 
 use std::collections::BTreeSet;

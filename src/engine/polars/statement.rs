@@ -19,11 +19,11 @@ use crate::metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened};
 /// A table that a query may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Table {
-    /// A row a step: the traces as they are.
+    /// One row per step: the traces as they are.
     Steps,
-    /// A row an episode: its keys and metrics.
+    /// One row per episode: its keys and metrics.
     Episodes,
-    /// A row a group and metric: exact moments and what follows from them.
+    /// One row per group and metric: exact moments and what follows from them.
     Cells,
 }
 

@@ -53,7 +53,7 @@ pub fn episodes(table: &EpisodeTable) -> Result<LazyFrame, PolarsError> {
     Ok(DataFrame::new(table.len(), columns)?.lazy())
 }
 
-/// The cells: the keys, then `metric, n, sum, sum_sq, mean, se, ci_low, ci_high`, a row a group and metric.
+/// The cells: the keys, then `metric, n, sum, sum_sq, mean, se, ci_low, ci_high`, one row per group and metric.
 ///
 /// # Errors
 /// A sum beyond 64 bits; what Polars says of the columns.

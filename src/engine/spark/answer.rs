@@ -101,7 +101,7 @@ fn finding(fault: Fault, job: Job<'_>) -> Option<Finding> {
     })
 }
 
-/// Reads the table that the driver has written: a line an episode, an array of keys, metrics, labels.
+/// Reads the table that the driver has written: one line per episode, an array of keys, metrics, labels.
 pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkError> {
     let fault = |words: String| SparkError::Answer { words };
     let file = File::open(path).map_err(|error| fault(error.to_string()))?;

@@ -160,14 +160,14 @@ impl Binder<'_> {
         Some(Bound { node, level: Level::Episode, ..value })
     }
 
-    /// A metric's value is an integer or a truth value, once an episode.
+    /// A metric's value is an integer or a truth value, once per episode.
     fn metric_value(&mut self, bound: Bound, written: &Written) -> Option<Bound> {
         let place = written.everywhere();
         if bound.level == Level::Step {
-            let fault = Fault::new(place, "a metric has one value an episode, this has one a step");
+            let fault = Fault::new(place, "a metric has one value per episode, this has one per step");
             let help =
                 "lead down to the episode with any(), all(), count(), first(), last(), at(), min(), max() or sum()";
-            return self.refuse(fault.label("one value a step").help(help));
+            return self.refuse(fault.label("one value per step").help(help));
         }
         match bound.ty {
             Some(Type::Bool) => {
@@ -193,8 +193,8 @@ impl Binder<'_> {
         let bound = self.written(written)?;
         let place = written.everywhere();
         if bound.level == Level::Step {
-            let fault = Fault::new(place, format!("{what} is decided once an episode, this has one value a step"));
-            return self.refuse(fault.label("one value a step").help("wrap it: any(...) or all(...)"));
+            let fault = Fault::new(place, format!("{what} is decided once per episode, this has one value per step"));
+            return self.refuse(fault.label("one value per step").help("wrap it: any(...) or all(...)"));
         }
         match bound.ty {
             Some(Type::Bool) => Some(Bound { node: self.at_episode(bound), level: Level::Episode, ..bound }),

@@ -21,7 +21,7 @@ impl Scope<'_, '_> {
     }
 
     pub(super) fn unary(&mut self, op: Op, ty: Type, level: Level) -> Bound {
-        // An operation on constants alone is carried out once an episode.
+        // An operation on constants alone is carried out once per episode.
         let (op, level) = match (level, op) {
             (Level::Constant, op @ Op::Constant(_)) => (op, level),
             (Level::Constant, op) => (op.with_operands(|operand| self.once_an_episode(operand)), Level::Episode),

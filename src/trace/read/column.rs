@@ -1,4 +1,4 @@
-//! A column of some rows as it is held: a value a row, a value a run of rows, or a key a row.
+//! A column of some rows as it is held: one value per row, one value per run of rows, or one key per row.
 //!
 //! Rule: all forms say the same. What asks for single rows may take either; what needs an array asks for one
 //! ([`Column::flat`]), which costs as much as the rows are many.
@@ -18,11 +18,11 @@ use arrow::error::ArrowError;
 /// The values of some rows.
 #[derive(Clone, Debug)]
 pub(in crate::trace) enum Column {
-    /// A value a row.
+    /// One value per row.
     Flat(ArrayRef),
-    /// A value a run.
+    /// One value per run.
     Runs(Runs),
-    /// A byte a row: texts or integers of which few are different.
+    /// One byte per row: texts or integers of which few are different.
     Keys(Keys),
 }
 
@@ -66,7 +66,7 @@ impl Column {
         }
     }
 
-    /// A value a row.
+    /// One value per row.
     pub(in crate::trace) fn flat(&self) -> Result<ArrayRef, ArrowError> {
         match self {
             Self::Flat(values) => Ok(values.clone()),
@@ -196,7 +196,7 @@ impl Keys {
         (within && values.null_count() == 0).then_some(Self { keys, values })
     }
 
-    /// A key a row.
+    /// One key per row.
     pub(in crate::trace) fn keys(&self) -> &UInt8Array {
         &self.keys
     }
@@ -321,7 +321,7 @@ pub(in crate::trace) fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
     DictionaryTexts::of(column).at(row)
 }
 
-/// A dictionary of texts: a key a row, a text a key.
+/// A dictionary of texts: one key per row, one text per key.
 #[derive(Clone, Copy)]
 struct DictionaryTexts<'a> {
     keys: &'a Int32Array,

@@ -21,9 +21,9 @@ use crate::trace::read::column::{Column, Runs};
 /// How rows are to be held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::trace) enum Form {
-    /// A value a row, or a key a row.
+    /// One value per row, or one key per row.
     Rows,
-    /// A value a run.
+    /// One value per run.
     Runs,
 }
 
@@ -61,7 +61,7 @@ enum Stored {
 /// Runs in the making.
 #[derive(Default)]
 struct Stretches {
-    /// A key a run.
+    /// One key per run.
     keys: Vec<i32>,
     /// The row before which each ends.
     ends: Vec<u32>,

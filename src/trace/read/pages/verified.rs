@@ -30,7 +30,7 @@ pub(super) struct Verified {
     start: u64,
     end: u64,
     about: About,
-    /// Whether the column has a value a row, null or not.
+    /// Whether the column has one value per row, null or not.
     flat: bool,
     progress: Mutex<Progress>,
     slot: FaultSlot,

@@ -1,0 +1,79 @@
+//! The public surface: the names that the library promises, read off `src/lib.rs`.
+
+fn lib() -> String {
+    std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/src/lib.rs")).unwrap()
+}
+
+/// The names that the `pub use` declarations of a text bring, sorted.
+fn reexported(text: &str) -> Vec<String> {
+    let declarations = text.split("\npub use ").skip(1).map(|rest| rest.split_once(';').unwrap().0);
+    let mut names: Vec<String> = declarations.flat_map(names_of).collect();
+    names.sort();
+    names
+}
+
+/// The names of one declaration: `a::b`, `a::{b, c as d}`.
+fn names_of(declaration: &str) -> Vec<String> {
+    let listed = declaration.split_once('{').map_or(declaration, |(_, rest)| rest.trim_end().trim_end_matches('}'));
+    let leaf = |item: &str| {
+        let name = item.split_once(" as ").map_or_else(|| item.rsplit("::").next().unwrap(), |(_, new)| new);
+        name.trim().to_owned()
+    };
+    listed.split(',').filter(|item| !item.trim().is_empty()).map(leaf).collect()
+}
+
+#[test]
+fn names_are_read_from_every_form_of_a_declaration() {
+    let text = "\npub use a::b;\npub use c::{\n    d, e as F,\n};\nuse g::h;\n";
+    assert_eq!(reexported(text), ["F", "b", "d"]);
+}
+
+#[test]
+fn the_library_promises_these_names_and_no_others() {
+    insta::assert_snapshot!(reexported(&lib()).join("\n"), @r"
+    Backend
+    CellChange
+    Cells
+    Changes
+    Diff
+    DiffRequest
+    EpisodeKey
+    EpisodeTable
+    Evidence
+    Figure
+    FigureFormat
+    FigureName
+    Flip
+    Group
+    KeyValue
+    Manifest
+    MetricColumn
+    Moments
+    Outputs
+    Report
+    ReportOptions
+    RescoreRequest
+    Rescored
+    Results
+    Side
+    Statistics
+    StatisticsOptions
+    Study
+    StudyError
+    Table
+    diff
+    record_batch
+    resolve
+    ");
+}
+
+#[test]
+fn modules_are_reachable_and_no_promise() {
+    let text = lib();
+    let lines: Vec<&str> = text.lines().collect();
+    let modules: Vec<usize> = (0..lines.len()).filter(|at| lines[*at].starts_with("pub mod ")).collect();
+    assert!(modules.len() > 10, "the rooms are modules of the library");
+    for at in modules {
+        assert_eq!(lines[at - 1], "#[doc(hidden)]", "{}", lines[at]);
+    }
+}

@@ -1,0 +1,59 @@
+//! A study is of one state of its inputs: a file that changes between opening and reading gives an error, never a mixture.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use mirrorstats::trace::write::OptionalColumns;
+use mirrorstats::{ReportOptions, Study, StudyError};
+
+use crate::harness::traces::{episode, write_trace};
+
+fn trace(folder: &Path, name: &str, episodes: usize) -> PathBuf {
+    let path = folder.join(name);
+    let named = |at| episode(&format!("{name}-{at}"), vec![mirrorstats::trace::episode::Step::default(); 3]);
+    write_trace(&path, &(0..episodes).map(named).collect::<Vec<_>>(), OptionalColumns::NONE);
+    path
+}
+
+/// What a study of two traces says after `change` was done to the second one.
+fn after(change: impl Fn(&Path)) -> [Result<(), StudyError>; 3] {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = [trace(folder.path(), "a.parquet", 2), trace(folder.path(), "b.parquet", 2)];
+    let study = Study::open(paths.iter().map(|path| path.to_str().unwrap())).unwrap();
+    assert_eq!(study.score().unwrap().episodes.len(), 4);
+    change(&paths[1]);
+    let options = ReportOptions { figures: false, ..Default::default() };
+    [study.score().map(drop), study.cells().map(drop), study.report(&options).map(drop)]
+}
+
+#[track_caller]
+fn assert_changed(answers: [Result<(), StudyError>; 3]) {
+    for answer in answers {
+        match answer.unwrap_err() {
+            StudyError::Changed { name } => assert!(name.ends_with("b.parquet"), "{name}"),
+            other => panic!("{other}"),
+        }
+    }
+}
+
+#[test]
+fn a_file_that_was_replaced_is_an_error() {
+    assert_changed(after(|path| {
+        let other = trace(path.parent().unwrap(), "c.parquet", 3);
+        fs::rename(other, path).unwrap();
+    }));
+}
+
+#[test]
+fn a_file_that_was_written_to_is_an_error() {
+    assert_changed(after(|path| {
+        let mut bytes = fs::read(path).unwrap();
+        bytes.extend(b"more");
+        fs::write(path, bytes).unwrap();
+    }));
+}
+
+#[test]
+fn a_file_that_is_gone_is_an_error() {
+    assert_changed(after(|path| fs::remove_file(path).unwrap()));
+}

@@ -1,9 +1,9 @@
 //! Legends: which model is which, and what signs mean; laid out by the measured widths of their texts.
 
 use super::frame::{Frame, Point, many};
-use super::ink::{Fill, Stroke};
 use super::label;
 use super::lettering::{self, Lettering, MARGIN, NAME_ROOM};
+use super::look::{Fill, Stroke};
 use super::marker;
 use super::palette::{ModelStyle, PALETTE};
 use super::panels::Panels;

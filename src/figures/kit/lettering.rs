@@ -1,7 +1,7 @@
 //! How text looks, and its sizes: few, so that a reader sees at once what belongs together.
 
 use super::font::{self, Weight};
-use super::ink::Rgb;
+use super::look::Rgb;
 use super::palette::PALETTE;
 
 /// The empty rim of every figure, px.

@@ -5,7 +5,7 @@
 
 use std::fmt::Write as _;
 
-use super::svg::escaped;
+use super::ink::escaped;
 use crate::base::escape::visible;
 use crate::base::number;
 

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use super::frame::{Point, many};
-use super::ink::Fill;
+use super::look::Fill;
 use super::palette::{ModelStyle, PALETTE, Shape};
 use super::sheet::Sheet;
 

@@ -1,9 +1,9 @@
 //! The drawing kit: everything that figures are made of, and nothing that knows what they show.
 //!
-//! From the ground up: `frame`, `ink`, `font`, `palette` and `lettering` (places, looks, what is embedded), `svg`, `mark`
-//! and `sheet` (verbs to draw with), `marker`, `label`, `tiles`, `dodge` (parts), `roster`, `legend`, `panels` and `plot`
-//! (arrangements), `picture`, `format` and `convert` (a drawing as bytes of SVG, PNG, PDF; the last two with the feature
-//! `raster`).
+//! From the ground up: `frame`, `look`, `font`, `palette` and `lettering` (places, looks, what is embedded), `ink` (SVG
+//! under plotters), `mark` and `sheet` (verbs to draw with), `marker`, `label`, `tiles`, `dodge` (parts), `roster`,
+//! `legend`, `panels` and `plot` (arrangements), `picture`, `format` and `convert` (a drawing as bytes of SVG, PNG, PDF;
+//! the last two with the feature `raster`).
 
 #[cfg(feature = "raster")]
 pub mod convert;
@@ -22,16 +22,16 @@ pub(super) mod tiles;
 
 mod frame;
 mod ink;
+mod look;
 mod mark;
 mod plot;
 mod roster;
 mod sheet;
-mod svg;
 
 pub(super) use frame::{Frame, Point, many};
-pub(super) use ink::{Fill, Rgb, Stroke};
 pub(super) use legend::{Legend, Swatch};
 pub(super) use lettering::{Align, FULL_WIDTH, Lettering, MARGIN, NAME_ROOM, leading};
+pub(super) use look::{Fill, Rgb, Stroke};
 pub(super) use mark::Mark;
 pub(super) use marker::polar;
 pub(super) use palette::{PALETTE, text_on};

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use serde::Deserialize;
 
 use super::frame::many;
-use super::ink::{Rgb, Stroke};
+use super::look::{Rgb, Stroke};
 
 /// The palette of all figures.
 pub static PALETTE: LazyLock<Palette> = LazyLock::new(|| {

@@ -2,19 +2,24 @@
 
 use std::ops::Range;
 
+use plotters::coord::CoordTranslate;
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::ranged1d::{BoldPoints, Ranged};
+use plotters::coord::types::RangedCoordf64;
+
 use super::frame::{Frame, Point};
-use super::ink::Stroke;
+use super::ink::UNITS_PER_PX;
 use super::lettering::{self, Align};
+use super::look::Stroke;
 use super::palette::PALETTE;
 use super::sheet::Sheet;
+use crate::base::number::Decimal;
 
 /// Two linear axes over a frame; y grows upwards.
-#[derive(Clone, Debug)]
 pub struct Plot {
     /// Where it lies.
     pub frame: Frame,
-    x: Range<f64>,
-    y: Range<f64>,
+    spec: Cartesian2d<RangedCoordf64, RangedCoordf64>,
 }
 
 /// A place on an axis.
@@ -28,14 +33,16 @@ pub struct Tick {
 
 impl Plot {
     /// Axes over `frame`.
-    pub const fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
-        Self { frame, x, y }
+    pub fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
+        let across = units(frame.left)..units(frame.right());
+        let upwards = units(frame.bottom())..units(frame.top);
+        Self { frame, spec: Cartesian2d::new(x, y, (across, upwards)) }
     }
 
     /// The place of a pair of values.
     pub fn at(&self, x: f64, y: f64) -> Point {
-        let Frame { left, top, .. } = self.frame;
-        (place(&self.x, x, [left, self.frame.right()]), place(&self.y, y, [self.frame.bottom(), top]))
+        let (x, y) = self.spec.translate(&(x, y));
+        (f64::from(x) / UNITS_PER_PX, f64::from(y) / UNITS_PER_PX)
     }
 
     /// Upright grid lines, with numbers below the plot.
@@ -81,28 +88,20 @@ pub fn rate_ticks() -> Vec<Tick> {
     [(0.0, "0"), (0.25, ""), (0.5, "0.5"), (0.75, ""), (1.0, "1")].map(tick).into()
 }
 
-/// At most `most` whole numbers from 0 to `last`, 1, 2 or 5 times a power of ten apart.
-pub fn whole_ticks(last: u32, most: u32) -> Vec<Tick> {
-    let powers = std::iter::successors(Some(1_u32), |power| power.checked_mul(10));
-    let steps = powers.flat_map(|power| [1, 2, 5].map(|times| power.saturating_mul(times)));
-    let step = steps.into_iter().find(|step| last / step < most).unwrap_or(u32::MAX);
-    (0..=last / step).map(|at| Tick { at: f64::from(at * step), text: (at * step).to_string() }).collect()
-}
-
-/// Where a value of `range` lies between two ends, in whole hundredths of a px, away from the first end only where the
-/// value is.
-fn place(range: &Range<f64>, value: f64, ends: [f64; 2]) -> f64 {
-    const STEPS_PER_PX: f64 = 100.0;
-    // What a float falls short of a whole step.
-    const SLACK: f64 = 1e-3;
-    let [from, to] = ends.map(|px| (px * STEPS_PER_PX).round());
-    let along = (to - from) * ((value - range.start) / (range.end - range.start));
-    let steps = if to > from { (along + SLACK).floor() } else { (along - SLACK).ceil() };
-    (from + steps) / STEPS_PER_PX
+/// At most `most` whole numbers from 0 to `last`, at even distances.
+pub fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
+    let axis = RangedCoordf64::from(0.0..f64::from(last));
+    let whole = axis.key_points(BoldPoints(most)).into_iter().filter(|at| at.fract() == 0.0);
+    whole.filter_map(|at| Some(Tick { at, text: Decimal::of_float(at, 0)?.to_string() })).collect()
 }
 
 fn grid() -> Stroke {
     Stroke::solid(PALETTE.surface.rule, 0.7)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "`as` clamps, and sheets are small")]
+fn units(px: f64) -> i32 {
+    (px * UNITS_PER_PX).round() as i32
 }
 
 #[cfg(test)]

@@ -1,29 +1,37 @@
-//! The sheet a figure is drawn on: a few verbs in px that write SVG elements, and groups that carry values.
+//! The sheet a figure is drawn on: a few verbs in px over plotters' elements, and groups that carry values.
 
+use std::cell::RefCell;
 use std::fmt::Write as _;
+use std::rc::Rc;
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use plotters::coord::Shift;
+use plotters::drawing::DrawingArea;
+use plotters::element::{Circle, Drawable, PathElement, PointCollection, Polygon, Rectangle, Text};
+use plotters::style::text_anchor::{HPos, Pos, VPos};
+use plotters::style::{Color as _, FontDesc, FontFamily, FontStyle, FontTransform, RGBColor, ShapeStyle, TextStyle};
+use plotters_backend::BackendCoord;
 
 use super::font::{self, Weight};
 use super::frame::{Frame, Point};
-use super::ink::{Fill, Rgb, Stroke};
+use super::ink::{Ink, UNITS_PER_PX, escaped};
 use super::lettering::{Align, Lettering};
+use super::look::{Fill, Rgb, Stroke};
 use super::mark::Mark;
-use super::svg::{self, escaped, px};
 use crate::base::format::fixed;
 
 /// A figure in the making. What lies further down than its final height must not be drawn.
 #[derive(Debug)]
 pub struct Sheet {
-    body: String,
+    ink: Rc<RefCell<Ink>>,
     width: f64,
 }
 
 impl Sheet {
     /// An empty sheet, `width` px wide.
-    pub const fn new(width: f64) -> Self {
-        Self { body: String::new(), width }
+    pub fn new(width: f64) -> Self {
+        Self { ink: Rc::default(), width }
     }
 
     /// The sheet's width, px.
@@ -33,64 +41,44 @@ impl Sheet {
 
     /// A line through these points.
     pub fn line(&mut self, points: &[Point], stroke: Stroke) {
-        let _ = writeln!(self.body, "<path d=\"{}\"{}/>", svg::path(points), svg::stroke(stroke));
+        let points: Vec<_> = points.iter().map(|&at| lattice(at)).collect();
+        let style =
+            ShapeStyle { color: RGBColor::from(stroke.color).into(), filled: false, stroke_width: units(stroke.width) };
+        self.put(&PathElement::new(points, style), dash_attribute(stroke));
     }
 
     /// A filled polygon.
     pub fn polygon(&mut self, corners: &[Point], fill: Fill) {
-        let _ = writeln!(self.body, "<path d=\"{}Z\"{}/>", svg::path(corners), svg::fill(fill));
+        let corners: Vec<_> = corners.iter().map(|&at| lattice(at)).collect();
+        self.put(&Polygon::new(corners, shape(fill)), outline_attributes(fill));
     }
 
     /// A filled rectangle.
     pub fn rectangle(&mut self, frame: Frame, fill: Fill) {
-        let [x, y] = [frame.left, frame.top].map(px);
-        let [width, height] = [svg::between(frame.left, frame.right()), svg::between(frame.top, frame.bottom())];
-        let paint = svg::fill(fill);
-        let _ = writeln!(self.body, "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"{paint}/>");
+        let corners = [lattice((frame.left, frame.top)), lattice((frame.right(), frame.bottom()))];
+        self.put(&Rectangle::new(corners, shape(fill)), outline_attributes(fill));
     }
 
     /// Filled rectangles side by side, from the same top and of the same height: pairs of left and right ends,
     /// ascending. Many of them take little room in the file.
     pub fn bars(&mut self, ends: &[(f64, f64)], top: f64, height: f64, color: Rgb) {
-        let Some(&(first, _)) = ends.first() else { return };
-        let mut path = format!("M{} {}", px(first), px(top + height / 2.0));
-        let mut at = first;
-        for (index, &(left, right)) in ends.iter().enumerate() {
-            if index > 0 {
-                let _ = write!(path, "m{} 0", svg::between(at, left));
-            }
-            let _ = write!(path, "h{}", svg::between(left, right));
-            at = right;
-        }
-        let _ = writeln!(self.body, "<path d=\"{path}\" stroke=\"{color}\" stroke-width=\"{}\"/>", px(height));
+        let ends: Vec<_> =
+            ends.iter().map(|&(left, right)| (lattice((left, top)).0, lattice((right, top)).0)).collect();
+        let middle = lattice((0.0, top + height / 2.0)).1;
+        self.ink.borrow_mut().bars(&ends, middle, units(height), color);
     }
 
     /// A filled circle.
-    pub fn circle(&mut self, (x, y): Point, radius: f64, fill: Fill) {
-        let (x, y, radius, paint) = (px(x), px(y), px(radius), svg::fill(fill));
-        let _ = writeln!(self.body, "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"{paint}/>");
+    pub fn circle(&mut self, center: Point, radius: f64, fill: Fill) {
+        self.put(&Circle::new(lattice(center), units(radius), shape(fill)), outline_attributes(fill));
     }
 
     /// One line of text, the middle of its capitals at the height of `at`.
     pub fn text(&mut self, at: Point, text: &str, lettering: Lettering) {
         let drop = font::drop_to_baseline(lettering.size);
-        let (x, y) = if lettering.upwards { (at.0 + drop, at.1) } else { (at.0, at.1 + drop) };
-        let (x, y) = (px(x), px(y));
-        let weight = match lettering.weight {
-            Weight::Regular => "",
-            Weight::Semibold => " font-weight=\"600\"",
-        };
-        let anchor = match lettering.align {
-            Align::Start => "",
-            Align::Middle => " text-anchor=\"middle\"",
-            Align::End => " text-anchor=\"end\"",
-        };
-        let turn = if lettering.upwards { format!(" transform=\"rotate(-90 {x} {y})\"") } else { String::new() };
-        let (size, color, text) = (lettering.size, lettering.color, escaped(&font::drawable(text)));
-        let _ = writeln!(
-            self.body,
-            "<text x=\"{x}\" y=\"{y}\" font-size=\"{size}\"{weight}{anchor}{turn} fill=\"{color}\">{text}</text>"
-        );
+        let at = if lettering.upwards { (at.0 + drop, at.1) } else { (at.0, at.1 + drop) };
+        let style = text_style(lettering);
+        self.put(&Text::new(font::drawable(text), lattice(at), style), String::new());
     }
 
     /// A picture that fills a frame; it is carried along in the file.
@@ -98,7 +86,7 @@ impl Sheet {
         let [left, top, width, height] =
             [frame.left, frame.top, frame.width, frame.height].map(|length| fixed(Some(length), 2));
         let _ = writeln!(
-            self.body,
+            self.ink.borrow_mut().body,
             "<image x=\"{left}\" y=\"{top}\" width=\"{width}\" height=\"{height}\" \
              preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
             STANDARD.encode(png)
@@ -107,20 +95,31 @@ impl Sheet {
 
     /// What `draw` draws, as one group that carries the mark's title and values.
     pub fn mark(&mut self, mark: &Mark, draw: impl FnOnce(&mut Self)) {
-        self.body.push_str(&mark.opening());
+        self.ink.borrow_mut().body.push_str(&mark.opening());
         draw(self);
-        self.body.push_str("</g>\n");
+        self.ink.borrow_mut().body.push_str("</g>\n");
     }
 
     /// The SVG, cut at `height`; `title` and `description` are for those who do not see it.
     pub fn finish(self, height: f64, title: &str, description: &str) -> Drawing {
+        let body = std::mem::take(&mut self.ink.borrow_mut().body);
         Drawing {
             width: self.width.ceil(),
             height: height.ceil(),
             title: title.into(),
             description: description.into(),
-            body: self.body,
+            body,
         }
+    }
+
+    fn put<E>(&mut self, element: &E, extra: String)
+    where
+        for<'a> &'a E: PointCollection<'a, BackendCoord>,
+        E: Drawable<Ink>,
+    {
+        self.ink.borrow_mut().extra = extra;
+        let area: DrawingArea<Ink, Shift> = (&self.ink).into();
+        area.draw(element).expect("writing to a string does not fail, and nobody else holds the ink");
     }
 }
 
@@ -160,6 +159,49 @@ impl Drawing {
         svg.push_str("</svg>\n");
         svg
     }
+}
+
+/// px to the whole numbers of plotters.
+#[expect(clippy::cast_possible_truncation, reason = "`as` clamps, and sheets are small")]
+fn lattice((x, y): Point) -> BackendCoord {
+    let place = |px: f64| (px * UNITS_PER_PX).round() as i32;
+    (place(x), place(y))
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps, and sizes are small")]
+fn units(px: f64) -> u32 {
+    (px * UNITS_PER_PX).round() as u32
+}
+
+fn shape(fill: Fill) -> ShapeStyle {
+    ShapeStyle { color: RGBColor::from(fill.color).mix(fill.opacity), filled: true, stroke_width: 0 }
+}
+
+fn text_style(lettering: Lettering) -> TextStyle<'static> {
+    let style = match lettering.weight {
+        Weight::Regular => FontStyle::Normal,
+        Weight::Semibold => FontStyle::Bold,
+    };
+    let turn = if lettering.upwards { FontTransform::Rotate270 } else { FontTransform::None };
+    let font = FontDesc::new(FontFamily::Name(font::FAMILY), lettering.size * UNITS_PER_PX, style).transform(turn);
+    let h_pos = match lettering.align {
+        Align::Start => HPos::Left,
+        Align::Middle => HPos::Center,
+        Align::End => HPos::Right,
+    };
+    let color = RGBColor::from(lettering.color).to_backend_color();
+    TextStyle { font, color, pos: Pos::new(h_pos, VPos::Center) }
+}
+
+fn dash_attribute(stroke: Stroke) -> String {
+    let lengths: Vec<_> = stroke.dash.iter().map(f64::to_string).collect();
+    if lengths.is_empty() { String::new() } else { format!(" stroke-dasharray=\"{}\"", lengths.join(" ")) }
+}
+
+fn outline_attributes(fill: Fill) -> String {
+    let Some(stroke) = fill.outline else { return String::new() };
+    let dash = dash_attribute(stroke);
+    format!(" stroke=\"{}\" stroke-width=\"{}\"{dash}", stroke.color, stroke.width)
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! Cells of a heat map: a value on its colour, hatched where undefined, crossed where there is no episode.
 
 use super::frame::{Frame, Point, many};
-use super::ink::{Fill, Rgb, Stroke};
 use super::label;
 use super::lettering::{self, Align, Lettering};
+use super::look::{Fill, Rgb, Stroke};
 use super::palette::{PALETTE, text_on};
 use super::sheet::Sheet;
 

@@ -1,6 +1,6 @@
 //! What traces hold: episodes, steps, who and what, which cells of the grid are filled, and the files themselves.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::num::NonZeroUsize;
 
@@ -108,21 +108,15 @@ pub struct FileInfo {
 /// # Errors
 /// The first fault of the traces, or a file that cannot be read.
 pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
-    let (mut cells, mut episodes) = (Cells::new(), vec![0; set.files().len()]);
+    let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
     let statuses: Vec<String> = set.column(REPLY_STATUS).map(|_| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
     let summary = set.scan(
         &Projection { unchecked: statuses, ..Projection::default() },
         threads,
-        |batch| Ok::<_, TraceError>((cells_of(&batch), ReplyCounts::of_batch(&batch))),
-        |((file, found), counts)| {
-            for (cell, pairs) in found {
-                episodes[file] += pairs.values().sum::<u64>();
-                let known = cells.entry(cell).or_default();
-                for (pair, count) in pairs {
-                    *known.entry(pair).or_default() += count;
-                }
-            }
+        |batch| Ok::<_, TraceError>((Keys::of(&batch), ReplyCounts::of_batch(&batch))),
+        |(keys, counts)| {
+            tally.add(keys);
             if let Some(replies) = &mut replies {
                 replies.merge(&counts);
             }
@@ -130,7 +124,7 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
         },
     )?;
     let mut files = Vec::with_capacity(set.files().len());
-    let counted: Vec<(&TraceFile, u64)> = set.files().iter().zip(episodes).collect();
+    let counted: Vec<(&TraceFile, u64)> = set.files().iter().zip(tally.files.iter().copied()).collect();
     in_order(
         threads,
         &counted,
@@ -140,6 +134,7 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
             Ok::<_, TraceError>(())
         },
     )?;
+    let cells = tally.cells();
     let pairs: BTreeSet<SeedRun> = cells.values().flat_map(|pairs| pairs.keys()).copied().collect();
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
@@ -157,23 +152,75 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
     })
 }
 
+/// The episodes of a batch: experiments and models by their place among the distinct ones.
+struct Keys {
+    file: usize,
+    /// Each experiment with each model that it has here.
+    cells: Vec<(String, String)>,
+    /// The cell, seed and run of each episode.
+    episodes: Vec<(usize, SeedRun)>,
+}
+
+impl Keys {
+    fn of(batch: &EpisodeBatch) -> Self {
+        let column = |name| batch.episodes.column_by_name(name).expect("a scan delivers the columns of an episode");
+        let [experiments, models] = ["experiment", "model"].map(|name| column(name).as_dictionary::<Int32Type>());
+        let [seeds, runs] = ["seed", "run"].map(|name| column(name).as_primitive::<Int64Type>().values());
+        let text = |column: &DictionaryArray<Int32Type>, row| {
+            let key = column.key(row);
+            key.map_or_else(String::new, |key| column.values().as_string::<i32>().value(key).to_owned())
+        };
+        let (mut cells, mut known) = (Vec::new(), HashMap::new());
+        let episode = |row: usize| {
+            let cell = *known.entry((experiments.key(row), models.key(row))).or_insert_with(|| {
+                cells.push((text(experiments, row), text(models, row)));
+                cells.len() - 1
+            });
+            (cell, SeedRun { seed: seeds[row], run: runs[row] })
+        };
+        let episodes = (0..batch.episodes.num_rows()).map(episode).collect();
+        Self { file: batch.origin.file, cells, episodes }
+    }
+}
+
+#[derive(Default)]
+struct Tally {
+    files: Vec<u64>,
+    /// The place of each experiment with each model.
+    places: HashMap<(String, String), usize>,
+    /// The seed and run of each episode there.
+    episodes: Vec<Vec<SeedRun>>,
+}
+
 /// How often each experiment with each model has each seed and run.
 type Cells = BTreeMap<(String, String), BTreeMap<SeedRun, u64>>;
 
-/// The cells of a batch, and its file.
-fn cells_of(batch: &EpisodeBatch) -> (usize, Cells) {
-    let column = |name| batch.episodes.column_by_name(name).expect("a scan delivers the columns of an episode");
-    let [experiments, models] = ["experiment", "model"].map(|name| column(name).as_dictionary::<Int32Type>());
-    let [seeds, runs] = ["seed", "run"].map(|name| column(name).as_primitive::<Int64Type>().values());
-    let text = |column: &DictionaryArray<Int32Type>, row| {
-        column.key(row).map_or_else(String::new, |key| column.values().as_string::<i32>().value(key).to_owned())
-    };
-    let mut cells = Cells::new();
-    for row in 0..batch.episodes.num_rows() {
-        let pairs = cells.entry((text(experiments, row), text(models, row))).or_default();
-        *pairs.entry(SeedRun { seed: seeds[row], run: runs[row] }).or_default() += 1;
+impl Tally {
+    fn add(&mut self, Keys { file, cells, episodes }: Keys) {
+        self.files[file] += episodes.len() as u64;
+        let places: Vec<usize> = cells.into_iter().map(|cell| self.place(cell)).collect();
+        for (cell, pair) in episodes {
+            self.episodes[places[cell]].push(pair);
+        }
     }
-    (batch.origin.file, cells)
+
+    fn place(&mut self, cell: (String, String)) -> usize {
+        *self.places.entry(cell).or_insert_with(|| {
+            self.episodes.push(Vec::new());
+            self.episodes.len() - 1
+        })
+    }
+
+    fn cells(self) -> Cells {
+        let Self { places, mut episodes, .. } = self;
+        let mut counted = |place: usize| {
+            let mut pairs = std::mem::take(&mut episodes[place]);
+            pairs.sort_unstable();
+            let same = pairs.chunk_by(|a, b| a == b);
+            same.map(|same| (same[0], same.len() as u64)).collect()
+        };
+        places.into_iter().map(|(cell, place)| (cell, counted(place))).collect()
+    }
 }
 
 fn coverage(

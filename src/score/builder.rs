@@ -3,7 +3,7 @@
 //! Rule: values stay in columns. Texts are interned, so that only small integers are sorted; ids are kept once, in the
 //! order in which they come, and the sorted column points at them.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use arrow::array::{
     Array, ArrayRef, AsArray as _, BooleanArray, BooleanBufferBuilder, DictionaryArray, Int32Array, Int64Array,
@@ -14,7 +14,8 @@ use arrow::datatypes::{ArrowNativeType as _, DataType, Float64Type, Int32Type, I
 
 use super::order::order;
 use super::table::{
-    EpisodeKeys, EpisodeTable, Header, KeyRef, LabelColumn, MetricColumn, MetricValues, TextColumn, narrow,
+    EpisodeKey, EpisodeKeys, EpisodeTable, Header, JoinError, KeyRef, LabelColumn, MetricColumn, MetricValues,
+    TextColumn, narrow,
 };
 use crate::trace::scan::EPISODE_COLUMNS;
 
@@ -202,6 +203,51 @@ fn shown(column: &ArrayRef, row: usize) -> Option<String> {
         DataType::Int64 => Some(column.as_primitive::<Int64Type>().value(row).to_string()),
         DataType::Float64 => Some(column.as_primitive::<Float64Type>().value(row).to_string()),
         other => unreachable!("a scan gives no column of {other}"),
+    }
+}
+
+impl EpisodeTable {
+    /// The rows of two tables, in the order of their keys.
+    ///
+    /// # Errors
+    /// When they differ in their definitions or columns, or have an episode in common.
+    pub fn joined(self, other: &Self) -> Result<Self, JoinError> {
+        if self.catalog.hash != other.catalog.hash {
+            return Err(JoinError::Definitions(self.catalog.name, other.catalog.name.clone()));
+        }
+        let columns = |table: &Self| {
+            let Header { labels, metrics, .. } = table.header();
+            labels.into_iter().chain(metrics).collect::<Vec<_>>()
+        };
+        if columns(&self) != columns(other) {
+            return Err(JoinError::Columns(columns(&self).join(", "), columns(other).join(", ")));
+        }
+        let ids: HashSet<&str> = self.keys.iter().map(|key| key.episode_id).collect();
+        if let Some(twice) = other.keys.iter().find(|key| ids.contains(key.episode_id)) {
+            return Err(JoinError::Episode(twice.episode_id.to_owned()));
+        }
+        let mut builder = TableBuilder::new(self.header());
+        for table in [&self, other] {
+            (0..table.len()).for_each(|row| builder.push_row(table, row));
+        }
+        Ok(builder.finish())
+    }
+}
+
+impl FromIterator<EpisodeKey> for EpisodeKeys {
+    /// Keys in the order in which they come.
+    fn from_iter<I: IntoIterator<Item = EpisodeKey>>(keys: I) -> Self {
+        let mut columns = KeyBuilder::default();
+        keys.into_iter().for_each(|key| columns.push(key.as_ref()));
+        columns.finish()
+    }
+}
+
+impl<T: AsRef<str>> FromIterator<Option<T>> for TextColumn {
+    fn from_iter<I: IntoIterator<Item = Option<T>>>(texts: I) -> Self {
+        let mut column = TextBuilder::default();
+        texts.into_iter().for_each(|text| column.push(text.as_ref().map(AsRef::as_ref)));
+        column.finish()
     }
 }
 

@@ -374,7 +374,6 @@ pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::score::timeline::timelines;
     use crate::trace::inputs;
 
     #[test]
@@ -392,7 +391,7 @@ mod tests {
             assert_eq!(*table, score(&traces, definitions, outputs.labels, threads).unwrap());
         }
         assert_eq!(found.tables.map(|table| table.len()), [280, 840]);
-        assert_eq!(found.timelines, timelines(&traces, &seed, threads).unwrap());
+        assert_eq!(found.timelines, score_each(&traces, [&seed], outputs, threads).unwrap().timelines);
         assert_eq!(found.timelines.unwrap().len(), 280);
     }
 }

@@ -11,7 +11,6 @@ use arrow::buffer::{BooleanBuffer, NullBuffer};
 use arrow::datatypes::Int64Type;
 use arrow::error::ArrowError;
 
-use super::vectors::{nulls_of, truths};
 use crate::metric::plan::{Aggregate, Comparison};
 use crate::trace::bits::{self, Bits};
 
@@ -299,5 +298,22 @@ fn inside(comparison: Comparison, moment: i64, length: usize) -> Range<usize> {
         Comparison::Greater => until..length,
         Comparison::GreaterEqual => before..length,
         Comparison::Equal | Comparison::NotEqual => before..until,
+    }
+}
+
+/// The set bits where a truth value is true, null counting as not.
+pub(super) fn truths(values: &BooleanArray) -> BooleanBuffer {
+    match values.nulls() {
+        None => values.values().clone(),
+        Some(valid) => values.values() & valid.inner(),
+    }
+}
+
+/// A null buffer, if any value is null.
+pub(super) fn nulls_of(valid: &[bool]) -> Option<NullBuffer> {
+    if valid.iter().all(|&valid| valid) {
+        None
+    } else {
+        Some(NullBuffer::new(BooleanBuffer::new(bits::pack(valid).into(), 0, valid.len())))
     }
 }

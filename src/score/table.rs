@@ -1,6 +1,5 @@
 //! The episode table: one row per episode, its keys and one integer per metric, in Arrow columns.
 
-use std::collections::HashSet;
 use std::ops::Range;
 
 use arrow::array::{
@@ -8,7 +7,6 @@ use arrow::array::{
 };
 use arrow::compute::take;
 
-use super::builder::TableBuilder;
 use crate::metric::catalog::Catalog;
 
 /// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
@@ -138,32 +136,6 @@ impl EpisodeTable {
         self.len() == 0
     }
 
-    /// The rows of two tables, in the order of their keys.
-    ///
-    /// # Errors
-    /// When they differ in their definitions or columns, or have an episode in common.
-    pub fn joined(self, other: &Self) -> Result<Self, JoinError> {
-        if self.catalog.hash != other.catalog.hash {
-            return Err(JoinError::Definitions(self.catalog.name, other.catalog.name.clone()));
-        }
-        let columns = |table: &Self| {
-            let Header { labels, metrics, .. } = table.header();
-            labels.into_iter().chain(metrics).collect::<Vec<_>>()
-        };
-        if columns(&self) != columns(other) {
-            return Err(JoinError::Columns(columns(&self).join(", "), columns(other).join(", ")));
-        }
-        let ids: HashSet<&str> = self.keys.iter().map(|key| key.episode_id).collect();
-        if let Some(twice) = other.keys.iter().find(|key| ids.contains(key.episode_id)) {
-            return Err(JoinError::Episode(twice.episode_id.to_owned()));
-        }
-        let mut builder = TableBuilder::new(self.header());
-        for table in [&self, other] {
-            (0..table.len()).for_each(|row| builder.push_row(table, row));
-        }
-        Ok(builder.finish())
-    }
-
     /// The rows at these positions, in this order.
     #[must_use]
     pub fn taken(&self, rows: &[usize]) -> Self {
@@ -242,16 +214,6 @@ impl EpisodeKeys {
     /// The keys, in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = KeyRef<'_>> + Clone {
         (0..self.len()).map(|row| self.get(row))
-    }
-
-    /// The row of a key, where the keys ascend.
-    pub fn position(&self, key: KeyRef<'_>) -> Option<usize> {
-        let (mut low, mut high) = (0, self.len());
-        while low < high {
-            let middle = low + (high - low) / 2;
-            if self.get(middle) < key { low = middle + 1 } else { high = middle }
-        }
-        (low < self.len() && self.get(low) == key).then_some(low)
     }
 
     pub(super) fn taken(&self, rows: &UInt32Array) -> Self {
@@ -392,22 +354,5 @@ impl MetricColumn {
 impl PartialEq for MetricColumn {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name && self.iter().eq(other.iter())
-    }
-}
-
-impl FromIterator<EpisodeKey> for EpisodeKeys {
-    /// Keys in the order in which they come.
-    fn from_iter<I: IntoIterator<Item = EpisodeKey>>(keys: I) -> Self {
-        let mut columns = super::builder::KeyBuilder::default();
-        keys.into_iter().for_each(|key| columns.push(key.as_ref()));
-        columns.finish()
-    }
-}
-
-impl<T: AsRef<str>> FromIterator<Option<T>> for TextColumn {
-    fn from_iter<I: IntoIterator<Item = Option<T>>>(texts: I) -> Self {
-        let mut column = super::builder::TextBuilder::default();
-        texts.into_iter().for_each(|text| column.push(text.as_ref().map(AsRef::as_ref)));
-        column.finish()
     }
 }

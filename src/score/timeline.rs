@@ -3,21 +3,17 @@
 //! The moments are those of the definitions: the `let`s `visible` (a truth value a step), `sight`,
 //! `claim` and `done` (timesteps), and `answered` (whether the decision committed to a colour).
 
-use std::num::NonZeroUsize;
 use std::ops::RangeInclusive;
 
 use arrow::array::Array;
 
 use super::evaluate::Evaluated;
 use super::physical::{PhysicalPlan, StepId};
-use super::score_traces::{ScoreError, failed, projection, view};
-use super::segments::Segments;
+use super::segments::{Segments, truths};
 use super::table::{EpisodeKey, EpisodeKeys};
-use super::vectors::truths;
 use crate::metric::columns::{Level, Type};
 use crate::metric::definitions::Definitions;
 use crate::metric::plan::{NodeId, Plan};
-use crate::trace::open::TraceSet;
 use crate::trace::scan::EpisodeBatch;
 
 /// One episode along its time.
@@ -108,75 +104,10 @@ impl TimelineReader {
     }
 }
 
-/// For each of `episodes`, which ascend, whether its decision committed to a colour; `false` for those that the traces
-/// lack. Takes a byte per episode, whatever its length.
-///
-/// `None` where the definitions do not name `answered`.
-///
-/// # Errors
-/// As [`score`](super::score_traces::score).
-pub fn answered(
-    traces: &TraceSet,
-    definitions: &Definitions,
-    episodes: &EpisodeKeys,
-    threads: NonZeroUsize,
-) -> Result<Option<Vec<bool>>, ScoreError> {
-    let Some(node) = answered_node(definitions) else { return Ok(None) };
-    let (mut plan, logical) = (PhysicalPlan::default(), &definitions.plan);
-    let answered = plan.add_nodes(logical, [node])[0];
-    let filter = plan.add_nodes(logical, logical.filter).pop();
-    let projection = projection(traces, &[definitions], &plan, &[])?;
-    let mut found = vec![false; episodes.len()];
-    let work = |batch: EpisodeBatch| -> Result<Vec<usize>, ScoreError> {
-        let values = plan.evaluate(&view(&batch)).map_err(|source| failed(traces, &batch, source))?;
-        let holds = |step: StepId| truths(values.of(step).bools());
-        let committed = filter.map_or_else(|| holds(answered), |filter| &holds(answered) & &holds(filter));
-        let keys = EpisodeKeys::of_batch(&batch.episodes);
-        Ok(committed.set_indices().filter_map(|episode| episodes.position(keys.get(episode))).collect())
-    };
-    traces.scan(&projection, threads, work, |rows| {
-        for row in rows {
-            found[row] = true;
-        }
-        Ok(())
-    })?;
-    Ok(Some(found))
-}
-
 /// Timelines in the order of their keys.
 pub(super) fn in_key_order(mut timelines: Vec<Timeline>) -> Vec<Timeline> {
     timelines.sort_by(|a, b| a.key.cmp(&b.key));
     timelines
-}
-
-/// The timelines of all episodes that the definitions' filter keeps, in the order of their keys.
-///
-/// `None` where the definitions do not name the moments.
-///
-/// # Errors
-/// As [`score`](super::score_traces::score).
-pub fn timelines(
-    traces: &TraceSet,
-    definitions: &Definitions,
-    threads: NonZeroUsize,
-) -> Result<Option<Vec<Timeline>>, ScoreError> {
-    let mut plan = PhysicalPlan::default();
-    let Some(reader) = TimelineReader::of(&mut plan, definitions) else { return Ok(None) };
-    let projection = projection(traces, &[definitions], &plan, &[])?;
-    let mut found = Vec::new();
-    traces.scan(
-        &projection,
-        threads,
-        |batch| -> Result<Vec<Timeline>, ScoreError> {
-            let values = plan.evaluate(&view(&batch)).map_err(|source| failed(traces, &batch, source))?;
-            Ok(reader.timelines(&values, &batch))
-        },
-        |part| {
-            found.extend(part);
-            Ok(())
-        },
-    )?;
-    Ok(Some(in_key_order(found)))
 }
 
 impl Moments<StepId> {

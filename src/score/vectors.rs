@@ -293,19 +293,6 @@ impl Symbols {
     }
 }
 
-/// The set bits where a truth value is true, null counting as not.
-pub(super) fn truths(values: &BooleanArray) -> BooleanBuffer {
-    match values.nulls() {
-        None => values.values().clone(),
-        Some(valid) => values.values() & valid.inner(),
-    }
-}
-
-/// A null buffer, if any value is null.
-pub(super) fn nulls_of(valid: &[bool]) -> Option<NullBuffer> {
-    if valid.iter().all(|&valid| valid) { None } else { Some(NullBuffer::new(packed(valid))) }
-}
-
 #[cfg(test)]
 mod tests {
     use arrow::array::{Array, BooleanArray, DictionaryArray, Int32Array, StringArray, UInt8Array};

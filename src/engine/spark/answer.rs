@@ -7,6 +7,7 @@ use std::path::Path;
 use serde::Deserialize;
 use serde_json::Value;
 
+use super::cause::Failed;
 use super::{Job, SparkError, cause, check, request, source};
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeKey, EpisodeTable, Header};
@@ -50,13 +51,6 @@ pub(super) struct Fault {
     /// The place in [`check::rules`].
     rule: usize,
     found: String,
-}
-
-/// An error of Spark, by its name and in its words.
-#[derive(Debug, Deserialize)]
-pub(super) struct Failed {
-    pub(super) name: String,
-    pub(super) message: String,
 }
 
 impl Refused {

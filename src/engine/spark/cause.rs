@@ -1,12 +1,20 @@
 //! Spark's own errors, shortened to their cause: one line, without stack, plan, secrets or users in URIs.
 
-use super::answer::Failed;
+use serde::Deserialize;
+
 use super::setting::Setting;
 use super::source::without_user;
 use super::{Cluster, SparkError};
 
 /// The longest cause shown, in characters.
 const LONGEST: usize = 400;
+
+/// An error of Spark, by its name and in its words.
+#[derive(Debug, Deserialize)]
+pub(super) struct Failed {
+    pub(super) name: String,
+    pub(super) message: String,
+}
 
 /// What an error that the driver caught means.
 pub(super) fn of_failure(failed: &Failed, cluster: &Cluster) -> SparkError {

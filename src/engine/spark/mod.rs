@@ -15,6 +15,7 @@ mod answer;
 mod cause;
 mod check;
 mod locate;
+mod place;
 mod request;
 pub mod setting;
 pub mod source;
@@ -188,7 +189,7 @@ fn more_episodes(more: u64) -> String {
 /// # Errors
 /// See [`SparkError`]; nothing was written.
 pub fn score(job: Job<'_>, cluster: &Cluster) -> Result<EpisodeTable, SparkError> {
-    let place = submit::Place::new()?;
+    let place = place::Place::new()?;
     let request = Request::new(job, cluster, &place, None)?;
     finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
     answer::table(&place.table(), job)
@@ -208,7 +209,7 @@ pub fn write(job: Job<'_>, cluster: &Cluster, folder: &str) -> Result<Written, S
         source::local_uri(Path::new(folder))
             .map_err(|source| SparkError::System { what: format!("resolve `{folder}`"), source })?
     };
-    let place = submit::Place::new()?;
+    let place = place::Place::new()?;
     let request = Request::new(job, cluster, &place, Some(target))?;
     let done = finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
     Ok(Written { episodes: done.episodes })

@@ -3,8 +3,8 @@
 use serde::Serialize;
 use serde_json::{Map, Value};
 
+use super::place::Place;
 use super::source::{Group, Sources};
-use super::submit::Place;
 use super::{Cluster, Job, SparkError, check};
 use crate::metric::columns::Type;
 use crate::metric::plan::{Op, Plan};

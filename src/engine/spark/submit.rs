@@ -6,53 +6,18 @@
 use std::fs::{self, File};
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs as _};
-use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
-use tempfile::TempDir;
-
 use super::answer::Answer;
 use super::locate::{Spark, locate};
+use super::place::Place;
 use super::request::Request;
 use super::{Cluster, SparkError, cause};
-use crate::base::replace;
 
 const DRIVER: &str = include_str!("../../../assets/spark/driver.py");
 /// How long a master may take to accept a connection.
 const PATIENCE: Duration = Duration::from_secs(10);
-
-/// The private folder of one submission.
-pub(super) struct Place(TempDir);
-
-impl Place {
-    pub(super) fn new() -> Result<Self, SparkError> {
-        let mut folder = tempfile::Builder::new();
-        folder.prefix("mirrorstats-spark-");
-        // The request may hold secrets.
-        #[cfg(unix)]
-        folder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
-        let made = folder.tempdir().map_err(replace::without_name);
-        made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
-    }
-
-    /// Where the driver writes the table, if Spark does not.
-    pub(super) fn table(&self) -> PathBuf {
-        self.0.path().join("table.jsonl")
-    }
-
-    /// Where the driver writes what happened.
-    pub(super) fn answer(&self) -> PathBuf {
-        self.0.path().join("answer.json")
-    }
-
-    fn file(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, SparkError> {
-        let path = self.0.path().join(name);
-        fs::write(&path, bytes)
-            .map_err(|source| SparkError::System { what: "write a temporary file".into(), source })?;
-        Ok(path)
-    }
-}
 
 /// The child, which does not outlive its owner.
 struct Running(Child);
@@ -76,7 +41,7 @@ pub(super) fn submit(request: &Request, cluster: &Cluster, place: &Place) -> Res
     let spark = locate()?;
     reach(cluster)?;
     let request = serde_json::to_vec(request).map_err(|error| SparkError::Answer { words: error.to_string() })?;
-    let log = cluster.log.clone().unwrap_or_else(|| place.0.path().join("log"));
+    let log = cluster.log.clone().unwrap_or_else(|| place.log());
     let open = |what: &str| {
         let file = File::create(&log).and_then(|file| Ok((file.try_clone()?, file)));
         file.map_err(|source| SparkError::System { what: format!("write {what}"), source })

@@ -173,11 +173,6 @@ impl Journal {
         self.requests
     }
 
-    /// Whether the journal is played, not written.
-    pub fn is_cassette(&self) -> bool {
-        self.file.is_none()
-    }
-
     /// Adds a line and waits until it is on the disk.
     ///
     /// # Errors

@@ -33,9 +33,9 @@ impl Type {
 pub enum Level {
     /// The same value everywhere.
     Constant,
-    /// One value an episode.
+    /// One value per episode.
     Episode,
-    /// One value a step.
+    /// One value per step.
     Step,
 }
 

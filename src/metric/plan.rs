@@ -178,7 +178,7 @@ pub struct Output {
     pub name: String,
     /// A rate or a quantity.
     pub kind: Kind,
-    /// Its value an episode: a truth value for most rates, else an integer.
+    /// Its value per episode: a truth value for most rates, else an integer.
     pub node: NodeId,
 }
 

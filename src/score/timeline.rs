@@ -1,6 +1,6 @@
 //! When an agent looked, claimed and decided: an episode as a line of time, for rasters of gaze.
 //!
-//! The moments are those of the definitions: the `let`s `visible` (a truth value a step), `sight`,
+//! The moments are those of the definitions: the `let`s `visible` (a truth value per step), `sight`,
 //! `claim` and `done` (timesteps), and `answered` (whether the decision committed to a colour).
 
 use std::ops::RangeInclusive;

@@ -103,7 +103,7 @@ fn bad_usage_says_what_is_wrong_and_what_to_do() {
             (&["score", "a.parquet", "--metrics", ""], &["metrics are TSA, TTD"]),
             (&["score", "a.parquet", "--where", "TSAA = 1"], &["--where:1:1", "^^^^", "did you mean `TSA`?"]),
             (&["score", "a.parquet", "--where", "TSA ="], &["--where:1", "expected: an expression"]),
-            (&["score", "a.parquet", "--where", "mirror_visible"], &["one value a step", "any(...)"]),
+            (&["score", "a.parquet", "--where", "mirror_visible"], &["one value per step", "any(...)"]),
             (&["score", "a.parquet", "--where", "seed"], &["true or false", "an integer"]),
             (&["score", "a.parquet", "--where", "model = \"ant\""], &["unknown name `ant`", "'ant'"]),
             (

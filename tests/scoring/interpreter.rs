@@ -113,7 +113,7 @@ pub struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    /// A definition's value; `t` is the step for those that have one a step.
+    /// A definition's value; `t` is the step for those that have one per step.
     pub fn definition(self, at: usize, t: Option<usize>) -> Value {
         let definition = &self.definitions[at];
         match &definition.when {

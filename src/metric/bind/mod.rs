@@ -188,7 +188,7 @@ impl Binder<'_> {
         self.condition(written, "a filter of episodes").map(|bound| bound.node)
     }
 
-    /// A truth value an episode.
+    /// One truth value per episode.
     fn condition(&mut self, written: &Written, what: &str) -> Option<Bound> {
         let bound = self.written(written)?;
         let place = written.everywhere();

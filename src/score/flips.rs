@@ -9,10 +9,11 @@ use arrow::compute::kernels::{boolean, cmp};
 use arrow::datatypes::DataType;
 
 use super::error::EngineError;
-use super::evaluate::Evaluated;
+use super::evaluate::{BatchScores, Evaluated};
 use super::evidence::{Evidence, Reader, episode_ids};
 use super::physical::{Metric, PhysicalPlan, Scores};
-use super::score_traces::{ScoreError, collect, header, projection};
+use super::score_traces::{ScoreError, collect, header, projection, view};
+use super::segments::truths;
 use super::table::EpisodeTable;
 use crate::metric::definitions::Definitions;
 use crate::trace::open::TraceSet;
@@ -23,8 +24,8 @@ use crate::trace::scan::EpisodeBatch;
 pub struct ScoredPair {
     /// A table per definitions.
     pub tables: [EpisodeTable; 2],
-    /// Per definitions, what decided the metrics that differ, by episode: those episodes alone in which some differ,
-    /// whether a filter keeps them or not.
+    /// Per definitions, what decided the metrics that differ, by episode: those episodes alone in which some differ and
+    /// that both filters keep.
     pub evidence: [BTreeMap<String, Evidence>; 2],
 }
 
@@ -49,16 +50,16 @@ pub fn score_pair(
     let projection = projection(traces, &definitions, &wide, labels)?;
     let headers = definitions.map(|definitions| header(definitions, labels));
     let mut evidence = [BTreeMap::new(), BTreeMap::new()];
-    let read = |batch: &EpisodeBatch, values: &Evaluated| candidates.explained(batch, values, &readers);
     let tables = collect(
         traces,
         &projection,
         headers,
         threads,
         |batch| {
-            let values = plan.evaluate(&super::score_traces::view(batch))?;
-            let scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<_, _>>()?;
-            Ok((scores, read(batch, &values)?))
+            let values = plan.evaluate(&view(batch))?;
+            let scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
+            let explained = candidates.explained(batch, &values, &scores, &readers)?;
+            Ok((scores, explained))
         },
         |explained| {
             for (side, explained) in evidence.iter_mut().zip(explained) {
@@ -97,15 +98,18 @@ impl Candidates {
         &self,
         batch: &EpisodeBatch,
         values: &Evaluated,
+        scores: &[BatchScores],
         readers: &[Reader<'_>; 2],
     ) -> Result<[Vec<Evidence>; 2], EngineError> {
-        let Some(differs) = self.differs(values)?.filter(|differs| differs.true_count() > 0) else {
+        let Some(differs) = self.differs(values)? else { return Ok([Vec::new(), Vec::new()]) };
+        let kept = scores.iter().filter_map(|scores| scores.kept.as_ref());
+        let wanted = kept.fold(differs.values().clone(), |wanted, kept| &wanted & &truths(kept));
+        if wanted.count_set_bits() == 0 {
             return Ok([Vec::new(), Vec::new()]);
-        };
+        }
         let ids = episode_ids(batch);
         let of_side = |reader: &Reader<'_>| -> Result<Vec<Evidence>, EngineError> {
-            let rows = differs.values().set_indices();
-            rows.map(|row| reader.episode(batch, row, &ids[row])).collect()
+            wanted.set_indices().map(|row| reader.episode(batch, row, &ids[row])).collect()
         };
         Ok([of_side(&readers[0])?, of_side(&readers[1])?])
     }
@@ -130,7 +134,7 @@ fn distinct(old: &ArrayRef, new: &ArrayRef) -> BooleanArray {
 mod tests {
     use super::*;
     use crate::score::evidence::explain_each;
-    use crate::score::score_traces::{Request, definitions, score};
+    use crate::score::score_traces::{Request, definitions, score, trace_columns};
     use crate::trace::inputs;
 
     #[test]
@@ -142,6 +146,13 @@ mod tests {
         let [old, new] = ["paper", &inclusive].map(|name| definitions(&traces, &Request::of(name)).unwrap());
         let threads = NonZeroUsize::new(2).unwrap();
         let pair = score_pair(&traces, [&old, &new], &[], threads).unwrap();
+        let columns = trace_columns(&traces);
+        let filtered = [&old, &new].map(|all| all.clone().filtered("--where", "seed = 1", &columns).unwrap());
+        let kept = score_pair(&traces, [&filtered[0], &filtered[1]], &[], threads).unwrap();
+        let of_seed = |id: &str| pair.tables[0].keys.iter().any(|key| key.episode_id == id && key.seed == 1);
+        for (kept, all) in kept.evidence.iter().zip(&pair.evidence) {
+            assert!(kept.iter().eq(all.iter().filter(|(id, _)| of_seed(id))) && kept.len() < all.len());
+        }
         for (table, definitions) in pair.tables.iter().zip([&old, &new]) {
             assert_eq!(*table, score(&traces, definitions, &[], threads).unwrap());
         }

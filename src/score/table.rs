@@ -278,7 +278,8 @@ impl TextColumn {
         self.codes.is_valid(row).then(|| self.texts.value(self.codes.value(row) as usize))
     }
 
-    /// A number that stands for the text of a row; `None` for null. Equal texts may have several.
+    /// A number that stands for the text of a row; `None` for null. Equal texts have one number, but for episode ids, of
+    /// which each row has its own.
     ///
     /// # Panics
     /// For a row that is not there.

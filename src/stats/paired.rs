@@ -24,19 +24,6 @@ pub struct Pairs {
 }
 
 impl Pairs {
-    /// These pairs and one more.
-    #[must_use]
-    pub fn with(mut self, first: bool, second: bool) -> Self {
-        let count = match (first, second) {
-            (true, true) => &mut self.both,
-            (true, false) => &mut self.first_only,
-            (false, true) => &mut self.second_only,
-            (false, false) => &mut self.neither,
-        };
-        *count += 1;
-        self
-    }
-
     /// The number of pairs.
     pub fn n(self) -> u64 {
         self.both + self.first_only + self.second_only + self.neither

@@ -95,7 +95,7 @@ struct Entrant<'a> {
     outcomes: Outcomes,
 }
 
-/// A bit per seed and run of the experiment.
+/// One bit per seed and run of the experiment.
 struct Outcomes {
     /// Whether there is an episode, or several.
     present: BooleanBuffer,

@@ -55,7 +55,7 @@ pub enum RecordError {
         /// What failed.
         lost: Lost,
     },
-    /// The world, the eye or the disk failed, as they would for any episode.
+    /// The world, the camera or the disk failed, as they would for any episode.
     #[error(transparent)]
     Fatal(Box<dyn std::error::Error + Send + Sync>),
 }

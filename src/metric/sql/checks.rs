@@ -12,7 +12,8 @@ use crate::metric::plan::{Arithmetic, NodeId, Op, Plan};
 /// The statement that says whether numbers leave 64 bits: a row per episode, a column `g<node>` for each of `checked`,
 /// 1 where the node does and 0 elsewhere.
 ///
-/// For engines that wrap: what such a number is compared with is the same in doubles, which is far off then.
+/// For engines that wrap silently: each number is compared with the same computation in doubles, which a wrapped number is
+/// far from.
 ///
 /// # Errors
 /// As [`lower`](super::lower).

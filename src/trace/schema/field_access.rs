@@ -1,4 +1,4 @@
-//! How a column is had from an [`Episode`] and put into one: the field behind it, read and set as a [`Value`].
+//! Reads and sets the field of an [`Episode`] behind a column, as a [`Value`].
 
 use crate::trace::episode::{Action, Episode};
 

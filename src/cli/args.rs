@@ -52,6 +52,17 @@ impl ScoringArgs {
     }
 }
 
+/// How episodes are grouped into cells.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct GroupingArgs {
+    /// Group episodes by these columns, separated by commas [default: experiment,model, and condition where there are some]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
+    pub by: Option<Vec<String>>,
+    /// Let a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent
+    #[arg(long)]
+    pub pool: bool,
+}
+
 /// What computes the episode table.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct EngineArgs {

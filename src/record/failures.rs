@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::error::StoreError;
-use super::plan::Key;
+use super::plan::{Key, Subject};
 use crate::agent::Lost;
 use crate::base::replace::NewFile;
 
@@ -23,6 +23,9 @@ pub struct LostEpisode {
     pub episode_id: String,
     /// The model's name as shown in tables.
     pub model: String,
+    /// The condition; absent for the default one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
     /// The experiment, E1 to E5.
     pub experiment: String,
     /// The block of runs.
@@ -39,10 +42,11 @@ pub struct LostEpisode {
 
 impl LostEpisode {
     /// The episode of a key, lost at this step.
-    pub fn of(key: Key, model: &str, step: Option<i32>, lost: Lost) -> Self {
+    pub fn of(key: Key, subject: &Subject, step: Option<i32>, lost: Lost) -> Self {
         Self {
-            episode_id: key.episode_id(model),
-            model: model.to_owned(),
+            episode_id: key.episode_id(subject),
+            model: subject.model.clone(),
+            condition: subject.condition.clone(),
             experiment: key.experiment.name().to_owned(),
             seed: key.seed,
             run: key.run,
@@ -68,7 +72,7 @@ pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) ->
     let stays = |id: &str| !recorded.contains(id) && !again.contains(id);
     let mut listed: Vec<&LostEpisode> =
         before.iter().filter(|episode| stays(&episode.episode_id)).chain(lost).collect();
-    listed.sort_by_key(|episode| (&episode.model, &episode.experiment, episode.seed, episode.run));
+    listed.sort_by_key(|episode| (&episode.model, &episode.condition, &episode.experiment, episode.seed, episode.run));
     match listed.as_slice() {
         [] if before.is_empty() => Ok(()),
         [] => fs::remove_file(path).map_err(StoreError::io("remove", path)),
@@ -100,13 +104,13 @@ mod tests {
 
     use super::{LostEpisode, list_of, read, update};
     use crate::agent::{Lost, Status};
-    use crate::record::plan::Key;
+    use crate::record::plan::{Key, Subject};
     use crate::sim::Experiment;
 
     fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
         let key = Key { experiment: Experiment::E1, seed: 1, run };
         let lost = Lost { status: Some(Status::Timeout), cause: cause.to_owned() };
-        LostEpisode::of(key, model, Some(4), lost)
+        LostEpisode::of(key, &Subject::of(model), Some(4), lost)
     }
 
     #[test]

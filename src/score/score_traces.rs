@@ -14,7 +14,7 @@ use super::table::{EpisodeTable, Header};
 use super::timeline::{Timeline, TimelineReader, in_key_order};
 use crate::base::suggest::nearest;
 use crate::metric::catalog::Catalog;
-use crate::metric::columns::{Column, Columns, Level, Type};
+use crate::metric::columns::{Column, Columns, Fallback, Level, Type};
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::Faults;
 use crate::metric::file::FileError;
@@ -22,7 +22,7 @@ use crate::metric::restore::RestoreError;
 use crate::trace::error::TraceError;
 use crate::trace::open::TraceSet;
 use crate::trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
-use crate::trace::schema::{COLUMNS, Kind};
+use crate::trace::schema::{self, COLUMNS, Kind};
 
 /// What to score.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,13 +98,37 @@ pub fn schema_columns() -> Columns {
         let level = if column.constant { Level::Episode } else { Level::Step };
         type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
     };
-    COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect()
+    let mut columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
+    set_fallbacks(&mut columns, |_| false);
+    COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
+    columns
+}
+
+/// The columns that definitions may name over traces of which nothing is known yet: as [`schema_columns`], where each row
+/// may have a value.
+pub fn unknown_columns() -> Columns {
+    let mut columns = schema_columns();
+    set_fallbacks(&mut columns, |_| true);
+    columns
+}
+
+/// Says what columns mean where there is no value; `is_read` says which of them some trace has.
+fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
+    for column in COLUMNS {
+        if let Some(expression) = column.default {
+            columns.set_fallback(column.name, Fallback { expression, is_read: is_read(column.name) });
+        }
+    }
 }
 
 /// The columns that definitions may name over these traces: those of the schema, and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns = schema_columns().with_help("`mirrorstats schema` and `mirrorstats info` list the columns");
+    set_fallbacks(&mut columns, |name| traces.declares(name));
     for name in traces.column_names().into_iter().filter(|name| *name != "t") {
+        if schema::column(name).is_some_and(|known| known.since > 1 && !traces.declares(name)) {
+            columns.forget(name);
+        }
         if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
             columns.set_own(name, Column { ty, level: Level::Step });
         }
@@ -170,12 +194,13 @@ pub fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(),
 
 fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     let absent = || "record it, or choose other metrics with --metrics".to_owned();
+    let has_default = schema::column(column).is_some_and(|known| known.default.is_some());
     let Some(found) = traces.column(column) else { return Some(("no trace has it".to_owned(), absent())) };
     if let Some([(first, a), (second, b)]) = found.conflict {
         let problem = format!("it is {} in `{first}` and {} in `{second}`", a.name(), b.name());
         return Some((problem, "write it with one type in all traces".to_owned()));
     }
-    found.missing_from.map(|file| (format!("`{file}` has no such column"), absent()))
+    found.missing_from.filter(|_| !has_default).map(|file| (format!("`{file}` has no such column"), absent()))
 }
 
 /// What a scan gives besides the metrics.
@@ -329,7 +354,9 @@ pub(super) fn projection(
     let (steps, mut constants) = plan.columns();
     for label in labels {
         check_label(traces, label)?;
-        constants.push(label.clone());
+        if traces.column(label).is_some() {
+            constants.push(label.clone());
+        }
     }
     let mut seen = Vec::new();
     constants.retain(|name| {
@@ -357,7 +384,8 @@ fn experiments(definitions: &[&Definitions]) -> Option<Vec<String>> {
 pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     let constant = |name: &str| COLUMNS.iter().any(|column| column.name == name && column.constant);
     let problem = column_problem(traces, label);
-    if constant(label) && problem.is_none() {
+    let is_known_anyway = schema::column(label).is_some_and(|column| column.default_text().is_some());
+    if constant(label) && (problem.is_none() || is_known_anyway) {
         return Ok(());
     }
     let known: Vec<String> =

@@ -8,6 +8,7 @@ use arrow::array::{
 use arrow::compute::take;
 
 use crate::metric::catalog::Catalog;
+use crate::trace::declared::Declared;
 
 /// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +21,8 @@ pub struct EpisodeTable {
     pub labels: Vec<LabelColumn>,
     /// The metrics in the order of the catalog, or of the selection made.
     pub metrics: Vec<MetricColumn>,
+    /// What the traces declare of how they were recorded.
+    pub declared: Declared,
 }
 
 /// The key columns of a table.
@@ -126,6 +129,11 @@ impl EpisodeTable {
         }
     }
 
+    /// The further key column of this name, if the table has it.
+    pub fn label(&self, name: &str) -> Option<&TextColumn> {
+        self.labels.iter().find(|label| label.name == name).map(|label| &label.values)
+    }
+
     /// The number of episodes.
     pub fn len(&self) -> usize {
         self.keys.len()
@@ -146,6 +154,7 @@ impl EpisodeTable {
             keys: self.keys.taken(&rows),
             labels: self.labels.iter().map(label).collect(),
             metrics: self.metrics.iter().map(|metric| metric.taken(&rows)).collect(),
+            declared: self.declared.clone(),
         }
     }
 }

@@ -145,7 +145,7 @@ impl Side {
             Self::Scores(files) if files.iter().any(|file| file.carries_definitions) => None,
             Self::Scores(_) => request.definitions_of_scores.clone(),
         };
-        Question { definitions, filter: request.filter.clone(), metrics: None, by: request.by.clone() }
+        Question { definitions, filter: request.filter.clone(), metrics: None, by: Some(request.by.clone()), pool: true }
     }
 
     /// The side by itself.
@@ -170,7 +170,7 @@ impl Side {
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
             Self::Scores(files) => {
-                let table = scores::read(files, &Question { by: Vec::new(), ..self.question(request) })?;
+                let table = scores::read(files, &Question { by: None, ..self.question(request) })?;
                 Ok((table.metrics.iter().map(|metric| metric.name.clone()).collect(), Some(table)))
             }
         }
@@ -294,7 +294,7 @@ fn score_sides(
     traces: Option<&TraceSet>,
     request: &DiffRequest,
 ) -> Result<ScoredSides, StudyError> {
-    let labels = Question { by: request.by.clone(), ..Question::default() }.labels();
+    let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
     let score = |traces, definitions| score_traces::score(traces, definitions, &labels, request.threads);
     match (definitions, read, traces) {
         ([None, None], [Some(old), Some(new)], _) => Ok(([old, new], None)),

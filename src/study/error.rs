@@ -78,6 +78,22 @@ pub enum StudyError {
     /// No file at all.
     #[error("expected at least one file of scores, found none\n  help: name traces or scores")]
     NoScores,
+    /// A cell that mixes episodes which were recorded differently.
+    #[error(
+        "{cell}: expected episodes that were recorded alike, found {counts}: {differences}; for example {episodes}\n  help: {help}"
+    )]
+    Pooled {
+        /// The experiment and model.
+        cell: String,
+        /// Two episodes that differ.
+        episodes: String,
+        /// How many episodes have each fingerprint.
+        counts: String,
+        /// In which parts the fingerprints differ.
+        differences: String,
+        /// What to do.
+        help: String,
+    },
     /// Scores under other definitions than those asked for.
     #[error(
         "{file}: expected scores under `{wanted}` ({wanted_hash}), found scores under `{found}` ({found_hash})\n  \

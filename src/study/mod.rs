@@ -16,6 +16,7 @@ mod error;
 mod figure_inputs;
 mod input_hashes;
 mod inputs;
+mod pooled;
 mod provenance;
 mod report;
 mod rescore;
@@ -37,7 +38,8 @@ use crate::report::style::Style;
 use crate::score::evidence::{self, Evidence};
 use crate::score::score_traces;
 use crate::stats::cell::Cells;
-use crate::stats::group::{DEFAULT_BY, KEY_COLUMNS, group};
+use crate::score::table::EpisodeTable;
+use crate::stats::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group, has_conditions};
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
 
@@ -55,6 +57,9 @@ pub use scores::write as write_scores;
 
 use inputs::Stamp;
 
+/// What scores say of each episode's recording, where the traces do.
+const STANDING_LABELS: [&str; 3] = [CONDITION, "scene", "fingerprint"];
+
 /// The definitions that are used where none are named.
 pub const DEFAULT_DEFINITIONS: &str = "paper";
 
@@ -71,7 +76,7 @@ pub struct Study {
 }
 
 /// What is asked of the inputs.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Question {
     /// Definitions by name or path; the default ones, or those that scores carry, if absent.
     pub definitions: Option<String>,
@@ -79,14 +84,11 @@ pub struct Question {
     pub filter: Option<String>,
     /// The metrics wanted, by name; all if absent.
     pub metrics: Option<Vec<String>>,
-    /// The columns that cells are grouped by.
-    pub by: Vec<String>,
-}
-
-impl Default for Question {
-    fn default() -> Self {
-        Self { definitions: None, filter: None, metrics: None, by: DEFAULT_BY.map(str::to_owned).to_vec() }
-    }
+    /// The columns that cells are grouped by; experiment and model if absent, and the condition where there is more than the
+    /// default one.
+    pub by: Option<Vec<String>>,
+    /// Whether a cell may hold episodes that were recorded differently.
+    pub pool: bool,
 }
 
 impl Question {
@@ -97,7 +99,28 @@ impl Question {
 
     /// The columns among those to group by that a score does not have by itself.
     pub(crate) fn labels(&self) -> Vec<String> {
-        self.by.iter().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
+        self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
+    }
+
+    /// The labels of scores of these traces: the columns to group by, and what the traces say of each episode's recording.
+    pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
+        let mut labels = self.labels();
+        let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
+        for name in standing {
+            if !labels.iter().any(|label| label == name) {
+                labels.push(name.to_owned());
+            }
+        }
+        labels
+    }
+
+    /// The columns that cells of these episodes are grouped by.
+    pub(crate) fn by_over(&self, episodes: &EpisodeTable) -> Vec<String> {
+        let default = || {
+            let condition = has_conditions(episodes).then_some(CONDITION);
+            DEFAULT_BY.into_iter().chain(condition).map(str::to_owned).collect()
+        };
+        self.by.clone().unwrap_or_else(default)
     }
 
     /// The definitions asked for, with every column that they read in every trace.
@@ -177,11 +200,18 @@ impl Study {
         self.checked()
     }
 
-    /// Groups cells by these columns; experiment and model where this is not called. A column that no episode has is an
+    /// Groups cells by these columns; experiment and model where this is not called, and the condition where there are some. A column that no episode has is an
     /// error of the scan.
     #[must_use]
     pub fn by<T: Into<String>>(mut self, columns: impl IntoIterator<Item = T>) -> Self {
-        self.question.by = columns.into_iter().map(Into::into).collect();
+        self.question.by = Some(columns.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Lets a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent.
+    #[must_use]
+    pub const fn pool(mut self) -> Self {
+        self.question.pool = true;
         self
     }
 
@@ -235,7 +265,19 @@ impl Study {
     /// # Errors
     /// As [`Study::score`]; a column to group by that the episodes do not have.
     pub fn cells(&self) -> Result<Cells, StudyError> {
-        Ok(group(&self.score()?.episodes, &self.question.by)?)
+        self.cells_of(&self.score()?.episodes)
+    }
+
+    /// The cells of these episodes, as [`Study::cells`].
+    ///
+    /// # Errors
+    /// A column to group by that the episodes do not have; a cell that mixes episodes which were recorded differently.
+    pub fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
+        let by = self.question.by_over(episodes);
+        if !self.question.pool {
+            pooled::check(episodes, &by)?;
+        }
+        Ok(group(episodes, &by)?)
     }
 
     /// The statistics of the cells: intervals, tests, comparisons.
@@ -245,7 +287,7 @@ impl Study {
     pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
         let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;
-        let cells = group(&results.episodes, &self.question.by)?;
+        let cells = self.cells_of(&results.episodes)?;
         let options = Options { lost: results.lost, ..options.clone() };
         Ok(Statistics::of(&results.episodes, &cells, &options)?)
     }
@@ -258,6 +300,7 @@ impl Study {
         let style = Style::load(style)?;
         let results = self.scan(Outputs::of_figures(&[name]))?;
         self.check_filter(results.episodes.len())?;
+        self.cells_of(&results.episodes)?;
         Ok(FigureInputs::of(&results, &style)?.draw(name)?)
     }
 

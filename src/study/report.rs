@@ -17,7 +17,6 @@ use crate::report::table::Table;
 use crate::report::tables::markdown;
 use crate::score::format::Format;
 use crate::stats::cell::Cells;
-use crate::stats::group::group;
 use crate::trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.
@@ -87,7 +86,7 @@ impl Study {
         let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
         let results = self.scan(Outputs { losses: options.figures, hashes: true, ..Outputs::of_figures(figures) })?;
         self.check_filter(results.episodes.len())?;
-        let cells = group(&results.episodes, &self.question.by)?;
+        let cells = self.cells_of(&results.episodes)?;
         let tables = layout::tables(&cells, &style)?;
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());

@@ -1,5 +1,6 @@
 //! The one pass over the inputs, and everything that it gives.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::thread;
 
@@ -13,7 +14,9 @@ use crate::report::bundle;
 use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
 use crate::score::timeline::Timeline;
+use crate::stats::group::{CONDITION, has_conditions};
 use crate::stats::losses::INFRASTRUCTURE;
+use crate::trace::declared::Declared;
 use crate::trace::open::TraceSet;
 
 /// What a scan gives beside the episode table.
@@ -44,7 +47,7 @@ impl Outputs {
 }
 
 /// What a scan gave.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Results {
     /// One row per episode.
     pub episodes: EpisodeTable,
@@ -75,7 +78,11 @@ impl Study {
         });
         // A change explains whatever else went wrong.
         self.check_unchanged()?;
-        Ok(Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? })
+        let mut results = Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? };
+        if let Source::Traces(traces) = &self.source {
+            results.episodes.declared = Declared::of(traces);
+        }
+        Ok(results)
     }
 
     fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
@@ -99,7 +106,7 @@ impl Study {
 
     /// Scores, timelines and losses in one pass over the traces.
     fn scan_traces(&self, traces: &TraceSet, outputs: Outputs) -> Result<Results, StudyError> {
-        let labels = self.question.labels();
+        let labels = self.question.labels_over(traces);
         let definitions = self.question.bind(traces)?;
         let wanted = score_traces::Outputs { labels: &labels, timelines: outputs.timelines || outputs.outcomes };
         let lost = if outputs.losses { lost_episodes(traces)? } else { None };
@@ -147,12 +154,25 @@ impl Results {
         Self { episodes, timelines: None, outcomes: None, lost: None, inputs: Vec::new() }
     }
 
+    /// The same with the name of a model under another condition than the default one as `model [condition]`.
+    pub(super) fn with_conditions_as_models(&self) -> Cow<'_, Self> {
+        if !has_conditions(&self.episodes) {
+            return Cow::Borrowed(self);
+        }
+        let (episodes, order) = self.episodes.with_labelled_models(CONDITION);
+        let timelines = self.timelines.as_ref();
+        let timelines = timelines.map(|timelines| order.iter().map(|row| timelines[*row].clone()).collect());
+        Cow::Owned(Self { episodes, timelines, ..self.clone() })
+    }
+
     /// Keeps what is asked for: how open questions ended, and timelines of as many episodes as a figure shows.
     fn select(&mut self, outputs: Outputs) {
         if outputs.outcomes && Outcomes::are_there(&self.episodes) {
+            let shown = self.with_conditions_as_models();
             let answered =
-                self.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
-            self.outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&self.episodes, &answered));
+                shown.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
+            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&shown.episodes, &answered));
+            self.outcomes = outcomes;
         }
         if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
             self.timelines = None;

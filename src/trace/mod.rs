@@ -12,6 +12,7 @@
 
 pub mod bits;
 pub(crate) mod catch_panic;
+pub mod declared;
 pub mod diagnostic;
 pub mod episode;
 pub mod error;

@@ -73,6 +73,7 @@ fn table(rows: &[Row]) -> EpisodeTable {
         catalog: catalog(),
         keys: rows.iter().enumerate().map(key).collect(),
         labels: Vec::new(),
+        declared: Declared::default(),
         metrics: vec![
             column("TSA", |row| Some(i64::from(row.4))),
             column("TTD", |row| Some(row.5.abs())),

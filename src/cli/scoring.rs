@@ -2,10 +2,10 @@
 
 use std::io;
 
-use super::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
+use super::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
 use super::outcome::Failure;
 use crate::metric::fault::Faults;
-use crate::study::{Question, Study, StudyError, resolve};
+use crate::study::{LostAs, Question, Study, StudyError, resolve};
 use crate::trace::inputs::Input;
 
 impl TraceArgs {
@@ -57,6 +57,10 @@ impl ScoringArgs {
             metrics: self.metrics.clone(),
             by: grouping.by.clone(),
             pool: grouping.pool,
+            lost: match grouping.lost {
+                LostArg::Excluded => LostAs::Nothing,
+                LostArg::AsFailure => LostAs::Failure,
+            },
         }
     }
 }

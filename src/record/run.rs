@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
 use super::error::RecordError;
-use super::failures::LostEpisode;
+use super::failures::{LostEpisode, lost_episode};
 use super::lock::EpisodeLock;
 use super::plan::{Key, Subject};
 use super::queue::{Held, Next, Queue};
@@ -241,7 +241,7 @@ impl Recording<'_> {
             Err(RecordError::Stopped) => tally.stopped = true,
             Err(RecordError::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
-                tally.lost.push((key, LostEpisode::of(key, self.subject, step, lost)));
+                tally.lost.push((key, lost_episode(key, self.subject, step, lost)));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }

@@ -21,11 +21,11 @@ use serde_json::{Value, json};
 
 use super::error::StoreError;
 use super::failures::{self, LostEpisode};
+use super::fingerprint::Fingerprint;
 use super::folder_lock::FolderLock;
 use super::index::{RecordingIndex, narrow, recording_of};
 use super::lock::{Attempt, EpisodeLock};
 use super::metadata::{FINGERPRINTS, SEEDS};
-use super::fingerprint::Fingerprint;
 use super::plan::{Key, Subject};
 use crate::log::{LogError, assemble};
 use crate::sim::Experiment;

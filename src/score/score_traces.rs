@@ -9,6 +9,7 @@ use super::builder::TableBuilder;
 use super::error::EngineError;
 use super::evaluate::{Batch, BatchScores};
 use super::physical::PhysicalPlan;
+use super::quality::{QualityByCell, QualityReader};
 use super::segments::Segments;
 use super::table::{EpisodeTable, Header};
 use super::timeline::{Timeline, TimelineReader, in_key_order};
@@ -210,6 +211,8 @@ pub struct Outputs<'a> {
     pub labels: &'a [String],
     /// Whether the timelines of the first definitions are wanted.
     pub timelines: bool,
+    /// What to read of the replies of the episodes that the first definitions keep.
+    pub quality: Option<&'a QualityReader>,
 }
 
 /// What one scan gives.
@@ -220,6 +223,8 @@ pub struct Scored<const N: usize> {
     /// The timelines of the first definitions, in the order of their keys; `None` where they were not asked for, or the
     /// definitions do not name their moments.
     pub timelines: Option<Vec<Timeline>>,
+    /// What became of the replies; `None` where it was not asked for.
+    pub quality: Option<QualityByCell>,
 }
 
 /// Scores all episodes of some traces.
@@ -235,7 +240,7 @@ pub fn score(
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, ScoreError> {
     let Scored { tables: [table], .. } =
-        score_each(traces, [definitions], Outputs { labels, timelines: false }, threads)?;
+        score_each(traces, [definitions], Outputs { labels, ..Outputs::default() }, threads)?;
     Ok(table)
 }
 
@@ -253,18 +258,29 @@ pub fn score_each<const N: usize>(
     let mut plan = PhysicalPlan::of(&definitions.map(|definitions| &definitions.plan));
     let first = definitions.first().filter(|_| outputs.timelines);
     let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
-    let projection = projection(traces, &definitions, &plan, outputs.labels)?;
+    let mut projection = projection(traces, &definitions, &plan, outputs.labels)?;
+    if let Some(quality) = outputs.quality {
+        let new = quality.columns().iter().filter(|name| !projection.steps.contains(name)).cloned().collect::<Vec<_>>();
+        projection.unchecked.extend(new);
+        let condition = quality.constants().filter(|name| !projection.constants.contains(name));
+        projection.constants.extend(condition);
+    }
     let headers = definitions.map(|definitions| header(definitions, outputs.labels));
     let mut found = timelines.as_ref().map(|_| Vec::new());
+    let mut quality = outputs.quality.map(|_| QualityByCell::default());
     let read = |batch: &EpisodeBatch| {
         let values = plan.evaluate(&view(batch))?;
         let scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
-        Ok((scores, timelines.as_ref().map(|reader| reader.timelines(&values, batch))))
+        let kept = scores.first().and_then(|scores: &BatchScores| scores.kept.as_ref());
+        let quality = outputs.quality.map(|reader| reader.read(batch, kept));
+        let timelines = timelines.as_ref().map(|reader| reader.timelines(&values, batch));
+        Ok((scores, (timelines, quality)))
     };
-    let tables = collect(traces, &projection, headers, threads, read, |part| {
-        found.iter_mut().zip(part).for_each(|(found, part)| found.extend(part));
+    let tables = collect(traces, &projection, headers, threads, read, |(timelines, replies)| {
+        found.iter_mut().zip(timelines).for_each(|(found, part)| found.extend(part));
+        quality.iter_mut().zip(replies).for_each(|(quality, part)| quality.merge(part));
     })?;
-    Ok(Scored { tables, timelines: found.map(in_key_order) })
+    Ok(Scored { tables, timelines: found.map(in_key_order), quality })
 }
 
 /// The columns of the table that definitions give.
@@ -413,7 +429,8 @@ mod tests {
         let metrics = Some(vec!["TSA".to_owned(), "MGD".to_owned()]);
         let some = definitions(&traces, &Request { metrics, ..Request::of("paper") }).unwrap();
         let threads = NonZeroUsize::new(2).unwrap();
-        let outputs = Outputs { labels: &["body_color".to_owned()], timelines: true };
+        let labels = ["body_color".to_owned()];
+        let outputs = Outputs { labels: &labels, timelines: true, quality: None };
         let found = score_each(&traces, [&seed, &some], outputs, threads).unwrap();
         for (table, definitions) in found.tables.iter().zip([&seed, &some]) {
             assert_eq!(*table, score(&traces, definitions, outputs.labels, threads).unwrap());

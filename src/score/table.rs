@@ -8,7 +8,8 @@ use arrow::array::{
 use arrow::compute::take;
 
 use crate::metric::catalog::Catalog;
-use crate::trace::declared::Declared;
+pub use crate::trace::declared::Declared;
+use crate::trace::schema::{self, Column};
 
 /// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +35,9 @@ pub struct EpisodeKeys {
     pub(super) run: Int32Array,
     pub(super) episode_id: TextColumn,
 }
+
+/// The label of what a study varies besides the model.
+pub const CONDITION: &str = "condition";
 
 /// What names an episode. The derived order is the order of the table.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -127,6 +131,12 @@ impl EpisodeTable {
             labels: self.labels.iter().map(|label| label.name.clone()).collect(),
             metrics: self.metrics.iter().map(|metric| metric.name.clone()).collect(),
         }
+    }
+
+    /// Whether some episode was recorded under another condition than the default one.
+    pub fn has_conditions(&self) -> bool {
+        let default = schema::column(CONDITION).and_then(Column::default_text);
+        self.label(CONDITION).is_some_and(|column| column.iter().flatten().any(|condition| Some(condition) != default))
     }
 
     /// The further key column of this name, if the table has it.

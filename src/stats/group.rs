@@ -8,23 +8,14 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::cell::{Cells, Group, KeyValue};
 use super::moments::{MomentOverflow, Moments};
 use crate::base::suggest::hint;
+pub use crate::score::table::CONDITION;
 use crate::score::table::{EpisodeTable, KeyRef, LabelColumn, TextColumn};
-use crate::trace::schema::{self, Column};
 
 /// The key columns of every episode table.
 pub const KEY_COLUMNS: [&str; 5] = ["experiment", "model", "seed", "run", "episode_id"];
 
 /// The columns that cells are grouped by unless asked otherwise.
 pub const DEFAULT_BY: [&str; 2] = ["experiment", "model"];
-
-/// The label of what a study varies besides the model.
-pub const CONDITION: &str = "condition";
-
-/// Whether some episode was recorded under another condition than the default one.
-pub fn has_conditions(table: &EpisodeTable) -> bool {
-    let default = schema::column(CONDITION).and_then(Column::default_text);
-    table.label(CONDITION).is_some_and(|column| column.iter().flatten().any(|condition| Some(condition) != default))
-}
 
 /// Why episodes cannot be grouped as asked.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -244,9 +235,8 @@ mod tests {
 
     use super::{GroupError, group, membership};
     use crate::metric::catalog::Catalog;
-    use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+    use crate::score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
     use crate::stats::cell::KeyValue;
-    use crate::trace::declared::Declared;
 
     /// Rows of (experiment, model, seed, label, value).
     type RowOf<'a> = (&'a str, &'a str, i32, Option<&'a str>, Option<i64>);

@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::error::StudyError;
 use super::inputs::{ScoreFile, Source, Stamp};
-use super::{Question, Study, scores};
+use super::{LostAs, Question, Study, scores};
 use crate::base::suggest::nearest;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::report::order::TableOrder;
@@ -145,7 +145,14 @@ impl Side {
             Self::Scores(files) if files.iter().any(|file| file.carries_definitions) => None,
             Self::Scores(_) => request.definitions_of_scores.clone(),
         };
-        Question { definitions, filter: request.filter.clone(), metrics: None, by: Some(request.by.clone()), pool: true }
+        Question {
+            definitions,
+            filter: request.filter.clone(),
+            metrics: None,
+            by: Some(request.by.clone()),
+            pool: true,
+            lost: LostAs::Nothing,
+        }
     }
 
     /// The side by itself.

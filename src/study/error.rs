@@ -22,6 +22,7 @@ use crate::score::select::SelectError;
 use crate::stats::group::GroupError;
 use crate::stats::moments::MomentOverflow;
 use crate::trace::error::TraceError;
+use crate::trace::lost::LostListError;
 
 /// Why a study gives no answer. Each message says what, where, expected, found, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -78,6 +79,9 @@ pub enum StudyError {
     /// No file at all.
     #[error("expected at least one file of scores, found none\n  help: name traces or scores")]
     NoScores,
+    /// A list of lost episodes that cannot be read.
+    #[error(transparent)]
+    LostList(#[from] LostListError),
     /// A cell that mixes episodes which were recorded differently.
     #[error(
         "{cell}: expected episodes that were recorded alike, found {counts}: {differences}; for example {episodes}\n  help: {help}"

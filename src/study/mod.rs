@@ -16,6 +16,7 @@ mod error;
 mod figure_inputs;
 mod input_hashes;
 mod inputs;
+mod losses;
 mod pooled;
 mod provenance;
 mod report;
@@ -37,9 +38,9 @@ use crate::report::statistics::{Options, Statistics};
 use crate::report::style::Style;
 use crate::score::evidence::{self, Evidence};
 use crate::score::score_traces;
-use crate::stats::cell::Cells;
 use crate::score::table::EpisodeTable;
-use crate::stats::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group, has_conditions};
+use crate::stats::cell::Cells;
+use crate::stats::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group};
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
 
@@ -49,6 +50,7 @@ pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
 pub use figure_inputs::{Drawings, FigureInputs};
 pub use inputs::{ScoreFile, Source, resolve};
+pub use losses::LostAs;
 pub use provenance::ProvenanceError;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
@@ -56,6 +58,7 @@ pub use scan::{Outputs, Results};
 pub use scores::write as write_scores;
 
 use inputs::Stamp;
+use losses::Counted;
 
 /// What scores say of each episode's recording, where the traces do.
 const STANDING_LABELS: [&str; 3] = [CONDITION, "scene", "fingerprint"];
@@ -89,6 +92,8 @@ pub struct Question {
     pub by: Option<Vec<String>>,
     /// Whether a cell may hold episodes that were recorded differently.
     pub pool: bool,
+    /// What lost episodes count as.
+    pub lost: LostAs,
 }
 
 impl Question {
@@ -117,7 +122,7 @@ impl Question {
     /// The columns that cells of these episodes are grouped by.
     pub(crate) fn by_over(&self, episodes: &EpisodeTable) -> Vec<String> {
         let default = || {
-            let condition = has_conditions(episodes).then_some(CONDITION);
+            let condition = episodes.has_conditions().then_some(CONDITION);
             DEFAULT_BY.into_iter().chain(condition).map(str::to_owned).collect()
         };
         self.by.clone().unwrap_or_else(default)
@@ -257,7 +262,7 @@ impl Study {
     /// # Errors
     /// Whatever is wrong with the traces or the scores; numbers beyond 64 bits.
     pub fn score(&self) -> Result<Results, StudyError> {
-        self.scan(Outputs::default())
+        self.scan(Outputs { losses: true, ..Outputs::default() })
     }
 
     /// The cells: exact moments of every metric in every group.
@@ -265,7 +270,8 @@ impl Study {
     /// # Errors
     /// As [`Study::score`]; a column to group by that the episodes do not have.
     pub fn cells(&self) -> Result<Cells, StudyError> {
-        self.cells_of(&self.score()?.episodes)
+        let counted = self.counted(self.score()?);
+        self.cells_of(&counted.results.episodes)
     }
 
     /// The cells of these episodes, as [`Study::cells`].
@@ -287,8 +293,10 @@ impl Study {
     pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
         let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;
+        let is_known = results.lost.is_some();
+        let Counted { results, lost, .. } = self.counted(results);
         let cells = self.cells_of(&results.episodes)?;
-        let options = Options { lost: results.lost, ..options.clone() };
+        let options = Options { lost: (is_known || !lost.is_empty()).then_some(lost), ..options.clone() };
         Ok(Statistics::of(&results.episodes, &cells, &options)?)
     }
 
@@ -298,8 +306,9 @@ impl Study {
     /// As [`Study::score`]; inputs that lack what the figure needs.
     pub fn figure(&self, name: FigureName, style: &str) -> Result<Figure, StudyError> {
         let style = Style::load(style)?;
-        let results = self.scan(Outputs::of_figures(&[name]))?;
+        let results = self.scan(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
         self.check_filter(results.episodes.len())?;
+        let results = self.counted(results).results;
         self.cells_of(&results.episodes)?;
         Ok(FigureInputs::of(&results, &style)?.draw(name)?)
     }

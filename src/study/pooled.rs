@@ -57,7 +57,10 @@ fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2
         episodes: format!("`{}` and `{}`", visible(one.episode_id), visible(other.episode_id)),
         counts: counts.join(", "),
         differences: differences(&table.declared, rows.map(fingerprint)),
-        help: format!("{help}; --where \"fingerprint = '{}'\" keeps some of them, --pool takes all", fingerprint(rows[0])),
+        help: format!(
+            "{help}; --where \"fingerprint = '{}'\" keeps some of them, --pool takes all",
+            fingerprint(rows[0])
+        ),
     }
 }
 
@@ -76,7 +79,11 @@ fn differences(declared: &Declared, names: [&str; 2]) -> String {
         format!("{} ({one}, {other})", visible(key))
     });
     let parts: Vec<String> = parts.collect();
-    if parts.is_empty() { "the traces do not say in what".to_owned() } else { format!("they differ in {}", parts.join(", ")) }
+    if parts.is_empty() {
+        "the traces do not say in what".to_owned()
+    } else {
+        format!("they differ in {}", parts.join(", "))
+    }
 }
 
 /// The beginning of a hash, or a name.

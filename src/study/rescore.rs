@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use super::diff::{Diff, Pair, Scored};
 use super::error::StudyError;
 use super::report::{Report, ReportOptions};
-use super::{Question, Study, provenance};
+use super::{LostAs, Question, Study, provenance};
 use crate::report::bundle::Manifest;
 use crate::report::order::TableOrder;
 use crate::report::style::Style;
@@ -75,6 +75,7 @@ impl RescoreRequest {
             metrics: self.metrics.clone().or_else(|| selected.then(|| manifest.metrics.clone())),
             by: Some(manifest.by.clone()),
             pool: true,
+            lost: LostAs::Nothing,
         }
     }
 

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::lost::LostEpisode;
 use super::read::open::TraceSet;
 use super::schema::RECORDING_KEY;
 use crate::base::names::names;
@@ -48,6 +49,9 @@ pub struct Declared {
     /// The hash of the plan that was registered before the recording, where all files say the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub registration: Option<String>,
+    /// Episodes that failures kept from being recorded: in no trace.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unrecorded: Vec<LostEpisode>,
 }
 
 impl Declared {
@@ -63,9 +67,13 @@ impl Declared {
         let fingerprints = recording["fingerprints"].as_object().cloned().unwrap_or_default();
         Self {
             origin: recording["kind"].as_str().and_then(Origin::named),
-            cluster: recording["design"]["cluster"].as_str().filter(|cluster| *cluster == "seed").map(|_| Cluster::Seed),
+            cluster: recording["design"]["cluster"]
+                .as_str()
+                .filter(|cluster| *cluster == "seed")
+                .map(|_| Cluster::Seed),
             fingerprints: fingerprints.into_iter().collect(),
             registration: recording["registration"].as_str().map(str::to_owned),
+            unrecorded: Vec::new(),
         }
     }
 
@@ -73,11 +81,15 @@ impl Declared {
     #[must_use]
     pub fn joined(mut self, other: Self) -> Self {
         self.fingerprints.extend(other.fingerprints);
+        self.unrecorded.extend(other.unrecorded);
+        self.unrecorded.sort();
+        self.unrecorded.dedup();
         Self {
             origin: self.origin.filter(|origin| other.origin == Some(*origin)),
             cluster: self.cluster.filter(|cluster| other.cluster == Some(*cluster)),
             registration: self.registration.filter(|hash| other.registration.as_ref() == Some(hash)),
             fingerprints: self.fingerprints,
+            unrecorded: self.unrecorded,
         }
     }
 }
@@ -90,8 +102,9 @@ mod tests {
     fn files_declare_together_what_each_declares() {
         let import = Declared::of_recording(Some(r#"{"kind":"import","design":{"cluster":"seed"}}"#));
         assert_eq!((import.origin, import.cluster), (Some(Origin::Import), Some(Cluster::Seed)));
-        let recording =
-            Declared::of_recording(Some(r#"{"kind":"recording","fingerprints":{"a":{"model":"m"}},"registration":"r"}"#));
+        let recording = Declared::of_recording(Some(
+            r#"{"kind":"recording","fingerprints":{"a":{"model":"m"}},"registration":"r"}"#,
+        ));
         assert_eq!(recording.registration.as_deref(), Some("r"));
         let both = import.clone().joined(recording);
         assert_eq!((both.origin, both.cluster, both.registration), (None, None, None));

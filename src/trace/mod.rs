@@ -20,6 +20,7 @@ pub mod identification;
 pub mod import;
 pub mod info;
 pub mod inputs;
+pub mod lost;
 mod read;
 pub mod renormalize;
 pub mod replies;

@@ -50,7 +50,7 @@ impl CompareArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let errata = self.errata()?;
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
-        let study = self.traces.study(&scoring, &GroupingArgs { by: None, pool: self.pool })?;
+        let study = self.traces.study(&scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
         let comparison = study.compare(&self.published, &self.style, self.table.as_deref(), &errata)?;
         print(&comparison, self.json)?;
         Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })

@@ -65,7 +65,11 @@ impl FigureArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         // An ending of no known format should not cost a pass over the traces.
         let format = self.format()?;
-        let study = self.traces.study_on(&self.engine, &self.scoring, &GroupingArgs { by: None, pool: self.pool })?;
+        let study = self.traces.study_on(
+            &self.engine,
+            &self.scoring,
+            &GroupingArgs { pool: self.pool, ..GroupingArgs::default() },
+        )?;
         if let Some(path) = &self.output {
             output::check_target(path, study.files_read(Some(&self.style)))?;
         }

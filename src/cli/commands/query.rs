@@ -76,8 +76,8 @@ mod rows {
 
     use super::{AnswerFormat, Failure, Outcome, QueryArgs};
     use crate::base::escape::visible;
-    use crate::cli::text_table::listing;
     use crate::cli::args::GroupingArgs;
+    use crate::cli::text_table::listing;
     use crate::cli::{output, terminal};
     use crate::engine::polars::answer::{Excerpt, Format, QueryError, excerpt, plan, write};
     use crate::engine::polars::run::PolarsError;

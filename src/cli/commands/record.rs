@@ -124,7 +124,8 @@ impl RecordArgs {
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
         let vlm = vlm.filter(|_| self.vlm.sends());
-        let requests = vlm.map(|vlm| RequestForecast::of(&vlm, &subject, &todo, config)).transpose().map_err(Failure::input)?;
+        let requests =
+            vlm.map(|vlm| RequestForecast::of(&vlm, &subject, &todo, config)).transpose().map_err(Failure::input)?;
         let answer = ForecastAnswer::of(&subject, planned.len(), &todo, config, requests);
         if self.json {
             output::print_json(&answer)?;

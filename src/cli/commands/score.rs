@@ -92,7 +92,11 @@ impl ScoreArgs {
     fn spark_job(&self) -> Result<SparkJob, Failure> {
         let cluster = self.engine.cluster();
         if are_uris(&self.traces.traces)? {
-            return Ok(SparkJob::of_uris(self.traces.traces.clone(), &self.scoring.question(&GroupingArgs::default()), cluster)?);
+            return Ok(SparkJob::of_uris(
+                self.traces.traces.clone(),
+                &self.scoring.question(&GroupingArgs::default()),
+                cluster,
+            )?);
         }
         Ok(SparkJob::of_study(&self.traces.study(&self.scoring, &GroupingArgs::default())?, cluster)?)
     }

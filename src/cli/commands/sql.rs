@@ -45,7 +45,8 @@ impl SqlArgs {
     /// # Errors
     /// Faults of the definitions; a construct that the dialect cannot say.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let definitions = self.scoring.question(&GroupingArgs::default()).bind_to(&schema_columns()).map_err(Failure::from)?;
+        let definitions =
+            self.scoring.question(&GroupingArgs::default()).bind_to(&schema_columns()).map_err(Failure::from)?;
         let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
         io::stdout().lock().write_all(statement.as_bytes())?;
         Ok(Outcome::Done)

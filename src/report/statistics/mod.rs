@@ -15,8 +15,6 @@ mod models;
 mod study;
 pub mod text;
 
-use std::collections::BTreeSet;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +28,7 @@ pub use models::{Family, Gap, PairTest, Reach};
 
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
+use crate::stats::losses::LostCounts;
 use crate::stats::moments::MomentOverflow;
 use study::Study;
 
@@ -40,8 +39,8 @@ pub struct Options {
     pub confidence: f64,
     /// The horizon of restricted means in steps, instead of the last step known for every model.
     pub horizon: Option<i64>,
-    /// The identifiers of the episodes that the infrastructure ended; `None` where the traces do not say.
-    pub lost: Option<BTreeSet<String>>,
+    /// How many episodes were lost beside those given; `None` where the traces do not say.
+    pub lost: Option<LostCounts>,
 }
 
 impl Default for Options {

@@ -20,7 +20,9 @@ use ::parquet::file::reader::ChunkReader;
 use super::table::EpisodeTable;
 use crate::metric::catalog::{Catalog, Kind};
 
-pub use self::parquet::{DECLARED_KEY, DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
+pub use self::parquet::{
+    DECLARED_KEY, DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores,
+};
 pub use self::partition::Partition;
 
 /// A format of episode tables.

@@ -210,7 +210,10 @@ pub const METADATA: &[MetadataKey] = &[
               configuration hashes, view size, visibility threshold in pixels, seeds. Every trace may have the keys that \
               follow.",
     },
-    MetadataKey { key: "mirrorstats.recording.kind", doc: "`recording`, `import`, or `reconstruction`: how the rows came to be." },
+    MetadataKey {
+        key: "mirrorstats.recording.kind",
+        doc: "`recording`, `import`, or `reconstruction`: how the rows came to be.",
+    },
     MetadataKey {
         key: "mirrorstats.recording.design",
         doc: "What depends on what. `pairs`: `scene` where episodes with equal `scene` are pairs. `cluster`: `seed` where \

@@ -49,7 +49,8 @@ impl<W: Write + Send> RowGroups<W> {
     /// Starts a file of these columns.
     pub(in crate::trace) fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
         // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
-        let options = ArrowWriterOptions::new().with_properties(properties(layout, recording)).with_skip_arrow_metadata(true);
+        let options =
+            ArrowWriterOptions::new().with_properties(properties(layout, recording)).with_skip_arrow_metadata(true);
         Ok(Self { parquet: ArrowWriter::try_new_with_options(out, Arc::clone(layout), options)?, rows: 0 })
     }
 

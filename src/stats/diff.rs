@@ -388,7 +388,7 @@ mod tests {
     use crate::metric::definitions::Definitions;
     use crate::score::evidence::MetricEvidence;
     use crate::score::score_traces::schema_columns;
-    use crate::score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+    use crate::score::table::{Declared, EpisodeKey, EpisodeTable, MetricColumn};
 
     const RATE: &str = "[metric.R]\nvalue = \"length() > 2\"";
 

@@ -41,6 +41,7 @@ use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
 use crate::stats::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group};
+use crate::stats::losses::LostCounts;
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
 
@@ -281,7 +282,7 @@ impl Study {
     pub fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
         let by = self.question.by_over(episodes);
         if !self.question.pool {
-            pooled::check(episodes, &by)?;
+            pooled::check(episodes, &by, self.source.traces().ok())?;
         }
         Ok(group(episodes, &by)?)
     }
@@ -293,11 +294,23 @@ impl Study {
     pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
         let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;
-        let is_known = results.lost.is_some();
-        let Counted { results, lost, .. } = self.counted(results);
-        let cells = self.cells_of(&results.episodes)?;
-        let options = Options { lost: (is_known || !lost.is_empty()).then_some(lost), ..options.clone() };
-        Ok(Statistics::of(&results.episodes, &cells, &options)?)
+        let counted = self.counted(results);
+        let cells = self.cells_of(&counted.results.episodes)?;
+        self.statistics_of(&counted, &cells, options)
+    }
+
+    /// The statistics of the episodes that count.
+    fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
+        let Counted { results, lost, .. } = counted;
+        let (is_known, total) = (results.lost.is_some() || !lost.is_empty(), lost.total());
+        let beside = if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() };
+        let options = Options { lost: is_known.then_some(beside), ..options.clone() };
+        let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
+        if self.question.lost == LostAs::Failure && total > 0 {
+            let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
+            statistics.warnings.push(words);
+        }
+        Ok(statistics)
     }
 
     /// One figure, with the models in the order of a style.

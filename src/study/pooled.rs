@@ -12,17 +12,19 @@ use crate::base::escape::visible;
 use crate::score::table::EpisodeTable;
 use crate::stats::group::{CONDITION, membership};
 use crate::trace::declared::Declared;
+use crate::trace::open::TraceSet;
+use crate::trace::schema::RECORDING_KEY;
 
 /// The label of what an episode was recorded with.
 const FINGERPRINT: &str = "fingerprint";
 /// Digits of a hash in a message.
 const SHOWN: usize = 8;
 
-/// Refuses cells, grouped by these columns, that mix fingerprints.
+/// Refuses cells, grouped by these columns, that mix fingerprints. `traces` are those of the episodes, where they are at hand.
 ///
 /// # Errors
 /// [`StudyError::Pooled`] for the first such cell; columns that the episodes do not have.
-pub(super) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyError> {
+pub(super) fn check(table: &EpisodeTable, by: &[String], traces: Option<&TraceSet>) -> Result<(), StudyError> {
     let Some(fingerprints) = table.label(FINGERPRINT) else { return Ok(()) };
     let groups = membership(table, by)?;
     let mut first: BTreeMap<(usize, Option<usize>, Option<usize>), usize> = BTreeMap::new();
@@ -30,14 +32,20 @@ pub(super) fn check(table: &EpisodeTable, by: &[String]) -> Result<(), StudyErro
         let cell = (*group, table.keys.experiments().code(row), table.keys.models().code(row));
         let other = *first.entry(cell).or_insert(row);
         if fingerprints.get(other) != fingerprints.get(row) {
-            return Err(pooled(table, by, &groups, [other, row]));
+            return Err(pooled(table, by, &groups, [other, row], traces));
         }
     }
     Ok(())
 }
 
 /// What is the matter with the cell of two rows.
-fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2]) -> StudyError {
+fn pooled(
+    table: &EpisodeTable,
+    by: &[String],
+    groups: &[usize],
+    rows: [usize; 2],
+    traces: Option<&TraceSet>,
+) -> StudyError {
     let [one, other] = rows.map(|row| table.keys.get(row));
     let fingerprint = |row: usize| table.label(FINGERPRINT).and_then(|column| column.get(row)).unwrap_or_default();
     let is_in_cell = |row: usize| {
@@ -56,7 +64,7 @@ fn pooled(table: &EpisodeTable, by: &[String], groups: &[usize], rows: [usize; 2
         cell: format!("{}, {}", visible(one.experiment), visible(one.model)),
         episodes: format!("`{}` and `{}`", visible(one.episode_id), visible(other.episode_id)),
         counts: counts.join(", "),
-        differences: differences(&table.declared, rows.map(fingerprint)),
+        differences: differences(&table.declared, rows.map(fingerprint)) + &settings(traces, rows.map(fingerprint)),
         help: format!(
             "{help}; --where \"fingerprint = '{}'\" keeps some of them, --pool takes all",
             fingerprint(rows[0])
@@ -84,6 +92,35 @@ fn differences(declared: &Declared, names: [&str; 2]) -> String {
     } else {
         format!("they differ in {}", parts.join(", "))
     }
+}
+
+/// The first setting of the world, and of the agent, in which the recordings of two fingerprints differ, as their footers
+/// have it.
+fn settings(traces: Option<&TraceSet>, names: [&str; 2]) -> String {
+    let recording = |name: &str| {
+        let recordings = traces?.files().iter().filter_map(|file| file.metadata_value(RECORDING_KEY));
+        let mut recordings = recordings.filter_map(|text| serde_json::from_str::<Value>(text).ok());
+        recordings.find(|recording| !recording["fingerprints"][name].is_null())
+    };
+    let [Some(one), Some(other)] = names.map(recording) else { return String::new() };
+    let found = ["world", "agent"].into_iter().filter_map(|key| first_difference(key, &one[key], &other[key]));
+    found.map(|words| format!("; {words}")).collect()
+}
+
+/// The innermost key in which two values differ, and what each has.
+fn first_difference(name: &str, one: &Value, other: &Value) -> Option<String> {
+    if one == other {
+        return None;
+    }
+    if let (Value::Object(a), Value::Object(b)) = (one, other) {
+        let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+        let mut inner = keys.map(|key| (key, &one[key], &other[key])).filter(|(_, one, other)| one != other);
+        if let Some((key, one, other)) = inner.next() {
+            return first_difference(&format!("{name}.{}", visible(key)), one, other);
+        }
+    }
+    let [one, other] = [one, other].map(|value| shown(Some(value)));
+    Some(format!("{name} is {one} and {other}"))
 }
 
 /// The beginning of a hash, or a name.

@@ -48,8 +48,6 @@ pub struct Report {
     pub results: Results,
     /// All episodes, where some were lost: those in `results` are the ones that count.
     all: Option<EpisodeTable>,
-    /// How many were lost.
-    lost: LostCounts,
     /// The cells, grouped as the study says.
     pub cells: Cells,
     /// The tables, as the style lays them out.
@@ -97,8 +95,11 @@ impl Study {
         let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
         let results = self.scan(outputs)?;
         self.check_filter(results.episodes.len())?;
-        let Counted { results, all, lost } = self.counted(results);
-        let cells = self.cells_of(&results.episodes)?;
+        let counted = self.counted(results);
+        let cells = self.cells_of(&counted.results.episodes)?;
+        let statistics =
+            options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
+        let Counted { results, all, lost } = counted;
         let quality = results.quality.as_ref().and_then(QualityTable::of);
         let tables = layout::tables(&cells, &style)?;
         let filter = self.question.filter.clone();
@@ -107,15 +108,13 @@ impl Study {
         let (illustrations, read) = (Vec::new(), self.files_read(Some(&options.style)));
         let threads = self.threads;
         let mut report =
-            Report { results, all, lost, cells, tables, quality, manifest, notes, style, threads, illustrations, read };
-        if options.figures {
-            report.illustrate()?;
+            Report { results, all, cells, tables, quality, manifest, notes, style, threads, illustrations, read };
+        if let Some(statistics) = &statistics {
+            report.illustrate(statistics)?;
         }
         Ok(report)
     }
-}
 
-impl Study {
     /// What a reader of the tables must know of the data, one sentence each.
     fn notes(&self, results: &Results, lost: &LostCounts) -> Vec<String> {
         let mut notes = Vec::new();
@@ -187,23 +186,20 @@ impl Report {
     }
 
     /// Adds the figures and the page.
-    fn illustrate(&mut self) -> Result<(), StudyError> {
+    fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {
         let drawings = FigureInputs::of(&self.results, &self.style)?.draw_all();
         self.notes.extend(drawings.left_out.iter().map(|(name, reason)| format!("no figure `{name}`: {reason}")));
         self.illustrations = drawings.files()?;
         if self.results.episodes.len() > MOST_LISTED {
             self.notes.push(format!("no report.html: it lists at most {MOST_LISTED} episodes"));
         } else {
-            let bytes = self.page(&drawings)?.into_bytes();
+            let bytes = self.page(&drawings, statistics)?.into_bytes();
             self.illustrations.push(OutputFile { path: "report.html".into(), bytes });
         }
         Ok(())
     }
 
-    fn page(&self, drawings: &Drawings) -> Result<String, StudyError> {
-        let is_known = self.results.lost.is_some() || !self.lost.is_empty();
-        let options = Options { lost: is_known.then(|| self.lost.clone()), ..Options::default() };
-        let statistics = Statistics::of(&self.results.episodes, &self.cells, &options)?;
+    fn page(&self, drawings: &Drawings, statistics: &Statistics) -> Result<String, StudyError> {
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
         let figures: Vec<Figure> =
             drawings.drawn.iter().zip(&svgs).map(|((name, _), svg)| figure_of(*name, svg)).collect();
@@ -213,7 +209,7 @@ impl Report {
             episodes: &self.results.episodes,
             manifest: &self.manifest,
             figures: &figures,
-            statistics: Some(&statistics),
+            statistics: Some(statistics),
             quality: self.quality.as_ref(),
         })?)
     }

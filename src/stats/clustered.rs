@@ -10,12 +10,16 @@ use super::interval::{Interval, student_t_of};
 use super::moments::Moments;
 use super::quantile;
 
-/// The fewest clusters that a claim beyond the clusters at hand can rest on.
+/// The fewest clusters over which a test can reach a level at all.
 ///
 /// Reversing the signs of C cluster means gives 2^C equally likely outcomes under no effect, hence no
 /// two-sided p below 2^(1-C): 0.0625 for five clusters, 0.031 for six. Cluster-robust inference is known to
 /// fail well above that number too (Cameron and Miller 2015, section VI).
-pub const FEWEST_CLUSTERS: usize = 6;
+pub fn fewest_clusters(level: f64) -> usize {
+    let reach = |clusters: &usize| 0.5f64.powi(i32::try_from(*clusters).unwrap_or(i32::MAX) - 1) <= level;
+    // Beyond it the power underflows, and no level is reached.
+    (1..1100).find(reach).unwrap_or(usize::MAX)
+}
 
 /// What the division of a cell into clusters says about its mean.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -154,6 +158,11 @@ mod tests {
         close(found.interval.unwrap().high, 1.4168965922917767);
         close(found.icc.unwrap(), 0.3488372093023256);
         close(found.design_effect.unwrap(), 3.0930232558139537);
+    }
+
+    #[test]
+    fn fewer_clusters_are_needed_for_a_weaker_level() {
+        assert_eq!([0.05, 0.2, 0.01, 1.0].map(super::fewest_clusters), [6, 4, 8, 1]);
     }
 
     #[test]

@@ -63,7 +63,8 @@ impl StatsArgs {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let study = self.traces.study(&scoring, &self.by)?;
-        let options = Options { confidence: self.confidence, horizon: self.horizon, ..Options::default() };
+        let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
+        let options = Options { confidence, horizon, improvements, ..Options::default() };
         let statistics = study.statistics(&options)?;
         let text = if self.json {
             serde_json::to_string_pretty(&statistics).map_err(Failure::input)? + "\n"

@@ -18,8 +18,8 @@ mod matching;
 mod models;
 mod overall;
 mod study;
-mod warnings;
 pub mod text;
+mod warnings;
 
 use std::collections::BTreeSet;
 

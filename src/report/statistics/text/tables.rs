@@ -226,7 +226,7 @@ pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Grid {
     let lines = statistics.losses.rows.iter().filter(|row| shown(&row.metric)).map(|row| {
         let lossy = row.lossy;
         let (count, lost) = (format!("{}/{}", lossy.successes, lossy.n), lossy.lost.to_string());
-        let bounds = [format!("[{:.3}, {:.3}]", lossy.bounds.low, lossy.bounds.high), plain(Some(lossy.interval), 3)];
+        let bounds = [lossy.bounds, lossy.interval].map(|interval| plain(Some(interval), 3));
         let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
         names.into_iter().chain([count, lost]).chain(bounds).collect()
     });

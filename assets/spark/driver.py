@@ -164,15 +164,15 @@ def inspect(spark, request):
 
     with ThreadPool(8) as pool:
         for path, folders, found in pool.imap(look, sorted(every)):
-            compare(path, folders, found, request["columns"])
+            compare(path, folders, found, request["columns"], request["optional"])
     return set(every) != set(files(False, *group["paths"]))
 
 
-def compare(path, folders, found, columns):
+def compare(path, folders, found, columns, optional):
     for name, kind in columns:
         if name in folders and name in found:
             raise Refusal(column={"file": path, "column": name, "expected": "one value", "found": "one in the file and one in the name of its folder"})
-        if name not in folders and name not in found:
+        if name not in folders and name not in found and name not in optional:
             raise Refusal(column={"file": path, "column": name, "expected": kind, "found": None})
         if name in found and not isinstance(found[name], ACCEPTED[kind]):
             raise Refusal(column={"file": path, "column": name, "expected": kind, "found": found[name].simpleString()})

@@ -87,6 +87,8 @@ pub struct Reply {
     pub raw: Option<String>,
     /// What it cost.
     pub usage: Usage,
+    /// The id of the model as the provider returned it; `None` where no provider answers.
+    pub model: Option<String>,
 }
 
 /// The free text of a reply; the keys of the reply's JSON object in the paper.

@@ -52,6 +52,30 @@ impl ScoringArgs {
     }
 }
 
+/// How episodes are grouped into cells.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct GroupingArgs {
+    /// Group episodes by these columns, separated by commas [default: experiment,model, and condition where there are some]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
+    pub by: Option<Vec<String>>,
+    /// Let a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent
+    #[arg(long)]
+    pub pool: bool,
+    /// What episodes count as that were lost to failures which are not the agent's
+    #[arg(long, value_enum, default_value_t)]
+    pub lost: LostArg,
+}
+
+/// What lost episodes count as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum LostArg {
+    /// They are in no denominator
+    #[default]
+    Excluded,
+    /// They are in the denominator of every rate that each episode has, as failures
+    AsFailure,
+}
+
 /// What computes the episode table.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct EngineArgs {

@@ -11,7 +11,7 @@ use super::vlm::VlmPlayer;
 use crate::agent::Family;
 use crate::agent::vlm::estimate;
 use crate::base::escape::visible;
-use crate::record::plan::Key;
+use crate::record::plan::{Key, Subject};
 use crate::sim::config::WorldConfig;
 
 /// The answer of `record --dry-run --json`.
@@ -51,17 +51,17 @@ pub struct RequestForecast {
 impl ForecastAnswer {
     /// What recording the episodes that are still to do would come to.
     pub fn of(
-        model: &str,
+        subject: &Subject,
         asked: usize,
         todo: &[Key],
         config: &WorldConfig,
         requests: Option<RequestForecast>,
     ) -> Self {
         Self {
-            model: model.to_owned(),
+            model: subject.model.clone(),
             asked,
             found: asked - todo.len(),
-            episodes: todo.iter().map(|key| key.episode_id(model)).collect(),
+            episodes: todo.iter().map(|key| key.episode_id(subject)).collect(),
             steps_at_most: todo.len() as u64 * u64::from(config.episode.steps),
             requests,
         }
@@ -75,6 +75,7 @@ impl RequestForecast {
     /// A built-in prompt cannot be made, which a test rules out; and a journal that cannot be read.
     pub fn of(
         player: &VlmPlayer,
+        subject: &Subject,
         todo: &[Key],
         config: &WorldConfig,
     ) -> Result<Self, Box<dyn std::error::Error + Send + Sync>> {
@@ -89,7 +90,7 @@ impl RequestForecast {
             cost_usd_at_most: None,
         };
         for key in todo {
-            let answered = vlm.answered(&key.file_stem(&vlm.choice().name))?;
+            let answered = vlm.answered(&key.file_stem(subject))?;
             let left = u64::from(config.episode.steps).saturating_sub(answered);
             let family = if key.experiment.has_candidates() { Family::CubeSelection } else { Family::Exploration };
             forecast.answered += answered;

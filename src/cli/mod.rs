@@ -11,6 +11,7 @@ pub mod dry_run;
 pub mod exec;
 pub mod outcome;
 pub mod output;
+pub mod quality;
 #[cfg(feature = "sim")]
 pub mod recording;
 pub mod scoring;

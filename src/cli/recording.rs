@@ -17,7 +17,7 @@ use crate::base::escape::visible;
 use crate::base::format::fixed;
 use crate::base::number::Decimal;
 use crate::record::failures::LostEpisode;
-use crate::record::plan::Key;
+use crate::record::plan::{Key, Subject};
 use crate::record::queue::Held;
 use crate::record::replies::{Replies, RepliesAnswer, UnreadableReply};
 use crate::record::run::Progress;
@@ -62,6 +62,7 @@ const BETWEEN_LINES: Duration = Duration::from_secs(10);
 pub(super) struct Bar<'a> {
     line: ProgressBar,
     player: &'a dyn Player,
+    subject: &'a Subject,
     episodes: usize,
     ended: AtomicUsize,
     replies: Replies,
@@ -75,7 +76,7 @@ pub(super) struct Bar<'a> {
 
 impl<'a> Bar<'a> {
     /// A bar for so many episodes of so many steps at most.
-    pub(super) fn new(player: &'a dyn Player, episodes: usize, steps: u32) -> Self {
+    pub(super) fn new(player: &'a dyn Player, subject: &'a Subject, episodes: usize, steps: u32) -> Self {
         let is_shown = io::stderr().is_terminal();
         let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let budget = u64::from(steps);
@@ -84,7 +85,7 @@ impl<'a> Bar<'a> {
         line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let told = Mutex::new(Instant::now());
         let (ended, is_waiting, replies) = (AtomicUsize::new(0), AtomicBool::new(false), Replies::default());
-        let bar = Self { line, player, episodes, ended, replies, budget, is_shown, told, is_waiting };
+        let bar = Self { line, player, subject, episodes, ended, replies, budget, is_shown, told, is_waiting };
         bar.line.set_message(bar.message());
         bar
     }
@@ -136,7 +137,7 @@ impl<'a> Bar<'a> {
 impl Progress for Bar<'_> {
     fn step(&self, episode: Key, t: i32, row: &Step) {
         self.line.inc(1);
-        if let Some(first) = self.replies.add(self.player.model(), episode, t, row) {
+        if let Some(first) = self.replies.add(self.subject, episode, t, row) {
             self.say(&format!("a reply could not be read: {}: {}", first.status, quoted(&first)));
         }
         if self.is_shown {
@@ -270,7 +271,7 @@ mod tests {
     use super::{Bar, dollars, shares, spent, waiting};
     use crate::agent::scripted::Scripted;
     use crate::agent::vlm::limits::Spend;
-    use crate::record::plan::Key;
+    use crate::record::plan::{Key, Subject};
     use crate::record::queue::Held;
     use crate::record::run::Progress as _;
     use crate::record::shares::Spent;
@@ -290,7 +291,8 @@ mod tests {
     #[test]
     fn the_progress_tells_of_replies_that_cannot_be_read() {
         let player = Scripted::named("frozen").unwrap();
-        let bar = Bar::new(&player, 2, 10);
+        let subject = Subject::of("frozen");
+        let bar = Bar::new(&player, &subject, 2, 10);
         let row = |status: &str| {
             let extra = Extra { reply_status: Some(status.to_owned()), ..Extra::default() };
             Step { action: None, self_color: None, selected_cube: None, mirror_visible: false, extra }

@@ -2,10 +2,10 @@
 
 use std::io;
 
-use super::args::{EngineArgs, ScoringArgs, TraceArgs};
+use super::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
 use super::outcome::Failure;
 use crate::metric::fault::Faults;
-use crate::study::{Question, Study, StudyError, resolve};
+use crate::study::{LostAs, Question, Study, StudyError, resolve};
 use crate::trace::inputs::Input;
 
 impl TraceArgs {
@@ -29,28 +29,38 @@ impl TraceArgs {
     ///
     /// # Errors
     /// As [`TraceArgs::open`]; every fault of the definitions and the condition.
-    pub fn study(&self, scoring: &ScoringArgs, by: &[String]) -> Result<Study, Failure> {
-        Ok(self.open()?.asked(scoring.question(by))?)
+    pub fn study(&self, scoring: &ScoringArgs, grouping: &GroupingArgs) -> Result<Study, Failure> {
+        Ok(self.open()?.asked(scoring.question(grouping))?)
     }
 
     /// As [`TraceArgs::study`], scored by the engine asked for.
     ///
     /// # Errors
     /// As [`TraceArgs::study`]; options of another engine.
-    pub fn study_on(&self, engine: &EngineArgs, scoring: &ScoringArgs, by: &[String]) -> Result<Study, Failure> {
+    pub fn study_on(
+        &self,
+        engine: &EngineArgs,
+        scoring: &ScoringArgs,
+        grouping: &GroupingArgs,
+    ) -> Result<Study, Failure> {
         let backend = engine.backend()?;
-        Ok(self.study(scoring, by)?.backend(backend))
+        Ok(self.study(scoring, grouping)?.backend(backend))
     }
 }
 
 impl ScoringArgs {
-    /// What is asked, with cells grouped by some columns.
-    pub fn question(&self, by: &[String]) -> Question {
+    /// What is asked, with cells grouped so.
+    pub fn question(&self, grouping: &GroupingArgs) -> Question {
         Question {
             definitions: self.definitions.clone(),
             filter: self.condition.clone(),
             metrics: self.metrics.clone(),
-            by: by.to_vec(),
+            by: grouping.by.clone(),
+            pool: grouping.pool,
+            lost: match grouping.lost {
+                LostArg::Excluded => LostAs::Nothing,
+                LostArg::AsFailure => LostAs::Failure,
+            },
         }
     }
 }

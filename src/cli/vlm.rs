@@ -19,7 +19,7 @@ use crate::agent::{Agent, Lost, Player, Task};
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent vlm")]
 pub struct VlmArgs {
-    /// The model: a name of the paper's table, an id, or one of --models; with exec: its name in tables
+    /// The model: a name of the paper's table, an id, or one of --models; of any other agent its name in tables
     #[arg(long, value_name = "NAME|ID")]
     model: Option<String>,
     /// A file with more models, in the shape of assets/models.toml

@@ -19,6 +19,9 @@ pub enum EpisodeMessage {
         episode_id: String,
         /// Its steps.
         steps: usize,
+        /// What it was recorded with, which is not known before the first answer; the column of that name.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        fingerprint: Option<String>,
     },
 }
 
@@ -95,14 +98,14 @@ mod tests {
     use serde_json::json;
 
     use super::{Decision, Episode, Step};
-    use crate::trace::schema::TABLE;
+    use crate::trace::schema::COLUMNS;
 
     #[test]
     fn messages_have_the_columns_of_the_table_as_keys() {
         let keys = |schema: schemars::Schema| -> Vec<String> {
             json!(schema)["properties"].as_object().unwrap().keys().cloned().collect()
         };
-        let columns = |constant| TABLE.iter().filter(move |c| c.constant == constant).map(|c| c.name.to_owned());
+        let columns = |constant| COLUMNS.iter().filter(move |c| c.constant == constant).map(|c| c.name.to_owned());
         assert_eq!(keys(schemars::schema_for!(Episode)), columns(true).collect::<Vec<_>>());
         assert_eq!(keys(schemars::schema_for!(Decision)), columns(false).collect::<Vec<_>>());
     }

@@ -229,7 +229,9 @@ impl Salvage {
                 self.close("the next episode begins before its end");
                 self.open = Some((head, Vec::new(), None));
             }
-            Ok(Event::Episode(EpisodeMessage::End { episode_id, steps })) => self.end(&episode_id, steps),
+            Ok(Event::Episode(EpisodeMessage::End { episode_id, steps, fingerprint })) => {
+                self.end(&episode_id, steps, fingerprint);
+            }
             Ok(Event::Decision(row)) => {
                 let Some((_, rows, fault)) = &mut self.open else {
                     self.result.losses.stray_rows += 1;
@@ -253,10 +255,11 @@ impl Salvage {
         }
     }
 
-    fn end(&mut self, episode_id: &str, steps: usize) {
+    fn end(&mut self, episode_id: &str, steps: usize, fingerprint: Option<String>) {
         match self.open.take() {
             Some((head, rows, None)) if head.episode_id == episode_id && rows.len() == steps && steps > 0 => {
-                self.result.episodes.push(Episode { steps: rows, ..head });
+                let fingerprint = fingerprint.or_else(|| head.fingerprint.clone());
+                self.result.episodes.push(Episode { steps: rows, fingerprint, ..head });
             }
             Some((head, rows, fault)) => {
                 let reason = fault.unwrap_or_else(|| format!("its end says {steps} rows of `{episode_id}`"));

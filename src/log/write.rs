@@ -147,8 +147,9 @@ impl EpisodeLog {
     ///
     /// # Errors
     /// Whatever writing gives.
-    pub fn end(mut self, time: u64, episode_id: &str, steps: usize) -> Result<(), LogError> {
-        let end = EpisodeMessage::End { episode_id: episode_id.to_owned(), steps };
+    pub fn end(mut self, time: u64, episode: &Episode) -> Result<(), LogError> {
+        let Episode { episode_id, steps, fingerprint, .. } = episode.clone();
+        let end = EpisodeMessage::End { episode_id, steps: steps.len(), fingerprint };
         self.json(self.channels.episode, time, &end)?;
         self.out.finish().map_err(LogError::writing(&self.path))?;
         let failed = |error| LogError::io("write", &self.path)(error);

@@ -53,7 +53,19 @@ pub struct Column {
 pub struct Columns {
     schema: IndexMap<String, Column>,
     own: IndexMap<String, Column>,
+    fallbacks: IndexMap<String, Fallback>,
+    /// Columns of the schema whose names definitions may use for something else.
+    free: Vec<String>,
     stranger: Option<&'static str>,
+}
+
+/// What a column of the schema means where a trace, or a row, has no value in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fallback {
+    /// An expression over columns that every trace has.
+    pub expression: &'static str,
+    /// Whether some trace has the column.
+    pub is_read: bool,
 }
 
 impl Columns {
@@ -76,6 +88,31 @@ impl Columns {
     /// The schema's column of this name: one that every trace means the same by.
     pub fn of_schema(&self, name: &str) -> Option<Column> {
         self.schema.get(name).copied()
+    }
+
+    /// Whether a column of the schema keeps its name for itself.
+    pub fn is_reserved(&self, name: &str) -> bool {
+        self.schema.contains_key(name) && !self.free.iter().any(|free| free == name)
+    }
+
+    /// Lets definitions use the name of a column of the schema for something else.
+    pub fn set_free(&mut self, name: impl Into<String>) {
+        self.free.push(name.into());
+    }
+
+    /// Takes a column out of the schema: these traces use its name for something else.
+    pub fn forget(&mut self, name: &str) {
+        self.schema.shift_remove(name);
+    }
+
+    /// What the column of this name means where there is no value; `None` where that is null.
+    pub fn fallback_of(&self, name: &str) -> Option<Fallback> {
+        self.fallbacks.get(name).copied().filter(|_| self.schema.contains_key(name))
+    }
+
+    /// Says what a column of the schema means where there is no value.
+    pub fn set_fallback(&mut self, name: impl Into<String>, fallback: Fallback) {
+        self.fallbacks.insert(name.into(), fallback);
     }
 
     /// The names in order.

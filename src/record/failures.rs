@@ -6,56 +6,27 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::io::{self, Write as _};
-use std::path::{Path, PathBuf};
-
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 use super::error::StoreError;
-use super::plan::Key;
+use super::plan::{Key, Subject};
 use crate::agent::Lost;
 use crate::base::replace::NewFile;
+pub use crate::trace::lost::{LostEpisode, list_of};
 
-/// An episode that was lost to a failure which is not the agent's.
-#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-pub struct LostEpisode {
-    /// Its id.
-    pub episode_id: String,
-    /// The model's name as shown in tables.
-    pub model: String,
-    /// The experiment, E1 to E5.
-    pub experiment: String,
-    /// The block of runs.
-    pub seed: i32,
-    /// The run within it.
-    pub run: i32,
-    /// The step that got no reply; null if the episode did not come to its first.
-    pub step: Option<i32>,
-    /// What the failure counts as, by the names of the trace's column `reply_status`; null where none of them fits.
-    pub status: Option<String>,
-    /// What failed, without any key.
-    pub reason: String,
-}
-
-impl LostEpisode {
-    /// The episode of a key, lost at this step.
-    pub fn of(key: Key, model: &str, step: Option<i32>, lost: Lost) -> Self {
-        Self {
-            episode_id: key.episode_id(model),
-            model: model.to_owned(),
-            experiment: key.experiment.name().to_owned(),
-            seed: key.seed,
-            run: key.run,
-            step,
-            status: lost.status.map(|status| status.name().to_owned()),
-            reason: lost.cause,
-        }
+/// The episode of a key, lost at this step.
+pub fn lost_episode(key: Key, subject: &Subject, step: Option<i32>, lost: Lost) -> LostEpisode {
+    LostEpisode {
+        episode_id: key.episode_id(subject),
+        model: subject.model.clone(),
+        condition: subject.condition.clone(),
+        experiment: key.experiment.name().to_owned(),
+        seed: key.seed,
+        run: key.run,
+        step,
+        status: lost.status.map(|status| status.name().to_owned()),
+        reason: lost.cause,
     }
-}
-
-/// The list in a folder.
-pub fn list_of(folder: &Path) -> PathBuf {
-    folder.join("lost.jsonl")
 }
 
 /// Writes the list anew: without the episodes of these ids, and with those that were lost now.
@@ -68,7 +39,7 @@ pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) ->
     let stays = |id: &str| !recorded.contains(id) && !again.contains(id);
     let mut listed: Vec<&LostEpisode> =
         before.iter().filter(|episode| stays(&episode.episode_id)).chain(lost).collect();
-    listed.sort_by_key(|episode| (&episode.model, &episode.experiment, episode.seed, episode.run));
+    listed.sort_by_key(|episode| (&episode.model, &episode.condition, &episode.experiment, episode.seed, episode.run));
     match listed.as_slice() {
         [] if before.is_empty() => Ok(()),
         [] => fs::remove_file(path).map_err(StoreError::io("remove", path)),
@@ -98,15 +69,16 @@ fn write(path: &Path, episodes: &[&LostEpisode]) -> io::Result<()> {
 mod tests {
     use std::collections::BTreeSet;
 
-    use super::{LostEpisode, list_of, read, update};
+    use super::{LostEpisode, lost_episode, read, update};
     use crate::agent::{Lost, Status};
-    use crate::record::plan::Key;
+    use crate::record::plan::{Key, Subject};
     use crate::sim::Experiment;
+    use crate::trace::lost::list_of;
 
     fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
         let key = Key { experiment: Experiment::E1, seed: 1, run };
         let lost = Lost { status: Some(Status::Timeout), cause: cause.to_owned() };
-        LostEpisode::of(key, model, Some(4), lost)
+        lost_episode(key, &Subject::of(model), Some(4), lost)
     }
 
     #[test]

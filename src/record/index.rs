@@ -13,7 +13,7 @@ use super::error::StoreError;
 use super::folder_lock;
 use super::lock::is_at;
 use super::metadata::{Difference, difference};
-use super::plan::slug;
+use super::plan::Subject;
 use crate::sim::Experiment;
 use crate::trace::error::TraceError;
 use crate::trace::inputs::Input;
@@ -21,11 +21,11 @@ use crate::trace::merge::{self, EpisodeRows};
 use crate::trace::open::TraceFile;
 use crate::trace::schema::RECORDING_KEY;
 
-/// The recordings of one model in a folder, which need not be there.
+/// The recordings of one model and condition in a folder, which need not be there.
 #[derive(Debug)]
 pub struct RecordingIndex {
     folder: PathBuf,
-    model: String,
+    subject: Subject,
     recording: Value,
     /// What was read of traces.
     traces: Mutex<BTreeMap<Experiment, InTrace>>,
@@ -44,12 +44,12 @@ struct InTrace {
 
 impl RecordingIndex {
     /// The recordings of a model in a folder, with what a trace of it says of how it was recorded.
-    pub fn new(folder: &Path, model: &str, recording: Value) -> Self {
-        Self { folder: folder.to_owned(), model: model.to_owned(), recording, traces: Mutex::default() }
+    pub fn new(folder: &Path, subject: Subject, recording: Value) -> Self {
+        Self { folder: folder.to_owned(), subject, recording, traces: Mutex::default() }
     }
 
-    pub(super) fn model(&self) -> &str {
-        &self.model
+    pub(super) const fn subject(&self) -> &Subject {
+        &self.subject
     }
 
     pub(super) const fn recording(&self) -> &Value {
@@ -58,7 +58,7 @@ impl RecordingIndex {
 
     /// The trace of an experiment.
     pub fn trace(&self, experiment: Experiment) -> PathBuf {
-        self.folder.join(format!("{}-{}.parquet", experiment.name(), slug(&self.model)))
+        self.folder.join(format!("{}-{}.parquet", experiment.name(), self.subject.slug()))
     }
 
     /// The log of an experiment.
@@ -136,7 +136,7 @@ impl RecordingIndex {
         if !parts.exists() {
             return Ok(Vec::new());
         }
-        let prefix = format!("{}-{}-s", experiment.name(), slug(&self.model));
+        let prefix = format!("{}-{}-s", experiment.name(), self.subject.slug());
         let mut found = Vec::new();
         for entry in fs::read_dir(&parts).map_err(StoreError::io("read", &parts))? {
             let path = entry.map_err(StoreError::io("read", &parts))?.path();
@@ -155,7 +155,7 @@ pub(super) fn narrow(value: i64) -> i32 {
     i32::try_from(value).unwrap_or(i32::MAX)
 }
 
-fn recording_of(path: &Path) -> Result<Value, StoreError> {
+pub(super) fn recording_of(path: &Path) -> Result<Value, StoreError> {
     let input = Input { name: path.display().to_string(), path: path.to_owned() };
     let file = TraceFile::open(&input)
         .map_err(|findings| TraceError::of(findings).map_or_else(|| unreachable_fault(path), StoreError::Trace))?;

@@ -6,16 +6,24 @@ use crate::agent::Player;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::SCENE_VERSION;
 
-/// The key that grows with the recording's episodes.
+/// A key that grows with the recording's episodes.
 pub(super) const SEEDS: &str = "seeds";
+/// A key that grows with the recording's episodes: what they were recorded with, by fingerprint.
+pub(super) const FINGERPRINTS: &str = "fingerprints";
 
 /// The version of this object's shape.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
-/// The value of `mirrorstats.recording`; the store adds the seeds.
-pub fn recording(config: &WorldConfig, player: &dyn Player) -> Value {
+/// The value of `mirrorstats.recording`; the store adds the seeds and fingerprints. `condition` is absent for the default
+/// one.
+///
+/// Episodes with equal scenes are pairs. A seed is no cluster: each of its runs has a room of its own.
+pub fn recording(config: &WorldConfig, player: &dyn Player, condition: Option<&str>) -> Value {
     json!({
         "version": VERSION,
+        "kind": "recording",
+        "design": { "pairs": "scene", "cluster": null },
+        "condition": condition.unwrap_or("default"),
         "scene_version": SCENE_VERSION,
         "agent": player.description(),
         "view": { "width": config.eye.width, "height": config.eye.height_px, "fov_y": config.eye.fovy },
@@ -36,12 +44,13 @@ pub(super) struct Difference {
     pub found: String,
 }
 
-/// The first key in which the metadata of two recordings differ, but for the one that grows with the episodes.
+/// The first key in which the metadata of two recordings differ, but for those that grow with the episodes.
 pub(super) fn difference(ours: &Value, theirs: &Value) -> Option<Difference> {
     let keys = |value: &Value| -> Vec<String> {
         value.as_object().map(|object| object.keys().cloned().collect()).unwrap_or_default()
     };
-    let mut names = keys(ours).into_iter().chain(keys(theirs)).filter(|name| name != SEEDS);
+    let grows = |name: &String| [SEEDS, FINGERPRINTS].contains(&name.as_str());
+    let mut names = keys(ours).into_iter().chain(keys(theirs)).filter(|name| !grows(name));
     let name = names.find(|name| ours.get(name) != theirs.get(name))?;
     Some(first_difference(&name, ours.get(&name), theirs.get(&name)))
 }

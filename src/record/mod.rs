@@ -10,6 +10,7 @@
 //! |---|---|
 //! | [`plan`] | which episodes, their names, and which of them a shard has |
 //! | [`rollout`] | one episode, from the first frame to the last step |
+//! | [`fingerprint`] | what an episode was recorded with, in a few hashes |
 //! | [`metadata`] | what a trace says of how it was recorded |
 //! | [`index`] | what is recorded in a folder already |
 //! | [`store`] | the folder: how an episode commits, how the final files are made |
@@ -29,6 +30,7 @@
 mod continued;
 pub mod error;
 pub mod failures;
+pub mod fingerprint;
 pub mod folder_lock;
 pub mod index;
 pub mod lock;

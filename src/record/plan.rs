@@ -32,15 +32,39 @@ pub struct Key {
     pub run: i32,
 }
 
+/// Whose episodes they are: a model, under a condition where one is named.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Subject {
+    /// The name shown in tables.
+    pub model: String,
+    /// What the study varies besides the model; the default one if absent.
+    pub condition: Option<String>,
+}
+
+impl Subject {
+    /// A model under the default condition.
+    pub fn of(model: &str) -> Self {
+        Self { model: model.to_owned(), condition: None }
+    }
+
+    /// The subject as part of a file's name: `oracle`, `oracle@near`. No model's own name has an `@` in it there.
+    pub fn slug(&self) -> String {
+        match &self.condition {
+            None => slug(&self.model),
+            Some(condition) => format!("{}@{}", slug(&self.model), slug(condition)),
+        }
+    }
+}
+
 impl Key {
-    /// The episode's id with a model: `E1/oracle/s1/r3`.
-    pub fn episode_id(self, model: &str) -> String {
-        format!("{}/{}/s{}/r{}", self.experiment.name(), slug(model), self.seed, self.run)
+    /// The episode's id: `E1/oracle/s1/r3`, under a condition `E1/oracle@near/s1/r3`.
+    pub fn episode_id(self, subject: &Subject) -> String {
+        format!("{}/{}/s{}/r{}", self.experiment.name(), subject.slug(), self.seed, self.run)
     }
 
     /// The name of a file of the episode, without its ending: `E1-oracle-s1-r3`.
-    pub fn file_stem(self, model: &str) -> String {
-        self.episode_id(model).replace('/', "-")
+    pub fn file_stem(self, subject: &Subject) -> String {
+        self.episode_id(subject).replace('/', "-")
     }
 
     /// A number for the agent's chances: differs between episodes, and from what the world is drawn by.

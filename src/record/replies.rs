@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::plan::Key;
+use super::plan::{Key, Subject};
 use crate::base::escape::visible;
 use crate::trace::episode::Step;
 use crate::trace::replies::ReplyCounts;
@@ -49,7 +49,7 @@ pub struct UnreadableReply {
 
 impl Replies {
     /// Adds the reply of a step. Gives the reply back if it is the first one that came and gave no decision.
-    pub fn add(&self, model: &str, key: Key, step: i32, row: &Step) -> Option<UnreadableReply> {
+    pub fn add(&self, subject: &Subject, key: Key, step: i32, row: &Step) -> Option<UnreadableReply> {
         let status = row.extra.reply_status.as_deref()?;
         let mut found = self.found();
         found.counts.add(status, 1);
@@ -59,7 +59,7 @@ impl Replies {
         }
         let is_first_in_time = found.first.is_none();
         let text = row.extra.reply.as_deref().filter(|text| !text.trim().is_empty()).map(beginning);
-        let reply = UnreadableReply { episode_id: key.episode_id(model), step, status: status.to_owned(), text };
+        let reply = UnreadableReply { episode_id: key.episode_id(subject), step, status: status.to_owned(), text };
         found.first = Some((key, step, reply.clone()));
         is_first_in_time.then_some(reply)
     }
@@ -100,7 +100,7 @@ fn beginning(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Replies, SHOWN, beginning};
-    use crate::record::plan::Key;
+    use crate::record::plan::{Key, Subject};
     use crate::sim::Experiment;
     use crate::trace::episode::{Extra, Step};
 
@@ -114,12 +114,12 @@ mod tests {
     fn the_first_is_so_by_its_place_and_told_once() {
         let replies = Replies::default();
         let key = |run| Key { experiment: Experiment::E1, seed: 1, run };
-        assert_eq!(replies.add("m", key(2), 1, &row("ok", None)), None);
+        assert_eq!(replies.add(&Subject::of("m"), key(2), 1, &row("ok", None)), None);
         assert_eq!(replies.answer().first_unreadable, None);
-        let told = replies.add("m", key(2), 3, &row("parse_failed", Some("later"))).unwrap();
+        let told = replies.add(&Subject::of("m"), key(2), 3, &row("parse_failed", Some("later"))).unwrap();
         assert_eq!((told.step, told.text.as_deref()), (3, Some("later")));
-        assert_eq!(replies.add("m", key(1), 9, &row("refusal", Some(" \n"))), None);
-        assert_eq!(replies.add("m", key(1), 10, &row("parse_failed", None)), None);
+        assert_eq!(replies.add(&Subject::of("m"), key(1), 9, &row("refusal", Some(" \n"))), None);
+        assert_eq!(replies.add(&Subject::of("m"), key(1), 10, &row("parse_failed", None)), None);
         let answer = replies.answer();
         let first = answer.first_unreadable.unwrap();
         assert_eq!((first.episode_id.as_str(), first.step, first.text), ("E1/m/s1/r1", 9, None));

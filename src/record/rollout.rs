@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::error::RecordError;
-use super::plan::Key;
+use super::plan::{Key, Subject};
 use super::shares::Shares;
 use crate::agent::reply::Repair;
 use crate::agent::{Agent, Family, Observation, Reply, Task};
@@ -62,10 +62,13 @@ pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
 }
 
 /// The episode of a key as it begins: its constants, without steps.
-pub fn head(scene: &Scene, key: Key, model: &str) -> Episode {
+pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) -> Episode {
     Episode {
-        episode_id: key.episode_id(model),
-        model: model.to_owned(),
+        episode_id: key.episode_id(subject),
+        model: subject.model.clone(),
+        condition: Some(subject.condition.clone().unwrap_or_else(|| "default".to_owned())),
+        scene: Some(scene.fingerprint(config)),
+        decision: Some(if scene.experiment.has_candidates() { "selected_cube" } else { "self_color" }.to_owned()),
         experiment: key.experiment.name().to_owned(),
         seed: key.seed,
         run: key.run,
@@ -74,6 +77,15 @@ pub fn head(scene: &Scene, key: Key, model: &str) -> Episode {
         distractors: Some(i8::try_from(scene.others.len()).unwrap_or(i8::MAX)),
         ..Episode::default()
     }
+}
+
+/// An episode that was played to its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Played {
+    /// Its rows.
+    pub episode: Episode,
+    /// The id of the model as the provider returned it with the first answer; `None` where nothing is returned.
+    pub model: Option<String>,
 }
 
 /// Plays an episode to its end: `done`, or the last step of the budget.
@@ -87,9 +99,9 @@ pub async fn play(
     key: Key,
     mut episode: Episode,
     observer: &mut dyn Observer,
-) -> Result<Episode, RecordError> {
+) -> Result<Played, RecordError> {
     let budget = i32::try_from(stage.config.episode.steps).unwrap_or(i32::MAX);
-    let (mut bumped, mut history) = (false, None);
+    let (mut bumped, mut history, mut model) = (false, None, None);
     for t in 1..=budget {
         if stage.stop.load(Ordering::Relaxed) {
             return Err(RecordError::Stopped);
@@ -110,6 +122,7 @@ pub async fn play(
         stage.shares.visibility(start);
         let reply = agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: Some(t), lost })?;
         let action = reply.action;
+        model = model.or_else(|| reply.model.clone());
         history = Some((action, reply.words.summary.clone()));
         let mut row = row(world, key, t, &visibility, reply);
         observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
@@ -123,7 +136,7 @@ pub async fn play(
             break;
         }
     }
-    Ok(episode)
+    Ok(Played { episode, model })
 }
 
 fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {

@@ -12,11 +12,11 @@ use std::time::{Duration, Instant};
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
 use super::error::RecordError;
-use super::failures::LostEpisode;
+use super::failures::{LostEpisode, lost_episode};
 use super::lock::EpisodeLock;
-use super::plan::Key;
+use super::plan::{Key, Subject};
 use super::queue::{Held, Next, Queue};
-use super::rollout::{self, Observer, Stage};
+use super::rollout::{self, Observer, Played, Stage};
 use super::shares::Shares;
 use super::store::Store;
 use crate::agent::{Ended, Player};
@@ -76,6 +76,8 @@ pub struct Recording<'a> {
     pub config: &'a WorldConfig,
     /// Who plays.
     pub player: &'a dyn Player,
+    /// Whose episodes they are.
+    pub subject: &'a Subject,
     /// Where it goes.
     pub store: &'a Store,
     /// Told of everything.
@@ -180,7 +182,7 @@ impl Recording<'_> {
 
     /// Waits for a moment, with nothing to do but what other processes are doing.
     async fn wait<T>(&self, held: Held) -> Option<T> {
-        self.progress.waiting(&held.key.episode_id(self.player.model()), held);
+        self.progress.waiting(&held.key.episode_id(self.subject), held);
         tokio::time::sleep(AGAIN).await;
         None
     }
@@ -189,7 +191,7 @@ impl Recording<'_> {
     async fn episode(&self, key: Key, _lock: EpisodeLock, eye: Option<&RefCell<Camera>>) -> Result<usize, RecordError> {
         let start = Instant::now();
         let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
-        let episode = rollout::head(&scene, key, self.player.model());
+        let episode = rollout::head(self.config, &scene, key, self.subject);
         let task = rollout::task(self.config, &scene, key);
         let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
         self.shares.visibility(start);
@@ -205,29 +207,31 @@ impl Recording<'_> {
         let mut observer = Observers { key, progress: self.progress, shares: self.shares, frames, log };
         let played = rollout::play(&stage, &mut world, agent.as_mut(), key, episode, &mut observer).await;
         let committed = match &played {
-            Ok(episode) => self.commit(key, episode, observer.log),
+            Ok(played) => self.commit(key, played, observer.log),
             Err(_) => Ok(()),
         };
         if let Some(ended) = ended(&played) {
             agent.end(ended).await;
         }
-        committed.and(played).map(|episode| episode.steps.len())
+        committed.and(played).map(|played| played.episode.steps.len())
     }
 
     /// Makes an episode whole on the disk, its trace last.
-    fn commit(&self, key: Key, episode: &Episode, log: Option<Log>) -> Result<(), RecordError> {
+    fn commit(&self, key: Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
         let start = Instant::now();
+        let fingerprint = self.store.fingerprint(played.model.as_deref());
+        let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };
         if let Some(log) = log {
-            log.end(episode).map_err(RecordError::fatal)?;
+            log.end(&episode).map_err(RecordError::fatal)?;
         }
-        self.store.commit(key, episode).map_err(RecordError::fatal)?;
+        self.store.commit(key, &episode, &fingerprint).map_err(RecordError::fatal)?;
         self.shares.writing(start);
         Ok(())
     }
 
     /// Counts what became of an episode.
     fn note(&self, key: Key, result: Result<usize, RecordError>, tally: &mut Tally) -> Result<(), RecordError> {
-        let id = key.episode_id(self.player.model());
+        let id = key.episode_id(self.subject);
         match result {
             Ok(steps) => {
                 tally.recorded.push(key);
@@ -237,7 +241,7 @@ impl Recording<'_> {
             Err(RecordError::Stopped) => tally.stopped = true,
             Err(RecordError::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
-                tally.lost.push((key, LostEpisode::of(key, self.player.model(), step, lost)));
+                tally.lost.push((key, lost_episode(key, self.subject, step, lost)));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }
@@ -249,9 +253,9 @@ impl Recording<'_> {
 }
 
 /// What the agent is told of the end; nothing where it, or everything, has failed.
-fn ended(played: &Result<Episode, RecordError>) -> Option<Ended> {
+fn ended(played: &Result<Played, RecordError>) -> Option<Ended> {
     match played {
-        Ok(episode) => {
+        Ok(Played { episode, .. }) => {
             let last = episode.steps.last().and_then(|step| step.action);
             Some(if last == Some(Action::Done) { Ended::Done } else { Ended::Budget })
         }

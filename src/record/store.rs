@@ -12,7 +12,7 @@
 //! from the parts and from what was there, by seed and run, and replaced in one step. So any number of processes may
 //! record into one folder, the same episodes or others, and together they leave the trace that one of them would.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -21,11 +21,12 @@ use serde_json::{Value, json};
 
 use super::error::StoreError;
 use super::failures::{self, LostEpisode};
+use super::fingerprint::Fingerprint;
 use super::folder_lock::FolderLock;
-use super::index::{RecordingIndex, narrow};
+use super::index::{RecordingIndex, narrow, recording_of};
 use super::lock::{Attempt, EpisodeLock};
-use super::metadata::SEEDS;
-use super::plan::Key;
+use super::metadata::{FINGERPRINTS, SEEDS};
+use super::plan::{Key, Subject};
 use crate::log::{LogError, assemble};
 use crate::sim::Experiment;
 use crate::trace::episode::Episode;
@@ -56,11 +57,11 @@ impl Store {
     ///
     /// # Errors
     /// When it cannot be made or written to.
-    pub fn open(folder: &Path, model: &str, recording: Value) -> Result<Self, StoreError> {
+    pub fn open(folder: &Path, subject: Subject, recording: Value) -> Result<Self, StoreError> {
         let columns = OptionalColumns::recorded(&recording);
         Ok(Self {
             folder_lock: FolderLock::stake(folder)?,
-            index: RecordingIndex::new(folder, model, recording),
+            index: RecordingIndex::new(folder, subject, recording),
             columns,
         })
     }
@@ -80,7 +81,7 @@ impl Store {
     }
 
     fn part(&self, key: Key) -> PathBuf {
-        self.parts().join(format!("{}.parquet", key.file_stem(self.index.model())))
+        self.parts().join(format!("{}.parquet", key.file_stem(self.index.subject())))
     }
 
     /// Where the log of an episode is committed.
@@ -140,7 +141,7 @@ impl Store {
                 still.push(lost);
             }
         }
-        let recorded = recorded.into_iter().map(|key| key.episode_id(self.index.model())).collect();
+        let recorded = recorded.into_iter().map(|key| key.episode_id(self.index.subject())).collect();
         failures::update(&self.lost_list(), &recorded, &still)?;
         Ok(still)
     }
@@ -150,13 +151,20 @@ impl Store {
         failures::list_of(self.folder_lock.folder())
     }
 
+    /// What an episode of this recording was recorded with, given the id of the model as the provider returned it.
+    pub fn fingerprint(&self, model: Option<&str>) -> Fingerprint {
+        Fingerprint::of(self.index.recording(), model)
+    }
+
     /// Commits an episode whose log, if there is one, is committed already.
     ///
     /// # Errors
     /// Whatever writing gives; the episode is not there then.
-    pub fn commit(&self, key: Key, episode: &Episode) -> Result<(), StoreError> {
+    pub fn commit(&self, key: Key, episode: &Episode, fingerprint: &Fingerprint) -> Result<(), StoreError> {
         let path = self.part(key);
-        let metadata = TraceMetadata { recording: Some(self.index.recording().clone()), columns: self.columns.clone() };
+        let mut recording = self.index.recording().clone();
+        recording[FINGERPRINTS] = json!({ fingerprint.id.as_str(): fingerprint.parts });
+        let metadata = TraceMetadata { recording: Some(recording), columns: self.columns.clone() };
         let mut writer = TraceWriter::create(&path, &metadata)?;
         writer.write(episode)?;
         Ok(writer.finish()?)
@@ -179,12 +187,24 @@ impl Store {
         let mut recording = self.index.recording().clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
+        recording[FINGERPRINTS] = self.fingerprints(&trace, &parts)?;
         self.assemble_log(experiment, &parts, &recording)?;
         merge::write_in(&self.parts(), &trace, Some(&recording), &episodes)?;
         for part in parts.iter().chain(log_parts.iter().filter(|part| part.exists())) {
             fs::remove_file(part).map_err(StoreError::io("remove", part))?;
         }
         Ok(())
+    }
+
+    /// What the episodes of a trace and of parts were recorded with.
+    fn fingerprints(&self, trace: &Path, parts: &[PathBuf]) -> Result<Value, StoreError> {
+        let mut all = BTreeMap::new();
+        for path in trace.exists().then_some(trace).into_iter().chain(parts.iter().map(PathBuf::as_path)) {
+            if let Some(Value::Object(some)) = recording_of(path)?.get_mut(FINGERPRINTS).map(Value::take) {
+                all.extend(some);
+            }
+        }
+        Ok(json!(all))
     }
 
     /// Puts the log together from the parts that have one.

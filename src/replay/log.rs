@@ -75,10 +75,9 @@ impl Log {
     /// # Errors
     /// When it cannot be written.
     pub fn end(self, episode: &Episode) -> Result<(), LogFault> {
-        let steps = episode.steps.len();
-        let last = i32::try_from(steps).unwrap_or(i32::MAX);
+        let last = i32::try_from(episode.steps.len()).unwrap_or(i32::MAX);
         let time = self.time(last);
-        Ok(self.file.end(time, &episode.episode_id, steps)?)
+        Ok(self.file.end(time, episode)?)
     }
 
     fn time(&self, t: i32) -> u64 {

@@ -13,6 +13,7 @@ pub mod html;
 pub mod layout;
 pub mod order;
 pub mod published;
+pub mod quality;
 pub mod statistics;
 pub mod style;
 pub mod table;

@@ -17,7 +17,9 @@ use super::table::{
     EpisodeKey, EpisodeKeys, EpisodeTable, Header, JoinError, KeyRef, LabelColumn, MetricColumn, MetricValues,
     TextColumn, narrow,
 };
+use crate::trace::declared::Declared;
 use crate::trace::scan::EPISODE_COLUMNS;
+use crate::trace::schema::{self, Column};
 
 /// A table under way.
 #[derive(Debug)]
@@ -57,7 +59,10 @@ impl TableBuilder {
     pub fn extend(&mut self, episodes: &RecordBatch, metrics: &[ArrayRef]) {
         self.keys.extend(episodes);
         for (name, label) in self.header.labels.iter().zip(&mut self.labels) {
-            label.extend(column(episodes, name));
+            match episodes.column_by_name(name) {
+                Some(column) => label.extend(column, default_text(name)),
+                None => label.repeat(default_text(name), episodes.num_rows()),
+            }
         }
         self.metrics.iter_mut().zip(metrics).for_each(|(builder, column)| builder.extend(column));
     }
@@ -83,6 +88,7 @@ impl TableBuilder {
             labels: labels.map(|(name, values)| LabelColumn { name, values: sorted(values.finish()) }).collect(),
             metrics: metrics.collect(),
             keys: order.as_ref().map_or_else(|| keys.clone(), |order| keys.taken(order)),
+            declared: Declared::default(),
         }
     }
 }
@@ -108,8 +114,8 @@ impl KeyBuilder {
 
     fn extend(&mut self, episodes: &RecordBatch) {
         let [ids, models, experiments, seeds, runs] = EPISODE_COLUMNS.map(|name| column(episodes, name));
-        self.experiment.extend(experiments);
-        self.model.extend(models);
+        self.experiment.extend(experiments, None);
+        self.model.extend(models, None);
         // The scan has checked that they fit.
         let int = |value: &i64| i32::try_from(*value).unwrap_or_default();
         self.seed.extend(seeds.as_primitive::<Int64Type>().values().iter().map(int));
@@ -154,22 +160,29 @@ impl TextBuilder {
         self.codes.append_option(code);
     }
 
-    /// Adds the values of a column of any type, as text.
-    fn extend(&mut self, column: &ArrayRef) {
+    /// Adds the values of a column of any type, as text, and `null` where there is none.
+    fn extend(&mut self, column: &ArrayRef, null: Option<&str>) {
         match column.as_dictionary_opt::<Int32Type>() {
-            Some(texts) => self.extend_coded(texts),
-            None => (0..column.len()).for_each(|row| self.push(shown(column, row).as_deref())),
+            Some(texts) => self.extend_coded(texts, null),
+            None => (0..column.len()).for_each(|row| self.push(shown(column, row).as_deref().or(null))),
         }
     }
 
+    /// Adds a text so many times.
+    fn repeat(&mut self, text: Option<&str>, rows: usize) {
+        let code = text.map(|text| self.code(text));
+        (0..rows).for_each(|_| self.codes.append_option(code));
+    }
+
     /// Looks each text up once.
-    fn extend_coded(&mut self, column: &DictionaryArray<Int32Type>) {
+    fn extend_coded(&mut self, column: &DictionaryArray<Int32Type>, null: Option<&str>) {
+        let null = null.filter(|_| column.null_count() > 0).map(|text| self.code(text));
         let texts = column.values().as_string::<i32>();
         let mut known = vec![None; texts.len()];
         for key in column.keys() {
             let code =
                 key.map(|key| *known[key.as_usize()].get_or_insert_with(|| self.code(texts.value(key.as_usize()))));
-            self.codes.append_option(code);
+            self.codes.append_option(code.or(null));
         }
     }
 
@@ -191,6 +204,11 @@ impl TextBuilder {
 
 fn column<'a>(episodes: &'a RecordBatch, name: &str) -> &'a ArrayRef {
     episodes.column_by_name(name).expect("the projection asks for this column")
+}
+
+/// What a label means where there is no value.
+fn default_text(name: &str) -> Option<&'static str> {
+    schema::column(name).and_then(Column::default_text)
 }
 
 /// A value that is no text as text; `None` for null.
@@ -230,7 +248,28 @@ impl EpisodeTable {
         for table in [&self, other] {
             (0..table.len()).for_each(|row| builder.push_row(table, row));
         }
-        Ok(builder.finish())
+        let declared = self.declared.clone().joined(other.declared.clone());
+        Ok(Self { declared, ..builder.finish() })
+    }
+}
+
+impl EpisodeTable {
+    /// The same episodes with a label, unless it is the default one, as part of the model's name: `model [label]`; and for
+    /// each row where it was before.
+    pub fn with_labelled_models(&self, label: &str) -> (Self, Vec<usize>) {
+        let labels = self.label(label);
+        let name = |row: usize| {
+            let model = self.keys.get(row).model;
+            let label = labels.and_then(|labels| labels.get(row)).filter(|text| Some(*text) != default_text(label));
+            label.map_or_else(|| model.to_owned(), |label| format!("{model} [{label}]"))
+        };
+        let model: TextColumn = (0..self.len()).map(|row| Some(name(row))).collect();
+        let keys = EpisodeKeys { model, ..self.keys.clone() };
+        let rows: Vec<usize> = match order(&keys) {
+            Some(order) => order.into_iter().map(|row| row as usize).collect(),
+            None => (0..self.len()).collect(),
+        };
+        (Self { keys, ..self.clone() }.taken(&rows), rows)
     }
 }
 

@@ -17,6 +17,7 @@ pub mod flips;
 pub mod format;
 mod order;
 pub mod physical;
+pub mod quality;
 pub mod score_traces;
 pub mod segments;
 pub mod select;

@@ -9,12 +9,13 @@ use super::builder::TableBuilder;
 use super::error::EngineError;
 use super::evaluate::{Batch, BatchScores};
 use super::physical::PhysicalPlan;
+use super::quality::{QualityByCell, QualityReader};
 use super::segments::Segments;
 use super::table::{EpisodeTable, Header};
 use super::timeline::{Timeline, TimelineReader, in_key_order};
 use crate::base::suggest::nearest;
 use crate::metric::catalog::Catalog;
-use crate::metric::columns::{Column, Columns, Level, Type};
+use crate::metric::columns::{Column, Columns, Fallback, Level, Type};
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::metric::fault::Faults;
 use crate::metric::file::FileError;
@@ -22,7 +23,7 @@ use crate::metric::restore::RestoreError;
 use crate::trace::error::TraceError;
 use crate::trace::open::TraceSet;
 use crate::trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
-use crate::trace::schema::{COLUMNS, Kind};
+use crate::trace::schema::{self, COLUMNS, Kind};
 
 /// What to score.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -98,13 +99,37 @@ pub fn schema_columns() -> Columns {
         let level = if column.constant { Level::Episode } else { Level::Step };
         type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
     };
-    COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect()
+    let mut columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
+    set_fallbacks(&mut columns, |_| false);
+    COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
+    columns
+}
+
+/// The columns that definitions may name over traces of which nothing is known yet: as [`schema_columns`], where each row
+/// may have a value.
+pub fn unknown_columns() -> Columns {
+    let mut columns = schema_columns();
+    set_fallbacks(&mut columns, |_| true);
+    columns
+}
+
+/// Says what columns mean where there is no value; `is_read` says which of them some trace has.
+fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
+    for column in COLUMNS {
+        if let Some(expression) = column.default {
+            columns.set_fallback(column.name, Fallback { expression, is_read: is_read(column.name) });
+        }
+    }
 }
 
 /// The columns that definitions may name over these traces: those of the schema, and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns = schema_columns().with_help("`mirrorstats schema` and `mirrorstats info` list the columns");
+    set_fallbacks(&mut columns, |name| traces.declares(name));
     for name in traces.column_names().into_iter().filter(|name| *name != "t") {
+        if schema::column(name).is_some_and(|known| known.since > 1 && !traces.declares(name)) {
+            columns.forget(name);
+        }
         if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
             columns.set_own(name, Column { ty, level: Level::Step });
         }
@@ -170,12 +195,13 @@ pub fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(),
 
 fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     let absent = || "record it, or choose other metrics with --metrics".to_owned();
+    let has_default = schema::column(column).is_some_and(|known| known.default.is_some());
     let Some(found) = traces.column(column) else { return Some(("no trace has it".to_owned(), absent())) };
     if let Some([(first, a), (second, b)]) = found.conflict {
         let problem = format!("it is {} in `{first}` and {} in `{second}`", a.name(), b.name());
         return Some((problem, "write it with one type in all traces".to_owned()));
     }
-    found.missing_from.map(|file| (format!("`{file}` has no such column"), absent()))
+    found.missing_from.filter(|_| !has_default).map(|file| (format!("`{file}` has no such column"), absent()))
 }
 
 /// What a scan gives besides the metrics.
@@ -185,6 +211,8 @@ pub struct Outputs<'a> {
     pub labels: &'a [String],
     /// Whether the timelines of the first definitions are wanted.
     pub timelines: bool,
+    /// What to read of the replies of the episodes that the first definitions keep.
+    pub quality: Option<&'a QualityReader>,
 }
 
 /// What one scan gives.
@@ -195,6 +223,8 @@ pub struct Scored<const N: usize> {
     /// The timelines of the first definitions, in the order of their keys; `None` where they were not asked for, or the
     /// definitions do not name their moments.
     pub timelines: Option<Vec<Timeline>>,
+    /// What became of the replies; `None` where it was not asked for.
+    pub quality: Option<QualityByCell>,
 }
 
 /// Scores all episodes of some traces.
@@ -210,7 +240,7 @@ pub fn score(
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, ScoreError> {
     let Scored { tables: [table], .. } =
-        score_each(traces, [definitions], Outputs { labels, timelines: false }, threads)?;
+        score_each(traces, [definitions], Outputs { labels, ..Outputs::default() }, threads)?;
     Ok(table)
 }
 
@@ -228,18 +258,29 @@ pub fn score_each<const N: usize>(
     let mut plan = PhysicalPlan::of(&definitions.map(|definitions| &definitions.plan));
     let first = definitions.first().filter(|_| outputs.timelines);
     let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
-    let projection = projection(traces, &definitions, &plan, outputs.labels)?;
+    let mut projection = projection(traces, &definitions, &plan, outputs.labels)?;
+    if let Some(quality) = outputs.quality {
+        let new = quality.columns().iter().filter(|name| !projection.steps.contains(name)).cloned().collect::<Vec<_>>();
+        projection.unchecked.extend(new);
+        let condition = quality.constants().filter(|name| !projection.constants.contains(name));
+        projection.constants.extend(condition);
+    }
     let headers = definitions.map(|definitions| header(definitions, outputs.labels));
     let mut found = timelines.as_ref().map(|_| Vec::new());
+    let mut quality = outputs.quality.map(|_| QualityByCell::default());
     let read = |batch: &EpisodeBatch| {
         let values = plan.evaluate(&view(batch))?;
         let scores = plan.scores().iter().map(|scores| values.scores(scores)).collect::<Result<Vec<_>, _>>()?;
-        Ok((scores, timelines.as_ref().map(|reader| reader.timelines(&values, batch))))
+        let kept = scores.first().and_then(|scores: &BatchScores| scores.kept.as_ref());
+        let quality = outputs.quality.map(|reader| reader.read(batch, kept));
+        let timelines = timelines.as_ref().map(|reader| reader.timelines(&values, batch));
+        Ok((scores, (timelines, quality)))
     };
-    let tables = collect(traces, &projection, headers, threads, read, |part| {
-        found.iter_mut().zip(part).for_each(|(found, part)| found.extend(part));
+    let tables = collect(traces, &projection, headers, threads, read, |(timelines, replies)| {
+        found.iter_mut().zip(timelines).for_each(|(found, part)| found.extend(part));
+        quality.iter_mut().zip(replies).for_each(|(quality, part)| quality.merge(part));
     })?;
-    Ok(Scored { tables, timelines: found.map(in_key_order) })
+    Ok(Scored { tables, timelines: found.map(in_key_order), quality })
 }
 
 /// The columns of the table that definitions give.
@@ -329,7 +370,9 @@ pub(super) fn projection(
     let (steps, mut constants) = plan.columns();
     for label in labels {
         check_label(traces, label)?;
-        constants.push(label.clone());
+        if traces.column(label).is_some() {
+            constants.push(label.clone());
+        }
     }
     let mut seen = Vec::new();
     constants.retain(|name| {
@@ -357,7 +400,8 @@ fn experiments(definitions: &[&Definitions]) -> Option<Vec<String>> {
 pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     let constant = |name: &str| COLUMNS.iter().any(|column| column.name == name && column.constant);
     let problem = column_problem(traces, label);
-    if constant(label) && problem.is_none() {
+    let is_known_anyway = schema::column(label).is_some_and(|column| column.default_text().is_some());
+    if constant(label) && (problem.is_none() || is_known_anyway) {
         return Ok(());
     }
     let known: Vec<String> =
@@ -385,7 +429,8 @@ mod tests {
         let metrics = Some(vec!["TSA".to_owned(), "MGD".to_owned()]);
         let some = definitions(&traces, &Request { metrics, ..Request::of("paper") }).unwrap();
         let threads = NonZeroUsize::new(2).unwrap();
-        let outputs = Outputs { labels: &["body_color".to_owned()], timelines: true };
+        let labels = ["body_color".to_owned()];
+        let outputs = Outputs { labels: &labels, timelines: true, quality: None };
         let found = score_each(&traces, [&seed, &some], outputs, threads).unwrap();
         for (table, definitions) in found.tables.iter().zip([&seed, &some]) {
             assert_eq!(*table, score(&traces, definitions, outputs.labels, threads).unwrap());

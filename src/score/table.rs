@@ -8,6 +8,8 @@ use arrow::array::{
 use arrow::compute::take;
 
 use crate::metric::catalog::Catalog;
+pub use crate::trace::declared::Declared;
+use crate::trace::schema::{self, Column};
 
 /// Scores of some episodes, ordered by experiment, model, seed, run, `episode_id` (bytes and integers, ascending).
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +22,8 @@ pub struct EpisodeTable {
     pub labels: Vec<LabelColumn>,
     /// The metrics in the order of the catalog, or of the selection made.
     pub metrics: Vec<MetricColumn>,
+    /// What the traces declare of how they were recorded.
+    pub declared: Declared,
 }
 
 /// The key columns of a table.
@@ -31,6 +35,9 @@ pub struct EpisodeKeys {
     pub(super) run: Int32Array,
     pub(super) episode_id: TextColumn,
 }
+
+/// The label of what a study varies besides the model.
+pub const CONDITION: &str = "condition";
 
 /// What names an episode. The derived order is the order of the table.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -126,6 +133,17 @@ impl EpisodeTable {
         }
     }
 
+    /// Whether some episode was recorded under another condition than the default one.
+    pub fn has_conditions(&self) -> bool {
+        let default = schema::column(CONDITION).and_then(Column::default_text);
+        self.label(CONDITION).is_some_and(|column| column.iter().flatten().any(|condition| Some(condition) != default))
+    }
+
+    /// The further key column of this name, if the table has it.
+    pub fn label(&self, name: &str) -> Option<&TextColumn> {
+        self.labels.iter().find(|label| label.name == name).map(|label| &label.values)
+    }
+
     /// The number of episodes.
     pub fn len(&self) -> usize {
         self.keys.len()
@@ -146,6 +164,7 @@ impl EpisodeTable {
             keys: self.keys.taken(&rows),
             labels: self.labels.iter().map(label).collect(),
             metrics: self.metrics.iter().map(|metric| metric.taken(&rows)).collect(),
+            declared: self.declared.clone(),
         }
     }
 }

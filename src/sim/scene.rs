@@ -5,16 +5,21 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::Experiment;
 use super::angle::Heading;
 use super::body::Pose;
 use super::config::WorldConfig;
 use super::floor::{FloorPlan, Square};
+use crate::base::hash;
 use crate::base::palette::Color;
 
 /// Changes whenever the same configuration and seeds give other scenes or other motion than before.
 pub const SCENE_VERSION: u32 = 1;
+
+/// Digits of the fingerprint of a scene: enough for any study.
+const FINGERPRINT_DIGITS: usize = 16;
 
 /// The most other agents that a world holds.
 pub const MOST_OTHERS: usize = 6;
@@ -127,6 +132,16 @@ impl Scene {
     /// Whether there is a reflective surface.
     pub const fn has_mirror(&self) -> bool {
         self.experiment.has_mirror()
+    }
+
+    /// What two episodes share that are a pair: the room, the body, the cubes, the start and the others. What they are
+    /// compared in is not part of it: the mirror, and what is stated.
+    pub fn fingerprint(&self, config: &WorldConfig) -> String {
+        let Self { body_color, start, cubes, others, .. } = self;
+        let parts = json!([SCENE_VERSION, config.room, body_color, start, cubes, others]);
+        let mut hash = hash::of_bytes(parts.to_string().as_bytes());
+        hash.truncate(FINGERPRINT_DIGITS);
+        hash
     }
 
     /// What does not move, as a plan.

@@ -388,7 +388,7 @@ mod tests {
     use crate::metric::definitions::Definitions;
     use crate::score::evidence::MetricEvidence;
     use crate::score::score_traces::schema_columns;
-    use crate::score::table::{EpisodeKey, EpisodeTable, MetricColumn};
+    use crate::score::table::{Declared, EpisodeKey, EpisodeTable, MetricColumn};
 
     const RATE: &str = "[metric.R]\nvalue = \"length() > 2\"";
 
@@ -404,7 +404,7 @@ mod tests {
         let keys = (first..).take(values.len()).map(key).collect();
         let catalog = Definitions::from_toml("d", definitions, &schema_columns()).unwrap().catalog;
         let metrics = vec![MetricColumn::new("R", values.iter().copied())];
-        EpisodeTable { catalog, keys, labels: vec![], metrics }
+        EpisodeTable { catalog, keys, labels: vec![], metrics, declared: Declared::default() }
     }
 
     fn changes(before: &EpisodeTable, after: &EpisodeTable) -> Changes {

@@ -8,6 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::cell::{Cells, Group, KeyValue};
 use super::moments::{MomentOverflow, Moments};
 use crate::base::suggest::hint;
+pub use crate::score::table::CONDITION;
 use crate::score::table::{EpisodeTable, KeyRef, LabelColumn, TextColumn};
 
 /// The key columns of every episode table.
@@ -234,7 +235,7 @@ mod tests {
 
     use super::{GroupError, group, membership};
     use crate::metric::catalog::Catalog;
-    use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+    use crate::score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
     use crate::stats::cell::KeyValue;
 
     /// Rows of (experiment, model, seed, label, value).
@@ -264,6 +265,7 @@ mod tests {
                 values: rows.iter().map(|row| row.3).collect(),
             }],
             metrics: vec![MetricColumn::new("X", rows.iter().map(|row| row.4))],
+            declared: Declared::default(),
         }
     }
 

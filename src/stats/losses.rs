@@ -3,10 +3,13 @@
 //! Rule: a lost episode is neither a success nor a failure. It is counted apart, and the rate is given
 //! with the bounds between "all lost ones fail" and "all succeed" (Manski 1989).
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::interval::{Interval, wilson};
+use crate::score::quality::CellKey;
 
 /// The outcomes of a step's reply, as recorded, that are the infrastructure's doing and not the model's.
 pub const INFRASTRUCTURE: [&str; 3] = ["rate_limited", "server_error", "timeout"];
@@ -51,6 +54,42 @@ pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidenc
         bounds: Interval { low: successes as f64 / all, high: (successes + lost) as f64 / all },
         interval: Interval { low: worst.low, high: best.high },
     })
+}
+
+/// How many episodes of each experiment, model and condition were lost.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LostCounts(BTreeMap<CellKey, u64>);
+
+impl LostCounts {
+    /// One more of a cell.
+    pub fn add(&mut self, key: CellKey) {
+        *self.0.entry(key).or_default() += 1;
+    }
+
+    /// The cells that lost some, and how many.
+    pub fn iter(&self) -> impl Iterator<Item = (&CellKey, &u64)> {
+        self.0.iter()
+    }
+
+    /// Whether none is lost.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// All of them.
+    pub fn total(&self) -> u64 {
+        self.0.values().sum()
+    }
+
+    /// Those of an experiment and model, under one condition or under any.
+    pub fn of(&self, experiment: &str, model: &str, condition: Option<&str>) -> u64 {
+        let is_wanted = |key: &CellKey| {
+            key.experiment == experiment
+                && key.model == model
+                && condition.is_none_or(|condition| key.condition == condition)
+        };
+        self.0.iter().filter(|(key, _)| is_wanted(key)).map(|(_, lost)| lost).sum()
+    }
 }
 
 /// Whether an episode counts.

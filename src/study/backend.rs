@@ -43,7 +43,7 @@ impl SparkJob {
     /// Files of scores; whatever is wrong with the definitions or the columns to group by.
     pub(crate) fn of_study(study: &Study, cluster: Cluster) -> Result<Self, StudyError> {
         let traces = study.source.traces()?;
-        let labels = study.question.labels();
+        let labels = study.question.labels_over(traces);
         labels.iter().try_for_each(|label| check_label(traces, label))?;
         let definitions = study.question.bind(traces)?;
         let sources = Sources::files(&study.inputs, traces)
@@ -60,7 +60,7 @@ impl SparkJob {
     /// # Errors
     /// Every fault of the definitions.
     pub(crate) fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
-        let definitions = question.bind_to(&crate::score::score_traces::schema_columns())?;
+        let definitions = question.bind_to(&crate::score::score_traces::unknown_columns())?;
         let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
         Ok(Self { sources, definitions, labels, cluster, read })
     }
@@ -111,7 +111,7 @@ pub(super) fn polars(
     threads: NonZeroUsize,
 ) -> Result<EpisodeTable, StudyError> {
     let definitions = question.bind(traces)?;
-    Ok(crate::engine::polars::score::score(traces, &definitions, &question.labels(), threads)?)
+    Ok(crate::engine::polars::score::score(traces, &definitions, &question.labels_over(traces), threads)?)
 }
 
 /// The refusal of a build without Polars.

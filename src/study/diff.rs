@@ -10,7 +10,7 @@ use std::path::Path;
 
 use super::error::StudyError;
 use super::inputs::{ScoreFile, Source, Stamp};
-use super::{Question, Study, scores};
+use super::{LostAs, Question, Study, scores};
 use crate::base::suggest::nearest;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::report::order::TableOrder;
@@ -145,7 +145,14 @@ impl Side {
             Self::Scores(files) if files.iter().any(|file| file.carries_definitions) => None,
             Self::Scores(_) => request.definitions_of_scores.clone(),
         };
-        Question { definitions, filter: request.filter.clone(), metrics: None, by: request.by.clone() }
+        Question {
+            definitions,
+            filter: request.filter.clone(),
+            metrics: None,
+            by: Some(request.by.clone()),
+            pool: true,
+            lost: LostAs::Nothing,
+        }
     }
 
     /// The side by itself.
@@ -170,7 +177,7 @@ impl Side {
                 Ok((definitions.catalog.metric.keys().cloned().collect(), None))
             }
             Self::Scores(files) => {
-                let table = scores::read(files, &Question { by: Vec::new(), ..self.question(request) })?;
+                let table = scores::read(files, &Question { by: None, ..self.question(request) })?;
                 Ok((table.metrics.iter().map(|metric| metric.name.clone()).collect(), Some(table)))
             }
         }
@@ -294,7 +301,7 @@ fn score_sides(
     traces: Option<&TraceSet>,
     request: &DiffRequest,
 ) -> Result<ScoredSides, StudyError> {
-    let labels = Question { by: request.by.clone(), ..Question::default() }.labels();
+    let labels = Question { by: Some(request.by.clone()), ..Question::default() }.labels();
     let score = |traces, definitions| score_traces::score(traces, definitions, &labels, request.threads);
     match (definitions, read, traces) {
         ([None, None], [Some(old), Some(new)], _) => Ok(([old, new], None)),

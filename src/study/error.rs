@@ -22,6 +22,7 @@ use crate::score::select::SelectError;
 use crate::stats::group::GroupError;
 use crate::stats::moments::MomentOverflow;
 use crate::trace::error::TraceError;
+use crate::trace::lost::LostListError;
 
 /// Why a study gives no answer. Each message says what, where, expected, found, and what to do.
 #[derive(Debug, thiserror::Error)]
@@ -78,6 +79,25 @@ pub enum StudyError {
     /// No file at all.
     #[error("expected at least one file of scores, found none\n  help: name traces or scores")]
     NoScores,
+    /// A list of lost episodes that cannot be read.
+    #[error(transparent)]
+    LostList(#[from] LostListError),
+    /// A cell that mixes episodes which were recorded differently.
+    #[error(
+        "{cell}: expected episodes that were recorded alike, found {counts}: {differences}; for example {episodes}\n  help: {help}"
+    )]
+    Pooled {
+        /// The experiment and model.
+        cell: String,
+        /// Two episodes that differ.
+        episodes: String,
+        /// How many episodes have each fingerprint.
+        counts: String,
+        /// In which parts the fingerprints differ.
+        differences: String,
+        /// What to do.
+        help: String,
+    },
     /// Scores under other definitions than those asked for.
     #[error(
         "{file}: expected scores under `{wanted}` ({wanted_hash}), found scores under `{found}` ({found_hash})\n  \

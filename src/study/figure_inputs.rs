@@ -1,5 +1,7 @@
 //! What figures are drawn from, and the figures of a report.
 
+use std::borrow::Cow;
+
 use super::error::StudyError;
 use super::scan::Results;
 use crate::figures::{self, Figure, FigureError, FigureFormat, FigureName, Input};
@@ -13,7 +15,7 @@ use crate::stats::group::{DEFAULT_BY, group};
 pub struct FigureInputs<'a> {
     cells: Cells,
     order: &'a [String],
-    results: &'a Results,
+    results: Cow<'a, Results>,
 }
 
 /// The figures of a report.
@@ -26,11 +28,12 @@ pub struct Drawings {
 }
 
 impl<'a> FigureInputs<'a> {
-    /// Groups the episodes as figures show them: by experiment and model.
+    /// Groups the episodes as figures show them: by experiment and model, a model under another condition as one of its own.
     ///
     /// # Errors
     /// Sums of squares that leave 128 bits.
     pub fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
+        let results = results.with_conditions_as_models();
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
         Ok(Self { cells, order: &style.sheet.row_order, results })
     }

@@ -10,12 +10,15 @@
 //! in between is an error. Nothing here knows a command line: text for people comes from errors and from `report`.
 
 mod backend;
+mod design;
 mod diff;
 mod empty_filter;
 mod error;
 mod figure_inputs;
 mod input_hashes;
 mod inputs;
+mod losses;
+mod pooled;
 mod provenance;
 mod report;
 mod rescore;
@@ -36,8 +39,10 @@ use crate::report::statistics::{Options, Statistics};
 use crate::report::style::Style;
 use crate::score::evidence::{self, Evidence};
 use crate::score::score_traces;
+use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
-use crate::stats::group::{DEFAULT_BY, KEY_COLUMNS, group};
+use crate::stats::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group};
+use crate::stats::losses::LostCounts;
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
 
@@ -47,13 +52,19 @@ pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
 pub use figure_inputs::{Drawings, FigureInputs};
 pub use inputs::{ScoreFile, Source, resolve};
+pub use losses::LostAs;
 pub use provenance::ProvenanceError;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
 pub use scan::{Outputs, Results};
 pub use scores::write as write_scores;
 
+use design::design_of;
 use inputs::Stamp;
+use losses::Counted;
+
+/// What scores say of each episode's recording, where the traces do.
+const STANDING_LABELS: [&str; 3] = [CONDITION, "scene", "fingerprint"];
 
 /// The definitions that are used where none are named.
 pub const DEFAULT_DEFINITIONS: &str = "paper";
@@ -71,7 +82,7 @@ pub struct Study {
 }
 
 /// What is asked of the inputs.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Question {
     /// Definitions by name or path; the default ones, or those that scores carry, if absent.
     pub definitions: Option<String>,
@@ -79,14 +90,13 @@ pub struct Question {
     pub filter: Option<String>,
     /// The metrics wanted, by name; all if absent.
     pub metrics: Option<Vec<String>>,
-    /// The columns that cells are grouped by.
-    pub by: Vec<String>,
-}
-
-impl Default for Question {
-    fn default() -> Self {
-        Self { definitions: None, filter: None, metrics: None, by: DEFAULT_BY.map(str::to_owned).to_vec() }
-    }
+    /// The columns that cells are grouped by; experiment and model if absent, and the condition where there is more than the
+    /// default one.
+    pub by: Option<Vec<String>>,
+    /// Whether a cell may hold episodes that were recorded differently.
+    pub pool: bool,
+    /// What lost episodes count as.
+    pub lost: LostAs,
 }
 
 impl Question {
@@ -97,7 +107,28 @@ impl Question {
 
     /// The columns among those to group by that a score does not have by itself.
     pub(crate) fn labels(&self) -> Vec<String> {
-        self.by.iter().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
+        self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
+    }
+
+    /// The labels of scores of these traces: the columns to group by, and what the traces say of each episode's recording.
+    pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
+        let mut labels = self.labels();
+        let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
+        for name in standing {
+            if !labels.iter().any(|label| label == name) {
+                labels.push(name.to_owned());
+            }
+        }
+        labels
+    }
+
+    /// The columns that cells of these episodes are grouped by.
+    pub(crate) fn by_over(&self, episodes: &EpisodeTable) -> Vec<String> {
+        let default = || {
+            let condition = episodes.has_conditions().then_some(CONDITION);
+            DEFAULT_BY.into_iter().chain(condition).map(str::to_owned).collect()
+        };
+        self.by.clone().unwrap_or_else(default)
     }
 
     /// The definitions asked for, with every column that they read in every trace.
@@ -177,11 +208,18 @@ impl Study {
         self.checked()
     }
 
-    /// Groups cells by these columns; experiment and model where this is not called. A column that no episode has is an
+    /// Groups cells by these columns; experiment and model where this is not called, and the condition where there are some. A column that no episode has is an
     /// error of the scan.
     #[must_use]
     pub fn by<T: Into<String>>(mut self, columns: impl IntoIterator<Item = T>) -> Self {
-        self.question.by = columns.into_iter().map(Into::into).collect();
+        self.question.by = Some(columns.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Lets a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent.
+    #[must_use]
+    pub const fn pool(mut self) -> Self {
+        self.question.pool = true;
         self
     }
 
@@ -227,7 +265,7 @@ impl Study {
     /// # Errors
     /// Whatever is wrong with the traces or the scores; numbers beyond 64 bits.
     pub fn score(&self) -> Result<Results, StudyError> {
-        self.scan(Outputs::default())
+        self.scan(Outputs { losses: true, ..Outputs::default() })
     }
 
     /// The cells: exact moments of every metric in every group.
@@ -235,7 +273,20 @@ impl Study {
     /// # Errors
     /// As [`Study::score`]; a column to group by that the episodes do not have.
     pub fn cells(&self) -> Result<Cells, StudyError> {
-        Ok(group(&self.score()?.episodes, &self.question.by)?)
+        let counted = self.counted(self.score()?);
+        self.cells_of(&counted.results.episodes)
+    }
+
+    /// The cells of these episodes, as [`Study::cells`].
+    ///
+    /// # Errors
+    /// A column to group by that the episodes do not have; a cell that mixes episodes which were recorded differently.
+    pub fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
+        let by = self.question.by_over(episodes);
+        if !self.question.pool {
+            pooled::check(episodes, &by, self.source.traces().ok())?;
+        }
+        Ok(group(episodes, &by)?)
     }
 
     /// The statistics of the cells: intervals, tests, comparisons.
@@ -245,9 +296,24 @@ impl Study {
     pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
         let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;
-        let cells = group(&results.episodes, &self.question.by)?;
-        let options = Options { lost: results.lost, ..options.clone() };
-        Ok(Statistics::of(&results.episodes, &cells, &options)?)
+        let counted = self.counted(results);
+        let cells = self.cells_of(&counted.results.episodes)?;
+        self.statistics_of(&counted, &cells, options)
+    }
+
+    /// The statistics of the episodes that count.
+    fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
+        let Counted { results, lost, .. } = counted;
+        let (is_known, total) = (results.lost.is_some() || !lost.is_empty(), lost.total());
+        let beside = if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() };
+        let design = design_of(&results.episodes.declared);
+        let options = Options { lost: is_known.then_some(beside), design, ..options.clone() };
+        let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
+        if self.question.lost == LostAs::Failure && total > 0 {
+            let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
+            statistics.warnings.push(words);
+        }
+        Ok(statistics)
     }
 
     /// One figure, with the models in the order of a style.
@@ -256,8 +322,10 @@ impl Study {
     /// As [`Study::score`]; inputs that lack what the figure needs.
     pub fn figure(&self, name: FigureName, style: &str) -> Result<Figure, StudyError> {
         let style = Style::load(style)?;
-        let results = self.scan(Outputs::of_figures(&[name]))?;
+        let results = self.scan(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
         self.check_filter(results.episodes.len())?;
+        let results = self.counted(results).results;
+        self.cells_of(&results.episodes)?;
         Ok(FigureInputs::of(&results, &style)?.draw(name)?)
     }
 

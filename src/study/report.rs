@@ -5,19 +5,22 @@ use std::path::{Path, PathBuf};
 
 use super::error::StudyError;
 use super::figure_inputs::{Drawings, FigureInputs};
+use super::losses::Counted;
 use super::scan::{Outputs, Results};
-use super::{Study, scores};
+use super::{LostAs, Study, scores};
 use crate::figures::FigureName;
 use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
 use crate::report::html::{self, Figure, Page};
 use crate::report::layout;
+use crate::report::quality::{self, QualityTable};
 use crate::report::statistics::{Options, Statistics};
 use crate::report::style::{MAIN_TABLE, Style};
 use crate::report::table::Table;
 use crate::report::tables::markdown;
 use crate::score::format::Format;
+use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
-use crate::stats::group::group;
+use crate::stats::losses::LostCounts;
 use crate::trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.
@@ -43,10 +46,14 @@ impl Default for ReportOptions {
 pub struct Report {
     /// What the scan gave: one row per episode, and more.
     pub results: Results,
+    /// All episodes, where some were lost: those in `results` are the ones that count.
+    all: Option<EpisodeTable>,
     /// The cells, grouped as the study says.
     pub cells: Cells,
     /// The tables, as the style lays them out.
     pub tables: Vec<Table>,
+    /// What became of the replies; `None` for scores, which do not say.
+    pub quality: Option<QualityTable>,
     /// Where everything comes from.
     pub manifest: Manifest,
     /// What the folder lacks and why, one sentence each.
@@ -85,20 +92,60 @@ impl Study {
         // Small files first: a slip in the style should not cost a pass over the traces.
         let style = Style::load(&options.style)?;
         let figures: &[FigureName] = if options.figures { &FigureName::ALL } else { &[] };
-        let results = self.scan(Outputs { losses: options.figures, hashes: true, ..Outputs::of_figures(figures) })?;
+        let outputs = Outputs { losses: true, quality: true, hashes: true, ..Outputs::of_figures(figures) };
+        let results = self.scan(outputs)?;
         self.check_filter(results.episodes.len())?;
-        let cells = group(&results.episodes, &self.question.by)?;
+        let counted = self.counted(results);
+        let cells = self.cells_of(&counted.results.episodes)?;
+        let statistics =
+            options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
+        let Counted { results, all, lost } = counted;
+        let quality = results.quality.as_ref().and_then(QualityTable::of);
         let tables = layout::tables(&cells, &style)?;
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
-        let (notes, illustrations, read) = (Vec::new(), Vec::new(), self.files_read(Some(&options.style)));
+        let notes = self.notes(&results, &lost);
+        let (illustrations, read) = (Vec::new(), self.files_read(Some(&options.style)));
         let threads = self.threads;
-        let mut report = Report { results, cells, tables, manifest, notes, style, threads, illustrations, read };
-        if options.figures {
-            report.illustrate()?;
+        let mut report =
+            Report { results, all, cells, tables, quality, manifest, notes, style, threads, illustrations, read };
+        if let Some(statistics) = &statistics {
+            report.illustrate(statistics)?;
         }
         Ok(report)
     }
+
+    /// What a reader of the tables must know of the data, one sentence each.
+    fn notes(&self, results: &Results, lost: &LostCounts) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some(undeclared) = undeclared(&results.episodes) {
+            notes.push(undeclared);
+        }
+        let total = lost.total();
+        if total > 0 {
+            let (noun, verb) = if total == 1 { ("episode", "was") } else { ("episodes", "were") };
+            let counted = match self.question.lost {
+                LostAs::Nothing => "in no denominator (--lost as-failure counts them)",
+                LostAs::Failure => "counted as failures",
+            };
+            notes.push(format!(
+                "{total} {noun} {verb} lost to failures that are not the agent's: {counted}; see tables/quality.md"
+            ));
+        }
+        notes
+    }
+}
+
+/// What the traces do not declare, in one line; `None` where they declare it.
+fn undeclared(episodes: &EpisodeTable) -> Option<String> {
+    let lacks = |label: &str| episodes.label(label).is_none();
+    let what = match (lacks("fingerprint"), lacks("scene")) {
+        (true, true) => "what they were recorded with, nor which episodes share a scene",
+        (true, false) => "what they were recorded with",
+        (false, true) => "which episodes share a scene",
+        (false, false) => return None,
+    };
+    Some(format!("the traces do not declare {what} (schema version 1): pooled and unpaired as they are"))
 }
 
 impl Report {
@@ -119,30 +166,40 @@ impl Report {
     /// report that this one is made from.
     pub fn write(&self, out: &Path) -> Result<WrittenReport, StudyError> {
         let mut episodes = Vec::new();
-        scores::write(&self.results.episodes, Format::Parquet, &mut episodes, self.threads)?;
-        let Self { cells, tables, manifest, illustrations: others, read, .. } = self;
+        let all = self.all.as_ref().unwrap_or(&self.results.episodes);
+        scores::write(all, Format::Parquet, &mut episodes, self.threads)?;
+        let Self { cells, tables, manifest, illustrations, read, .. } = self;
+        let others = &[self.quality_files(), illustrations.clone()].concat();
         let written = bundle::write(out, &Bundle { cells, tables, episodes: &episodes, manifest, read, others })?;
         let inside = |path: &PathBuf| path.strip_prefix(out).unwrap_or(path).display().to_string();
         Ok(WrittenReport { files: written.files.iter().map(inside).collect(), manifest: written.manifest })
     }
 
+    /// The table of data quality in its formats.
+    fn quality_files(&self) -> Vec<OutputFile> {
+        let file = |ending: &str, text: String| OutputFile {
+            path: format!("tables/{}.{ending}", quality::NAME).into(),
+            bytes: text.into_bytes(),
+        };
+        let Some(table) = &self.quality else { return Vec::new() };
+        vec![file("tex", table.latex()), file("md", table.markdown()), file("csv", table.csv().to_owned())]
+    }
+
     /// Adds the figures and the page.
-    fn illustrate(&mut self) -> Result<(), StudyError> {
+    fn illustrate(&mut self, statistics: &Statistics) -> Result<(), StudyError> {
         let drawings = FigureInputs::of(&self.results, &self.style)?.draw_all();
         self.notes.extend(drawings.left_out.iter().map(|(name, reason)| format!("no figure `{name}`: {reason}")));
         self.illustrations = drawings.files()?;
         if self.results.episodes.len() > MOST_LISTED {
             self.notes.push(format!("no report.html: it lists at most {MOST_LISTED} episodes"));
         } else {
-            let bytes = self.page(&drawings)?.into_bytes();
+            let bytes = self.page(&drawings, statistics)?.into_bytes();
             self.illustrations.push(OutputFile { path: "report.html".into(), bytes });
         }
         Ok(())
     }
 
-    fn page(&self, drawings: &Drawings) -> Result<String, StudyError> {
-        let options = Options { lost: self.results.lost.clone(), ..Options::default() };
-        let statistics = Statistics::of(&self.results.episodes, &self.cells, &options)?;
+    fn page(&self, drawings: &Drawings, statistics: &Statistics) -> Result<String, StudyError> {
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
         let figures: Vec<Figure> =
             drawings.drawn.iter().zip(&svgs).map(|((name, _), svg)| figure_of(*name, svg)).collect();
@@ -152,7 +209,8 @@ impl Report {
             episodes: &self.results.episodes,
             manifest: &self.manifest,
             figures: &figures,
-            statistics: Some(&statistics),
+            statistics: Some(statistics),
+            quality: self.quality.as_ref(),
         })?)
     }
 }

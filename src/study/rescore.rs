@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use super::diff::{Diff, Pair, Scored};
 use super::error::StudyError;
 use super::report::{Report, ReportOptions};
-use super::{Question, Study, provenance};
+use super::{LostAs, Question, Study, provenance};
 use crate::report::bundle::Manifest;
 use crate::report::order::TableOrder;
 use crate::report::style::Style;
@@ -73,7 +73,9 @@ impl RescoreRequest {
             definitions: Some(self.definitions.clone()),
             filter: manifest.filter.clone(),
             metrics: self.metrics.clone().or_else(|| selected.then(|| manifest.metrics.clone())),
-            by: manifest.by.clone(),
+            by: Some(manifest.by.clone()),
+            pool: true,
+            lost: LostAs::Nothing,
         }
     }
 
@@ -133,7 +135,7 @@ fn changes(study: &Study, before: EpisodeTable, report: &Report) -> Result<Diff,
     let definitions = study.question.bind(traces)?;
     let after = scored(report.results.episodes.clone(), Some(definitions));
     let pair = Pair { before: scored(before, None), after, evidence: None };
-    let mut changes = pair.changes(&study.question.by)?;
+    let mut changes = pair.changes(&report.cells.by)?;
     TableOrder { catalog: &report.cells.catalog, style: &report.style }.sort(&mut changes);
     let notes = pair.explain(&mut changes, traces, study.threads)?;
     Ok(Diff { changes, notes })

@@ -1,19 +1,24 @@
 //! The one pass over the inputs, and everything that it gives.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::thread;
 
 use super::error::StudyError;
 use super::inputs::Source;
-use super::{Backend, Study, backend, input_hashes, scores};
+use super::{Backend, Study, backend, input_hashes, losses, scores};
 use crate::figures::e5_outcomes::Outcomes;
 use crate::figures::{FigureName, gaze};
 use crate::metric::definitions::Definitions;
 use crate::report::bundle;
-use crate::score::score_traces;
-use crate::score::table::EpisodeTable;
+use crate::score::quality::{QualityByCell, QualityReader};
+use crate::score::score_traces::{self, Scored};
+use crate::score::table::{EpisodeKey, EpisodeTable};
 use crate::score::timeline::Timeline;
+use crate::stats::group::CONDITION;
 use crate::stats::losses::INFRASTRUCTURE;
+use crate::trace;
+use crate::trace::declared::Declared;
 use crate::trace::open::TraceSet;
 
 /// What a scan gives beside the episode table.
@@ -26,6 +31,8 @@ pub struct Outputs {
     pub outcomes: bool,
     /// The episodes that the infrastructure ended.
     pub losses: bool,
+    /// What became of the replies.
+    pub quality: bool,
     /// The hashes of the inputs.
     pub hashes: bool,
 }
@@ -39,12 +46,12 @@ impl Outputs {
 
     /// Whether anything beside the scores needs the steps.
     const fn needs_steps(self) -> bool {
-        self.timelines || self.outcomes || self.losses
+        self.timelines || self.outcomes || self.losses || self.quality
     }
 }
 
 /// What a scan gave.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Results {
     /// One row per episode.
     pub episodes: EpisodeTable,
@@ -56,6 +63,9 @@ pub struct Results {
     /// The ids of the episodes without `done` whose last reply was lost to the infrastructure. `None` where they were not
     /// asked for, and where the inputs do not record it.
     pub lost: Option<BTreeSet<String>>,
+    /// What became of the replies, by cell; the lost episodes are counted in it. `None` where it was not asked for, and for
+    /// scores.
+    pub quality: Option<QualityByCell>,
     /// The inputs with their hashes; empty where they were not asked for.
     pub inputs: Vec<bundle::Input>,
 }
@@ -75,7 +85,45 @@ impl Study {
         });
         // A change explains whatever else went wrong.
         self.check_unchanged()?;
-        Ok(Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? })
+        let mut results = Results { inputs: inputs.transpose()?.unwrap_or_default(), ..results? };
+        self.declare(&mut results)?;
+        Ok(results)
+    }
+
+    /// What became of the replies of all episodes, lost ones counted; empty where the traces do not record it.
+    ///
+    /// # Errors
+    /// Scores, which have no replies; whatever is wrong with the traces or the list of lost episodes.
+    pub fn quality(&self) -> Result<QualityByCell, StudyError> {
+        let traces = self.source.traces()?;
+        let reader = QualityReader::of(traces);
+        if reader.columns().is_empty() && trace::lost::beside(&self.inputs)?.is_empty() {
+            return Ok(QualityByCell::default());
+        }
+        let columns = score_traces::trace_columns(traces);
+        let all = Definitions::from_toml("all", "open = true", &columns)?;
+        let nobody = all.clone().filtered("nobody", "false", &columns)?;
+        let lost = lost_episodes(traces)?;
+        let labels: Vec<String> = traces.declares(CONDITION).then(|| CONDITION.to_owned()).into_iter().collect();
+        let wanted = score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader) };
+        let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
+        let Scored { tables: [episodes, ended], quality, .. } =
+            score_traces::score_each(traces, definitions, wanted, self.threads)?;
+        let lost = lost.map(|_| ended.keys.iter().map(|key| key.episode_id.to_owned()).collect());
+        let mut results = Results { lost, quality, ..Results::of(episodes) };
+        self.declare(&mut results)?;
+        self.check_unchanged()?;
+        Ok(results.quality.unwrap_or_default())
+    }
+
+    /// Adds to the episodes what is known of them besides their rows.
+    fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
+        if let Source::Traces(traces) = &self.source {
+            let unrecorded = losses::unrecorded(&self.inputs, &results.episodes)?;
+            results.episodes.declared = Declared { unrecorded, ..Declared::of(traces) };
+        }
+        losses::label(results);
+        Ok(())
     }
 
     fn scan_rows(&self, outputs: Outputs) -> Result<Results, StudyError> {
@@ -99,23 +147,21 @@ impl Study {
 
     /// Scores, timelines and losses in one pass over the traces.
     fn scan_traces(&self, traces: &TraceSet, outputs: Outputs) -> Result<Results, StudyError> {
-        let labels = self.question.labels();
+        let labels = self.question.labels_over(traces);
         let definitions = self.question.bind(traces)?;
-        let wanted = score_traces::Outputs { labels: &labels, timelines: outputs.timelines || outputs.outcomes };
+        let reader = outputs.quality.then(|| QualityReader::of(traces));
+        let timelines = outputs.timelines || outputs.outcomes;
+        let wanted = score_traces::Outputs { labels: &labels, timelines, quality: reader.as_ref() };
         let lost = if outputs.losses { lost_episodes(traces)? } else { None };
-        let (episodes, lost, timelines) = match &lost {
-            None => {
-                let scored = score_traces::score_each(traces, [&definitions], wanted, self.threads)?;
-                let [episodes] = scored.tables;
-                (episodes, None, scored.timelines)
-            }
-            Some(lost) => {
-                let scored = score_traces::score_each(traces, [&definitions, lost], wanted, self.threads)?;
-                let [episodes, lost] = scored.tables;
-                (episodes, Some(lost.keys.iter().map(|key| key.episode_id.to_owned()).collect()), scored.timelines)
-            }
+        let Some(lost) = lost else {
+            let Scored { tables: [episodes], timelines, quality } =
+                score_traces::score_each(traces, [&definitions], wanted, self.threads)?;
+            return Ok(Results { timelines, quality, ..Results::of(episodes) });
         };
-        Ok(Results { timelines, lost, ..Results::of(episodes) })
+        let Scored { tables: [episodes, lost], timelines, quality } =
+            score_traces::score_each(traces, [&definitions, &lost], wanted, self.threads)?;
+        let lost = Some(lost.keys.iter().map(|key| key.episode_id.to_owned()).collect());
+        Ok(Results { timelines, lost, quality, ..Results::of(episodes) })
     }
 
     fn scored_elsewhere(&self) -> Result<EpisodeTable, StudyError> {
@@ -144,15 +190,36 @@ fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
 impl Results {
     /// The episode table alone.
     fn of(episodes: EpisodeTable) -> Self {
-        Self { episodes, timelines: None, outcomes: None, lost: None, inputs: Vec::new() }
+        let (timelines, outcomes, lost, quality, inputs) = (None, None, None, None, Vec::new());
+        Self { episodes, timelines, outcomes, lost, quality, inputs }
+    }
+
+    /// The same with the name of a model under another condition than the default one as `model [condition]`.
+    pub(super) fn with_conditions_as_models(&self) -> Cow<'_, Self> {
+        if !self.episodes.has_conditions() {
+            return Cow::Borrowed(self);
+        }
+        let (episodes, order) = self.episodes.with_labelled_models(CONDITION);
+        let timelines = self.timelines.as_ref();
+        let timelines = timelines.map(|timelines| {
+            let of = |(row, was): (usize, &usize)| {
+                let model = episodes.keys.get(row).model.to_owned();
+                let line = timelines[*was].clone();
+                Timeline { key: EpisodeKey { model, ..line.key.clone() }, ..line }
+            };
+            order.iter().enumerate().map(|(row, was)| of((row, was))).collect()
+        });
+        Cow::Owned(Self { episodes, timelines, ..self.clone() })
     }
 
     /// Keeps what is asked for: how open questions ended, and timelines of as many episodes as a figure shows.
     fn select(&mut self, outputs: Outputs) {
         if outputs.outcomes && Outcomes::are_there(&self.episodes) {
+            let shown = self.with_conditions_as_models();
             let answered =
-                self.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
-            self.outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&self.episodes, &answered));
+                shown.timelines.as_ref().map(|timelines| timelines.iter().map(|line| line.answered).collect());
+            let outcomes = answered.and_then(|answered: Vec<bool>| Outcomes::of(&shown.episodes, &answered));
+            self.outcomes = outcomes;
         }
         if !outputs.timelines || self.episodes.len() > gaze::MOST_EPISODES {
             self.timelines = None;

@@ -16,6 +16,22 @@ pub struct Episode {
     pub body_color: String,
     pub stated_color: Option<String>,
     pub distractors: Option<i8>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub repetition: Option<i32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub decision: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fingerprint: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub participant: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub episode_hash: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start_distance: Option<i32>,
     /// The steps t = 1..T in order; never empty where an episode is whole.
     #[serde(skip)]
     pub steps: Vec<Step>,
@@ -108,5 +124,9 @@ optional! {
         completion_tokens: i32,
         cost_usd: f64,
         frame_time: i64,
+        mark_color: String,
+        mark_report: String,
+        mirror_mark_px: i32,
+        target_distance: i32,
     }
 }

@@ -12,6 +12,7 @@
 
 pub mod bits;
 pub(crate) mod catch_panic;
+pub mod declared;
 pub mod diagnostic;
 pub mod episode;
 pub mod error;
@@ -19,6 +20,7 @@ pub mod identification;
 pub mod import;
 pub mod info;
 pub mod inputs;
+pub mod lost;
 mod read;
 pub mod renormalize;
 pub mod replies;

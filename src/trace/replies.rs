@@ -14,7 +14,7 @@ use super::schema::REPLY_STATUSES;
 use crate::base::escape::visible;
 
 /// The column.
-pub(super) const REPLY_STATUS: &str = "reply_status";
+pub const REPLY_STATUS: &str = "reply_status";
 /// The statuses of replies that gave a decision.
 const READ: [&str; 2] = ["ok", "repaired"];
 

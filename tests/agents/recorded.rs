@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use mirrorstats::agent::scripted::Scripted;
 use mirrorstats::record::error::RecordError;
-use mirrorstats::record::plan::Key;
+use mirrorstats::record::plan::{Key, Subject};
 use mirrorstats::record::rollout::{Observer, Stage, head, play, task};
 use mirrorstats::record::shares::Shares;
 use mirrorstats::replay::log::Seen;
@@ -41,11 +41,11 @@ impl Observer for Nobody {
 fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, key: Key) -> Episode {
     let scene = Scene::draw(config, key.experiment, key.seed, key.run).unwrap();
     let mut player = agent.agent(&task(config, &scene, key));
-    let episode = head(&scene, key, agent.name());
+    let episode = head(config, &scene, key, &Subject::of(agent.name()));
     let mut world = World::new(config, scene).unwrap();
     let stage = Stage { config, eye, stop: &AtomicBool::new(false), shares: &Shares::default() };
     let mut nobody = Nobody;
-    ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut nobody))).unwrap()
+    ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut nobody))).unwrap().episode
 }
 
 /// Records episodes on `threads` threads, each with an eye of its own; the order is that of the plan.

@@ -3,16 +3,16 @@
 mod design;
 mod durations;
 
-use std::collections::BTreeSet;
-
 use indexmap::IndexMap;
 use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
 use mirrorstats::report::statistics::text::{self, Length};
 use mirrorstats::report::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
-use mirrorstats::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use mirrorstats::score::quality::CellKey;
+use mirrorstats::score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 use mirrorstats::stats::cell::{Cells, Group, KeyValue};
 use mirrorstats::stats::design::{Cluster, Design, DesignKind};
 use mirrorstats::stats::interval::Interval;
+use mirrorstats::stats::losses::LostCounts;
 use mirrorstats::stats::moments::Moments;
 
 use crate::assert_shown;
@@ -78,6 +78,7 @@ fn table(rows: &[Row]) -> EpisodeTable {
         catalog: catalog(),
         keys: rows.iter().enumerate().map(key).collect(),
         labels: Vec::new(),
+        declared: Declared::default(),
         metrics: vec![
             column("TSA", |row| Some(i64::from(row.4))),
             column("TTD", |row| Some(row.5.abs())),
@@ -229,14 +230,16 @@ fn chance_comes_from_the_definitions_and_references_where_there_is_none() {
 
 #[test]
 fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
-    let table = table(&block("E1", "a", 10, 9));
-    let lost: BTreeSet<String> = table.keys.iter().skip(18).map(|key| key.episode_id.to_owned()).collect();
+    let table = table(&block("E1", "a", 10, 9)).taken(&(0..18).collect::<Vec<_>>());
+    let mut lost = LostCounts::default();
+    let cell = CellKey { experiment: "E1".into(), model: "a".into(), condition: "default".into() };
+    (0..3).for_each(|_| lost.add(cell.clone()));
     let options = Options { lost: Some(lost), ..Options::default() };
     let found = Statistics::of(&table, &cells(&table), &options).unwrap();
     let row = &found.losses.rows[0];
     assert_eq!((row.metric.as_str(), row.lossy.n, row.lossy.successes, row.lossy.lost), ("TSA", 18, 10, 3));
     assert_eq!(row.lossy.bounds, Interval { low: 10.0 / 21.0, high: 13.0 / 21.0 });
-    assert!(found.warnings.iter().any(|warning| warning.starts_with("3 episodes ended by the infrastructure")));
+    assert!(found.warnings.iter().any(|warning| warning.starts_with("3 episodes were lost to failures")));
     let unknown = statistics(&block("E1", "a", 10, 9));
     assert!(!unknown.losses.recorded && unknown.warnings.iter().any(|warning| warning.contains("reply_status")));
 }

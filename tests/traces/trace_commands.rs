@@ -27,7 +27,7 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         bumped: Some(false),
         cube_distance: Some(1.0),
         reply_status: Some("ok".into()),
-        reply_repair: None,
+        reply_repair: Some("fence".into()),
         view_description: text(),
         reasoning: text(),
         summary: text(),
@@ -38,6 +38,10 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         completion_tokens: Some(5),
         cost_usd: Some(0.001),
         frame_time: Some(1_700_000_000_000_000_000),
+        mark_color: Some("pink".into()),
+        mark_report: Some("none".into()),
+        mirror_mark_px: Some(5),
+        target_distance: Some(300),
     };
     let step = Step {
         action: Some(Action::Done),
@@ -53,6 +57,14 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         run,
         stated_color: Some("blue".into()),
         distractors: Some(2),
+        condition: Some("near".into()),
+        scene: Some("5ce4e".into()),
+        repetition: Some(1),
+        decision: Some("selected_cube".into()),
+        fingerprint: Some("f1".into()),
+        participant: Some("p01".into()),
+        episode_hash: Some("e4".into()),
+        start_distance: Some(1200),
         ..traces::episode(&format!("{experiment}-{model}-{seed}-{run}"), vec![step; 3])
     }
 }

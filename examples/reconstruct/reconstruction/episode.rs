@@ -29,6 +29,7 @@ pub fn build(pair: &Pair, seed: i32, run: i32, outline: &Outline) -> Episode {
         stated_color: scene.stated.map(str::to_owned),
         distractors: scene.distractors,
         steps,
+        ..Episode::default()
     }
 }
 

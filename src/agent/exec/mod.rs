@@ -248,6 +248,7 @@ impl ExecAgent {
                 words: Words::default(),
                 raw: Some(self.shared.without_secrets(&String::from_utf8_lossy(line))),
                 usage,
+                model: None,
             },
         }
     }

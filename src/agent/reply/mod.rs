@@ -80,6 +80,7 @@ impl Reading {
             words: self.words,
             raw: Some(raw),
             usage,
+            model: None,
         }
     }
 }

@@ -111,6 +111,33 @@ impl crate::agent::Player for Scripted {
     }
 }
 
+/// A script under a name of its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Renamed {
+    /// What plays.
+    pub script: Scripted,
+    /// The name in tables.
+    pub model: String,
+}
+
+impl crate::agent::Player for Renamed {
+    fn model(&self) -> &str {
+        &self.model
+    }
+
+    fn description(&self) -> serde_json::Value {
+        crate::agent::Player::description(&self.script)
+    }
+
+    fn looks(&self) -> bool {
+        crate::agent::Player::looks(&self.script)
+    }
+
+    fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
+        Ok(self.script.agent(&task))
+    }
+}
+
 /// What traces say of a script. The first version is not written: traces were recorded before there was a second.
 fn described(name: &str, version: u32) -> serde_json::Value {
     let mut description = serde_json::json!({ "scripted": name });
@@ -159,6 +186,7 @@ impl Agent for Puppet {
             words,
             raw: None,
             usage: Usage::default(),
+            model: None,
         };
         Box::pin(std::future::ready(Ok(reply)))
     }

@@ -99,7 +99,8 @@ impl VlmAgent {
                     completion_tokens: count(answer.completion_tokens),
                     cost_usd,
                 };
-                Ok(reply::read(&answer.text, self.task.family, answer.ending).into_reply(answer.text, usage))
+                let reply = reply::read(&answer.text, self.task.family, answer.ending).into_reply(answer.text, usage);
+                Ok(Reply { model: answer.model, ..reply })
             }
         }
     }
@@ -115,5 +116,6 @@ fn without_decision(status: Status) -> Reply {
         words: Words::default(),
         raw: None,
         usage: Usage::default(),
+        model: None,
     }
 }

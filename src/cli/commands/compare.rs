@@ -3,13 +3,12 @@
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
-use crate::cli::args::{ScoringArgs, TraceArgs};
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use crate::report::comparison::Comparison;
 use crate::report::errata::Errata;
 use crate::report::tables::side_by_side;
-use crate::stats::group::DEFAULT_BY;
 
 /// The style that printed the published tables.
 const PAPER_STYLE: &str = "paper";
@@ -38,6 +37,9 @@ pub struct CompareArgs {
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
+    /// Let a cell hold episodes that were recorded differently
+    #[arg(long)]
+    pub pool: bool,
 }
 
 impl CompareArgs {
@@ -48,7 +50,7 @@ impl CompareArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let errata = self.errata()?;
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
-        let study = self.traces.study(&scoring, &DEFAULT_BY.map(str::to_owned))?;
+        let study = self.traces.study(&scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
         let comparison = study.compare(&self.published, &self.style, self.table.as_deref(), &errata)?;
         print(&comparison, self.json)?;
         Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })

@@ -6,11 +6,10 @@ use std::path::PathBuf;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
-use crate::cli::args::{EngineArgs, ScoringArgs, TraceArgs};
+use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::figures::{FigureFormat, FigureName};
-use crate::stats::group::DEFAULT_BY;
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
@@ -36,6 +35,9 @@ pub struct FigureArgs {
     /// Where to write it [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
+    /// Let a cell hold episodes that were recorded differently
+    #[arg(long)]
+    pub pool: bool,
 }
 
 impl ValueEnum for FigureFormat {
@@ -63,7 +65,11 @@ impl FigureArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         // An ending of no known format should not cost a pass over the traces.
         let format = self.format()?;
-        let study = self.traces.study_on(&self.engine, &self.scoring, &DEFAULT_BY.map(str::to_owned))?;
+        let study = self.traces.study_on(
+            &self.engine,
+            &self.scoring,
+            &GroupingArgs { pool: self.pool, ..GroupingArgs::default() },
+        )?;
         if let Some(path) = &self.output {
             output::check_target(path, study.files_read(Some(&self.style)))?;
         }

@@ -4,16 +4,17 @@ use std::fmt::Display;
 use std::io::{self, Write};
 
 use comfy_table::Table;
+use schemars::JsonSchema;
+use serde::Serialize;
 
 use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::quality::{self, CellAnswer};
 use crate::cli::terminal;
 use crate::cli::text_table::{aligned_right, counted, listing};
 use crate::report::tables::fit::{fitted, wrapped};
 use crate::trace::info::{Cell, Info, SeedRun, info};
-use crate::trace::inputs;
-use crate::trace::open::TraceSet;
 
 /// Summarise traces: episodes, steps, models, experiments, coverage, files
 #[derive(Clone, Debug, clap::Args)]
@@ -25,20 +26,34 @@ pub struct InfoCommand {
     json: bool,
 }
 
+/// The answer for a program.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct InfoAnswer {
+    /// What the traces hold.
+    #[serde(flatten)]
+    pub info: Info,
+    /// What became of the replies, by cell; empty where the traces do not record it.
+    pub quality: Vec<CellAnswer>,
+}
+
 impl InfoCommand {
     /// Reads the traces and prints what they hold.
     ///
     /// # Errors
     /// When the traces are not as they must be, or the output cannot be written.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
-        let set = TraceSet::open(&inputs).map_err(Failure::input)?;
-        let info = info(&set, self.input.threads.count()).map_err(Failure::input)?;
+        let study = self.input.open()?;
+        let info = info(study.traces()?, self.input.threads.count()).map_err(Failure::input)?;
+        let quality = study.quality()?;
         let mut out = io::stdout().lock();
         if self.json {
-            writeln!(out, "{:#}", serde_json::json!(info))?;
+            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: quality::answers(&quality) }))?;
         } else {
             print(&mut out, &info, terminal::width())?;
+            let text = quality::text(&quality, terminal::width());
+            if !text.is_empty() {
+                writeln!(out, "\nreplies by experiment and model\n{text}")?;
+            }
         }
         Ok(Outcome::Done)
     }

@@ -1,5 +1,6 @@
 //! The verbs: one file each.
 
+pub mod check;
 pub mod compare;
 pub mod definitions;
 pub mod diff;
@@ -41,6 +42,7 @@ pub enum Command {
     Diff(diff::DiffArgs),
     Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
+    Check(check::CheckArgs),
     Info(info::InfoCommand),
     Import(import::ImportArgs),
     Recover(recover::RecoverArgs),
@@ -74,6 +76,7 @@ impl Command {
             Self::Diff(args) => args.run(),
             Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),
+            Self::Check(args) => args.run(),
             Self::Info(command) => command.run(),
             Self::Import(args) => args.run(),
             Self::Recover(args) => args.run(),

@@ -76,6 +76,7 @@ mod rows {
 
     use super::{AnswerFormat, Failure, Outcome, QueryArgs};
     use crate::base::escape::visible;
+    use crate::cli::args::GroupingArgs;
     use crate::cli::text_table::listing;
     use crate::cli::{output, terminal};
     use crate::engine::polars::answer::{Excerpt, Format, QueryError, excerpt, plan, write};
@@ -84,7 +85,6 @@ mod rows {
     use crate::engine::polars::tables;
     use crate::metric::fault::Faults;
     use crate::report::tables::fit::fitted;
-    use crate::stats::group::{DEFAULT_BY, group};
     use crate::study::StudyError;
 
     /// What stands for null in a table.
@@ -153,7 +153,7 @@ mod rows {
 
     /// The tables that the query names; the others are not computed.
     fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Failure> {
-        let study = args.traces.study(&args.scoring, &DEFAULT_BY.map(str::to_owned))?;
+        let study = args.traces.study(&args.scoring, &GroupingArgs::default())?;
         if let Some(path) = &args.output {
             output::check_target(path, study.files_read(None))?;
         }
@@ -168,8 +168,7 @@ mod rows {
             }
             loaded.push((Table::Episodes, tables::episodes(&scores).map_err(failed)?));
             if query.tables.contains(&Table::Cells) {
-                let by = DEFAULT_BY.map(str::to_owned);
-                let cells = group(&scores, &by).map_err(Failure::input)?;
+                let cells = study.cells_of(&scores)?;
                 loaded.push((Table::Cells, tables::cells(&cells).map_err(failed)?));
             }
         }

@@ -8,7 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::agent::Player;
-use crate::agent::scripted::Scripted;
+use crate::agent::scripted::{Renamed, Scripted};
+use crate::base::escape::visible;
 use crate::base::suggest::hint;
 use crate::cli::args::ThreadArgs;
 use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
@@ -19,7 +20,7 @@ use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::vlm::VlmArgs;
 use crate::record::error::StoreError;
 use crate::record::index::RecordingIndex;
-use crate::record::plan::{Experiments, Key, Plan, Shard};
+use crate::record::plan::{Experiments, Key, Plan, Shard, Subject};
 use crate::record::run::{Recording, Settings, Tally};
 use crate::record::shares::Shares;
 use crate::record::store::Store;
@@ -54,6 +55,9 @@ pub struct RecordArgs {
     /// The folder for traces and logs
     #[arg(long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
+    /// What the study varies besides the model, by name: a column of traces and tables, and part of each episode's id
+    #[arg(long, value_name = "NAME", value_parser = condition)]
+    condition: Option<String>,
     /// A world configuration in TOML over the built-in one
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -99,11 +103,12 @@ impl RecordArgs {
             return self.forecast(&config, &plan);
         }
         let player = self.player()?;
-        let store = Store::open(&self.out, player.model(), metadata::recording(&config, player.as_ref()))
-            .map_err(Failure::input)?;
+        let subject = self.subject(player.as_ref());
+        let recording = metadata::recording(&config, player.as_ref(), self.condition.as_deref());
+        let store = Store::open(&self.out, subject.clone(), recording).map_err(Failure::input)?;
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         stop_at_interrupt(stop, Arc::clone(&player))?;
-        self.record(&config, player.as_ref(), &plan, &store, stop)
+        self.record(&config, player.as_ref(), &subject, &plan, &store, stop)
     }
 
     /// Says what recording would come to.
@@ -113,12 +118,15 @@ impl RecordArgs {
             Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
             None => self.player()?,
         };
-        let there = RecordingIndex::new(&self.out, player.model(), metadata::recording(config, player.as_ref()));
+        let subject = self.subject(player.as_ref());
+        let recording = metadata::recording(config, player.as_ref(), self.condition.as_deref());
+        let there = RecordingIndex::new(&self.out, subject.clone(), recording);
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
         let vlm = vlm.filter(|_| self.vlm.sends());
-        let requests = vlm.map(|vlm| RequestForecast::of(&vlm, &todo, config)).transpose().map_err(Failure::input)?;
-        let answer = ForecastAnswer::of(player.model(), planned.len(), &todo, config, requests);
+        let requests =
+            vlm.map(|vlm| RequestForecast::of(&vlm, &subject, &todo, config)).transpose().map_err(Failure::input)?;
+        let answer = ForecastAnswer::of(&subject, planned.len(), &todo, config, requests);
         if self.json {
             output::print_json(&answer)?;
         } else {
@@ -131,6 +139,7 @@ impl RecordArgs {
         &self,
         config: &WorldConfig,
         player: &dyn Player,
+        subject: &Subject,
         plan: &Plan,
         store: &Store,
         stop: &AtomicBool,
@@ -140,11 +149,11 @@ impl RecordArgs {
         if todo.len() < planned.len() {
             player.resumes();
         }
-        let bar = Bar::new(player, todo.len(), config.episode.steps);
+        let bar = Bar::new(player, subject, todo.len(), config.episode.steps);
         let shares = Shares::default();
         let start = Instant::now();
-        let recording =
-            Recording { config, player, store, progress: &bar, stop, shares: &shares, settings: self.settings(player) };
+        let (progress, settings) = (&bar, self.settings(player));
+        let recording = Recording { config, player, subject, store, progress, stop, shares: &shares, settings };
         let outcome = recording.run(&todo);
         // What is whole is put together whatever ended the recording.
         let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
@@ -184,8 +193,17 @@ impl RecordArgs {
         }
         match self.agent.as_str() {
             "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
-            name => Ok(Arc::new(scripted(name)?)),
+            name => {
+                let script = scripted(name)?;
+                let model = self.vlm.name().unwrap_or_else(|| script.name()).to_owned();
+                Ok(Arc::new(Renamed { script, model }))
+            }
         }
+    }
+
+    /// Whose episodes they are.
+    fn subject(&self, player: &dyn Player) -> Subject {
+        Subject { model: player.model().to_owned(), condition: self.condition.clone() }
     }
 
     fn settings(&self, player: &dyn Player) -> Settings {
@@ -242,6 +260,18 @@ fn unrecorded(
         todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run))));
     }
     Ok(todo)
+}
+
+/// A name that a table and a file can show.
+fn condition(text: &str) -> Result<String, String> {
+    match text {
+        "" => Err("expected a name such as near, found nothing".to_owned()),
+        "default" => Err("`default` is the condition without a name; leave the option out".to_owned()),
+        _ if text.trim() != text || text.chars().any(char::is_control) => {
+            Err(format!("expected a name without control characters, found `{}`", visible(text)))
+        }
+        name => Ok(name.to_owned()),
+    }
 }
 
 /// The first Ctrl-C stops at the next step of each episode, the second at once.

@@ -6,13 +6,12 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::args::{EngineArgs, ScoringArgs, TraceArgs};
+use super::super::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::output;
 use super::super::text_table::counted;
 use crate::report::bundle::Manifest;
 use crate::report::tables::terminal;
-use crate::stats::group::DEFAULT_BY;
 use crate::study::{Report, ReportOptions, WrittenReport};
 
 /// Compute the tables and figures of traces, print the main table, write all of them
@@ -33,9 +32,9 @@ pub struct ReportArgs {
     /// How tables look: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: String,
-    /// Group episodes by these columns, separated by commas [default: experiment,model]
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY, hide_default_value = true)]
-    pub by: Vec<String>,
+    /// How episodes are grouped into cells.
+    #[command(flatten)]
+    pub grouping: GroupingArgs,
     /// Write tables, cells and provenance alone: no figures, no report.html
     #[arg(long)]
     pub no_figures: bool,
@@ -63,7 +62,7 @@ impl ReportArgs {
     /// # Errors
     /// Whatever is wrong with the traces, the definitions, the style or the folder.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let study = self.traces.study_on(&self.engine, &self.scoring, &self.by)?;
+        let study = self.traces.study_on(&self.engine, &self.scoring, &self.grouping)?;
         let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };
         study.check_folder(&self.out, &options)?;
         let report = study.report(&options)?;

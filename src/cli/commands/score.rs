@@ -3,7 +3,7 @@
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use super::super::args::{Engine, EngineArgs, ScoringArgs, TraceArgs};
+use super::super::args::{Engine, EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::text_table::counted;
 use super::super::{output, spark};
@@ -50,7 +50,7 @@ impl ScoreArgs {
         }
         // An output name of no known format should not cost a pass over the traces.
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let study = self.traces.study_on(&self.engine, &self.scoring, &[])?;
+        let study = self.traces.study_on(&self.engine, &self.scoring, &GroupingArgs::default())?;
         self.check_target(study.files_read(None))?;
         if let Some(episode) = &self.explain {
             return output::print(&study.explain(episode)?, self.json);
@@ -92,9 +92,13 @@ impl ScoreArgs {
     fn spark_job(&self) -> Result<SparkJob, Failure> {
         let cluster = self.engine.cluster();
         if are_uris(&self.traces.traces)? {
-            return Ok(SparkJob::of_uris(self.traces.traces.clone(), &self.scoring.question(&[]), cluster)?);
+            return Ok(SparkJob::of_uris(
+                self.traces.traces.clone(),
+                &self.scoring.question(&GroupingArgs::default()),
+                cluster,
+            )?);
         }
-        Ok(SparkJob::of_study(&self.traces.study(&self.scoring, &[])?, cluster)?)
+        Ok(SparkJob::of_study(&self.traces.study(&self.scoring, &GroupingArgs::default())?, cluster)?)
     }
 
     /// Writes the table to where it was asked for.

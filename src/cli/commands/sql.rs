@@ -2,14 +2,18 @@
 
 use std::io::{self, Write as _};
 
-use super::super::args::ScoringArgs;
+use super::super::args::{GroupingArgs, ScoringArgs};
 use super::super::outcome::{Failure, Outcome};
 use crate::metric::sql::{self, Dialect};
-use crate::score::score_traces::schema_columns;
+use crate::score::score_traces::{schema_columns, trace_columns};
+use crate::study::Study;
 
 /// Print the SQL statement that computes the episode table from a table `steps`
 #[derive(Clone, Debug, clap::Args)]
 pub struct SqlArgs {
+    /// Traces whose columns `steps` has [default: those that every trace has; what others mean then is part of the statement]
+    #[arg(value_name = "TRACES")]
+    pub traces: Vec<String>,
     /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
@@ -45,7 +49,13 @@ impl SqlArgs {
     /// # Errors
     /// Faults of the definitions; a construct that the dialect cannot say.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let definitions = self.scoring.question(&[]).bind_to(&schema_columns()).map_err(Failure::from)?;
+        let question = self.scoring.question(&GroupingArgs::default());
+        let columns = if self.traces.is_empty() {
+            schema_columns()
+        } else {
+            trace_columns(Study::open(self.traces.clone())?.traces()?)
+        };
+        let definitions = question.bind_to(&columns).map_err(Failure::from)?;
         let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
         io::stdout().lock().write_all(statement.as_bytes())?;
         Ok(Outcome::Done)

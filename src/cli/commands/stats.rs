@@ -3,12 +3,11 @@
 use std::io::Write as _;
 
 use crate::base::suggest::hint;
-use crate::cli::args::{ScoringArgs, TraceArgs};
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use crate::report::statistics::text::{self, Length};
 use crate::report::statistics::{Options, Statistics};
-use crate::stats::group::DEFAULT_BY;
 
 /// The word that stands for every metric.
 const ALL: &str = "all";
@@ -25,9 +24,9 @@ pub struct StatsArgs {
     /// Only episodes where this holds, in the language of definitions
     #[arg(long = "where", value_name = "EXPR")]
     pub condition: Option<String>,
-    /// Group the cells by these columns, separated by commas [default: experiment,model]
-    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY, hide_default_value = true)]
-    pub by: Vec<String>,
+    /// How episodes are grouped into cells.
+    #[command(flatten)]
+    pub grouping: GroupingArgs,
     /// Confidence of every interval; tests are at one minus it
     #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = confidence)]
     pub confidence: f64,
@@ -62,7 +61,7 @@ impl StatsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
-        let study = self.traces.study(&scoring, &self.by)?;
+        let study = self.traces.study(&scoring, &self.grouping)?;
         let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
         let options = Options { confidence, horizon, improvements, ..Options::default() };
         let statistics = study.statistics(&options)?;

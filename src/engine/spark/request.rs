@@ -10,6 +10,7 @@ use crate::metric::columns::Type;
 use crate::metric::plan::{Op, Plan};
 use crate::metric::sql::{Dialect, lower};
 use crate::score::format::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND};
+use crate::trace::schema;
 
 /// The key columns of an episode and their types in a file of scores.
 const KEYS: [(&str, &str); 5] =
@@ -28,6 +29,8 @@ pub(super) struct Request {
     inspect: bool,
     /// Names and kinds of the columns to read.
     columns: Vec<(String, &'static str)>,
+    /// Those of them that a file need not have.
+    optional: Vec<String>,
     /// The number of rows by the footers.
     rows: Option<u64>,
     check: String,
@@ -72,9 +75,14 @@ impl Request {
             folder,
             table: place.table().display().to_string(),
             answer: place.answer().display().to_string(),
+            optional: columns.iter().filter(|(name, _)| has_default(name)).map(|(name, _)| name.clone()).collect(),
             columns,
         })
     }
+}
+
+fn has_default(name: &str) -> bool {
+    schema::column(name).is_some_and(|column| column.default.is_some())
 }
 
 /// The columns that the rules and the statement read, keys first, each once.
@@ -116,8 +124,13 @@ fn statement(job: Job<'_>) -> Result<String, SparkError> {
         return Ok(scores);
     }
     let number = 0..job.labels.len();
-    let read =
-        job.labels.iter().zip(number.clone()).map(|(name, at)| format!("MIN(CAST(s.{name} AS STRING)) AS l{at}"));
+    let read = job.labels.iter().zip(number.clone()).map(|(name, at)| {
+        let label = format!("MIN(CAST(s.{name} AS STRING))");
+        match schema::column(name).and_then(schema::Column::default_text) {
+            None => format!("{label} AS l{at}"),
+            Some(text) => format!("COALESCE({label}, {}) AS l{at}", Dialect::Spark.text(text)),
+        }
+    });
     let labels = format!(
         "SELECT s.episode_id AS episode_id, {} FROM steps s GROUP BY s.episode_id",
         read.collect::<Vec<_>>().join(", ")

@@ -95,14 +95,14 @@ struct Binder<'a> {
 const DEEPEST: usize = 400;
 
 impl Binder<'_> {
-    /// One name has one meaning. A column that only some traces have gives way to a definition of its name, so that
-    /// definitions say the same whatever else was recorded.
+    /// One name has one meaning. A column that only some traces have, and one that older versions of the schema had not,
+    /// gives way to a definition of its name, so that definitions say the same whatever else was recorded.
     fn check_names(&mut self) {
         let lets = self.document.lets.iter().map(|(name, (_, place))| (name, place, "`let`"));
         let metrics = self.document.metrics.iter().map(|(name, entry)| (name, &entry.place, "metric"));
         let mut faults = Vec::new();
         for (name, place, what) in lets.chain(metrics) {
-            let is_column = self.columns.of_schema(name).is_some() || self.document.columns.contains_key(name);
+            let is_column = self.columns.is_reserved(name) || self.document.columns.contains_key(name);
             if name.is_empty() || name.contains(|c: char| c == ',' || c.is_control()) {
                 let message = format!("`{}` is no name of a {}", visible(name), what.trim_matches('`'));
                 faults.push(Fault::new(place.clone(), message).help("a name has visible characters and no comma"));

@@ -1,8 +1,10 @@
 //! One expression: its names, constants and operators.
 
 use std::ops::Range;
+use std::sync::Arc;
 
-use super::super::fault::{Fault, Place};
+use super::super::columns::{Column, Fallback};
+use super::super::fault::{Fault, Place, Source};
 use super::super::functions;
 use super::super::origin::Written;
 use super::super::plan::{Arithmetic, Comparison, Constant, NodeId, Op};
@@ -97,10 +99,23 @@ impl Scope<'_, '_> {
         if name == "t" {
             return Some(self.unary(Op::Time, Type::Int, Level::Step));
         }
-        match binder.columns.get(name) {
-            Some(column) => Some(self.unary(Op::Column(name.to_owned()), column.ty, column.level)),
-            None => self.unknown_name(name, expr),
+        let Some(column) = binder.columns.get(name) else { return self.unknown_name(name, expr) };
+        match binder.columns.fallback_of(name) {
+            None => Some(self.unary(Op::Column(name.to_owned()), column.ty, column.level)),
+            Some(fallback) => self.column_or(name, column, fallback),
         }
+    }
+
+    /// A column of the schema, or what it means where there is no value.
+    fn column_or(&mut self, name: &str, column: Column, fallback: Fallback) -> Option<Bound> {
+        let source = Source { name: format!("the schema's column `{name}`"), text: fallback.expression.to_owned() };
+        let written = Written::whole(Arc::new(source));
+        let default = self.binder.written(&written)?;
+        if !fallback.is_read {
+            return Some(default);
+        }
+        let read = self.unary(Op::Column(name.to_owned()), column.ty, column.level);
+        Some(self.combine(&[read, default], column.ty, |nodes| Op::Coalesce(nodes.to_vec())))
     }
 
     pub(super) fn cycle<T>(&mut self, name: &str, expr: &Expr) -> Option<T> {
@@ -182,12 +197,42 @@ impl Scope<'_, '_> {
     ) -> Option<Bound> {
         let (both, _) = self.unified(&[left, right], whole, "compared")?;
         let (mut left, mut right) = (both[0], both[1]);
+        if let Some(known) = self.known_outcome(comparison, left, right) {
+            return Some(known);
+        }
         let is_time = |this: &Self, bound: Bound| this.binder.builder.node(bound.node).op == Op::Time;
         // Time to the left: the kernels know windows by that form.
         if is_time(self, right) && !is_time(self, left) {
             (left, right, comparison) = (right, left, comparison.flipped());
         }
         Some(self.combine(&[left, right], Type::Bool, |n| Op::Compare(comparison, n[0], n[1])))
+    }
+
+    /// Whether one of two constants equals a third: the condition itself. So a column that means one of two texts where
+    /// traces have none of it costs nothing.
+    fn known_outcome(&mut self, comparison: Comparison, left: Bound, right: Bound) -> Option<Bound> {
+        let text = |this: &Self, node: NodeId| match &this.binder.builder.node(node).op {
+            Op::Constant(Constant::Text(text)) => Some(text.clone()),
+            _ => None,
+        };
+        let Op::Case { branches, otherwise: Some(otherwise) } = &self.binder.builder.node(left.node).op else {
+            return None;
+        };
+        let ([(when, then)], otherwise) = (branches.as_slice(), *otherwise) else { return None };
+        let (when, then) = (*when, *then);
+        let wanted = text(self, right.node)?;
+        let equal = (text(self, then)? == wanted, text(self, otherwise)? == wanted);
+        let is_true = || Op::IsTrue(when);
+        match (comparison, equal) {
+            (Comparison::Equal, (true, false)) | (Comparison::NotEqual, (false, true)) => {
+                Some(self.unary(is_true(), Type::Bool, left.level))
+            }
+            (Comparison::Equal, (false, true)) | (Comparison::NotEqual, (true, false)) => {
+                let is = self.unary(is_true(), Type::Bool, left.level);
+                Some(self.negated_if(true, is))
+            }
+            _ => None,
+        }
     }
 
     pub(super) fn arithmetic(&mut self, op: Arithmetic, left: &Expr, right: &Expr, whole: &Expr) -> Option<Bound> {

@@ -21,6 +21,7 @@ mod page;
 mod template;
 
 use crate::report::bundle::Manifest;
+use crate::report::quality::QualityTable;
 use crate::report::statistics::Statistics;
 use crate::report::table::Table;
 use crate::score::table::EpisodeTable;
@@ -42,6 +43,8 @@ pub struct Page<'a> {
     pub figures: &'a [Figure<'a>],
     /// What can be concluded; none leaves the section out.
     pub statistics: Option<&'a Statistics>,
+    /// What became of the replies; none leaves the section out.
+    pub quality: Option<&'a QualityTable>,
 }
 
 /// A figure to set into the page.

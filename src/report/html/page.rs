@@ -16,6 +16,7 @@ use crate::metric::catalog::{Better, Metric};
 use crate::report::bundle::Manifest;
 use crate::report::layout::heading;
 use crate::report::order::row_key;
+use crate::report::quality::QualityTable;
 use crate::report::statistics::Statistics;
 use crate::report::statistics::text::{self, Length};
 use crate::report::table::{Column, Row, RowGroup, Table};
@@ -45,6 +46,7 @@ pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
         tables => Serde(tables),
         figures => page.figures.iter().map(figure).collect::<Vec<_>>(),
         statistics => Serde(page.statistics.map(statistics)),
+        quality => Serde(page.quality.map(quality)),
         metrics => Serde(metrics),
         lets => Serde(definitions::lets(catalog)),
         experiments => Serde(definitions::experiments(catalog)),
@@ -132,6 +134,15 @@ fn statistics(statistics: &Statistics) -> Json {
         "conclusions": all(&statistics.conclusions),
         "warnings": all(&statistics.warnings),
         "text": text::render(statistics, &statistics.headline, Length::Full, None),
+    })
+}
+
+fn quality(table: &QualityTable) -> Json {
+    let all = |texts: &[String]| texts.iter().map(|text| visible(text)).collect::<Vec<_>>();
+    json!({
+        "notes": all(&table.notes),
+        "header": all(&table.header),
+        "rows": table.rows.iter().map(|row| all(row)).collect::<Vec<_>>(),
     })
 }
 

@@ -10,12 +10,13 @@ use crate::base::hash::integrity_of_bytes;
 
 const PAGE: &str = "page.html";
 
-const TEMPLATES: [(&str, &str); 7] = [
+const TEMPLATES: [(&str, &str); 8] = [
     (PAGE, include_str!("../../../assets/templates/page.html")),
     ("header.html", include_str!("../../../assets/templates/header.html")),
     ("tables.html", include_str!("../../../assets/templates/tables.html")),
     ("figures.html", include_str!("../../../assets/templates/figures.html")),
     ("statistics.html", include_str!("../../../assets/templates/statistics.html")),
+    ("quality.html", include_str!("../../../assets/templates/quality.html")),
     ("definitions.html", include_str!("../../../assets/templates/definitions.html")),
     ("provenance.html", include_str!("../../../assets/templates/provenance.html")),
 ];

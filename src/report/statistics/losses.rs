@@ -1,12 +1,10 @@
 //! Episodes that the infrastructure ended, and what they could have changed.
 
-use std::collections::BTreeSet;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Block, Study};
-use crate::stats::losses::{Fate, Lossy, bounds};
+use crate::stats::losses::{Fate, Lossy, LostCounts, bounds};
 
 /// Losses, or that nothing is known of them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -35,16 +33,16 @@ pub struct LossRow {
 }
 
 impl Losses {
-    /// The losses among the episodes, given the identifiers of the lost ones where that is known.
-    pub(super) fn of(study: &Study, lost: Option<&BTreeSet<String>>, confidence: f64) -> Self {
+    /// The losses beside the episodes, where they are known; the episodes given are those that were not lost.
+    pub(super) fn of(study: &Study, lost: Option<&LostCounts>, confidence: f64) -> Self {
         let Some(lost) = lost else { return Self::default() };
         let rows = study.blocks().flat_map(|block| of_block(study, block, lost, confidence)).collect();
         Self { recorded: true, rows }
     }
 }
 
-fn of_block(study: &Study, block: &Block, lost: &BTreeSet<String>, confidence: f64) -> Vec<LossRow> {
-    let fate = |row: usize| if lost.contains(study.table.keys.get(row).episode_id) { Fate::Lost } else { Fate::Kept };
+fn of_block(study: &Study, block: &Block, lost: &LostCounts, confidence: f64) -> Vec<LossRow> {
+    let lost = usize::try_from(lost.of(block.experiment, block.model, block.condition)).unwrap_or(usize::MAX);
     let row = |metric: &str, lossy| LossRow {
         experiment: block.experiment.to_owned(),
         model: block.model.to_owned(),
@@ -55,8 +53,9 @@ fn of_block(study: &Study, block: &Block, lost: &BTreeSet<String>, confidence: f
     study
         .rates()
         .filter_map(|column| {
-            let episodes = block.rows().map(|at| (column.get(at), fate(at)));
-            bounds(episodes, confidence).map(|lossy| row(&column.name, lossy))
+            let kept = block.rows().map(|at| (column.get(at), Fate::Kept));
+            bounds(kept.chain(std::iter::repeat_n((None, Fate::Lost), lost)), confidence)
+                .map(|lossy| row(&column.name, lossy))
         })
         .filter(|row| row.lossy.lost > 0)
         .collect()

@@ -21,8 +21,6 @@ mod study;
 pub mod text;
 mod warnings;
 
-use std::collections::BTreeSet;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,6 +39,7 @@ pub use overall::{ImprovementRow, OverallMethod, OverallRow};
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
 use crate::stats::design::Design;
+use crate::stats::losses::LostCounts;
 use crate::stats::moments::MomentOverflow;
 use study::Study;
 
@@ -51,8 +50,8 @@ pub struct Options {
     pub confidence: f64,
     /// The horizon of restricted means in steps, instead of the last step known for every model.
     pub horizon: Option<i64>,
-    /// The identifiers of the episodes that the infrastructure ended; `None` where the traces do not say.
-    pub lost: Option<BTreeSet<String>>,
+    /// How many episodes were lost beside those given; `None` where the traces do not say.
+    pub lost: Option<LostCounts>,
     /// What the traces declare about their design; nothing by default.
     pub design: Design,
     /// Whether probabilities of improvement are computed, each of which resamples all episodes of two models.

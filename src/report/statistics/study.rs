@@ -5,12 +5,11 @@ use std::ops::Range;
 
 use super::durations::CENSORED;
 use crate::metric::catalog::{Better, Kind, Metric};
-use crate::score::table::{EpisodeTable, MetricColumn, TextColumn};
+use crate::score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use crate::stats::design::Design;
 use crate::stats::moments::{MomentOverflow, Moments};
 
-/// The label that tells conditions of one model apart, and what stands for none.
-const CONDITION: &str = "condition";
+/// What stands for no condition.
 const DEFAULT_CONDITION: &str = "default";
 
 /// The label of the scene: room, body, cubes, start.
@@ -45,8 +44,7 @@ pub(super) struct Block<'a> {
 
 impl<'a> Study<'a> {
     pub fn of(table: &'a EpisodeTable, design: Design) -> Result<Self, MomentOverflow> {
-        let conditions = label(table, CONDITION)
-            .filter(|column| column.iter().flatten().any(|condition| condition != DEFAULT_CONDITION));
+        let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
         let mut blocks: BTreeMap<(usize, &str), Vec<Block>> = BTreeMap::new();
         // A table is ordered by experiment, then by model.
         for rows in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
@@ -67,7 +65,7 @@ impl<'a> Study<'a> {
 
     /// The scene of each row, where equal scenes make pairs.
     pub fn scenes(&self) -> Option<&'a TextColumn> {
-        label(self.table, SCENE).filter(|_| self.design.has_pairs())
+        self.table.label(SCENE).filter(|_| self.design.has_pairs())
     }
 
     pub fn column(&self, metric: &str) -> Option<&'a MetricColumn> {
@@ -168,10 +166,6 @@ impl<'a> Block<'a> {
 /// A model under a condition.
 pub(super) fn named(model: &str, condition: Option<&str>) -> String {
     condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
-}
-
-fn label<'a>(table: &'a EpisodeTable, name: &str) -> Option<&'a TextColumn> {
-    table.labels.iter().find(|label| label.name == name).map(|label| &label.values)
 }
 
 /// The rows of one model by condition, which is not part of a table's order.

@@ -162,8 +162,8 @@ fn losses(statistics: &Statistics) -> Option<String> {
     let total: u64 = lost.iter().map(|(.., lost)| lost).sum();
     (total > 0).then(|| {
         format!(
-            "{total} episodes ended by the infrastructure (rate limit, server error, timeout) are in every number above but \
-             the bounds under losses, which say what they could have changed."
+            "{total} episodes were lost to failures that are not the agent's (rate limit, server error, timeout): they are \
+             in no denominator; the bounds under losses say what they could have changed."
         )
     })
 }

@@ -20,7 +20,9 @@ use ::parquet::file::reader::ChunkReader;
 use super::table::EpisodeTable;
 use crate::metric::catalog::{Catalog, Kind};
 
-pub use self::parquet::{DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores};
+pub use self::parquet::{
+    DECLARED_KEY, DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores,
+};
 pub use self::partition::Partition;
 
 /// A format of episode tables.
@@ -103,6 +105,9 @@ pub enum FormatError {
         /// What is wrong with it.
         reason: String,
     },
+    /// What the footer says of the recording.
+    #[error("`{DECLARED_KEY}` in the footer is not readable: {0}; score the traces again")]
+    Declared(String),
     /// The definitions in the footer.
     #[error("the definitions in the footer are not readable: {0}")]
     Definitions(String),

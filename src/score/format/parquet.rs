@@ -25,6 +25,7 @@ use crate::metric::catalog::Catalog;
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use crate::trace::catch_panic::contained;
+use crate::trace::declared::Declared;
 use crate::trace::footer_shape;
 
 /// The footer key that tells scores from traces.
@@ -35,6 +36,9 @@ pub const SCORES_KIND: &str = "scores";
 pub const DEFINITIONS_KEY: &str = "mirrorstats.definitions";
 /// The footer key of the definitions' hash.
 pub const HASH_KEY: &str = "mirrorstats.definitions_hash";
+
+/// The footer key of what the traces declare of how they were recorded, as JSON (a `Declared`).
+pub const DECLARED_KEY: &str = "mirrorstats.declared";
 
 /// Whether a file is Parquet with scores: its footer says so, or it has their key columns and no timestep.
 ///
@@ -99,7 +103,7 @@ pub struct Writer<W: Write + Send> {
 pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder<'_>, Writer<W>), FormatError> {
     let header = table.header();
     let schema = Arc::new(schema(&header));
-    let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties(&header)?))?;
+    let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties(&header, &table.declared)?))?;
     let (file, factory) = parquet.into_serialized_writer()?;
     let writer = Writer { file, columns: schema.fields().len(), group: Vec::new() };
     let groups = (0..table.len().div_ceil(ROW_GROUP_ROWS)).map(|_| Mutex::default()).collect();
@@ -214,16 +218,20 @@ impl<W: Write + Send> Writer<W> {
     }
 }
 
-fn properties(header: &Header) -> Result<WriterProperties, FormatError> {
+fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, FormatError> {
     let definitions =
         serde_json::to_string(&header.catalog).map_err(|error| FormatError::Definitions(error.to_string()))?;
     let pair = |key: &str, value: &str| KeyValue::new(key.to_owned(), value.to_owned());
-    let metadata = vec![
+    let mut metadata = vec![
         pair(KIND_KEY, SCORES_KIND),
         pair("mirrorstats.writer", concat!("mirrorstats ", env!("CARGO_PKG_VERSION"))),
         pair(HASH_KEY, &header.catalog.hash),
         pair(DEFINITIONS_KEY, &definitions),
     ];
+    if *declared != Declared::default() {
+        let text = serde_json::to_string(declared).map_err(|error| FormatError::Definitions(error.to_string()))?;
+        metadata.push(pair(DECLARED_KEY, &text));
+    }
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         // Who reads scores reads all of them.
@@ -260,6 +268,11 @@ fn decode(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Resul
         (None, Some(named)) => named.clone(),
         (None, None) => return Err(FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`"))),
     };
+    // Scores of other programs declare nothing.
+    let declared = match footer::value(builder.metadata().file_metadata(), DECLARED_KEY) {
+        Some(text) => serde_json::from_str(&text).map_err(|error| FormatError::Declared(error.to_string()))?,
+        None => Declared::default(),
+    };
     let names: Vec<&str> = builder.schema().fields().iter().map(|field| field.name().as_str()).collect();
     check_unique(&names)?;
     // A part without rows has its columns all the same.
@@ -271,7 +284,7 @@ fn decode(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Resul
         let batch = partition.complete(&batch, &table.header().catalog)?;
         append(&mut table, &batch)?;
     }
-    Ok(table.finish())
+    Ok(EpisodeTable { declared, ..table.finish() })
 }
 
 /// The labels and metrics among the columns of a batch.
@@ -379,6 +392,7 @@ mod tests {
                 })
                 .collect(),
             labels: Vec::new(),
+            declared: Declared::default(),
             metrics: vec![
                 metric("TSA", &|row| Some(small(row) % 2)),
                 metric("TTD", &|row| (row % 3 > 0).then(|| small(row) << 40)),

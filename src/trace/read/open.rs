@@ -38,6 +38,7 @@ pub struct TraceFile {
     name: String,
     path: PathBuf,
     bytes: u64,
+    version: u32,
     columns: Vec<FileColumn>,
     /// The rows of each row group.
     rows: Vec<usize>,
@@ -118,6 +119,11 @@ impl TraceSet {
         (present || seen.is_some()).then_some(ColumnUse { kind, missing_from, conflict })
     }
 
+    /// Whether some file has the schema's column of this name.
+    pub fn declares(&self, name: &str) -> bool {
+        self.files.iter().any(|file| file.declares(name))
+    }
+
     /// The names of all columns of all files: those of the schema in its order, then the others in the order of the
     /// files.
     pub fn column_names(&self) -> Vec<&str> {
@@ -140,9 +146,9 @@ impl TraceFile {
     /// Everything that is wrong with it; never empty.
     pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
         let (bytes, metadata) = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
-        check_version(&input.name, &metadata).map_err(|finding| vec![*finding])?;
+        let version = version_of(&input.name, &metadata).map_err(|finding| vec![*finding])?;
         let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
-        let mut findings = check_columns(&input.name, &columns);
+        let mut findings = check_columns(&input.name, &columns, version);
         findings.extend(bounds::fault(&input.name, bytes, &metadata));
         if !findings.is_empty() {
             return Err(findings);
@@ -153,7 +159,7 @@ impl TraceFile {
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
         let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
-        Ok(Self { name, path, bytes, columns, rows, pairs, colors, footer })
+        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, footer })
     }
 
     /// The name in messages and outputs.
@@ -187,6 +193,12 @@ impl TraceFile {
     /// The column of this name.
     pub fn column(&self, name: &str) -> Option<&FileColumn> {
         self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// Whether the file has the schema's column of this name, and not one of its own that is called so: a trace of an older
+    /// version may have used a name that the schema knows by now.
+    pub fn declares(&self, name: &str) -> bool {
+        self.column(name).is_some() && schema::column(name).is_some_and(|known| known.since <= self.version)
     }
 
     /// The number of rows.
@@ -258,16 +270,19 @@ fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {
     pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
 }
 
-fn check_version(file: &str, metadata: &ParquetMetaData) -> Result<(), Box<Finding>> {
+/// The version of the schema that a file follows.
+fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding>> {
     // A file of another writer has none; its columns are checked all the same.
     let pairs = metadata.file_metadata().key_value_metadata();
-    let Some(text) = pairs.and_then(|pairs| value(pairs, schema::VERSION_KEY)) else { return Ok(()) };
+    let Some(text) = pairs.and_then(|pairs| value(pairs, schema::VERSION_KEY)) else {
+        return Ok(schema::SCHEMA_VERSION);
+    };
     match text.parse::<u32>() {
         Ok(version) if version > schema::SCHEMA_VERSION => {
             let expected = format!("schema version {} or older", schema::SCHEMA_VERSION);
             Err(Box::new(Finding::new(Code::NewerSchema, file, expected, format!("version {version}"))))
         }
-        Ok(version) if version > 0 => Ok(()),
+        Ok(version) if version > 0 => Ok(version),
         _ => {
             let expected = format!("`{}` to be a whole number from 1", schema::VERSION_KEY);
             Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", visible(text)))))
@@ -313,7 +328,7 @@ fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
     }
 }
 
-fn check_columns(file: &str, columns: &[FileColumn]) -> Vec<Finding> {
+fn check_columns(file: &str, columns: &[FileColumn], version: u32) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (i, column) in columns.iter().enumerate() {
         if columns[..i].iter().filter(|before| before.name == column.name).count() == 1 {
@@ -321,7 +336,7 @@ fn check_columns(file: &str, columns: &[FileColumn]) -> Vec<Finding> {
             findings.push(finding.in_column(&column.name));
         }
     }
-    for known in COLUMNS {
+    for known in COLUMNS.iter().filter(|known| known.since <= version) {
         let wanted = known.stored.kind();
         match columns.iter().find(|column| column.name == known.name) {
             None if known.required => {

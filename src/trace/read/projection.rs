@@ -48,7 +48,8 @@ impl Layout {
             self.columns[at].constant |= constant;
             return Ok(());
         }
-        let known = schema::column(name);
+        // A name that only older traces have is a column of their own.
+        let known = schema::column(name).filter(|known| known.since == 1 || set.declares(name));
         let kind = kind_in(set, name)?;
         let constant = constant || known.is_some_and(|column| column.constant);
         self.columns.push(LayoutColumn { name: name.to_owned(), kind, known, constant });

@@ -26,9 +26,12 @@ pub struct Column {
     pub doc: &'static str,
     /// The only values that the column takes, where they are fixed.
     pub values: &'static [&'static str],
-    /// The first version of the schema that has the column; `None` for a recorder's own, which the schema does not know.
-    #[serde(skip)]
-    pub since: Option<u32>,
+    /// The first version of the schema that has the column. An older trace may have a column of this name that means
+    /// something else.
+    pub since: u32,
+    /// What a trace without the column, and a row without a value, mean: an expression in the language of definitions.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub default: Option<&'static str>,
     #[serde(skip)]
     pub(super) access: Access,
 }
@@ -128,7 +131,8 @@ impl Eq for Column {}
 impl Column {
     pub(super) const fn new(name: &'static str, stored: Stored, doc: &'static str, access: Access) -> Self {
         let (required, nullable, constant, unit) = (false, true, false, None);
-        Self { name, stored, required, nullable, constant, unit, doc, values: &[], since: Some(1), access }
+        let (values, since, default) = (&[] as &[&str], 1, None);
+        Self { name, stored, required, nullable, constant, unit, doc, values, since, default, access }
     }
 
     pub(super) const fn required(self) -> Self {
@@ -151,8 +155,12 @@ impl Column {
         Self { values, ..self }
     }
 
-    pub(super) const fn of_recorders(self) -> Self {
-        Self { since: None, ..self }
+    pub(super) const fn since(self, since: u32) -> Self {
+        Self { since, ..self }
+    }
+
+    pub(super) const fn default(self, default: &'static str) -> Self {
+        Self { default: Some(default), ..self }
     }
 
     /// Whether the column's text names something, so that an empty one is a fault.
@@ -162,7 +170,14 @@ impl Column {
 
     /// Whether the column counts something, so that a negative number is a fault.
     pub fn counts(&self) -> bool {
-        matches!(self.unit, Some("px" | "ms" | "tokens" | "USD" | "agents"))
+        matches!(self.unit, Some("px" | "ms" | "tokens" | "USD" | "agents" | "mm"))
+    }
+
+    /// What no value means, where that is a text or a number and not an expression over other columns.
+    pub fn default_text(&self) -> Option<&'static str> {
+        let text = self.default?;
+        let quoted = text.strip_prefix('\'').and_then(|text| text.strip_suffix('\''));
+        quoted.or_else(|| text.bytes().all(|byte| byte.is_ascii_digit()).then_some(text))
     }
 
     /// The values of all steps; `None` for null.

@@ -1,7 +1,7 @@
 //! The table of columns: what a trace holds, and the one place that says so.
 //!
 //! Writer, reader, `validate`, `import`, the messages of logs, `mirrorstats schema` and `schemas/trace.schema.json` all
-//! follow `TABLE`: a new column is an entry there, and a field of `Episode` or `Extra`. Columns that it does not name
+//! follow `COLUMNS`: a new column is an entry there, and a field of `Episode` or `Extra`. Columns that it does not name
 //! are a trace's own: they are kept, and definitions may use them.
 
 pub mod colors;
@@ -18,8 +18,8 @@ use field_access::{Access, Field as _};
 pub use column::{Column, Kind, Stored};
 pub(crate) use field_access::Value;
 
-/// The version of the schema that this program writes, and the newest that it reads.
-pub const SCHEMA_VERSION: u32 = 1;
+/// The newest version of the schema. A trace is written as the oldest one that has its columns.
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// The names that `action` takes.
 pub const ACTIONS: [&str; 5] = {
@@ -74,8 +74,8 @@ macro_rules! column {
     }};
 }
 
-/// All columns, those that only recorders know among them: required ones first.
-pub(crate) const TABLE: &[Column] = &[
+/// The columns of the schema, in the order in which the writer stores them: required ones first.
+pub const COLUMNS: &[Column] = &[
     constant!(episode_id, String, "Names the episode; unique in a report.").required(),
     constant!(model, String, "The model's name as shown in tables.").required(),
     constant!(experiment, String, "`E1`..`E5`, or any other name that a definition file knows.").required(),
@@ -100,6 +100,35 @@ pub(crate) const TABLE: &[Column] = &[
     step!(mirror_visible, Bool, "Ground truth: mirror evidence is in view at t.").required(),
     constant!(stated_color, String, "The false body colour told to the agent, where one was (E3); a lower-case name."),
     constant!(distractors, Int8, "Other agents in the room.").unit("agents"),
+    constant!(condition, String, "The condition that the episode was recorded under: what a study varies besides the model.")
+        .since(2)
+        .default("'default'"),
+    constant!(
+        scene,
+        String,
+        "The fingerprint of the room, the body, the cubes and the start. Episodes with the same one can be paired; null \
+         where nothing is known of it."
+    )
+    .since(2),
+    constant!(repetition, Int32, "Which time the model plays this scene, from 1.").since(2).default("1"),
+    constant!(
+        decision,
+        String,
+        "The column that holds the decision: `selected_cube` or `self_color`, or one of the trace's own."
+    )
+    .since(2)
+    .default("case when experiment = 'E5' then 'self_color' else 'selected_cube' end"),
+    constant!(
+        fingerprint,
+        String,
+        "What the episode was recorded with: the name of an entry of `fingerprints` in the footer's recording."
+    )
+    .since(2),
+    constant!(participant, String, "The code of the person who played, where one did; no personal data.").since(2),
+    constant!(episode_hash, String, "SHA-256 of the rows of the episode; the same in its log.").since(2),
+    constant!(start_distance, Int32, "Manhattan distance from the hand to its target at the start (reaching tasks).")
+        .unit("mm")
+        .since(2),
     extra!(mirror_self_px, Int32, "Pixels of the view whose ray reaches the agent's own body by way of the mirror.")
         .unit("px"),
     extra!(mirror_other_px, Int32, "Pixels whose ray reaches another agent by way of the mirror.").unit("px"),
@@ -116,7 +145,7 @@ pub(crate) const TABLE: &[Column] = &[
         String,
         "The repairs that made a `repaired` reply valid, in order, joined with `+`; null where there was none."
     )
-    .of_recorders(),
+    .since(2),
     extra!(view_description, String, "What the agent says it sees, as replied."),
     extra!(reasoning, String, "Why it acts, as replied."),
     extra!(summary, String, "Its notes for the next step, as replied."),
@@ -127,32 +156,22 @@ pub(crate) const TABLE: &[Column] = &[
     extra!(completion_tokens, Int32, "Tokens of the reply, as billed.").unit("tokens"),
     extra!(cost_usd, Float64, "What the request cost.").unit("USD"),
     extra!(frame_time, Int64, "The time of the frame in the episode's recording (MCAP).").unit("ns"),
+    extra!(mark_color, String, "The colour of the mark on the agent's own body; null where there is none.").since(2),
+    extra!(mark_report, String, "The mark that the reply reports on the own body: a colour, `none`, or null.").since(2),
+    extra!(mirror_mark_px, Int32, "Pixels whose ray reaches the mark on the own body by way of the mirror.")
+        .unit("px")
+        .since(2),
+    extra!(
+        target_distance,
+        Int32,
+        "Manhattan distance from the hand to its target after the step's action (reaching tasks)."
+    )
+    .unit("mm")
+    .since(2),
 ];
 
 /// The timestep is the place of its row.
 const T: Access = Access { get: |_, at| i64::try_from(at).ok().map(|at| Value::Int(at + 1)), set: |_, _, _| true };
-
-/// The columns of the schema, in the order in which the writer stores them.
-pub const COLUMNS: &[Column] = &{
-    let mut columns = [TABLE[0]; TABLE.len() - OF_RECORDERS];
-    let (mut from, mut to) = (0, 0);
-    while from < TABLE.len() {
-        if TABLE[from].since.is_some() {
-            columns[to] = TABLE[from];
-            to += 1;
-        }
-        from += 1;
-    }
-    columns
-};
-
-/// How many columns of the table the schema does not know.
-const OF_RECORDERS: usize = 1;
-
-/// The columns of the schema, then those that only recorders know: all that the writer can write, in its order.
-pub(crate) fn writable() -> impl Iterator<Item = &'static Column> {
-    COLUMNS.iter().chain(TABLE.iter().filter(|column| column.since.is_none()))
-}
 
 /// The column of this name.
 pub fn column(name: &str) -> Option<&'static Column> {
@@ -174,26 +193,60 @@ pub const VERSION_KEY: &str = "mirrorstats.schema_version";
 pub const WRITER_KEY: &str = "mirrorstats.writer";
 /// Footer key: how the recording was made, JSON.
 pub const RECORDING_KEY: &str = "mirrorstats.recording";
+/// Footer key: checksums of the columns and of the footer, JSON.
+pub const CHECKSUMS_KEY: &str = "mirrorstats.checksums";
 
 /// The key-value metadata of a trace's footer.
 pub const METADATA: &[MetadataKey] = &[
     MetadataKey {
         key: VERSION_KEY,
-        doc: "The version of this schema, a decimal integer. A file without it is read as version 1; a newer one is \
-              refused.",
+        doc: "The version of this schema, a decimal integer. A file without it is read as the newest; a newer one than \
+              that is refused.",
     },
     MetadataKey { key: WRITER_KEY, doc: "The program that wrote the file: `mirrorstats` and its version." },
     MetadataKey {
         key: RECORDING_KEY,
-        doc: "How the recording was made, a JSON object: scene, prompt and configuration hashes, view size, \
-              visibility threshold in pixels, model id as returned, seeds. A `palette` in it, a list of lower-case names, \
-              holds all colours of the trace; another value is refused.",
+        doc: "How the recording was made, a JSON object. Of a recording of this program: scene, prompt and \
+              configuration hashes, view size, visibility threshold in pixels, seeds. Every trace may have the keys that \
+              follow.",
+    },
+    MetadataKey {
+        key: "mirrorstats.recording.kind",
+        doc: "`recording`, `import`, or `reconstruction`: how the rows came to be.",
+    },
+    MetadataKey {
+        key: "mirrorstats.recording.design",
+        doc: "What depends on what. `pairs`: `scene` where episodes with equal `scene` are pairs. `cluster`: `seed` where \
+              the runs of a seed share more than chance, null where they do not. What is not declared is not assumed.",
+    },
+    MetadataKey {
+        key: "mirrorstats.recording.fingerprints",
+        doc: "By the values of the column `fingerprint`: SHA-256 of `world`, `prompts`, `reply_schema`, `agent` and \
+              `sampling`, and `model`, the model's id as the provider returned it.",
+    },
+    MetadataKey {
+        key: "mirrorstats.recording.palette",
+        doc: "A list of lower-case names: all colours of the trace. Another value is refused.",
+    },
+    MetadataKey {
+        key: "mirrorstats.recording.experiment",
+        doc: "The experiment as data: title, order, decision, action set, chance and reference levels. Where a \
+              definition file says something else, the definition file counts and `validate` says so.",
+    },
+    MetadataKey {
+        key: "mirrorstats.recording.registration",
+        doc: "SHA-256 of the plan that was registered before the recording.",
+    },
+    MetadataKey {
+        key: CHECKSUMS_KEY,
+        doc: "CRC-32C of each column chunk over its raw bytes, page headers included, and of schema, offsets and the \
+              other footer keys: a JSON object. Verified where it is there.",
     },
 ];
 
 #[cfg(test)]
 mod tests {
-    use super::{COLUMNS, Kind, TABLE, Value, column};
+    use super::{COLUMNS, Kind, Value, column};
     use crate::trace::episode::{Episode, Step};
 
     #[test]
@@ -210,12 +263,23 @@ mod tests {
         let constants: Vec<_> = COLUMNS.iter().filter(|c| c.constant).map(|c| c.name).collect();
         let expected =
             ["episode_id", "model", "experiment", "seed", "run", "body_color", "stated_color", "distractors"];
-        assert_eq!(constants, expected);
+        assert_eq!(constants[..expected.len()], expected);
+        let newer = [
+            "condition",
+            "scene",
+            "repetition",
+            "decision",
+            "fingerprint",
+            "participant",
+            "episode_hash",
+            "start_distance",
+        ];
+        assert_eq!(constants[expected.len()..], newer);
     }
 
     #[test]
     fn every_column_gives_what_was_put_into_its_field() {
-        for column in TABLE {
+        for column in COLUMNS {
             let mut episode = Episode { steps: vec![Step::default(); 2], ..Episode::default() };
             let value = match column.stored.kind() {
                 Kind::Bool => Value::Bool(true),

@@ -7,7 +7,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 
 use crate::trace::episode::{Episode, Step};
-use crate::trace::schema::{Column, Kind, Value, writable};
+use crate::trace::schema::{COLUMNS, Column, Kind, Value};
 use crate::trace::write::row_groups::data_type;
 
 /// Rows that are no episode of the schema.
@@ -25,7 +25,7 @@ pub struct NotAnEpisode {
 /// For a column of another type, a required column that is not there, and an action that is none of the five.
 pub(in crate::trace) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
     let mut episode = Episode { steps: vec![Step::default(); rows.num_rows()], ..Episode::default() };
-    for column in writable() {
+    for column in COLUMNS {
         match rows.column_by_name(column.name) {
             Some(values) => fill(&mut episode, column, values)?,
             None if column.required => return Err(fault(column, "the column", "none")),

@@ -19,7 +19,7 @@ use self::row_groups::{Gathered, RowGroups};
 use super::episode::Episode;
 use super::error::TraceError;
 use super::schema::rules::{Known, Requirement, Rule, rules_of};
-use super::schema::{COLUMNS, Column, Value, writable};
+use super::schema::{COLUMNS, Column, Value};
 use crate::base::escape::visible;
 use crate::base::replace::NewFile;
 
@@ -32,9 +32,13 @@ pub struct TraceMetadata {
     pub columns: OptionalColumns,
 }
 
-/// Columns that a trace may have besides the required ones: the schema's in its order, then the recorder's own.
+/// Columns that a trace may have besides the required ones, in the order of the schema.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct OptionalColumns(Vec<&'static Column>);
+
+/// Columns that no recording of the five experiments gives.
+const OF_OTHER_TASKS: [&str; 7] =
+    ["participant", "episode_hash", "start_distance", "mark_color", "mark_report", "mirror_mark_px", "target_distance"];
 
 impl OptionalColumns {
     /// No optional column.
@@ -45,14 +49,15 @@ impl OptionalColumns {
         Self(COLUMNS.iter().filter(|column| !column.required).collect())
     }
 
-    /// Those of a recording: all of the schema, and where its agent's replies are read, what had to be repaired.
+    /// Those of a recording: all of the schema but what its task and its agent never give.
     pub fn recorded(recording: &serde_json::Value) -> Self {
-        let mut columns = Self::all();
         let agent = &recording["agent"];
-        if agent.is_object() && agent.get("scripted").is_none() {
-            columns.0.extend(writable().filter(|column| column.since.is_none()));
-        }
-        columns
+        let reads_replies = agent.is_object() && agent.get("scripted").is_none();
+        let is_given = |name: &str| match name {
+            "reply_repair" => reads_replies,
+            _ => !OF_OTHER_TASKS.contains(&name),
+        };
+        Self(Self::all().0.into_iter().filter(|column| is_given(column.name)).collect())
     }
 
     /// Those of these names; `None` if one is no optional column of the schema.
@@ -64,18 +69,18 @@ impl OptionalColumns {
     /// Those that have a value in one of these episodes.
     pub fn used_by<'a>(episodes: impl IntoIterator<Item = &'a Episode>) -> Self {
         let mut used = Vec::new();
-        let mut unused: Vec<_> = writable().filter(|column| !column.required).collect();
+        let mut unused: Vec<_> = COLUMNS.iter().filter(|column| !column.required).collect();
         for episode in episodes {
             let (found, rest) = unused.into_iter().partition::<Vec<_>, _>(|column| has_value(column, episode));
             used.extend(found);
             unused = rest;
         }
-        Self(writable().filter(|column| used.contains(column)).collect())
+        Self(COLUMNS.iter().filter(|column| used.contains(column)).collect())
     }
 
     /// The columns of a file that has these, and those that it has not.
     fn split(&self) -> (Vec<&'static Column>, Vec<&'static Column>) {
-        writable().partition(|column| column.required || self.0.contains(column))
+        COLUMNS.iter().partition(|column| column.required || self.0.contains(column))
     }
 }
 
@@ -138,7 +143,7 @@ fn check(episode: &Episode, undeclared: &[&'static Column]) -> Result<(), TraceE
     if steps == 0 || i32::try_from(steps).is_err() {
         return refused(episode, format!("1 to {} steps", i32::MAX), steps.to_string());
     }
-    for column in writable() {
+    for column in COLUMNS {
         let rules = rules_of(column, Known::default());
         let broken = |value| rules.iter().find(|rule| !rule.allows_value(value)).map(|rule| (rule, value));
         if let Some((rule, value)) = column.of_steps(episode).flatten().find_map(broken) {

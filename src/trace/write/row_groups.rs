@@ -49,7 +49,8 @@ impl<W: Write + Send> RowGroups<W> {
     /// Starts a file of these columns.
     pub(in crate::trace) fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
         // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
-        let options = ArrowWriterOptions::new().with_properties(properties(recording)).with_skip_arrow_metadata(true);
+        let options =
+            ArrowWriterOptions::new().with_properties(properties(layout, recording)).with_skip_arrow_metadata(true);
         Ok(Self { parquet: ArrowWriter::try_new_with_options(out, Arc::clone(layout), options)?, rows: 0 })
     }
 
@@ -79,10 +80,16 @@ impl<W: Write + Send> RowGroups<W> {
     }
 }
 
-fn properties(recording: Option<&serde_json::Value>) -> WriterProperties {
+/// The oldest version of the schema that knows all columns: a program of that time can read the file.
+fn version(layout: &Schema) -> u32 {
+    let known = layout.fields().iter().filter_map(|field| schema::column(field.name()));
+    known.map(|column| column.since).max().unwrap_or(1)
+}
+
+fn properties(layout: &Schema, recording: Option<&serde_json::Value>) -> WriterProperties {
     let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let mut pairs = vec![
-        pair(schema::VERSION_KEY, schema::SCHEMA_VERSION.to_string()),
+        pair(schema::VERSION_KEY, version(layout).to_string()),
         pair(schema::WRITER_KEY, concat!("mirrorstats ", env!("CARGO_PKG_VERSION")).to_owned()),
     ];
     pairs.extend(recording.map(|json| pair(schema::RECORDING_KEY, json.to_string())));

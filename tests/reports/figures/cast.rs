@@ -7,7 +7,7 @@ use mirrorstats::base::ratio::Ratio;
 use mirrorstats::figures::Input;
 use mirrorstats::figures::e5_outcomes::{OutcomeRow, Outcomes};
 use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
-use mirrorstats::score::table::{EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
+use mirrorstats::score::table::{Declared, EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
 use mirrorstats::score::timeline::Timeline;
 use mirrorstats::stats::cell::{Cells, Group, KeyValue};
 use mirrorstats::stats::moments::Moments;
@@ -186,6 +186,7 @@ fn episodes(cells: &Cells) -> EpisodeTable {
         catalog: cells.catalog.clone(),
         keys: keys.into_iter().collect(),
         labels: Vec::new(),
+        declared: Declared::default(),
         metrics: vec![column("TTD", ttd), column("TSA-C", finished)],
     }
 }

@@ -80,6 +80,7 @@ impl Report {
             manifest: &self.manifest,
             figures: &figures,
             statistics: self.statistics.as_ref(),
+            quality: None,
         })
     }
 }

@@ -29,11 +29,13 @@ pub(crate) struct ColorColumn {
 }
 
 /// All columns of colours.
-pub(crate) const COLOR_COLUMNS: [ColorColumn; 4] = [
+pub(crate) const COLOR_COLUMNS: [ColorColumn; 6] = [
     ColorColumn { name: "body_color", word: None, advice: "give the true colour of the body" },
     ColorColumn { name: "self_color", word: Some("unknown"), advice: "`unknown`, or null where the reply gave none" },
     ColorColumn { name: "selected_cube", word: Some("none"), advice: "`none`, or null where the reply gave none" },
     ColorColumn { name: "stated_color", word: None, advice: "null where no colour was stated" },
+    ColorColumn { name: "mark_color", word: None, advice: "null where there is no mark" },
+    ColorColumn { name: "mark_report", word: Some("none"), advice: "`none`, or null where the reply gave none" },
 ];
 
 /// The column of this name, if it holds colours.

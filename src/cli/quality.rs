@@ -1,0 +1,44 @@
+//! What became of the replies, for the terminal and for programs.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::text_table::listing;
+use crate::report::quality::QualityTable;
+use crate::report::tables::fit::fitted;
+use crate::score::quality::{CellKey, Quality, QualityByCell};
+
+/// The replies of one cell.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct CellAnswer {
+    /// Whose they are.
+    #[serde(flatten)]
+    pub key: CellKey,
+    /// What became of them.
+    #[serde(flatten)]
+    pub quality: Quality,
+    /// Milliseconds within which half of the replies came.
+    pub latency_median_ms: Option<i64>,
+    /// Milliseconds within which 95 % of the replies came.
+    pub latency_95_ms: Option<i64>,
+}
+
+/// Every cell, for a program.
+pub(super) fn answers(cells: &QualityByCell) -> Vec<CellAnswer> {
+    let answer = |(key, quality): (&CellKey, &Quality)| CellAnswer {
+        key: key.clone(),
+        quality: quality.clone(),
+        latency_median_ms: quality.latency(0.5),
+        latency_95_ms: quality.latency(0.95),
+    };
+    cells.0.iter().map(answer).collect()
+}
+
+/// The table, no wider than the terminal; empty without a cell.
+pub(super) fn text(cells: &QualityByCell, width: Option<usize>) -> String {
+    let Some(table) = QualityTable::of(cells) else { return String::new() };
+    let keys = if cells.has_conditions() { 3 } else { 2 };
+    let mut lines = listing(table.header);
+    lines.add_rows(table.rows);
+    format!("{}\n", fitted(&lines, keys, width))
+}

@@ -6,10 +6,8 @@
 
 use std::iter::successors;
 
+use super::outcomes::{ExactTest, Outcomes};
 use crate::base::ratio::Ratio;
-
-/// Beyond exact weights, how near two weights count as equal.
-const TIE: f64 = 1e-12;
 
 /// No weights of more trials than this fit 128 bits.
 const MOST_EXACT: u64 = 128;
@@ -17,15 +15,25 @@ const MOST_EXACT: u64 = 128;
 /// The two-sided p value of `successes` in `n` trials under the rate `level`.
 ///
 /// `None` for n = 0, for more successes than trials, and for a level outside [0, 1].
-/// A p value below the smallest floating-point number is 0.
+/// A p value below the smallest normal floating-point number is 0.
 pub fn two_sided(successes: u64, n: u64, level: Ratio) -> Option<f64> {
-    let hit = u64::try_from(level.numerator()).ok()?;
-    let all = u64::try_from(level.denominator()).ok()?;
-    let odds = Odds { hit, miss: all.checked_sub(hit)? };
-    if n == 0 || successes > n {
-        return None;
-    }
-    Some(exact(successes, n, odds).unwrap_or_else(|| by_recurrence(successes, n, odds)))
+    exact_test(successes, n, level).map(|test| test.p)
+}
+
+/// The exact two-sided p value of [`two_sided`] and its mid-p value.
+///
+/// `mid_p` is less conservative and not guaranteed to keep the level. `None` as there.
+pub fn exact_test(successes: u64, n: u64, level: Ratio) -> Option<ExactTest> {
+    let odds = Odds::of(level).filter(|_| n > 0 && successes <= n)?;
+    Some(exact(successes, n, odds).unwrap_or_else(|| by_recurrence(n, odds).test(successes)))
+}
+
+/// The least p value that [`two_sided`] can give for `n` trials; 0 where it underflows, and for a level of 0 or 1.
+///
+/// `None` for n = 0 and for a level outside [0, 1].
+pub fn least_p(n: u64, level: Ratio) -> Option<f64> {
+    let odds = Odds::of(level).filter(|_| n > 0)?;
+    Some(exact_least_p(n, odds).unwrap_or_else(|| by_recurrence(n, odds).least_p()))
 }
 
 /// `hit` to `miss`: the level 1/3 is 1 to 2.
@@ -35,16 +43,48 @@ struct Odds {
     miss: u64,
 }
 
-/// Counts weigh `C(n, j) * hit^j * miss^(n - j)`; `None` where a weight leaves 128 bits.
-#[expect(clippy::cast_precision_loss, reason = "two exact sums become one quotient here")]
-fn exact(successes: u64, n: u64, odds: Odds) -> Option<f64> {
-    let weights = exact_weights(n, odds)?;
-    let seen = weights[usize::try_from(successes).ok()?];
-    let total: u128 = u128::from(odds.hit + odds.miss).checked_pow(u32::try_from(n).ok()?)?;
-    let as_extreme: u128 = weights.iter().filter(|&&weight| weight <= seen).sum();
-    Some(as_extreme as f64 / total as f64)
+impl Odds {
+    /// `None` outside [0, 1].
+    fn of(level: Ratio) -> Option<Self> {
+        let hit = u64::try_from(level.numerator()).ok()?;
+        let all = u64::try_from(level.denominator()).ok()?;
+        Some(Self { hit, miss: all.checked_sub(hit)? })
+    }
+
+    /// The probability of `j + 1` successes of `n` over that of `j`.
+    #[expect(clippy::cast_precision_loss, reason = "relative weights are approximate by design")]
+    fn rise(self, n: u64, j: u64) -> f64 {
+        ((n - j) as f64 * self.hit as f64) / ((j + 1) as f64 * self.miss as f64)
+    }
 }
 
+/// The test by whole numbers; `None` where a weight leaves 128 bits.
+#[expect(clippy::cast_precision_loss, reason = "exact sums become quotients here")]
+fn exact(successes: u64, n: u64, odds: Odds) -> Option<ExactTest> {
+    let weights = exact_weights(n, odds)?;
+    let seen = weights[usize::try_from(successes).ok()?];
+    let as_extreme: u128 = weights.iter().filter(|&&weight| weight <= seen).sum();
+    let tied: u128 = weights.iter().filter(|&&weight| weight == seen).sum();
+    let total = exact_total(n, odds)?;
+    let p = as_extreme as f64 / total as f64;
+    // At a level of 0 or 1 one count alone is possible, and no evidence.
+    let mid_p = if seen == total { 1.0 } else { (as_extreme as f64 - tied as f64 / 2.0) / total as f64 };
+    Some(ExactTest { p, mid_p })
+}
+
+#[expect(clippy::cast_precision_loss, reason = "two exact sums become one quotient here")]
+fn exact_least_p(n: u64, odds: Odds) -> Option<f64> {
+    let weights = exact_weights(n, odds)?;
+    let least = *weights.iter().min()?;
+    let as_extreme: u128 = weights.iter().filter(|&&weight| weight == least).sum();
+    Some(as_extreme as f64 / exact_total(n, odds)? as f64)
+}
+
+fn exact_total(n: u64, odds: Odds) -> Option<u128> {
+    u128::from(odds.hit + odds.miss).checked_pow(u32::try_from(n).ok()?)
+}
+
+/// Counts weigh `C(n, j) * hit^j * miss^(n - j)`; `None` where a weight leaves 128 bits.
 fn exact_weights(n: u64, odds: Odds) -> Option<Vec<u128>> {
     if n > MOST_EXACT {
         return None;
@@ -64,37 +104,19 @@ fn exact_weights(n: u64, odds: Odds) -> Option<Vec<u128>> {
     Some(weights)
 }
 
-/// The same with weights relative to the most probable count, by the ratios of neighbours.
-fn by_recurrence(successes: u64, n: u64, odds: Odds) -> f64 {
-    let weights = relative_weights(n, odds);
-    let seen = weights.iter().find(|(count, _)| *count == successes).map_or(0.0, |(_, weight)| *weight);
-    let limit = seen * (1.0 + TIE);
-    let as_extreme: f64 = weights.iter().map(|(_, weight)| weight).filter(|weight| **weight <= limit).sum();
-    let total: f64 = weights.iter().map(|(_, weight)| weight).sum();
-    as_extreme / total
-}
-
-/// Counts with their weights, the mode's being 1; what underflows is left out.
-#[expect(clippy::cast_precision_loss, reason = "relative weights are approximate by design")]
-fn relative_weights(n: u64, odds: Odds) -> Vec<(u64, f64)> {
+/// The same with weights relative to the most probable count, which have no largest `n`.
+fn by_recurrence(n: u64, odds: Odds) -> Outcomes {
     let all = u128::from(odds.hit) + u128::from(odds.miss);
     let mode = (u128::from(n) + 1) * u128::from(odds.hit) / all;
     let mode = u64::try_from(mode).unwrap_or(n).min(n);
-    let (hit, miss) = (odds.hit as f64, odds.miss as f64);
-    let down = successors(Some((mode, 1.0)), |&(j, weight)| {
-        (j > 0).then(|| (j - 1, weight * (j as f64 * miss) / ((n - j + 1) as f64 * hit)))
-    });
-    let up = successors(Some((mode, 1.0)), |&(j, weight)| {
-        (j < n).then(|| (j + 1, weight * ((n - j) as f64 * hit) / ((j + 1) as f64 * miss)))
-    });
-    let seen = |(_, weight): &(u64, f64)| *weight > 0.0;
-    down.take_while(seen).chain(up.skip(1).take_while(seen)).collect()
+    Outcomes::around(mode, (0, n), |j| odds.rise(n, j))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Odds, by_recurrence, two_sided};
+    use super::{Odds, by_recurrence, exact_test, least_p, two_sided};
     use crate::base::ratio::Ratio;
+    use crate::stats::outcomes::ExactTest;
 
     fn level(above: i64, below: i64) -> Ratio {
         Ratio::new(above, below).unwrap()
@@ -129,11 +151,49 @@ mod tests {
                 for (a, b) in [(1, 3), (1, 2), (1, 10), (9, 10)] {
                     let odds = Odds { hit: a, miss: b - a };
                     let exact = super::exact(k, n, odds).unwrap();
-                    let found = by_recurrence(k, n, odds);
-                    assert!((found / exact - 1.0).abs() < 1e-11, "{k}/{n} against {a}/{b}: {found}, {exact}");
+                    let found = by_recurrence(n, odds).test(k);
+                    let near = |found: f64, exact: f64| (found / exact - 1.0).abs() < 1e-11;
+                    let is_near = near(found.p, exact.p) && near(found.mid_p, exact.mid_p);
+                    assert!(is_near, "{k}/{n} against {a}/{b}: {found:?}, {exact:?}");
                 }
             }
         }
+    }
+
+    // Python: the fractions above, sum(p for p in P if p < P[k]) + sum(p for p in P if p == P[k]) / 2
+    #[test]
+    fn mid_p_values_are_the_known_ones() {
+        for (k, n, (a, b), expected) in [
+            (5, 21, (1, 3), 0.424_776_557_040_700_16),
+            (13, 21, (1, 3), 0.006_623_022_536_192_27),
+            (0, 21, (1, 3), 0.000_172_750_094_086_856_44),
+            (3, 21, (1, 10), 0.361_197_232_175_971_7),
+            (40, 100, (1, 3), 0.152_716_573_236_668_46),
+            (260, 700, (1, 3), 0.031_965_076_010_794_444),
+            (530, 1000, (1, 2), 0.057_850_522_371_686_69),
+        ] {
+            let found = exact_test(k, n, level(a, b)).unwrap().mid_p;
+            assert!((found / expected - 1.0).abs() < 1e-10, "{k}/{n} against {a}/{b}: {found}, expected {expected}");
+        }
+    }
+
+    // Python: the least of these p values over all counts.
+    #[test]
+    fn least_p_values_are_the_known_ones() {
+        for (n, (a, b), expected) in [
+            (1, (1, 3), 1.0 / 3.0),
+            (3, (1, 3), 1.0 / 27.0),
+            (21, (1, 3), 9.559_906_635_974_805e-11),
+            (21, (1, 2), 9.536_743_164_062_5e-7),
+            (21, (1, 10), 1e-21),
+            (5, (9, 10), 1e-5),
+            (200, (1, 3), 3.764_861_949_599_026e-96),
+        ] {
+            let found = least_p(n, level(a, b)).unwrap();
+            assert!((found / expected - 1.0).abs() < 1e-10, "{n} against {a}/{b}: {found}, expected {expected}");
+        }
+        assert_eq!([least_p(3, level(0, 1)), least_p(300, level(1, 1))], [Some(0.0); 2]);
+        assert_eq!([least_p(0, level(1, 3)), least_p(3, level(4, 3))], [None; 2]);
     }
 
     #[test]
@@ -152,6 +212,10 @@ mod tests {
         assert_eq!(two_sided(4, 5, level(1, 1)), Some(0.0));
         assert_eq!(two_sided(1000, 1000, level(1, 1)), Some(1.0));
         assert_eq!(two_sided(999, 1000, level(1, 1)), Some(0.0));
+        for n in [5, 1000] {
+            assert_eq!(exact_test(0, n, level(0, 1)), Some(ExactTest { p: 1.0, mid_p: 1.0 }));
+            assert_eq!(exact_test(1, n, level(0, 1)), Some(ExactTest { p: 0.0, mid_p: 0.0 }));
+        }
     }
 
     #[test]

@@ -24,6 +24,20 @@ pub struct Pairs {
 }
 
 impl Pairs {
+    /// The table of these pairs of values, of which 1 is a success and everything else a failure.
+    pub fn of(values: impl IntoIterator<Item = (i64, i64)>) -> Self {
+        let mut pairs = Self::default();
+        for value in values {
+            match value {
+                (1, 1) => pairs.both += 1,
+                (1, _) => pairs.first_only += 1,
+                (_, 1) => pairs.second_only += 1,
+                _ => pairs.neither += 1,
+            }
+        }
+        pairs
+    }
+
     /// The number of pairs.
     pub fn n(self) -> u64 {
         self.both + self.first_only + self.second_only + self.neither
@@ -40,12 +54,36 @@ impl Pairs {
     /// Under no difference a discordant pair falls either way with probability 1/2. 1 where no pair is
     /// discordant; `None` without a pair.
     pub fn mcnemar(self) -> Option<f64> {
-        let discordant = self.first_only + self.second_only;
-        match (self.n(), discordant) {
+        match (self.n(), self.discordant()) {
             (0, _) => None,
             (_, 0) => Some(1.0),
-            _ => chance::two_sided(self.first_only, discordant, Ratio::new(1, 2)?),
+            (_, discordant) => chance::two_sided(self.first_only, discordant, Ratio::new(1, 2)?),
         }
+    }
+
+    /// The mid-p value of [`Pairs::mcnemar`] (Fagerland, Lydersen and Laake 2013, BMC Medical Research Methodology 13:91).
+    ///
+    /// Less conservative than the exact test and **not guaranteed to keep the level**. 1 where no pair is discordant;
+    /// `None` without a pair.
+    pub fn mcnemar_mid_p(self) -> Option<f64> {
+        match (self.n(), self.discordant()) {
+            (0, _) => None,
+            (_, 0) => Some(1.0),
+            (_, discordant) => Some(chance::exact_test(self.first_only, discordant, Ratio::new(1, 2)?)?.mid_p),
+        }
+    }
+
+    /// The least p value that [`Pairs::mcnemar`] could have given with as many discordant pairs: 2^(1 - d).
+    ///
+    /// 1 where no pair is discordant; `None` without a pair.
+    pub fn mcnemar_least_p(self) -> Option<f64> {
+        let halvings = i32::try_from(self.discordant().saturating_sub(1)).unwrap_or(i32::MAX);
+        (self.n() > 0).then(|| 0.5f64.powi(halvings))
+    }
+
+    /// The pairs that differ.
+    pub fn discordant(self) -> u64 {
+        self.first_only + self.second_only
     }
 
     /// The interval of [`Pairs::difference`]: square and add, with the correlation of the pairs
@@ -110,6 +148,26 @@ mod tests {
         }
     }
 
+    // Python fractions over comb(n, j) / 2**n; Fagerland et al. 2013: p minus the probability of the counts seen, 1 minus
+    // half of it where both counts are equal.
+    #[test]
+    fn the_mid_p_value_and_the_least_p_value_are_the_known_ones() {
+        for (b, c, mid_p, least) in [
+            (1, 0, 0.5, 1.0),
+            (5, 0, 0.03125, 0.0625),
+            (8, 1, 0.021484375, 0.00390625),
+            (10, 3, 0.057373046875, 0.000244140625),
+            (4, 4, 0.86328125, 0.0078125),
+            (20, 9, 0.04277394525706768, 3.725290298461914e-09),
+            (0, 0, 1.0, 1.0),
+        ] {
+            let found = pairs([3, b, c, 4]);
+            assert!((found.mcnemar_mid_p().unwrap() - mid_p).abs() < 1e-15, "{b}-{c}");
+            assert_eq!(found.mcnemar_least_p(), Some(least));
+        }
+        assert_eq!(pairs([0, 5000, 0, 0]).mcnemar_least_p(), Some(0.0));
+    }
+
     // Python: method 10 written out over the Wilson limits of statsmodels 0.15.0, proportion_confint(k, n, 0.05, "wilson")
     #[test]
     fn the_interval_is_the_known_one() {
@@ -132,6 +190,7 @@ mod tests {
     fn no_pair_has_no_answer() {
         let none = Pairs::default();
         assert_eq!((none.difference(), none.mcnemar(), none.interval(0.95)), (None, None, None));
+        assert_eq!((none.mcnemar_mid_p(), none.mcnemar_least_p()), (None, None));
     }
 
     proptest! {

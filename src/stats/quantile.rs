@@ -4,7 +4,7 @@
 //! a machine's mathematics library may differ in the last bit from another's; the digits kept do not,
 //! and everything later is plain arithmetic, so an interval has the same bits everywhere.
 
-use statrs::distribution::{Beta, Continuous, ContinuousCDF, Normal, StudentsT};
+use statrs::distribution::{Beta, ChiSquared, Continuous, ContinuousCDF, Normal, StudentsT};
 
 /// Above this many degrees of freedom the expansion around the normal is exact to the digits kept.
 const EXPANSION_FROM: f64 = 1000.0;
@@ -24,6 +24,13 @@ pub fn normal(tail: f64) -> f64 {
 /// The share of the normal distribution below a deviate.
 pub fn normal_below(deviate: f64) -> f64 {
     settled(Normal::standard().cdf(deviate))
+}
+
+/// The share of the chi-squared distribution with 1 degree of freedom above `statistic`, which is not negative.
+///
+/// By the incomplete gamma function: the library's error function has ten digits.
+pub fn chi_squared_above(statistic: f64) -> f64 {
+    settled(ChiSquared::new(1.0).expect("one degree of freedom is positive").sf(statistic))
 }
 
 /// Student's t that leaves `tail` above it, for `freedom` > 0 degrees of freedom.
@@ -74,7 +81,7 @@ pub fn settled(x: f64) -> f64 {
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::{normal, student, tail};
+    use super::{chi_squared_above, normal, student, tail};
 
     fn close(found: f64, expected: f64) {
         assert!((found / expected - 1.0).abs() < 2e-11, "found {found}, expected {expected}");
@@ -105,6 +112,20 @@ mod tests {
             close(student(0.025, freedom), at_025);
             close(student(0.005, freedom), at_005);
         }
+    }
+
+    // scipy 1.17.1: stats.chi2.sf(x, 1)
+    #[test]
+    fn chi_squared_shares_are_the_known_ones() {
+        for (statistic, share) in [
+            (0.5, 0.47950012218695337),
+            (3.841458820694124, 0.04999999999999989),
+            (30.0, 4.3204630578274955e-08),
+            (100.0, 1.5239706048320995e-23),
+        ] {
+            close(chi_squared_above(statistic), share);
+        }
+        assert_eq!(chi_squared_above(0.0).to_bits(), 1.0f64.to_bits());
     }
 
     #[test]

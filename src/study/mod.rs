@@ -10,6 +10,7 @@
 //! in between is an error. Nothing here knows a command line: text for people comes from errors and from `report`.
 
 mod backend;
+mod design;
 mod diff;
 mod empty_filter;
 mod error;
@@ -58,6 +59,7 @@ pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
 pub use scan::{Outputs, Results};
 pub use scores::write as write_scores;
 
+use design::design_of;
 use inputs::Stamp;
 use losses::Counted;
 
@@ -304,7 +306,8 @@ impl Study {
         let Counted { results, lost, .. } = counted;
         let (is_known, total) = (results.lost.is_some() || !lost.is_empty(), lost.total());
         let beside = if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() };
-        let options = Options { lost: is_known.then_some(beside), ..options.clone() };
+        let design = design_of(&results.episodes.declared);
+        let options = Options { lost: is_known.then_some(beside), design, ..options.clone() };
         let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
         if self.question.lost == LostAs::Failure && total > 0 {
             let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");

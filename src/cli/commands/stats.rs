@@ -6,7 +6,8 @@ use crate::base::suggest::hint;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
-use crate::report::statistics::{Options, Statistics, text};
+use crate::report::statistics::text::{self, Length};
+use crate::report::statistics::{Options, Statistics};
 
 /// The word that stands for every metric.
 const ALL: &str = "all";
@@ -35,6 +36,9 @@ pub struct StatsArgs {
     /// Horizon of restricted means, in steps [default: the last step known for every model of an experiment]
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(i64).range(1..))]
     pub horizon: Option<i64>,
+    /// Print every interval, plain means, clusters, and what could have been shown
+    #[arg(long)]
+    pub full: bool,
     /// Print everything as JSON, of every metric
     #[arg(long)]
     pub json: bool,
@@ -58,15 +62,20 @@ impl StatsArgs {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let study = self.traces.study(&scoring, &self.grouping)?;
-        let options = Options { confidence: self.confidence, horizon: self.horizon, lost: None };
+        let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
+        let options = Options { confidence, horizon, improvements, ..Options::default() };
         let statistics = study.statistics(&options)?;
         let text = if self.json {
             serde_json::to_string_pretty(&statistics).map_err(Failure::input)? + "\n"
         } else {
-            text::render(&statistics, &self.chosen(&statistics)?, terminal::width())
+            text::render(&statistics, &self.chosen(&statistics)?, self.length(), terminal::width())
         };
         std::io::stdout().lock().write_all(text.as_bytes())?;
         Ok(Outcome::Done)
+    }
+
+    const fn length(&self) -> Length {
+        if self.full { Length::Full } else { Length::Short }
     }
 
     fn chosen(&self, statistics: &Statistics) -> Result<Vec<String>, Failure> {

@@ -22,6 +22,9 @@ pub struct LossRow {
     pub experiment: String,
     /// The model.
     pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
     /// The metric.
     pub metric: String,
     /// The rate without the lost episodes, and its bounds with them.
@@ -39,17 +42,18 @@ impl Losses {
 }
 
 fn of_block(study: &Study, block: &Block, lost: &LostCounts, confidence: f64) -> Vec<LossRow> {
-    let lost = usize::try_from(lost.of(block.experiment, block.model, None)).unwrap_or(usize::MAX);
+    let lost = usize::try_from(lost.of(block.experiment, block.model, block.condition)).unwrap_or(usize::MAX);
     let row = |metric: &str, lossy| LossRow {
         experiment: block.experiment.to_owned(),
         model: block.model.to_owned(),
+        condition: block.condition(),
         metric: metric.to_owned(),
         lossy,
     };
     study
         .rates()
         .filter_map(|column| {
-            let kept = block.rows.clone().map(|at| (column.get(at), Fate::Kept));
+            let kept = block.rows().map(|at| (column.get(at), Fate::Kept));
             bounds(kept.chain(std::iter::repeat_n((None, Fate::Lost), lost)), confidence)
                 .map(|lossy| row(&column.name, lossy))
         })

@@ -1,0 +1,135 @@
+//! Exact two-sided tests over the counts that could have been seen.
+//!
+//! Rule: two-sided by probability. The p value sums every count that is at most as probable as the one seen
+//! (Gibbons and Pratt 1975, the minimum likelihood rule). Weights are relative to the most probable count and follow
+//! from the ratios of neighbours: no factorial, no logarithm, the same bits on every machine.
+
+use std::iter::successors;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// How near two weights count as equal.
+pub(super) const TIE: f64 = 1e-12;
+
+/// The p values of one exact two-sided test.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ExactTest {
+    /// The exact p value: under the hypothesis it is at most any level with at most that probability.
+    /// One below the smallest normal floating-point number is 0.
+    pub p: f64,
+    /// The mid-p value (Lancaster 1961): outcomes exactly as probable as the one seen count half. Less conservative,
+    /// and **not guaranteed to keep the level**. 1 where only one outcome is possible.
+    pub mid_p: f64,
+}
+
+/// Neighbouring counts with weights in proportion to their probabilities.
+#[derive(Clone, Debug)]
+pub(super) struct Outcomes {
+    first: u64,
+    weights: Vec<f64>,
+    /// Whether every possible count is there: of large supports the ends underflow and are left out.
+    whole: bool,
+}
+
+impl Outcomes {
+    /// The counts from `low` to `high`, where `rise(j)` is the probability of `j + 1` over that of `j`.
+    ///
+    /// `mode` is a most probable count or close to one, within the bounds.
+    pub fn around(mode: u64, (low, high): (u64, u64), rise: impl Fn(u64) -> f64) -> Self {
+        // Below the normal numbers a product may stop shrinking.
+        let is_normal = |(_, weight): &(u64, f64)| *weight >= f64::MIN_POSITIVE;
+        let down = successors(Some((mode, 1.0)), |&(j, weight)| (j > low).then(|| (j - 1, weight / rise(j - 1))));
+        let up = successors(Some((mode, 1.0)), |&(j, weight)| (j < high).then(|| (j + 1, weight * rise(j))));
+        let mut kept: Vec<(u64, f64)> = down.take_while(is_normal).collect();
+        kept.reverse();
+        kept.extend(up.skip(1).take_while(is_normal));
+        let (first, last) = (kept.first().map_or(mode, |(j, _)| *j), kept.last().map_or(mode, |(j, _)| *j));
+        let weights = kept.into_iter().map(|(_, weight)| weight).collect();
+        Self { first, weights, whole: first == low && last == high }
+    }
+
+    /// Both p values of the count `seen`, one that is possible.
+    pub fn test(&self, seen: u64) -> ExactTest {
+        if self.weights.len() == 1 && seen == self.first {
+            return ExactTest { p: 1.0, mid_p: 1.0 };
+        }
+        let index = seen.checked_sub(self.first).and_then(|index| usize::try_from(index).ok());
+        let seen = index.and_then(|index| self.weights.get(index)).copied().unwrap_or(0.0);
+        let (lower, upper) = (seen * (1.0 - TIE), seen * (1.0 + TIE));
+        let sum = |bound: f64| self.weights.iter().filter(|&&weight| weight <= bound).sum::<f64>();
+        let (as_extreme, total) = (sum(upper), self.weights.iter().sum::<f64>());
+        let tied = self.weights.iter().filter(|&&weight| lower <= weight && weight <= upper).sum::<f64>();
+        ExactTest { p: as_extreme / total, mid_p: (as_extreme - tied / 2.0) / total }
+    }
+
+    /// The least p value that any count has; 0 where it underflows.
+    pub fn least_p(&self) -> f64 {
+        let ends = [self.weights.first(), self.weights.last()].map(|weight| weight.copied().unwrap_or(0.0));
+        let total: f64 = self.weights.iter().sum();
+        let [low, high] = ends;
+        match (self.whole, (low - high).abs() <= TIE * low.max(high)) {
+            (false, _) => 0.0,
+            (true, true) if self.weights.len() > 1 => (low + high) / total,
+            (true, _) => low.min(high) / total,
+        }
+    }
+
+    /// How many counts have a weight.
+    pub fn len(&self) -> usize {
+        self.weights.len()
+    }
+
+    /// The sum of two independent counts.
+    pub fn plus(&self, other: &Self) -> Self {
+        let mut weights = vec![0.0; self.len() + other.len() - 1];
+        for (i, a) in self.weights.iter().enumerate() {
+            for (sum, b) in weights[i..].iter_mut().zip(&other.weights) {
+                *sum += a * b;
+            }
+        }
+        let largest = weights.iter().copied().fold(0.0, f64::max);
+        for weight in &mut weights {
+            *weight /= largest;
+        }
+        Self { first: self.first + other.first, weights, whole: self.whole && other.whole }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Outcomes;
+
+    fn coins(n: u32) -> Outcomes {
+        Outcomes::around(u64::from(n) / 2, (0, n.into()), |j| {
+            let j = u32::try_from(j).unwrap();
+            f64::from(n - j) / f64::from(j + 1)
+        })
+    }
+
+    // By hand: four coins weigh 1, 4, 6, 4, 1 of 16.
+    #[test]
+    fn equally_probable_counts_go_together() {
+        let found = coins(4);
+        let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-15, "{found}, {expected}");
+        near(found.test(0).p, 2.0 / 16.0);
+        near(found.test(0).mid_p, 1.0 / 16.0);
+        near(found.test(3).p, 10.0 / 16.0);
+        near(found.test(3).mid_p, 6.0 / 16.0);
+        near(found.test(2).mid_p, 13.0 / 16.0);
+        near(found.least_p(), 2.0 / 16.0);
+    }
+
+    #[test]
+    fn sums_of_independent_counts_are_counts_of_the_whole() {
+        let (sum, whole) = (coins(7).plus(&coins(5)), coins(12));
+        assert!((0..=12).all(|seen| (sum.test(seen).p - whole.test(seen).p).abs() < 1e-14));
+    }
+
+    #[test]
+    fn ends_that_underflow_are_left_out() {
+        let many = coins(1_000_000);
+        assert!(many.len() < 50_000);
+        assert_eq!((many.test(0).p, many.least_p()), (0.0, 0.0));
+    }
+}

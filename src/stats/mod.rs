@@ -21,6 +21,7 @@ pub mod paired;
 pub mod power;
 mod quantile;
 pub mod random;
+pub mod sequential;
 pub mod stratified;
 pub mod survival;
 pub mod tarone;

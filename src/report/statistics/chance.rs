@@ -103,7 +103,7 @@ impl ChanceRow {
 }
 
 impl Verdict {
-    fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
+    pub(super) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
         let seen = i128::from(successes) * i128::from(level.denominator());
         let expected = i128::from(level.numerator()) * i128::from(n);
         match is_shown {

@@ -12,6 +12,7 @@ mod conditions;
 mod durations;
 mod losses;
 mod models;
+mod sequential;
 mod study;
 pub mod text;
 
@@ -27,6 +28,7 @@ pub use conditions::{Contrast, Method};
 pub use durations::{CENSORED, DurationRow};
 pub use losses::{LossRow, Losses};
 pub use models::{Family, Gap, PairTest, Reach};
+pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;

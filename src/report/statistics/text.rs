@@ -2,6 +2,8 @@
 //!
 //! Rule: text from traces is shown, never obeyed ([`visible`]).
 
+pub mod sequential;
+
 use std::fmt::Write as _;
 
 use comfy_table::{CellAlignment, ContentArrangement, Table, presets};

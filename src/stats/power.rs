@@ -4,25 +4,27 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::quantile;
+use super::unpaired::fisher;
 
 /// The power that [`Detectable::likely`] is stated at.
 pub const POWER: f64 = 0.8;
 
-/// The smallest difference of two paired rates that an exact `McNemar` test of n pairs could have shown.
+/// The smallest difference of two rates that an exact test of n pairs, or of n episodes on each side, could have shown.
 ///
-/// In the most favourable case: all discordant pairs point the same way. With pairs in both directions more is needed.
+/// In the most favourable case: all discordant pairs point the same way, or one side has no success. Else more is needed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Detectable {
-    /// The number of pairs.
+    /// The number of pairs, or of episodes on each side.
     pub n: u64,
     /// The level that p must not exceed.
     pub level: f64,
-    /// The fewest pairs, all in one direction, with p at most the level.
+    /// The fewest pairs, all in one direction, or the fewest successes against none, with p at most the level.
     pub pairs: u64,
     /// The same as a difference of rates: the smallest one that could have been significant.
     pub smallest: f64,
-    /// The true difference that would have been found with a probability of 0.8.
-    pub likely: f64,
+    /// The true difference that would have been found with a probability of 0.8; none for independent samples, where it
+    /// depends on both rates.
+    pub likely: Option<f64>,
 }
 
 /// The smallest detectable difference of `n` pairs at `level`; `None` where no outcome reaches it.
@@ -45,24 +47,50 @@ pub fn detectable(n: u64, level: f64) -> Option<Detectable> {
         level,
         pairs,
         smallest: pairs as f64 / n as f64,
-        likely: 1.0 - quantile::beta(quantile::settled(1.0 - POWER), (n - pairs + 1) as f64, pairs as f64),
+        likely: Some(1.0 - quantile::beta(quantile::settled(1.0 - POWER), (n - pairs + 1) as f64, pairs as f64)),
     })
+}
+
+/// The same for two independent samples of `n` episodes each by Fisher's exact test: k successes against none.
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+pub fn detectable_unpaired(n: u64, level: f64) -> Option<Detectable> {
+    let is_enough = |k: u64| fisher((k, n), (0, n)).is_some_and(|test| test.p <= level);
+    if n == 0 || !is_enough(n) {
+        return None;
+    }
+    // The p value falls with k.
+    let (mut least, mut enough) = (0, n);
+    while enough - least > 1 {
+        let middle = least + (enough - least) / 2;
+        if is_enough(middle) { enough = middle } else { least = middle }
+    }
+    Some(Detectable { n, level, pairs: enough, smallest: enough as f64 / n as f64, likely: None })
 }
 
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::detectable;
+    use super::{detectable, detectable_unpaired};
 
     // scipy 1.17.1: beta.ppf(0.8, k, n - k + 1); 2 * 0.5**6 = 0.03125 is the first p at most 0.05
     #[test]
     fn twenty_one_pairs_show_six_at_best() {
         let one = detectable(21, 0.05).unwrap();
         assert_eq!((one.pairs, one.smallest), (6, 6.0 / 21.0));
-        assert!((one.likely - 0.35032843001535).abs() < 1e-10, "{one:?}");
+        assert!((one.likely.unwrap() - 0.35032843001535).abs() < 1e-10, "{one:?}");
         let family = detectable(21, 0.05 / 28.0).unwrap();
         assert_eq!(family.pairs, 11);
-        assert!((family.likely - 0.589997196567057).abs() < 1e-10, "{family:?}");
+        assert!((family.likely.unwrap() - 0.589997196567057).abs() < 1e-10, "{family:?}");
+    }
+
+    // scipy 1.17.1: fisher_exact([[k, 21 - k], [0, 21]]).pvalue is 0.0478 for k = 5, 0.1069 for k = 4 and 0.0013 for k = 9
+    #[test]
+    fn twenty_one_episodes_each_show_five_against_none() {
+        assert_eq!(detectable_unpaired(21, 0.05).unwrap().pairs, 5);
+        assert_eq!(detectable_unpaired(21, 0.05 / 28.0).unwrap().pairs, 9);
+        assert_eq!(detectable_unpaired(3, 0.05), None);
+        assert_eq!(detectable_unpaired(4, 0.05).unwrap().pairs, 4);
+        assert_eq!(detectable_unpaired(0, 0.05), None);
     }
 
     #[test]

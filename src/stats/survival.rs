@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::interval::Interval;
+use super::interval::{Interval, student_t_of};
 use super::quantile;
 
 /// How near the curve must come to one half to count as having reached it: rounding only.
@@ -59,10 +59,49 @@ pub struct RestrictedMean {
     pub horizon: i64,
     /// The area under the curve up to the horizon.
     pub mean: f64,
-    /// Its standard error.
+    /// Its standard error: Greenwood's times sqrt(n / (n - 1)), so that of complete durations it is that of their mean.
     pub se: f64,
-    /// The mean plus and minus normal deviates of these standard errors, within [0, tau].
-    pub interval: Interval,
+    /// On the scale log(m / (tau - m)), plus and minus t(n - 1) standard errors by the delta method, so that the bounds lie
+    /// inside (0, tau) and lean away from the nearer end; none for one episode, and where the standard error is zero, which
+    /// says nothing about the mean of other episodes.
+    pub interval: Option<Interval>,
+}
+
+/// The interval of a median.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct MedianInterval {
+    /// The first step that it may be.
+    pub low: i64,
+    /// The last step that it may be; none where the episodes set no upper bound.
+    pub high: Option<i64>,
+}
+
+impl RestrictedMean {
+    /// The estimate from `n` episodes, with its interval; `variance` divides by n. `None` for a confidence outside (0, 1).
+    #[expect(clippy::cast_precision_loss, reason = "steps and counts are far below 2^53")]
+    pub(super) fn of(horizon: i64, mean: f64, variance: f64, n: u64, confidence: f64) -> Option<Self> {
+        quantile::tail(confidence)?;
+        let se = (variance * small_sample(n)).sqrt();
+        let whole = horizon as f64;
+        let is_inside = has_spread(se, horizon) && 0.0 < mean && mean < whole;
+        let (center, scale) = ((mean / (whole - mean)).ln(), whole / (mean * (whole - mean)));
+        let interval = student_t_of(center, scale * se, n as f64 - 1.0, confidence).filter(|_| is_inside);
+        let back = |x: f64| quantile::settled(whole / (1.0 + (-x).exp()));
+        let interval = interval.map(|found| Interval { low: back(found.low), high: back(found.high) });
+        Some(Self { horizon, mean, se, interval })
+    }
+}
+
+/// What makes a variance that divides by n one that divides by n - 1; 1 for a single episode, which has no variance.
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+pub(super) fn small_sample(n: u64) -> f64 {
+    if n > 1 { n as f64 / (n - 1) as f64 } else { 1.0 }
+}
+
+/// Whether a standard error is more than the rounding of steps up to `horizon`.
+#[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
+pub(super) fn has_spread(se: f64, horizon: i64) -> bool {
+    se > 1e-12 * horizon as f64
 }
 
 impl Survival {
@@ -107,7 +146,6 @@ impl Survival {
     /// outside (0, 1).
     #[expect(clippy::cast_precision_loss, reason = "steps and counts are far below 2^53")]
     pub fn restricted_mean(&self, horizon: i64, confidence: f64) -> Option<RestrictedMean> {
-        let z = quantile::normal(quantile::tail(confidence)?);
         if horizon <= 0 || self.known_until().is_some_and(|known| known < horizon) {
             return None;
         }
@@ -120,10 +158,39 @@ impl Survival {
                 variance += area * area * point.decided as f64 / (point.at_risk as f64 * remaining as f64);
             }
         }
-        let (mean, se) = (area + later as f64, variance.sqrt());
-        let interval = Interval { low: (mean - z * se).max(0.0), high: (mean + z * se).min(horizon as f64) };
-        Some(RestrictedMean { horizon, mean, se, interval })
+        let n = self.points.first()?.at_risk;
+        RestrictedMean::of(horizon, area + later as f64, variance, n, confidence)
     }
+
+    /// The steps that the median may be (Brookmeyer and Crowley 1982): those at which one half lies within the pointwise
+    /// interval of the curve, which is Greenwood's after the transformation log(-log) (Borgan and Liestol 1990).
+    ///
+    /// `None` where not even the lower bound is seen, and for a confidence outside (0, 1).
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    pub fn median_interval(&self, confidence: f64) -> Option<MedianInterval> {
+        let z = quantile::normal(quantile::tail(confidence)?);
+        let (mut sum, mut low) = (0.0, None);
+        for point in &self.points {
+            let (at_risk, decided) = (point.at_risk as f64, point.decided as f64);
+            sum += decided / (at_risk * (at_risk - decided));
+            // Once all are decided the curve is 0, and its interval is not defined: half is passed, by how much is open.
+            let bounds = if point.undecided > 0.0 { log_log(point.undecided, sum, z) } else { Interval { low: 0.0, high: 1.0 } };
+            low = low.or((bounds.low <= HALF).then_some(point.steps));
+            if bounds.high <= HALF {
+                return low.map(|low| MedianInterval { low, high: Some(point.steps) });
+            }
+        }
+        low.map(|low| MedianInterval { low, high: None })
+    }
+}
+
+/// The interval of a share that is above 0, from Greenwood's sum; a share of 1 has none but itself.
+fn log_log(share: f64, sum: f64, z: f64) -> Interval {
+    if share >= 1.0 {
+        return Interval { low: 1.0, high: 1.0 };
+    }
+    let reach = z * sum.sqrt() / share.ln().abs();
+    Interval { low: share.powf(reach.exp()), high: share.powf((-reach).exp()) }
 }
 
 /// The largest horizon that every curve is known to: restricted means up to it compare like with like.
@@ -137,7 +204,7 @@ pub fn common_horizon<'a>(curves: impl IntoIterator<Item = &'a Survival> + Clone
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::{Duration, End, Survival, common_horizon};
+    use super::{Duration, End, MedianInterval, Survival, common_horizon};
 
     /// Durations; a negative one is censored.
     fn curve(durations: &[i64]) -> Survival {
@@ -168,7 +235,7 @@ mod tests {
     }
 
     // lifelines 0.30.3: restricted_mean_survival_time(km, t=tau); standard errors by exact fractions in Python:
-    // sqrt(sum(area(t, tau)**2 * F(d, n * (n - d))))
+    // sqrt(sum(area(t, tau)**2 * F(d, n * (n - d)))), to which the factor sqrt(n / (n - 1)) comes
     #[test]
     fn the_restricted_mean_is_the_known_one() {
         for (durations, horizon, mean, se) in [
@@ -180,8 +247,10 @@ mod tests {
             let found = curve(durations).restricted_mean(horizon, 0.95).unwrap();
             assert_eq!(found.horizon, horizon);
             close(found.mean, mean);
-            close(found.se, se);
-            assert!(found.interval.contains(found.mean) && found.interval.high <= 100.0);
+            let n = durations.len() as f64;
+            close(found.se, se * (n / (n - 1.0)).sqrt());
+            let interval = found.interval.unwrap();
+            assert!(interval.contains(found.mean) && interval.high <= 100.0);
         }
     }
 
@@ -192,6 +261,33 @@ mod tests {
         assert_eq!(curve(&[-100; 21]).median(), None);
         assert_eq!(curve(&[7]).median(), Some(7));
         assert_eq!(Survival::of(&[]), None);
+    }
+
+    // scipy 1.17.1: 35 * expit(logit(m / 35) -+ t.ppf(0.975, 20) * se * 35 / (m * (35 - m)))
+    #[test]
+    fn the_interval_of_the_restricted_mean_leans_away_from_the_nearer_end() {
+        let interval = curve(&REMISSIONS).restricted_mean(35, 0.95).unwrap().interval.unwrap();
+        close(interval.low, 16.728114945660174);
+        close(interval.high, 28.418437311365157);
+        assert_eq!(curve(&[12; 21]).restricted_mean(100, 0.95).unwrap().interval, None);
+        assert_eq!(curve(&[-100; 21]).restricted_mean(100, 0.95).unwrap().interval, None);
+    }
+
+    // lifelines 0.30.3: median_survival_times(KaplanMeierFitter().fit(T, E).confidence_interval_); where all are decided
+    // it bounds the median by the longest duration, which the method does not support: none here, as in R's survfit
+    #[test]
+    fn the_interval_of_the_median_is_the_known_one() {
+        let written = [5, 12, -100, 30, -100, 44, 61, -100, 8, 77, -100, 15, -100, 90, 33];
+        for (durations, low, high) in [
+            (&REMISSIONS[..], 13, None),
+            (&written[..], 12, None),
+            (&[3, 8, 8, 15, 20][..], 3, None),
+            (&[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, -10][..], 2, Some(9)),
+        ] {
+            assert_eq!(curve(durations).median_interval(0.95), Some(MedianInterval { low, high }), "{durations:?}");
+        }
+        assert_eq!(curve(&[-100; 21]).median_interval(0.95), None);
+        assert_eq!(curve(&[5, 6]).median_interval(1.0), None);
     }
 
     #[test]

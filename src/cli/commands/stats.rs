@@ -6,7 +6,8 @@ use crate::base::suggest::hint;
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
-use crate::report::statistics::{Options, Sequential, Statistics, text};
+use crate::report::statistics::text::{self, Length};
+use crate::report::statistics::{Options, Sequential, Statistics};
 use crate::stats::group::DEFAULT_BY;
 
 /// The word that stands for every metric.
@@ -36,8 +37,11 @@ pub struct StatsArgs {
     /// Horizon of restricted means, in steps [default: the last step known for every model of an experiment]
     #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(i64).range(1..))]
     pub horizon: Option<i64>,
+    /// Print every interval, plain means, clusters, and what could have been shown
+    #[arg(long)]
+    pub full: bool,
     /// For a study that still runs: intervals and tests of rates that may be looked at after every episode
-    #[arg(long, conflicts_with_all = ["by", "horizon"])]
+    #[arg(long, conflicts_with_all = ["by", "horizon", "full"])]
     pub sequential: bool,
     /// Print everything as JSON, of every metric
     #[arg(long)]
@@ -63,7 +67,7 @@ impl StatsArgs {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let study = self.traces.study(&scoring, &self.by)?;
-        let options = Options { confidence: self.confidence, horizon: self.horizon, lost: None };
+        let options = Options { confidence: self.confidence, horizon: self.horizon, ..Options::default() };
         let text = if self.sequential {
             self.sequential_page(&study.sequential(&options)?)?
         } else {
@@ -73,13 +77,17 @@ impl StatsArgs {
         Ok(Outcome::Done)
     }
 
+    const fn length(&self) -> Length {
+        if self.full { Length::Full } else { Length::Short }
+    }
+
     fn page(&self, statistics: &Statistics) -> Result<String, Failure> {
         if self.json {
             return json(statistics);
         }
         let metrics = statistics.cells.iter().map(|cell| cell.metric.as_str());
         let chosen = self.chosen("metric", metrics, &statistics.headline)?;
-        Ok(text::render(statistics, &chosen, terminal::width()))
+        Ok(text::render(statistics, &chosen, self.length(), terminal::width()))
     }
 
     fn sequential_page(&self, sequential: &Sequential) -> Result<String, Failure> {

@@ -16,7 +16,8 @@ use crate::metric::catalog::{Better, Metric};
 use crate::report::bundle::Manifest;
 use crate::report::layout::heading;
 use crate::report::order::row_key;
-use crate::report::statistics::{Statistics, text};
+use crate::report::statistics::Statistics;
+use crate::report::statistics::text::{self, Length};
 use crate::report::table::{Column, Row, RowGroup, Table};
 use crate::score::table::{EpisodeTable, KeyRef};
 use crate::stats::cell::{Cells, Group};
@@ -130,7 +131,7 @@ fn statistics(statistics: &Statistics) -> Json {
     json!({
         "conclusions": all(&statistics.conclusions),
         "warnings": all(&statistics.warnings),
-        "text": text::render(statistics, &statistics.headline, None),
+        "text": text::render(statistics, &statistics.headline, Length::Full, None),
     })
 }
 

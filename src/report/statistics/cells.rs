@@ -9,8 +9,10 @@ use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::EpisodeTable;
 use crate::stats::bootstrap;
 use crate::stats::cell::{Cells, Group, KeyValue};
+use crate::stats::coverage::{self, Withheld};
 use crate::stats::group::membership;
 use crate::stats::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
+use crate::stats::moments::Moments;
 
 /// Conditional metrics with fewer defined episodes than this are marked.
 pub const FEW: u64 = 5;
@@ -55,10 +57,14 @@ pub enum Intervals {
     },
     /// Of the mean of a quantity.
     Quantity {
-        /// Student's t with n - 1 degrees of freedom.
+        /// Student's t with n - 1 degrees of freedom, within the values that a mean of steps can have.
         student_t: Option<Interval>,
+        /// Why there is none.
+        student_t_withheld: Option<Withheld>,
         /// Bias-corrected and accelerated bootstrap, seeded; none for very many values.
         bootstrap: Option<Interval>,
+        /// Why there is none.
+        bootstrap_withheld: Option<Withheld>,
     },
 }
 
@@ -73,17 +79,14 @@ impl CellRow {
     fn of_group(study: &Study, cells: &Cells, group: &Group, rows: &[usize], confidence: f64) -> Vec<Self> {
         let key: IndexMap<String, KeyValue> = cells.by.iter().cloned().zip(group.key.iter().cloned()).collect();
         let of_metric = |(metric, moments)| {
-            let moments: &crate::stats::moments::Moments = moments;
+            let moments: &Moments = moments;
             let metric: &String = metric;
             let kind = study.kind(metric);
             let definition = study.metric(metric);
             let se = definition.map_or(StandardError::Sample, |definition| definition.se);
             let intervals = match (kind, counts(moments)) {
                 (Kind::Rate, Some((k, n))) => Intervals::rate(k, n, confidence),
-                _ => Intervals::Quantity {
-                    student_t: student_t(moments, se, confidence),
-                    bootstrap: bootstrap::mean(&values(study, metric, rows), confidence),
-                },
+                _ => Intervals::quantity(study, metric, moments, rows, confidence),
             };
             Self {
                 key: key.clone(),
@@ -109,6 +112,25 @@ impl Intervals {
             clopper_pearson: clopper_pearson(successes, n, confidence),
             jeffreys: jeffreys(successes, n, confidence),
         }
+    }
+}
+
+impl Intervals {
+    fn quantity(study: &Study, metric: &str, moments: &Moments, rows: &[usize], confidence: f64) -> Self {
+        let form = study.metric(metric).map_or(StandardError::Sample, |definition| definition.se);
+        let (low, high) = study.range(metric);
+        let is_spread = moments.se(StandardError::Sample).is_some_and(|se| se > 0.0);
+        let given = |found: Option<Interval>, fewest| {
+            let found = found.filter(|found| found.low < found.high).map(|found| found.within(low, high));
+            coverage::given(found, moments.n, fewest, is_spread)
+        };
+        // 10,000 resamples are drawn only where their interval may be given.
+        let resampled = (moments.n >= coverage::BOOTSTRAP && is_spread)
+            .then(|| bootstrap::mean(&values(study, metric, rows), confidence))
+            .flatten();
+        let (student_t, student_t_withheld) = given(student_t(moments, form, confidence), coverage::STUDENT);
+        let (bootstrap, bootstrap_withheld) = given(resampled, coverage::BOOTSTRAP);
+        Self::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld }
     }
 }
 

@@ -1,12 +1,18 @@
 //! Rates against the levels of blind guessing, by the exact binomial test.
+//!
+//! Rule: a rate that counts unfinished episodes as failures stands beside the same rate among finished episodes
+//! ([`COMPLETED`]): who does not finish is below chance under the first and need not guess.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::{Experiment, Study, counts};
+use super::study::{Block, Experiment, Study, counts, named};
 use crate::base::ratio::Ratio;
-use crate::stats::chance::two_sided;
+use crate::score::table::MetricColumn;
+use crate::stats::chance::{exact_test, least_p};
 use crate::stats::holm::{holm, level};
+use crate::stats::outcomes::ExactTest;
+use crate::stats::tarone::{Attained, tarone_holm};
 
 /// One rate against one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -15,6 +21,9 @@ pub struct ChanceRow {
     pub experiment: String,
     /// The model.
     pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
     /// The metric.
     pub metric: String,
     /// What the level is.
@@ -25,11 +34,15 @@ pub struct ChanceRow {
     pub successes: u64,
     /// The episodes in which the metric is defined.
     pub n: u64,
-    /// The exact two-sided p value.
+    /// The exact p value, two-sided by minimum likelihood.
     pub p: f64,
-    /// The same adjusted by Holm's method over the models of the experiment, against this level.
+    /// The mid-p value, which is not guaranteed to keep the level.
+    pub mid_p: f64,
+    /// `p` adjusted by Holm's method over the models of the experiment, against this level.
     pub p_adjusted: f64,
-    /// What the adjusted value says at the level of significance.
+    /// `p` adjusted by Tarone and Holm: tests of too few episodes to reach it do not count.
+    pub p_tarone: f64,
+    /// What the value adjusted by Holm says at the level of significance.
     pub verdict: Verdict,
 }
 
@@ -55,6 +68,10 @@ pub enum Verdict {
     NotSeparated,
 }
 
+/// Rates that count an unfinished episode as a failure, and the same among finished episodes, which has the same levels
+/// of chance where the definitions give it none of its own.
+pub const COMPLETED: [(&str, &str); 1] = [("TSA", "TSA-C")];
+
 impl ChanceRow {
     /// Every rate against every level that its experiment has.
     pub(super) fn all(study: &Study, confidence: f64) -> Vec<Self> {
@@ -77,28 +94,47 @@ impl ChanceRow {
         confidence: f64,
     ) -> Vec<Self> {
         let Some(column) = study.column(metric) else { return Vec::new() };
-        let tested: Vec<_> = experiment
-            .blocks
-            .iter()
-            .filter_map(|block| {
-                let (successes, n) = counts(&block.moments(column))?;
-                two_sided(successes, n, chance).map(|p| (block.model, successes, n, p))
-            })
-            .collect();
-        let adjusted = holm(&tested.iter().map(|&(.., p)| p).collect::<Vec<_>>());
-        let row = |((model, successes, n, p), p_adjusted): ((&str, u64, u64, f64), f64)| Self {
+        let tested: Vec<_> = experiment.blocks.iter().filter_map(|block| Tested::of(block, column, chance)).collect();
+        let adjusted = holm(&tested.iter().map(|tested| tested.test.p).collect::<Vec<_>>());
+        let attained = |tested: &Tested| Attained { p: tested.test.p, least: tested.least };
+        let by_tarone = tarone_holm(&tested.iter().map(attained).collect::<Vec<_>>());
+        let row = |(Tested { block, successes, n, test, .. }, (p_adjusted, p_tarone)): (Tested, (f64, f64))| Self {
             experiment: experiment.name.to_owned(),
-            model: model.to_owned(),
+            model: block.model.to_owned(),
+            condition: block.condition(),
             metric: metric.to_owned(),
             role,
             level: chance,
             successes,
             n,
-            p,
+            p: test.p,
+            mid_p: test.mid_p,
             p_adjusted,
+            p_tarone,
             verdict: Verdict::of(successes, n, chance, level(confidence).is_some_and(|level| p_adjusted <= level)),
         };
-        tested.into_iter().zip(adjusted).map(row).collect()
+        tested.into_iter().zip(adjusted.into_iter().zip(by_tarone)).map(row).collect()
+    }
+
+    /// The model as it is compared.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+}
+
+/// One rate of one block against one level.
+struct Tested<'s, 'a> {
+    block: &'s Block<'a>,
+    successes: u64,
+    n: u64,
+    test: ExactTest,
+    least: f64,
+}
+
+impl<'s, 'a> Tested<'s, 'a> {
+    fn of(block: &'s Block<'a>, column: &MetricColumn, chance: Ratio) -> Option<Self> {
+        let (successes, n) = counts(&block.moments(column))?;
+        Some(Self { block, successes, n, test: exact_test(successes, n, chance)?, least: least_p(n, chance)? })
     }
 }
 
@@ -114,8 +150,18 @@ impl Verdict {
     }
 }
 
-/// The levels of a metric in an experiment: chance, then references.
+/// The levels of a metric in an experiment: chance, then references; those of the rate that it completes where it has none.
 pub(super) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+    let own = own_levels(study, experiment, metric);
+    let whole = COMPLETED.iter().find(|(_, completed)| *completed == metric);
+    match whole {
+        Some((whole, _)) if own.is_empty() => own_levels(study, experiment, whole),
+        _ => own,
+    }
+}
+
+/// The levels that the definitions give a metric in an experiment.
+pub(super) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
     let catalog = &study.table.catalog;
     let chance = catalog.chance(experiment, metric).map(|level| (Role::Chance, level));
     let references = catalog.experiment.get(experiment).and_then(|known| known.reference.get(metric));

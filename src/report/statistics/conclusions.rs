@@ -1,23 +1,17 @@
-//! What a reader may and may not conclude, in sentences made from the numbers.
-
-use std::collections::{BTreeMap, BTreeSet};
+//! What a reader may conclude, in sentences made from the numbers.
 
 use indexmap::IndexMap;
 
-use super::chance::levels;
+use super::chance::own_levels;
 use super::study::Study;
-use super::{CENSORED, ChanceRow, DurationRow, FEW, Family, Reach, Role, Statistics, Verdict};
+use super::{CENSORED, ChanceRow, DurationRow, Family, Method, Reach, Role, Statistics, Verdict};
 use crate::base::format::fixed;
-use crate::stats::clustered::FEWEST_CLUSTERS;
 use crate::stats::power::Detectable;
-
-/// How many gaps a warning names before it counts the rest.
-const NAMED_GAPS: usize = 5;
 
 /// The metrics that conclusions are about: rates with a level to compare with, and durations.
 /// The first metric where there is neither.
 pub(super) fn headline(study: &Study) -> Vec<String> {
-    let has_level = |metric: &str| study.experiments.iter().any(|known| !levels(study, known.name, metric).is_empty());
+    let has_level = |metric: &str| study.experiments.iter().any(|known| !own_levels(study, known.name, metric).is_empty());
     let rates = study.rates().map(|column| column.name.as_str()).filter(|metric| has_level(metric));
     let durations = CENSORED.iter().map(|(duration, _)| *duration).filter(|metric| study.column(metric).is_some());
     let chosen: Vec<String> = rates.chain(durations).map(str::to_owned).collect();
@@ -38,31 +32,44 @@ pub(super) fn conclusions(statistics: &Statistics) -> Vec<String> {
     sentences
 }
 
-/// What the numbers of pairs could have shown, once for all experiments that share them.
+/// What the numbers of episodes could have shown, once for all experiments that share them.
 fn reaches(families: &[&Family]) -> Vec<String> {
-    let mut shared: IndexMap<(u64, usize), (Reach, Vec<String>)> = IndexMap::new();
+    let mut shared: IndexMap<(Method, u64, usize), (Reach, Vec<String>)> = IndexMap::new();
     for family in families {
-        let reach = family.detectable;
-        let (_, names) = shared.entry((reach.n, reach.tests)).or_insert_with(|| (reach, Vec::new()));
-        names.push(format!("{} {}", family.experiment, family.metric));
+        let Some(reach) = family.detectable else { continue };
+        let of_reach = shared.entry((reach.method, reach.n, reach.tests));
+        of_reach.or_insert_with(|| (reach, Vec::new())).1.push(format!("{} {}", family.experiment, family.metric));
     }
     shared.into_values().map(|(reach, names)| reach_sentence(reach, &names)).collect()
 }
 
 fn reach_sentence(reach: Reach, names: &[String]) -> String {
-    let least = |found: Option<Detectable>| match found {
-        Some(found) => format!("{}/{} ({})", found.pairs, found.n, fixed(Some(found.smallest), 2)),
-        None => "no difference at all".to_owned(),
+    let is_paired = reach.method == Method::Mcnemar;
+    let (about, n) = (names.join(", "), reach.n);
+    let with = match (is_paired, n) {
+        (true, 1) => "1 pair".to_owned(),
+        (true, _) => format!("{n} pairs"),
+        (false, 1) => "1 episode per model".to_owned(),
+        (false, _) => format!("{n} episodes per model"),
     };
-    format!(
-        "{}: with {}, the smallest difference between two models that could have been shown is {} in one \
-         comparison and {} as the first of {} under Holm, if every disagreement points the same way.",
-        names.join(", "),
-        if reach.n == 1 { "1 pair".to_owned() } else { format!("{} pairs", reach.n) },
-        least(reach.single),
-        least(reach.family),
-        reach.tests,
-    )
+    let when = if is_paired { "if every disagreement points the same way" } else { "against a model without success" };
+    let least = |found: Detectable| format!("{}/{} ({})", found.pairs, found.n, fixed(Some(found.smallest), 2));
+    match (reach.single, reach.family) {
+        (None, _) => format!("{about}: {with} cannot show any difference between two models, whatever the outcomes."),
+        (Some(single), None) => format!(
+            "{about}: with {with}, the smallest difference between two models that could have been shown is {} in one \
+             comparison, {when}; as the first of {} under Holm none could have been.",
+            least(single),
+            reach.tests
+        ),
+        (Some(single), Some(family)) => format!(
+            "{about}: with {with}, the smallest difference between two models that could have been shown is {} in one \
+             comparison and {} as the first of {} under Holm, {when}.",
+            least(single),
+            least(family),
+            reach.tests
+        ),
+    }
 }
 
 fn against_levels(rows: &[ChanceRow]) -> Vec<String> {
@@ -79,8 +86,8 @@ fn against_levels(rows: &[ChanceRow]) -> Vec<String> {
 }
 
 fn level_sentence(experiment: &str, metric: &str, level: &str, rows: &[&ChanceRow]) -> String {
-    let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.model.as_str()).collect();
-    let phrase = |what: &str, models: Vec<&str>| match models.len() {
+    let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect();
+    let phrase = |what: &str, models: Vec<String>| match models.len() {
         0 => None,
         count if count == rows.len() && count > 1 => Some(format!("{what}: all {count} models")),
         _ => Some(format!("{what}: {}", models.join(", "))),
@@ -112,84 +119,10 @@ fn unfinished(rows: &[DurationRow]) -> Vec<String> {
     }
     let sentence = |(metric, (unfinished, all)): (&str, (u64, u64))| {
         format!(
-            "{metric}: {unfinished} of {all} episodes never finished and are censored; compare medians and restricted \
-             means, since the plain mean takes them as finished."
+            "{metric}: {unfinished} of {all} episodes never finished and are censored; every comparison is of restricted means, \
+             since the plain mean takes them as finished."
         )
     };
     totals.into_iter().filter(|(_, (unfinished, _))| *unfinished > 0).map(sentence).collect()
 }
 
-/// What the numbers do not allow to say.
-pub(super) fn warnings(statistics: &Statistics) -> Vec<String> {
-    let found = [few_seeds(statistics), few_episodes(statistics), gaps(statistics), losses(statistics)];
-    found.into_iter().flatten().collect()
-}
-
-fn few_seeds(statistics: &Statistics) -> Option<String> {
-    let mut blocks: BTreeMap<(&str, &str), usize> = BTreeMap::new();
-    for row in &statistics.clusters {
-        let seeds = blocks.entry((&row.experiment, &row.model)).or_default();
-        *seeds = row.seeds.max(*seeds);
-    }
-    let fewest = blocks.into_values().min().filter(|&fewest| fewest < FEWEST_CLUSTERS)?;
-    let seeds = if fewest == 1 { "1 seed".to_owned() } else { format!("{fewest} seeds") };
-    Some(format!(
-        "{seeds} are too few for a claim about new seeds: no test over fewer than {FEWEST_CLUSTERS} can reach p = 0.05. \
-         Tests and intervals speak of new runs of these seeds; see the clustered intervals for how little is known beyond them."
-    ))
-}
-
-fn few_episodes(statistics: &Statistics) -> Option<String> {
-    let few = statistics.cells.iter().filter(|cell| cell.few).count();
-    (few > 0).then(|| {
-        format!(
-            "{few} of {} cells are of conditional metrics with fewer than {FEW} defined episodes (marked with a dagger): \
-             do not compare them.",
-            statistics.cells.len()
-        )
-    })
-}
-
-fn gaps(statistics: &Statistics) -> Option<String> {
-    let named: Vec<String> = statistics
-        .gaps
-        .iter()
-        .take(NAMED_GAPS)
-        .map(|gap| {
-            let found = if gap.episodes == 0 { "missing".to_owned() } else { format!("{} episodes", gap.episodes) };
-            format!("{} {} seed {} run {} ({found})", gap.experiment, gap.model, gap.seed, gap.run)
-        })
-        .collect();
-    let rest = statistics.gaps.len().saturating_sub(named.len());
-    let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
-    (!named.is_empty()).then(|| {
-        format!(
-            "{} places cannot be paired, for want of exactly one episode: {}{rest}.",
-            statistics.gaps.len(),
-            named.join("; ")
-        )
-    })
-}
-
-fn losses(statistics: &Statistics) -> Option<String> {
-    if !statistics.losses.recorded {
-        return Some(
-            "the traces do not record how replies came (no reply_status): episodes lost to infrastructure, if any, are \
-             counted as the model's own."
-                .to_owned(),
-        );
-    }
-    let lost: BTreeSet<(&str, &str, u64)> = statistics
-        .losses
-        .rows
-        .iter()
-        .map(|row| (row.experiment.as_str(), row.model.as_str(), row.lossy.lost))
-        .collect();
-    let total: u64 = lost.iter().map(|(.., lost)| lost).sum();
-    (total > 0).then(|| {
-        format!(
-            "{total} episodes ended by the infrastructure (rate limit, server error, timeout) are in every number above but \
-             the bounds under losses, which say what they could have changed."
-        )
-    })
-}

@@ -24,6 +24,9 @@ pub struct LossRow {
     pub experiment: String,
     /// The model.
     pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
     /// The metric.
     pub metric: String,
     /// The rate without the lost episodes, and its bounds with them.
@@ -45,13 +48,14 @@ fn of_block(study: &Study, block: &Block, lost: &BTreeSet<String>, confidence: f
     let row = |metric: &str, lossy| LossRow {
         experiment: block.experiment.to_owned(),
         model: block.model.to_owned(),
+        condition: block.condition(),
         metric: metric.to_owned(),
         lossy,
     };
     study
         .rates()
         .filter_map(|column| {
-            let episodes = block.rows.clone().map(|at| (column.get(at), fate(at)));
+            let episodes = block.rows().map(|at| (column.get(at), fate(at)));
             bounds(episodes, confidence).map(|lossy| row(&column.name, lossy))
         })
         .filter(|row| row.lossy.lost > 0)

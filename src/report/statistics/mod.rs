@@ -2,18 +2,23 @@
 //!
 //! Rule: no statistic is computed here. This module asks `cells` about each cell, pair and block, keeps the
 //! answers as plain data for programs ([`Statistics`] as JSON) and states them for people ([`text`]).
-//! Cells follow the grouping asked for; every comparison is by experiment and model, paired by seed and run.
+//! Cells follow the grouping asked for; every comparison is by experiment, model and condition, and follows the declared
+//! design: paired where scenes are equal, by clusters where they are declared, of independent episodes elsewhere.
 
+mod answers;
 mod cells;
 mod chance;
 mod clusters;
+mod compare;
 mod conclusions;
 mod conditions;
 mod durations;
 mod losses;
+mod matching;
 mod models;
 mod sequential;
 mod study;
+mod warnings;
 pub mod text;
 
 use std::collections::BTreeSet;
@@ -21,17 +26,21 @@ use std::collections::BTreeSet;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use answers::Answer;
 pub use cells::{CellRow, FEW, Intervals};
-pub use chance::{ChanceRow, Role, Verdict};
+pub use chance::{COMPLETED, ChanceRow, Role, Verdict};
 pub use clusters::ClusterRow;
-pub use conditions::{Contrast, Method};
-pub use durations::{CENSORED, DurationRow};
+pub use compare::{Comparison, Method, Sign};
+pub use conditions::Contrast;
+pub use durations::{CENSORED, CorrectRow, DurationRow};
 pub use losses::{LossRow, Losses};
+pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
+use crate::stats::design::Design;
 use crate::stats::moments::MomentOverflow;
 use study::Study;
 
@@ -44,11 +53,13 @@ pub struct Options {
     pub horizon: Option<i64>,
     /// The identifiers of the episodes that the infrastructure ended; `None` where the traces do not say.
     pub lost: Option<BTreeSet<String>>,
+    /// What the traces declare about their design; nothing by default.
+    pub design: Design,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { confidence: 0.95, horizon: None, lost: None }
+        Self { confidence: 0.95, horizon: None, lost: None, design: Design::default() }
     }
 }
 
@@ -65,6 +76,12 @@ pub struct Statistics {
     pub by: Vec<String>,
     /// The number of episodes.
     pub episodes: usize,
+    /// What the traces declare about their design.
+    pub design: Design,
+    /// What follows from the design, in a sentence.
+    pub design_note: String,
+    /// The answers to the questions of the study, a line each.
+    pub answers: Vec<Answer>,
     /// What a reader may conclude, a sentence each.
     pub conclusions: Vec<String>,
     /// What a reader must not conclude, and why, a sentence each.
@@ -77,11 +94,11 @@ pub struct Statistics {
     pub chance: Vec<ChanceRow>,
     /// Models against each other.
     pub models: Vec<Family>,
-    /// Episodes without a partner to be paired with.
+    /// Scenes that keep episodes out of pairs, where models are compared by pairs.
     pub gaps: Vec<Gap>,
     /// The first experiment minus each other one.
     pub conditions: Vec<Contrast>,
-    /// Cells by seed.
+    /// Cells by seed; none unless the design declares that seeds are clusters.
     pub clusters: Vec<ClusterRow>,
     /// Durations with censoring.
     pub durations: Vec<DurationRow>,
@@ -97,28 +114,34 @@ impl Statistics {
     /// # Errors
     /// When the squares of some metric leave 128 bits, which no metric of steps can.
     pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
-        let study = Study::of(table)?;
-        let confidence = options.confidence;
+        let study = Study::of(table, options.design)?;
+        let (confidence, horizon) = (options.confidence, options.horizon);
+        let (models, gaps) = models::compared(&study, horizon, confidence);
         let mut statistics = Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),
             confidence,
             by: cells.by.clone(),
             episodes: table.len(),
+            design: options.design,
+            design_note: String::new(),
+            answers: Vec::new(),
             conclusions: Vec::new(),
             warnings: Vec::new(),
             headline: conclusions::headline(&study),
             cells: CellRow::all(&study, cells, confidence),
             chance: ChanceRow::all(&study, confidence),
-            models: Family::all(&study, confidence),
-            gaps: Gap::all(&study),
-            conditions: Contrast::all(&study, confidence),
+            models,
+            gaps,
+            conditions: Contrast::all(&study, horizon, confidence),
             clusters: ClusterRow::all(&study, confidence),
-            durations: DurationRow::all(&study, options.horizon, confidence),
+            durations: DurationRow::all(&study, horizon, confidence),
             losses: Losses::of(&study, options.lost.as_ref(), confidence),
         };
+        statistics.design_note = warnings::design_note(&statistics);
+        statistics.answers = answers::answers(&statistics);
         statistics.conclusions = conclusions::conclusions(&statistics);
-        statistics.warnings = conclusions::warnings(&statistics);
+        statistics.warnings = warnings::warnings(&statistics);
         Ok(statistics)
     }
 }

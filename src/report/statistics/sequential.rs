@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::chance::levels;
 use super::conclusions::headline;
-use super::study::{Experiment, Study, counts};
+use super::models::compared;
+use super::study::{Experiment, Study, counts, named};
 use super::{Family, Options, PairTest, Role, Verdict};
 use crate::base::ratio::Ratio;
 use crate::metric::catalog::Kind;
@@ -47,6 +48,9 @@ pub struct SequentialRate {
     pub experiment: String,
     /// The model.
     pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
     /// The metric.
     pub metric: String,
     /// The successes.
@@ -66,6 +70,9 @@ pub struct SequentialChance {
     pub experiment: String,
     /// The model.
     pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
     /// The metric.
     pub metric: String,
     /// What the level is.
@@ -117,7 +124,7 @@ impl Sequential {
     /// # Errors
     /// When the squares of some metric leave 128 bits, which no metric of steps can.
     pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
-        let study = Study::of(table)?;
+        let study = Study::of(table, options.design)?;
         Ok(Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),
@@ -138,6 +145,11 @@ fn headline_rates(study: &Study) -> Vec<String> {
 }
 
 impl SequentialRate {
+    /// The model as it is compared.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+
     fn all(study: &Study, confidence: f64) -> Vec<Self> {
         study.experiments.iter().flat_map(|experiment| of_experiment(study, experiment, confidence)).collect()
     }
@@ -152,6 +164,7 @@ fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec
         Some(SequentialRate {
             experiment: experiment.name.to_owned(),
             model: block.model.to_owned(),
+            condition: block.condition(),
             metric: column.name.clone(),
             successes,
             n,
@@ -163,6 +176,11 @@ fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec
 }
 
 impl SequentialChance {
+    /// The model as it is compared.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+
     /// Every rate against every level that its experiment has.
     fn all(study: &Study, confidence: f64) -> Vec<Self> {
         let mut rows = Vec::new();
@@ -188,6 +206,7 @@ impl SequentialChance {
                 verdict: Verdict::of(rate.successes, rate.n, chance, is_shown),
                 experiment: rate.experiment,
                 model: rate.model,
+                condition: rate.condition,
                 metric: rate.metric,
                 role,
                 level: chance,
@@ -209,19 +228,22 @@ impl SequentialPair {
     }
 
     fn family(family: &Family, confidence: f64) -> Vec<Self> {
-        let evidence = |test: &PairTest| Some((test.clone(), discordant(test.pairs)?));
+        let evidence = |test: &PairTest| {
+            let pairs = test.comparison.pairs?;
+            Some((test.clone(), pairs, discordant(pairs)?))
+        };
         let tested: Vec<_> = family.tests.iter().filter_map(evidence).collect();
-        let adjusted = holm(&tested.iter().map(|(_, found)| found.p).collect::<Vec<_>>());
-        let rows = tested.into_iter().zip(adjusted).map(|((test, found), p_adjusted)| Self {
+        let adjusted = holm(&tested.iter().map(|(.., found)| found.p).collect::<Vec<_>>());
+        let rows = tested.into_iter().zip(adjusted).map(|((test, pairs, found), p_adjusted)| Self {
             experiment: family.experiment.clone(),
             metric: family.metric.clone(),
             first: test.first,
             second: test.second,
-            pairs: test.pairs,
+            pairs,
             e: found.e,
             p: found.p,
             p_adjusted,
-            verdict: direction(test.pairs, level(confidence).is_some_and(|level| p_adjusted <= level)),
+            verdict: direction(pairs, level(confidence).is_some_and(|level| p_adjusted <= level)),
         });
         rows.collect()
     }
@@ -229,7 +251,7 @@ impl SequentialPair {
 
 /// The pairs of models: all that this page knows of how episodes are paired.
 fn paired(study: &Study, options: &Options) -> Vec<Family> {
-    Family::all(study, options.confidence)
+    compared(study, options.horizon, options.confidence).0
 }
 
 fn direction(pairs: Pairs, is_shown: bool) -> Verdict {

@@ -1,15 +1,28 @@
-//! The episode table seen by experiment and model: the blocks that every statistic compares.
+//! The episode table seen by experiment, model and condition: the blocks that every statistic compares.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use super::durations::CENSORED;
 use crate::metric::catalog::{Better, Kind, Metric};
-use crate::score::table::{EpisodeTable, MetricColumn};
+use crate::score::table::{EpisodeTable, MetricColumn, TextColumn};
+use crate::stats::design::Design;
 use crate::stats::moments::{MomentOverflow, Moments};
 
-/// An episode table and its blocks, ordered by the catalog's experiments, then by model.
+/// The label that tells conditions of one model apart, and what stands for none.
+const CONDITION: &str = "condition";
+const DEFAULT_CONDITION: &str = "default";
+
+/// The label of the scene: room, body, cubes, start.
+const SCENE: &str = "scene";
+
+/// The unit of metrics that count steps.
+const STEPS: &str = "steps";
+
+/// An episode table and its blocks, ordered by the catalog's experiments, then by model and condition.
 pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
+    pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
 }
 
@@ -19,44 +32,41 @@ pub(super) struct Experiment<'a> {
     pub blocks: Vec<Block<'a>>,
 }
 
-/// The episodes of one model in one experiment, as rows of the table, and the moments of their metrics.
+/// The episodes of one model in one experiment under one condition, and the moments of their metrics.
 pub(super) struct Block<'a> {
     pub experiment: &'a str,
     pub model: &'a str,
-    pub rows: Range<usize>,
+    /// The condition; none where no episode of the table has any but the default one.
+    pub condition: Option<&'a str>,
+    /// The rows of the table, in runs.
+    rows: Vec<Range<usize>>,
     moments: BTreeMap<&'a str, Moments>,
 }
 
-/// Where an episode stands in its block: what pairs it with another model's.
-pub(super) type Place = (i32, i32);
-
-/// The seeds and runs of an experiment's episodes.
-pub(super) struct Places {
-    /// The seeds and runs that some block has, ascending.
-    pub all: Vec<Place>,
-    /// Per block and place the rows of its episodes: one, none, or several where the same seed and run was recorded again.
-    pub rows: Vec<Vec<Range<usize>>>,
-}
-
 impl<'a> Study<'a> {
-    pub fn of(table: &'a EpisodeTable) -> Result<Self, MomentOverflow> {
+    pub fn of(table: &'a EpisodeTable, design: Design) -> Result<Self, MomentOverflow> {
+        let conditions = label(table, CONDITION)
+            .filter(|column| column.iter().flatten().any(|condition| condition != DEFAULT_CONDITION));
+        let mut blocks: BTreeMap<(usize, &str), Vec<Block>> = BTreeMap::new();
         // A table is ordered by experiment, then by model.
-        let mut rows: BTreeMap<(usize, &str), Vec<Range<usize>>> = BTreeMap::new();
-        for block in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
-            let key = table.keys.get(block.start);
-            let rank = table.catalog.experiment_rank(key.experiment);
-            rows.entry((rank, key.experiment)).or_default().push(block);
+        for rows in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
+            let key = table.keys.get(rows.start);
+            let of_experiment = blocks.entry((table.catalog.experiment_rank(key.experiment), key.experiment)).or_default();
+            for (condition, rows) in by_condition(conditions, rows) {
+                of_experiment.push(Block::of(table, (key.experiment, key.model, condition), rows)?);
+            }
         }
-        let mut experiments = Vec::with_capacity(rows.len());
-        for ((_, name), blocks) in rows {
-            let blocks = blocks.into_iter().map(|rows| Block::of(table, name, table.keys.get(rows.start).model, rows));
-            experiments.push(Experiment { name, blocks: blocks.collect::<Result<_, _>>()? });
-        }
-        Ok(Self { table, experiments })
+        let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
+        Ok(Self { table, design, experiments })
     }
 
     pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {
         self.experiments.iter().flat_map(|experiment| &experiment.blocks)
+    }
+
+    /// The scene of each row, where equal scenes make pairs.
+    pub fn scenes(&self) -> Option<&'a TextColumn> {
+        label(self.table, SCENE).filter(|_| self.design.has_pairs())
     }
 
     pub fn column(&self, metric: &str) -> Option<&'a MetricColumn> {
@@ -81,21 +91,57 @@ impl<'a> Study<'a> {
     pub fn better(&self, metric: &str) -> Better {
         self.metric(metric).map_or(Better::Neither, |metric| metric.better)
     }
+
+    /// The least and the largest mean that a metric can have, as far as that is known: steps are never negative, and
+    /// no more than the longest episode that ended without a decision had, which is the budget.
+    #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
+    pub fn range(&self, metric: &str) -> (f64, f64) {
+        if self.metric(metric).is_none_or(|metric| metric.kind == Kind::Rate || metric.unit != STEPS) {
+            return (f64::NEG_INFINITY, f64::INFINITY);
+        }
+        let longest = CENSORED.iter().filter_map(|(duration, finished)| {
+            let (duration, finished) = (self.column(duration)?, self.column(finished)?);
+            duration.iter().zip(finished.iter()).filter(|(_, finished)| finished.is_none()).filter_map(|(steps, _)| steps).max()
+        });
+        let all = self.column(metric).and_then(|column| column.iter().flatten().max());
+        // A metric that exceeds it counts something else than the steps of one episode.
+        let budget = longest.max().filter(|&budget| all.is_none_or(|most| most <= budget));
+        (0.0, budget.map_or(f64::INFINITY, |budget| budget as f64))
+    }
 }
 
 impl<'a> Block<'a> {
     fn of(
         table: &'a EpisodeTable,
-        experiment: &'a str,
-        model: &'a str,
-        rows: Range<usize>,
+        (experiment, model, condition): (&'a str, &'a str, Option<&'a str>),
+        rows: Vec<Range<usize>>,
     ) -> Result<Self, MomentOverflow> {
         let of_column = |column: &'a MetricColumn| {
-            let moments = Moments::default().with_rows(column, rows.clone())?;
+            let moments = rows.iter().try_fold(Moments::default(), |sum, rows| sum.with_rows(column, rows.clone()))?;
             Ok((column.name.as_str(), moments))
         };
         let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
-        Ok(Self { experiment, model, rows, moments })
+        Ok(Self { experiment, model, condition, rows, moments })
+    }
+
+    /// The model as it is compared: `model`, or `model [condition]` where there are several.
+    pub fn name(&self) -> String {
+        named(self.model, self.condition)
+    }
+
+    /// Whether another block is of the same model under the same condition.
+    pub fn is_same_subject(&self, other: &Self) -> bool {
+        (self.model, self.condition) == (other.model, other.condition)
+    }
+
+    /// The condition as rows have it.
+    pub fn condition(&self) -> Option<String> {
+        self.condition.map(str::to_owned)
+    }
+
+    /// The rows of the table.
+    pub fn rows(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.rows.iter().cloned().flatten()
     }
 
     /// The exact moments of a metric of the table.
@@ -104,26 +150,32 @@ impl<'a> Block<'a> {
     }
 
     /// The rows of each seed.
-    pub fn seeds(&self, table: &EpisodeTable) -> Vec<Range<usize>> {
-        runs(self.rows.clone(), |row| table.keys.seed(row))
+    pub fn seeds(&self, table: &EpisodeTable) -> Vec<Vec<usize>> {
+        let mut seeds: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
+        for row in self.rows() {
+            seeds.entry(table.keys.seed(row)).or_default().push(row);
+        }
+        seeds.into_values().collect()
     }
 }
 
-impl Places {
-    /// The places of an experiment's blocks.
-    pub fn of(blocks: &[Block<'_>], table: &EpisodeTable) -> Self {
-        let place = |row: usize| (table.keys.seed(row), table.keys.run(row));
-        let of_block: Vec<_> = blocks.iter().map(|block| runs(block.rows.clone(), place)).collect();
-        let mut all: Vec<Place> = of_block.iter().flatten().map(|rows| place(rows.start)).collect();
-        all.sort_unstable();
-        all.dedup();
-        let rows = of_block.into_iter().map(|rows| {
-            let mut rows = rows.into_iter().peekable();
-            let at = |wanted: &Place| rows.next_if(|rows| place(rows.start) == *wanted).unwrap_or_default();
-            all.iter().map(at).collect()
-        });
-        Self { rows: rows.collect(), all }
+/// A model under a condition.
+pub(super) fn named(model: &str, condition: Option<&str>) -> String {
+    condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
+}
+
+fn label<'a>(table: &'a EpisodeTable, name: &str) -> Option<&'a TextColumn> {
+    table.labels.iter().find(|label| label.name == name).map(|label| &label.values)
+}
+
+/// The rows of one model by condition, which is not part of a table's order.
+fn by_condition(conditions: Option<&TextColumn>, rows: Range<usize>) -> Vec<(Option<&str>, Vec<Range<usize>>)> {
+    let Some(conditions) = conditions else { return vec![(None, vec![rows])] };
+    let mut parts: BTreeMap<&str, Vec<Range<usize>>> = BTreeMap::new();
+    for run in runs(rows, |row| conditions.get(row).unwrap_or(DEFAULT_CONDITION)) {
+        parts.entry(conditions.get(run.start).unwrap_or(DEFAULT_CONDITION)).or_default().push(run);
     }
+    parts.into_iter().map(|(condition, rows)| (Some(condition), rows)).collect()
 }
 
 /// The runs of rows that have the same key.

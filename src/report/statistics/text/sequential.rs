@@ -1,10 +1,9 @@
 //! Sequential statistics for people.
 
-use std::fmt::Write as _;
-
-use super::{Grid, list, of, percent, push_wrapped, section};
+use super::grid::Grid;
+use super::{list, percent, push_wrapped, section};
 use crate::base::escape::visible;
-use crate::base::format::{e_value, fixed, p_value};
+use crate::base::format::{bounds, e_value, fixed, p_value};
 use crate::report::statistics::{Role, Sequential, SequentialChance, SequentialPair, Verdict};
 
 /// The methods, in the lines that they have where there is room.
@@ -35,9 +34,12 @@ pub fn render(sequential: &Sequential, metrics: &[String], width: Option<usize>)
         section(&mut text, title, &grid, width);
     }
     let told_apart = pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated).count();
-    if !pairs.is_empty() {
-        let _ = writeln!(text, "\n{told_apart} of {} pairs of models are told apart so far.", pairs.len());
-    }
+    let outcome = match pairs.len() {
+        0 => "No two models have episodes of equal scenes: they are not compared.".to_owned(),
+        all => format!("{told_apart} of {all} pairs of models are told apart so far."),
+    };
+    text.push('\n');
+    push_wrapped(&mut text, &outcome, width, 0);
     text.push('\n');
     for line in METHODS {
         push_wrapped(&mut text, line, width, 0);
@@ -55,9 +57,10 @@ type Shown<'a> = &'a dyn Fn(&String) -> bool;
 
 fn rates(sequential: &Sequential, shown: Shown) -> Grid {
     let lines = sequential.rates.iter().filter(|row| shown(&row.metric)).map(|row| {
-        let names = [row.experiment.clone(), row.model.clone(), row.metric.clone()];
+        let names = [row.experiment.clone(), row.name(), row.metric.clone()];
+        let interval = bounds(row.interval.map(|interval| (interval.low, interval.high)), 3);
         let count = format!("{}/{}", row.successes, row.n);
-        names.into_iter().chain([count, fixed(row.rate, 3), of(row.interval, 3)]).collect()
+        names.into_iter().chain([count, fixed(row.rate, 3), interval]).collect()
     });
     Grid::new(&["experiment", "model", "metric"], &["count", "rate", "sequence"]).with(lines)
 }
@@ -68,7 +71,7 @@ fn chance(sequential: &Sequential, shown: Shown) -> Grid {
             Role::Chance => "chance",
             Role::Reference => "reference",
         };
-        let names = [row.experiment.clone(), row.model.clone(), row.metric.clone(), format!("{role} {}", row.level)];
+        let names = [row.experiment.clone(), row.name(), row.metric.clone(), format!("{role} {}", row.level)];
         let count = format!("{}/{}", row.successes, row.n);
         let numbers = [count, e_value(row.e), p_value(Some(row.p)), p_value(Some(row.p_adjusted))];
         names.into_iter().chain(numbers).chain([word(row.verdict).to_owned()]).collect()

@@ -1,0 +1,121 @@
+//! The answers that a reader came for, a line each: who is above chance, who differs from whom, what the mirror changes.
+//!
+//! Rule: an answer names what a test shows after Holm's adjustment, and nothing else; the numbers stand in the tables.
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::chance::COMPLETED;
+use super::compare::Sign;
+use super::study::named;
+use super::{ChanceRow, Contrast, Family, Role, Statistics, Verdict};
+
+/// One question about one metric, and its answer over all experiments.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Answer {
+    /// The question.
+    pub question: String,
+    /// The metric that the answer is about.
+    pub metric: String,
+    /// The answer, in a line.
+    pub answer: String,
+}
+
+impl Answer {
+    fn new(question: &str, metric: &str, parts: &[String]) -> Option<Self> {
+        let answer = || Self { question: question.to_owned(), metric: metric.to_owned(), answer: parts.join("; ") };
+        (!parts.is_empty()).then(answer)
+    }
+}
+
+/// The answers about the headline metrics.
+pub(super) fn answers(statistics: &Statistics) -> Vec<Answer> {
+    let mut answers = Vec::new();
+    for metric in &statistics.headline {
+        let completed = COMPLETED.iter().filter(|(whole, _)| whole == metric).map(|(_, completed)| *completed);
+        for metric in [metric.as_str()].into_iter().chain(completed) {
+            answers.extend(Answer::new("Who is above chance?", metric, &above(&statistics.chance, metric)));
+        }
+    }
+    for metric in &statistics.headline {
+        let families = statistics.models.iter().filter(|family| family.metric == *metric);
+        let parts: Vec<String> = families.map(differing).collect();
+        answers.extend(Answer::new("Who differs from whom?", metric, &parts));
+    }
+    for metric in &statistics.headline {
+        let parts = changes(&statistics.conditions, metric);
+        answers.extend(Answer::new("What does the mirror change?", metric, &parts));
+    }
+    answers
+}
+
+/// Per experiment, the models above its chance level; above its highest reference where it has none.
+fn above(rows: &[ChanceRow], metric: &str) -> Vec<String> {
+    let mut experiments: IndexMap<&str, Vec<&ChanceRow>> = IndexMap::new();
+    for row in rows.iter().filter(|row| row.metric == metric) {
+        experiments.entry(&row.experiment).or_default().push(row);
+    }
+    experiments.into_iter().map(|(experiment, rows)| above_in(experiment, &rows)).collect()
+}
+
+fn above_in(experiment: &str, rows: &[&ChanceRow]) -> String {
+    let highest = |a: &&&ChanceRow, b: &&&ChanceRow| a.level.value().total_cmp(&b.level.value());
+    let level = rows.iter().filter(|row| row.role == Role::Chance).max_by(highest).or_else(|| rows.iter().max_by(highest));
+    let level = level.map(|row| (row.role, row.level));
+    let rows: Vec<_> = rows.iter().filter(|row| Some((row.role, row.level)) == level).collect();
+    let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect::<Vec<_>>();
+    let (above, below) = (those(Verdict::Above), those(Verdict::Below));
+    let reference = level.filter(|(role, _)| *role == Role::Reference);
+    let about = reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));
+    let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
+    format!("{about} {}{below}", names(&above, rows.len()))
+}
+
+/// The models, or how many where they are all.
+fn names(models: &[String], all: usize) -> String {
+    match models.len() {
+        0 => "nobody".to_owned(),
+        count if count == all && count > 1 => format!("all {count}"),
+        _ => models.join(", "),
+    }
+}
+
+/// The separated pairs of one experiment, by the better model.
+fn differing(family: &Family) -> String {
+    let mut better: IndexMap<&str, Vec<&str>> = IndexMap::new();
+    for test in family.tests.iter().filter(|test| test.comparison.separated) {
+        better.entry(&test.first).or_default().push(&test.second);
+    }
+    let over = |(first, seconds): (&str, Vec<&str>)| format!("{first} better than {}", seconds.join(", "));
+    let parts: Vec<String> = better.into_iter().map(over).collect();
+    let said = if parts.is_empty() { "nobody".to_owned() } else { parts.join(" and ") };
+    format!("{} {said}", family.experiment)
+}
+
+/// Per other experiment, the models that it shows a change of.
+fn changes(contrasts: &[Contrast], metric: &str) -> Vec<String> {
+    let mut groups: IndexMap<(&str, &str), Vec<&Contrast>> = IndexMap::new();
+    for contrast in contrasts.iter().filter(|contrast| contrast.metric == metric) {
+        groups.entry((&contrast.baseline, &contrast.against)).or_default().push(contrast);
+    }
+    groups.into_iter().map(|((baseline, against), group)| changed(baseline, against, &group)).collect()
+}
+
+fn changed(baseline: &str, against: &str, group: &[&Contrast]) -> String {
+    let those = |sign| -> Vec<String> {
+        let found = group.iter().filter(|contrast| contrast.comparison.sign() == sign);
+        found.map(|contrast| named(&contrast.model, contrast.condition.as_deref())).collect()
+    };
+    let phrase = |what: &str, sign| {
+        let models = those(sign);
+        (!models.is_empty()).then(|| format!("{what} {}", names(&models, group.len())))
+    };
+    let parts = [
+        phrase("higher for", Some(Sign::Higher)),
+        phrase("lower for", Some(Sign::Lower)),
+        phrase("no change shown for", None),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    format!("{baseline} - {against} {}", parts.join(", "))
+}

@@ -1,0 +1,69 @@
+//! The design of a study, as its recorder declares it: what pairs episodes, what groups them.
+//!
+//! Rule: what is not declared is not assumed. Seeds and runs that happen to be equal make neither pairs nor clusters.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What the traces declare about how their episodes came about; nothing by default.
+///
+/// Whether two episodes are a pair follows from their scenes, which are a column of the traces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Design {
+    /// Where the episodes come from; null where the traces do not say, or not all the same.
+    pub kind: Option<DesignKind>,
+    /// Which episodes depend on each other; null where none are declared to.
+    pub cluster: Option<Cluster>,
+}
+
+/// Where episodes come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum DesignKind {
+    /// An agent took these steps in a world, and this program wrote them down.
+    Recording,
+    /// Another harness wrote them down.
+    Import,
+    /// Steps made up so that aggregates come out as published: seeds, runs and scenes mean nothing.
+    Reconstruction,
+}
+
+/// What the episodes that depend on each other share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Cluster {
+    /// The seed: episodes of one seed share something that those of another do not, such as a room.
+    Seed,
+}
+
+impl Design {
+    /// Whether equal scenes make pairs: the scenes of a reconstruction are as made up as its outcomes.
+    pub fn has_pairs(self) -> bool {
+        self.kind != Some(DesignKind::Reconstruction)
+    }
+
+    /// What groups dependent episodes; never anything in a reconstruction.
+    pub fn clusters(self) -> Option<Cluster> {
+        self.cluster.filter(|_| self.kind != Some(DesignKind::Reconstruction))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Cluster, Design, DesignKind};
+
+    #[test]
+    fn a_reconstruction_has_neither_pairs_nor_clusters_whatever_it_declares() {
+        let made_up = Design { kind: Some(DesignKind::Reconstruction), cluster: Some(Cluster::Seed) };
+        assert_eq!((made_up.has_pairs(), made_up.clusters()), (false, None));
+        let recorded = Design { kind: Some(DesignKind::Recording), cluster: Some(Cluster::Seed) };
+        assert_eq!((recorded.has_pairs(), recorded.clusters()), (true, Some(Cluster::Seed)));
+        assert_eq!(Design::default().clusters(), None);
+    }
+
+    #[test]
+    fn names_are_lower_case() {
+        let declared = Design { kind: Some(DesignKind::Import), cluster: Some(Cluster::Seed) };
+        assert_eq!(serde_json::to_string(&declared).unwrap(), r#"{"kind":"import","cluster":"seed"}"#);
+    }
+}

@@ -23,7 +23,7 @@ pub const DIFFERENCE: u64 = 12;
 /// A difference of means by Welch's t, episodes on each side; also the mean of paired differences.
 pub const WELCH: u64 = 12;
 /// A mean by clusters, with t(clusters - 1).
-pub const CLUSTERS: u64 = 3;
+pub const CLUSTERS: u64 = 2;
 
 /// Why there is no interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

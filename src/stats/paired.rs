@@ -24,6 +24,20 @@ pub struct Pairs {
 }
 
 impl Pairs {
+    /// The table of these pairs of values, of which 1 is a success and everything else a failure.
+    pub fn of(values: impl IntoIterator<Item = (i64, i64)>) -> Self {
+        let mut pairs = Self::default();
+        for value in values {
+            match value {
+                (1, 1) => pairs.both += 1,
+                (1, _) => pairs.first_only += 1,
+                (_, 1) => pairs.second_only += 1,
+                _ => pairs.neither += 1,
+            }
+        }
+        pairs
+    }
+
     /// The number of pairs.
     pub fn n(self) -> u64 {
         self.both + self.first_only + self.second_only + self.neither

@@ -67,7 +67,8 @@ impl StatsArgs {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
         let study = self.traces.study(&scoring, &self.by)?;
-        let options = Options { confidence: self.confidence, horizon: self.horizon, ..Options::default() };
+        let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
+        let options = Options { confidence, horizon, improvements, ..Options::default() };
         let text = if self.sequential {
             self.sequential_page(&study.sequential(&options)?)?
         } else {

@@ -40,7 +40,10 @@ pub(super) fn answers(statistics: &Statistics) -> Vec<Answer> {
     }
     for metric in &statistics.headline {
         let families = statistics.models.iter().filter(|family| family.metric == *metric);
-        let parts: Vec<String> = families.map(differing).collect();
+        let overall: Vec<_> = statistics.overall.iter().filter(|row| row.metric == *metric).collect();
+        let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
+        let overall = (!overall.is_empty()).then(|| differing("over all experiments", separated));
+        let parts: Vec<String> = families.map(differing_in).chain(overall).collect();
         answers.extend(Answer::new("Who differs from whom?", metric, &parts));
     }
     for metric in &statistics.headline {
@@ -81,16 +84,21 @@ fn names(models: &[String], all: usize) -> String {
     }
 }
 
-/// The separated pairs of one experiment, by the better model.
-fn differing(family: &Family) -> String {
+fn differing_in(family: &Family) -> String {
+    let separated = family.tests.iter().filter(|test| test.comparison.separated);
+    differing(&family.experiment, separated.map(|test| (&*test.first, &*test.second)))
+}
+
+/// The separated pairs, by the better model.
+fn differing<'n>(about: &str, separated: impl Iterator<Item = (&'n str, &'n str)>) -> String {
     let mut better: IndexMap<&str, Vec<&str>> = IndexMap::new();
-    for test in family.tests.iter().filter(|test| test.comparison.separated) {
-        better.entry(&test.first).or_default().push(&test.second);
+    for (first, second) in separated {
+        better.entry(first).or_default().push(second);
     }
     let over = |(first, seconds): (&str, Vec<&str>)| format!("{first} better than {}", seconds.join(", "));
     let parts: Vec<String> = better.into_iter().map(over).collect();
     let said = if parts.is_empty() { "nobody".to_owned() } else { parts.join(" and ") };
-    format!("{} {said}", family.experiment)
+    format!("{about} {said}")
 }
 
 /// Per other experiment, the models that it shows a change of.

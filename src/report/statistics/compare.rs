@@ -97,16 +97,7 @@ impl Compared<'_, '_> {
     }
 
     fn paired_rate(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
-        let mut pairs = Pairs::default();
-        for &(a, b) in rows {
-            match (column.get(a), column.get(b)) {
-                (Some(1), Some(1)) => pairs.both += 1,
-                (Some(1), Some(_)) => pairs.first_only += 1,
-                (Some(_), Some(1)) => pairs.second_only += 1,
-                (Some(_), Some(_)) => pairs.neither += 1,
-                _ => {}
-            }
-        }
+        let pairs = Pairs::of(rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))));
         let test = pairs.mcnemar().zip(pairs.mcnemar_mid_p()).map(|(p, mid_p)| ExactTest { p, mid_p });
         Comparison {
             successes: Some([pairs.both + pairs.first_only, pairs.both + pairs.second_only]),

@@ -16,6 +16,7 @@ mod durations;
 mod losses;
 mod matching;
 mod models;
+mod overall;
 mod sequential;
 mod study;
 mod warnings;
@@ -36,6 +37,7 @@ pub use durations::{CENSORED, CorrectRow, DurationRow};
 pub use losses::{LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
+pub use overall::{ImprovementRow, OverallMethod, OverallRow};
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 
 use crate::score::table::EpisodeTable;
@@ -55,11 +57,13 @@ pub struct Options {
     pub lost: Option<BTreeSet<String>>,
     /// What the traces declare about their design; nothing by default.
     pub design: Design,
+    /// Whether probabilities of improvement are computed, each of which resamples all episodes of two models.
+    pub improvements: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { confidence: 0.95, horizon: None, lost: None, design: Design::default() }
+        Self { confidence: 0.95, horizon: None, lost: None, design: Design::default(), improvements: false }
     }
 }
 
@@ -94,6 +98,10 @@ pub struct Statistics {
     pub chance: Vec<ChanceRow>,
     /// Models against each other.
     pub models: Vec<Family>,
+    /// Models against each other over all experiments, under the headline rates.
+    pub overall: Vec<OverallRow>,
+    /// How often one model decides earlier than another; none unless asked for.
+    pub improvements: Vec<ImprovementRow>,
     /// Scenes that keep episodes out of pairs, where models are compared by pairs.
     pub gaps: Vec<Gap>,
     /// The first experiment minus each other one.
@@ -116,6 +124,8 @@ impl Statistics {
     pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
         let study = Study::of(table, options.design)?;
         let (confidence, horizon) = (options.confidence, options.horizon);
+        let headline = conclusions::headline(&study);
+        let asked: &[String] = if options.improvements { &headline } else { &[] };
         let (models, gaps) = models::compared(&study, horizon, confidence);
         let mut statistics = Self {
             definitions: table.catalog.name.clone(),
@@ -128,15 +138,17 @@ impl Statistics {
             answers: Vec::new(),
             conclusions: Vec::new(),
             warnings: Vec::new(),
-            headline: conclusions::headline(&study),
             cells: CellRow::all(&study, cells, confidence),
             chance: ChanceRow::all(&study, confidence),
             models,
+            overall: overall::rates(&study, &headline, confidence),
+            improvements: overall::improvements(&study, asked, confidence),
             gaps,
             conditions: Contrast::all(&study, horizon, confidence),
             clusters: ClusterRow::all(&study, confidence),
             durations: DurationRow::all(&study, horizon, confidence),
             losses: Losses::of(&study, options.lost.as_ref(), confidence),
+            headline,
         };
         statistics.design_note = warnings::design_note(&statistics);
         statistics.answers = answers::answers(&statistics);

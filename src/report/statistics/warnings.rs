@@ -44,7 +44,7 @@ pub(super) fn design_note(statistics: &Statistics) -> String {
         Some(Cluster::Seed) => "seeds are clusters",
         None => "no clusters are declared",
     };
-    format!("{kind}: {pairs}; {clusters}")
+    format!("{kind}; {pairs}; {clusters}")
 }
 
 fn matchings(statistics: &Statistics) -> impl Iterator<Item = &Matching> {

@@ -6,5 +6,5 @@ mod episodes;
 mod figures;
 mod hostile;
 mod results;
-mod scored;
+pub mod scored;
 mod surroundings;

@@ -95,6 +95,20 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
     let further = || {
         [
             (
+                format!(
+                    "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
+                     {percent} interval, or McNemar's over the pairs of all; two-sided by minimum likelihood; Holm over all pairs"
+                ),
+                tables::overall(statistics, shown),
+            ),
+            (
+                format!(
+                    "How often one model decides earlier than another, averaged over experiments; who never decides is the \
+                     latest; stratified bootstrap, {percent} percentile intervals"
+                ),
+                tables::improvements(statistics, shown),
+            ),
+            (
                 format!("Time to a correct decision: a wrong one competes (Aalen-Johansen); {percent} intervals"),
                 tables::correct(statistics, shown),
             ),

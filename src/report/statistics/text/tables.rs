@@ -1,7 +1,7 @@
 //! The tables of `stats`, one function each: a line per row of the statistics whose metric is shown.
 
 use super::super::study::named;
-use super::super::{COMPLETED, CellRow, Comparison, Intervals, Method, Role, Sign, Statistics, Verdict};
+use super::super::{COMPLETED, CellRow, Comparison, Intervals, Method, OverallMethod, Role, Sign, Statistics, Verdict};
 use super::grid::Grid;
 use crate::base::format::{UNDEFINED, bounds, fixed, p_value};
 use crate::metric::catalog::Kind;
@@ -129,6 +129,34 @@ fn compared(found: &Comparison) -> Vec<String> {
     line.push(held(found.interval, found.withheld, places));
     line.extend([found.p, found.mid_p, found.p_adjusted, found.p_tarone].map(p_value));
     line
+}
+
+/// Two models over all experiments.
+pub(super) fn overall(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.overall.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let test = match row.method {
+            OverallMethod::MantelHaenszel => "exact conditional",
+            OverallMethod::PooledMcnemar => "McNemar, pooled",
+        };
+        let verdict = if row.separated { "better" } else { "not told apart" };
+        let mut line: Vec<String> = [&*row.metric, &row.first, &row.second, test].map(str::to_owned).to_vec();
+        line.extend([row.experiments.len().to_string(), fixed(row.difference, 3), plain(row.interval, 3)]);
+        line.extend([row.p, row.mid_p, row.p_adjusted].map(p_value));
+        line.push(verdict.to_owned());
+        line
+    });
+    let numbers = ["experiments", "difference", "interval", "p", "mid-p", "p (Holm)", "verdict"];
+    Grid::new(&["metric", "first", "second", "test"], &numbers).with(lines)
+}
+
+pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.improvements.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let names = [&row.metric, &row.first, &row.second].map(Clone::clone);
+        let found = row.improvement;
+        let numbers = [row.experiments.len().to_string(), fixed(Some(found.probability), 3), plain(found.interval, 3)];
+        names.into_iter().chain(numbers).collect()
+    });
+    Grid::new(&["metric", "earlier", "than"], &["experiments", "probability", "interval"]).with(lines)
 }
 
 pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Grid {

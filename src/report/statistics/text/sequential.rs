@@ -19,11 +19,13 @@ const METHODS: [&str; 3] = [
 pub fn render(sequential: &Sequential, metrics: &[String], width: Option<usize>) -> String {
     let shown = |metric: &String| metrics.contains(metric);
     let percent = percent(sequential.confidence);
-    let mut text = format!(
-        "{} episodes so far, definitions {}, {percent} confidence at every look\n",
-        sequential.episodes,
-        visible(&sequential.definitions)
+    let definitions = visible(&sequential.definitions);
+    let opening = format!(
+        "{} episodes so far, definitions {definitions}, {percent} confidence at every look",
+        sequential.episodes
     );
+    let mut text = String::new();
+    push_wrapped(&mut text, &opening, width, 0);
     list(&mut text, "What this is for", &PURPOSE.map(str::to_owned), width);
     let pairs: Vec<&SequentialPair> = sequential.models.iter().filter(|pair| shown(&pair.metric)).collect();
     for (title, grid) in [

@@ -101,7 +101,8 @@ impl Steps {
     /// The chances of the steps 1 to the budget; what is missing to 1 comes later.
     #[expect(clippy::cast_precision_loss, reason = "steps are small")]
     fn chances(self) -> Vec<f64> {
-        let even = |low: i64, high: i64, t: i64| if (low..=high).contains(&t) { 1.0 / (high - low + 1) as f64 } else { 0.0 };
+        let even =
+            |low: i64, high: i64, t: i64| if (low..=high).contains(&t) { 1.0 / (high - low + 1) as f64 } else { 0.0 };
         let waiting = |mean: f64, t: i64| (1.0 - 1.0 / mean).powi(i32::try_from(t - 1).expect("small")) / mean;
         let chance = |t: i64| match self {
             Self::Even => even(1, BUDGET, t),
@@ -229,7 +230,7 @@ fn median(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval
     (found.map(|found| interval(found.low, found.high)), scenario.median().map(|median| median as f64))
 }
 
-/// Another scenario of the same list, far from this one.
+/// Another scenario, with a far larger or smaller share of finished episodes.
 fn other(scenario: Scenario) -> Scenario {
     let finishing = if scenario.finishing > 0.6 { 1.0 / 3.0 } else { 1.0 };
     Scenario { finishing, ..scenario }
@@ -308,7 +309,8 @@ fn tally(method: Method, scenario: Scenario, n: usize, samples: usize) -> Tally 
 /// One row per method: the lowest coverage of all scenarios at each size.
 fn rows(text: &mut String, methods: &[(&str, Method, usize)], sizes: &[usize], scenarios: &[Scenario]) {
     let names = sizes.iter().map(ToString::to_string).collect::<Vec<_>>().join(" | ");
-    let _ = writeln!(text, "| method | {names} | worst at the last but one |");
+    let shown = sizes.len().saturating_sub(2);
+    let _ = writeln!(text, "| method | {names} | worst scenario at {} |", sizes[shown]);
     let _ = writeln!(text, "|---|{}---|", "---:|".repeat(sizes.len()));
     for (name, method, samples) in methods {
         let mut cells = Vec::new();
@@ -319,8 +321,7 @@ fn rows(text: &mut String, methods: &[(&str, Method, usize)], sizes: &[usize], s
             cells.push(worst.map_or("--".to_owned(), |(coverage, _)| format!("{coverage:.3}")));
             worst_names.push(worst.map_or("--".to_owned(), |(_, scenario)| scenario.name()));
         }
-        let at = worst_names.len().saturating_sub(2);
-        let _ = writeln!(text, "| {name} | {} | {} |", cells.join(" | "), worst_names[at]);
+        let _ = writeln!(text, "| {name} | {} | {} |", cells.join(" | "), worst_names[shown]);
     }
 }
 
@@ -349,7 +350,8 @@ fn main() {
         ("Welch's t, unlike", welch_unlike, SAMPLES),
     ];
     rows(&mut text, &methods, &SIZES, &usual);
-    text.push_str("\nn is the number of episodes, of differences on each side.\n\n## By clusters of seven runs\n\n");
+    text.push_str("\nn is the number of episodes, of differences on each side. Unlike: a third of the episodes of one side finish, all of \
+         the other,\nor the other way about. Pairs: every other pair has the same episode twice.\n\n## By clusters of seven runs\n\n");
     let clustered: [(&str, Method, usize); 2] =
         [("steps, t(clusters - 1)", by_cluster, SAMPLES), ("a rate, t(clusters - 1)", rate_by_cluster, SAMPLES)];
     rows(&mut text, &clustered, &CLUSTERS, &usual);

@@ -75,10 +75,20 @@ impl Incidence {
         for (steps, [correct, wrong, censored]) in ends {
             is_correct += before * correct as f64 / at_risk as f64;
             is_wrong += before * wrong as f64 / at_risk as f64;
+            let ended = correct + wrong + censored;
             let [correct, wrong, censored] = [correct, wrong, censored].map(|count| count as f64);
-            points.push(Point { steps, at_risk: at_risk as f64, correct, wrong, censored, before, is_correct, is_wrong });
+            points.push(Point {
+                steps,
+                at_risk: at_risk as f64,
+                correct,
+                wrong,
+                censored,
+                before,
+                is_correct,
+                is_wrong,
+            });
             before *= (at_risk as f64 - correct - wrong) / at_risk as f64;
-            at_risk -= (correct + wrong + censored) as u64;
+            at_risk -= ended;
         }
         (!points.is_empty()).then_some(Self { points })
     }
@@ -256,16 +266,14 @@ pub(super) mod tests {
     #[test]
     fn without_wrong_decisions_it_is_the_kaplan_meier_curve() {
         let steps = [6, 6, 6, -6, 7, -9, 10, -10, -11, 13, 16, -17, -19, -20, 22, 23, -25, -32, -32, -34, -35i64];
-        let ending = |&d: &i64| Ending {
-            steps: d.abs(),
-            outcome: if d > 0 { Outcome::Correct } else { Outcome::Unfinished },
-        };
-        let duration =
-            |&d: &i64| Duration { steps: d.abs(), end: if d > 0 { End::Finished } else { End::Unfinished } };
+        let ending =
+            |&d: &i64| Ending { steps: d.abs(), outcome: if d > 0 { Outcome::Correct } else { Outcome::Unfinished } };
+        let duration = |&d: &i64| Duration { steps: d.abs(), end: if d > 0 { End::Finished } else { End::Unfinished } };
         let curve = Incidence::of(&steps.iter().map(ending).collect::<Vec<_>>()).unwrap();
         let survival = Survival::of(&steps.iter().map(duration).collect::<Vec<_>>()).unwrap();
         for horizon in [5, 6, 20, 35] {
-            let (a, b) = (curve.restricted_mean(horizon, 0.95).unwrap(), survival.restricted_mean(horizon, 0.95).unwrap());
+            let (a, b) =
+                (curve.restricted_mean(horizon, 0.95).unwrap(), survival.restricted_mean(horizon, 0.95).unwrap());
             close(a.mean, b.mean);
             close(a.se, b.se);
         }

@@ -12,16 +12,16 @@ use super::interval::Interval;
 
 /// Student's t of a mean of steps.
 pub const STUDENT: u64 = 12;
-/// The BCa bootstrap of a mean of steps; below it, resamples repeat too few values.
+/// The bootstrap (bias-corrected and accelerated) of a mean of steps; below it, resamples repeat too few values.
 pub const BOOTSTRAP: u64 = 15;
 /// A restricted mean, to any decision or to a correct one.
 pub const RESTRICTED_MEAN: u64 = 6;
 /// A median by Brookmeyer and Crowley.
 pub const MEDIAN: u64 = 4;
-/// A difference of restricted means, episodes on each side or pairs.
+/// A difference of restricted means, episodes on each side; of pairs too, though there fewer would do.
 pub const DIFFERENCE: u64 = 12;
-/// A difference of means by Welch's t, episodes on each side; also the mean of paired differences.
-pub const WELCH: u64 = 12;
+/// A difference of means by Welch's t, episodes on each side.
+pub const WELCH: u64 = 8;
 /// A mean by clusters, with t(clusters - 1).
 pub const CLUSTERS: u64 = 2;
 
@@ -41,7 +41,12 @@ pub enum Withheld {
 }
 
 /// The interval of `n` values where it may be given, and otherwise why not.
-pub fn given(interval: Option<Interval>, n: u64, fewest: u64, has_spread: bool) -> (Option<Interval>, Option<Withheld>) {
+pub fn given(
+    interval: Option<Interval>,
+    n: u64,
+    fewest: u64,
+    has_spread: bool,
+) -> (Option<Interval>, Option<Withheld>) {
     let reason = match interval {
         _ if n < fewest => Withheld::TooFew { fewest },
         Some(found) if found.low < found.high => return (interval, None),

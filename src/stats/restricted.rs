@@ -120,7 +120,9 @@ mod tests {
         ] {
             let apart = independent(&first, &second, horizon, 0.95).unwrap();
             let together = paired(&pairs, horizon, 0.95).unwrap();
-            for (found, [se, low, high, p]) in [(apart, [se, low, high, p]), (together, [pair_se, pair_low, pair_high, pair_p])] {
+            for (found, [se, low, high, p]) in
+                [(apart, [se, low, high, p]), (together, [pair_se, pair_low, pair_high, pair_p])]
+            {
                 close(found.difference, difference);
                 close(found.se, se);
                 close(found.interval.unwrap().low, low);

@@ -174,7 +174,8 @@ impl Survival {
             let (at_risk, decided) = (point.at_risk as f64, point.decided as f64);
             sum += decided / (at_risk * (at_risk - decided));
             // Once all are decided the curve is 0, and its interval is not defined: half is passed, by how much is open.
-            let bounds = if point.undecided > 0.0 { log_log(point.undecided, sum, z) } else { Interval { low: 0.0, high: 1.0 } };
+            let bounds =
+                if point.undecided > 0.0 { log_log(point.undecided, sum, z) } else { Interval { low: 0.0, high: 1.0 } };
             low = low.or((bounds.low <= HALF).then_some(point.steps));
             if bounds.high <= HALF {
                 return low.map(|low| MedianInterval { low, high: Some(point.steps) });

@@ -64,13 +64,15 @@ fn above(rows: &[ChanceRow], metric: &str) -> Vec<String> {
 
 fn above_in(experiment: &str, rows: &[&ChanceRow]) -> String {
     let highest = |a: &&&ChanceRow, b: &&&ChanceRow| a.level.value().total_cmp(&b.level.value());
-    let level = rows.iter().filter(|row| row.role == Role::Chance).max_by(highest).or_else(|| rows.iter().max_by(highest));
+    let level =
+        rows.iter().filter(|row| row.role == Role::Chance).max_by(highest).or_else(|| rows.iter().max_by(highest));
     let level = level.map(|row| (row.role, row.level));
     let rows: Vec<_> = rows.iter().filter(|row| Some((row.role, row.level)) == level).collect();
     let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect::<Vec<_>>();
     let (above, below) = (those(Verdict::Above), those(Verdict::Below));
     let reference = level.filter(|(role, _)| *role == Role::Reference);
-    let about = reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));
+    let about =
+        reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));
     let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
     format!("{about} {}{below}", names(&above, rows.len()))
 }

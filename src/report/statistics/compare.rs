@@ -110,12 +110,12 @@ impl Compared<'_, '_> {
     }
 
     fn paired_quantity(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
-        let differences = rows.iter().filter_map(|&(a, b)| column.get(a)?.checked_sub(column.get(b)?));
-        let moments = differences.fold(Some(Moments::default()), |sum, difference| sum?.with(difference).ok());
-        let moments = moments.unwrap_or_default();
+        let mut differences = rows.iter().filter_map(|&(a, b)| column.get(a)?.checked_sub(column.get(b)?));
+        // No sum of squares that 128 bits cannot hold: then there is no interval.
+        let moments = differences.try_fold(Moments::default(), Moments::with).unwrap_or_default();
         let interval = student_t(&moments, StandardError::Sample, self.confidence);
         let spread = moments.se(StandardError::Sample).is_some_and(|se| se > 0.0);
-        let (interval, withheld) = coverage::given(interval, moments.n, coverage::WELCH, spread);
+        let (interval, withheld) = coverage::given(interval, moments.n, coverage::STUDENT, spread);
         Comparison {
             undefined: rows.len() as u64 - moments.n,
             difference: moments.mean(),

@@ -11,7 +11,8 @@ use crate::stats::power::Detectable;
 /// The metrics that conclusions are about: rates with a level to compare with, and durations.
 /// The first metric where there is neither.
 pub(super) fn headline(study: &Study) -> Vec<String> {
-    let has_level = |metric: &str| study.experiments.iter().any(|known| !own_levels(study, known.name, metric).is_empty());
+    let has_level =
+        |metric: &str| study.experiments.iter().any(|known| !own_levels(study, known.name, metric).is_empty());
     let rates = study.rates().map(|column| column.name.as_str()).filter(|metric| has_level(metric));
     let durations = CENSORED.iter().map(|(duration, _)| *duration).filter(|metric| study.column(metric).is_some());
     let chosen: Vec<String> = rates.chain(durations).map(str::to_owned).collect();
@@ -125,4 +126,3 @@ fn unfinished(rows: &[DurationRow]) -> Vec<String> {
     };
     totals.into_iter().filter(|(_, (unfinished, _))| *unfinished > 0).map(sentence).collect()
 }
-

@@ -19,8 +19,8 @@ mod models;
 mod overall;
 mod sequential;
 mod study;
-mod warnings;
 pub mod text;
+mod warnings;
 
 use std::collections::BTreeSet;
 

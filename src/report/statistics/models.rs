@@ -118,9 +118,9 @@ impl<'s, 'a> Field<'s, 'a> {
     fn gaps(&self) -> Vec<Gap> {
         let mut gaps = Vec::new();
         for (at, block) in self.blocks.iter().enumerate() {
-            let partners = (0..self.blocks.len())
-                .filter(|&other| other != at)
-                .filter(|&other| self.matched[triangle(self.blocks.len(), at.min(other), at.max(other))].matching.paired);
+            let partners = (0..self.blocks.len()).filter(|&other| other != at).filter(|&other| {
+                self.matched[triangle(self.blocks.len(), at.min(other), at.max(other))].matching.paired
+            });
             let mut scenes: Vec<usize> = partners.flat_map(|other| self.scenes[other].rows.keys().copied()).collect();
             if scenes.is_empty() {
                 continue;
@@ -202,7 +202,8 @@ impl Reach {
     #[expect(clippy::cast_precision_loss, reason = "a family has few tests")]
     fn of(tests: &[PairTest], confidence: f64) -> Option<Self> {
         let of_method = |method| {
-            let tested = tests.iter().map(|test| &test.comparison).filter(move |it| it.method == method && it.p.is_some());
+            let tested =
+                tests.iter().map(|test| &test.comparison).filter(move |it| it.method == method && it.p.is_some());
             tested.map(|it| it.n[0].min(it.n[1])).max().map(|n| (method, n))
         };
         let (method, n) = of_method(Method::Mcnemar).or_else(|| of_method(Method::Fisher))?;

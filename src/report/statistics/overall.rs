@@ -141,7 +141,9 @@ impl<'s, 'a> Couple<'s, 'a> {
         let strata: Vec<Stratum> = self
             .strata
             .iter()
-            .filter_map(|(a, b)| Some(Stratum { first: counts(&a.moments(column))?, second: counts(&b.moments(column))? }))
+            .filter_map(|(a, b)| {
+                Some(Stratum { first: counts(&a.moments(column))?, second: counts(&b.moments(column))? })
+            })
             .filter(|stratum| stratum.first.1 > 0 && stratum.second.1 > 0)
             .collect();
         let common = common_difference(&strata, confidence);

@@ -51,7 +51,8 @@ impl<'a> Study<'a> {
         // A table is ordered by experiment, then by model.
         for rows in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
             let key = table.keys.get(rows.start);
-            let of_experiment = blocks.entry((table.catalog.experiment_rank(key.experiment), key.experiment)).or_default();
+            let of_experiment =
+                blocks.entry((table.catalog.experiment_rank(key.experiment), key.experiment)).or_default();
             for (condition, rows) in by_condition(conditions, rows) {
                 of_experiment.push(Block::of(table, (key.experiment, key.model, condition), rows)?);
             }
@@ -101,7 +102,12 @@ impl<'a> Study<'a> {
         }
         let longest = CENSORED.iter().filter_map(|(duration, finished)| {
             let (duration, finished) = (self.column(duration)?, self.column(finished)?);
-            duration.iter().zip(finished.iter()).filter(|(_, finished)| finished.is_none()).filter_map(|(steps, _)| steps).max()
+            duration
+                .iter()
+                .zip(finished.iter())
+                .filter(|(_, finished)| finished.is_none())
+                .filter_map(|(steps, _)| steps)
+                .max()
         });
         let all = self.column(metric).and_then(|column| column.iter().flatten().max());
         // A metric that exceeds it counts something else than the steps of one episode.

@@ -55,13 +55,12 @@ fn matchings(statistics: &Statistics) -> impl Iterator<Item = &Matching> {
 /// The comparisons by pairs, and all: each two blocks once, under one metric.
 fn pairings(statistics: &Statistics) -> (usize, usize) {
     let metric = statistics.models.first().map(|family| &family.metric);
-    let models = statistics.models.iter().filter(|family| Some(&family.metric) == metric).flat_map(|family| &family.tests);
+    let models =
+        statistics.models.iter().filter(|family| Some(&family.metric) == metric).flat_map(|family| &family.tests);
     let metric = statistics.conditions.first().map(|contrast| &contrast.metric);
     let conditions = statistics.conditions.iter().filter(|contrast| Some(&contrast.metric) == metric);
-    let all: Vec<bool> = models
-        .map(|test| test.matching.paired)
-        .chain(conditions.map(|contrast| contrast.matching.paired))
-        .collect();
+    let all: Vec<bool> =
+        models.map(|test| test.matching.paired).chain(conditions.map(|contrast| contrast.matching.paired)).collect();
     (all.iter().filter(|paired| **paired).count(), all.len())
 }
 

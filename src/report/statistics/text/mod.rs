@@ -47,7 +47,12 @@ pub fn render(statistics: &Statistics, metrics: &[String], length: Length, width
     }
     if length == Length::Short {
         text.push('\n');
-        push_wrapped(&mut text, "--full prints every interval, plain means, clusters, and what could have been shown.", width, 0);
+        push_wrapped(
+            &mut text,
+            "--full prints every interval, plain means, clusters, and what could have been shown.",
+            width,
+            0,
+        );
     }
     text
 }

@@ -31,7 +31,8 @@ pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Gri
 
 pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Grid {
     let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
-        let Intervals::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld } = cell.intervals else {
+        let Intervals::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld } = cell.intervals
+        else {
             return None;
         };
         let mut line = group(cell);
@@ -56,9 +57,8 @@ fn mark(cell: &CellRow) -> String {
 
 /// Rates against their levels; where a rate is shown, so is the same among finished episodes.
 pub(super) fn chance(statistics: &Statistics, shown: Shown) -> Grid {
-    let is_shown = |metric: &str| {
-        shown(metric) || COMPLETED.iter().any(|(whole, completed)| *completed == metric && shown(whole))
-    };
+    let is_shown =
+        |metric: &str| shown(metric) || COMPLETED.iter().any(|(whole, completed)| *completed == metric && shown(whole));
     let line = |row: &super::super::ChanceRow| {
         let role = match row.role {
             Role::Chance => "chance",

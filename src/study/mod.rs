@@ -35,7 +35,7 @@ use crate::report::comparison::{Comparison, choose, compare};
 use crate::report::errata::Errata;
 use crate::report::layout;
 use crate::report::published;
-use crate::report::statistics::{Options, Statistics};
+use crate::report::statistics::{Options, Sequential, Statistics};
 use crate::report::style::Style;
 use crate::score::evidence::{self, Evidence};
 use crate::score::score_traces;
@@ -314,6 +314,16 @@ impl Study {
             statistics.warnings.push(words);
         }
         Ok(statistics)
+    }
+
+    /// What may be said while the study still runs: confidence sequences and e-values.
+    ///
+    /// # Errors
+    /// As [`Study::statistics`].
+    pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
+        let results = self.score()?;
+        self.check_filter(results.episodes.len())?;
+        Ok(Sequential::of(&results.episodes, options)?)
     }
 
     /// One figure, with the models in the order of a style.

@@ -3,20 +3,26 @@
 use serde_json::{Value, json};
 
 use crate::agent::Player;
+use crate::base::palette::Color;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::SCENE_VERSION;
 
 /// The key that grows with the recording's episodes.
 pub(super) const SEEDS: &str = "seeds";
 
-/// The version of this object's shape.
-const VERSION: u32 = 1;
+/// The key of the version of this object's shape.
+pub(super) const VERSION_KEY: &str = "version";
+
+/// The version of this object's shape: 2 since it declares a palette. A recording of another one is not continued, since
+/// its episodes were not held against the same rules.
+const VERSION: u32 = 2;
 
 /// The value of `mirrorstats.recording`; the store adds the seeds.
 pub fn recording(config: &WorldConfig, player: &dyn Player) -> Value {
     json!({
-        "version": VERSION,
+        VERSION_KEY: VERSION,
         "scene_version": SCENE_VERSION,
+        "palette": Color::ALL.map(Color::name),
         "agent": player.description(),
         "view": { "width": config.eye.width, "height": config.eye.height_px, "fov_y": config.eye.fovy },
         "visibility_threshold_px": config.evidence.mirror_self_px,

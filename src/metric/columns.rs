@@ -53,6 +53,8 @@ pub struct Column {
 pub struct Columns {
     schema: IndexMap<String, Column>,
     own: IndexMap<String, Column>,
+    /// The only values of a column of the schema, where there is a list of them.
+    values: IndexMap<String, &'static [&'static str]>,
     stranger: Option<&'static str>,
 }
 
@@ -61,6 +63,18 @@ impl Columns {
     #[must_use]
     pub fn with_help(self, help: &'static str) -> Self {
         Self { stranger: Some(help), ..self }
+    }
+
+    /// The same columns; these of the schema take the values listed and no others, null apart.
+    #[must_use]
+    pub fn with_values<N: Into<String>>(self, lists: impl IntoIterator<Item = (N, &'static [&'static str])>) -> Self {
+        let values = lists.into_iter().map(|(name, values)| (name.into(), values)).collect();
+        Self { values, ..self }
+    }
+
+    /// The only values of a column, null apart; `None` where any is possible.
+    pub fn values(&self, name: &str) -> Option<&'static [&'static str]> {
+        self.values.get(name).copied()
     }
 
     /// What to do about a name that is like none of these.

@@ -98,7 +98,9 @@ pub fn schema_columns() -> Columns {
         let level = if column.constant { Level::Episode } else { Level::Step };
         type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
     };
-    COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect()
+    let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
+    let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
+    columns.with_values(lists)
 }
 
 /// The columns that definitions may name over these traces: those of the schema, and the traces' own.

@@ -22,7 +22,10 @@ fn a_report_from_scores_is_the_report_from_traces() {
         files.remove("manifest.json").unwrap();
         files.retain(|name, _| !name.starts_with("figures") && name != "report.html");
         // Scores do not say how replies came.
-        assert_eq!(files.keys().filter(|file| file.starts_with("tables/quality")).count(), if name == "traces" { 3 } else { 0 });
+        assert_eq!(
+            files.keys().filter(|file| file.starts_with("tables/quality")).count(),
+            if name == "traces" { 3 } else { 0 }
+        );
         files.retain(|name, _| !name.starts_with("tables/quality"));
         files
     };

@@ -5,7 +5,7 @@
 use indexmap::IndexMap;
 use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
 use mirrorstats::report::statistics::{Options, Sequential, Verdict, text};
-use mirrorstats::score::table::{EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use mirrorstats::score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 
 use crate::assert_shown;
 
@@ -61,6 +61,7 @@ fn sequential(blocks: &[Block]) -> Sequential {
     let table = EpisodeTable {
         catalog: catalog(),
         keys: keys.collect(),
+        declared: Declared::default(),
         labels: vec![LabelColumn {
             name: "scene".into(),
             values: rows().map(|(_, at)| Some(format!("room {at}"))).collect(),

@@ -323,7 +323,9 @@ impl Study {
     pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
         let results = self.score()?;
         self.check_filter(results.episodes.len())?;
-        Ok(Sequential::of(&results.episodes, options)?)
+        let episodes = self.counted(results).results.episodes;
+        let options = Options { design: design_of(&episodes.declared), ..options.clone() };
+        Ok(Sequential::of(&episodes, &options)?)
     }
 
     /// One figure, with the models in the order of a style.

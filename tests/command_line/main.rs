@@ -13,6 +13,7 @@ mod hostile;
 mod options;
 #[cfg(target_os = "linux")]
 mod outputs;
+mod quality;
 mod refusals;
 #[cfg(unix)]
 mod reports;

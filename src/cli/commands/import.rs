@@ -15,6 +15,7 @@ use crate::cli::output;
 use crate::cli::text_table::counted;
 use crate::study::known_experiments;
 use crate::trace::colors::palette::Palette;
+use crate::trace::declared::Cluster;
 use crate::trace::import::{self, Limits, Text};
 use crate::trace::inputs::Input;
 use crate::trace::schema::Kind;
@@ -39,9 +40,24 @@ pub struct ImportArgs {
     /// `default`, the ten colours of the study
     #[arg(long, value_name = "NAMES|FILE|default")]
     palette: Option<String>,
+    /// What episodes share that are more alike than chance: statistics of the trace then take it as a cluster. Episodes with
+    /// an equal `scene` are pairs without a word
+    #[arg(long, value_enum, value_name = "COLUMN")]
+    cluster: Option<ClusterArg>,
+    /// The steps are rebuilt from published numbers, which leave the rest of them open: statistics take no pairs and no
+    /// clusters from them
+    #[arg(long, conflicts_with = "cluster")]
+    reconstruction: bool,
     /// Answer as JSON
     #[arg(long)]
     json: bool,
+}
+
+/// What a cluster is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ClusterArg {
+    /// The episodes of one seed
+    Seed,
 }
 
 /// What was written.
@@ -78,7 +94,12 @@ impl ImportArgs {
         let experiments = known_experiments(&self.definitions)?;
         self.check_places()?;
         let palette = self.palette.as_deref().map(palette).transpose()?;
-        let limits = Limits { experiments: experiments.as_deref(), palette: palette.as_ref() };
+        let limits = Limits {
+            experiments: experiments.as_deref(),
+            palette: palette.as_ref(),
+            cluster: self.cluster.map(|ClusterArg::Seed| Cluster::Seed),
+            is_reconstruction: self.reconstruction,
+        };
         let mut texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
         let imported = import::import(&mut texts, &self.out, limits).map_err(Failure::input)?;
         let own = imported.own.into_iter().map(|own| OwnColumn { name: own.name, kind: own.kind });

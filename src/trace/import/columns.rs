@@ -187,7 +187,7 @@ fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
             }
         }
         (Kind::String, Value::Text(text)) => {
-            let Limits { experiments, palette } = limits;
+            let Limits { experiments, palette, .. } = limits;
             let rules = rules_of(column, Known { palette, experiments });
             rules.iter().find(|rule| !rule.allows(text)).map(|rule| odd_text(column, rule, text, value.shown()))
         }

@@ -24,19 +24,16 @@ mod text;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use parquet::errors::ParquetError;
-use serde_json::json;
-
 pub use columns::Own;
 pub use error::ImportError;
 pub use fault::Fault;
 pub use limits::Limits;
+use parquet::errors::ParquetError;
 pub use text::Text;
 
 use super::diagnostic::Severity;
 use super::error::TraceError;
 use super::inputs::Input;
-use super::schema::colors::palette::Palette;
 use super::validate::validate;
 use super::write::unwritable;
 use crate::base::replace::NewFile;
@@ -74,7 +71,7 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
     let names: Vec<_> = texts.iter().map(Text::shared_name).collect();
     let steps = index.into_steps(&names, &mut faults);
     faults.none()?;
-    let file = write(texts, &columns, &steps, out, limits.palette)?;
+    let file = write(texts, &columns, &steps, out, limits)?;
     check(&file, out, limits.experiments)?;
     file.commit().map_err(|error| unwritable(out, error))?;
     Ok(Imported {
@@ -128,13 +125,10 @@ fn write(
     columns: &Columns,
     steps: &[index::Step],
     out: &Path,
-    palette: Option<&Palette>,
+    limits: Limits<'_>,
 ) -> Result<NewFile, ImportError> {
     let hashes = texts.iter_mut().map(Text::hash).collect::<Result<Vec<_>, _>>()?;
-    let mut recording = json!({ "kind": "import", "sources": hashes });
-    if let Some(palette) = palette {
-        recording["palette"] = json!(palette.names());
-    }
+    let recording = limits.recording(&hashes);
     let file = NewFile::create(out).map_err(|error| unwritable(out, error))?;
     let failed = |error: ParquetError| TraceError::Write { file: out.display().to_string(), source: Box::new(error) };
     let mut rows = rows::Rows::new(file, columns, &recording).map_err(failed)?;

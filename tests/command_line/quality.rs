@@ -1,0 +1,133 @@
+//! Lost episodes and data quality: counted apart, bounded, and told wherever a table is.
+
+use std::fs;
+use std::path::Path;
+
+use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats::trace::write::OptionalColumns;
+use serde_json::{Value, json};
+
+use crate::harness::program::run;
+use crate::harness::traces::{episode, write_trace};
+
+fn step(action: Option<Action>, status: &str, cube: &str) -> Step {
+    let extra = Extra {
+        reply_status: Some(status.to_owned()),
+        reply_repair: (status == "repaired").then(|| "fence+case".to_owned()),
+        latency_ms: Some(100),
+        prompt_tokens: Some(1000),
+        completion_tokens: Some(50),
+        cost_usd: Some(0.001),
+        ..Extra::default()
+    };
+    Step { action, selected_cube: action.map(|_| cube.to_owned()), extra, ..Step::default() }
+}
+
+/// Eight episodes of which two succeed, four fail, and two are ended by a timeout.
+fn eight() -> Vec<Episode> {
+    let turn = || step(Some(Action::TurnLeft), "ok", "none");
+    let done = |cube| step(Some(Action::Done), "repaired", cube);
+    let lost = || step(None, "timeout", "none");
+    let last = [done("red"), done("red"), done("blue"), done("blue"), done("blue"), done("blue"), lost(), lost()];
+    let whole = |(run, last): (i32, Step)| Episode { run, ..episode(&format!("e{run}"), vec![turn(), turn(), last]) };
+    (1..).zip(last).map(whole).collect()
+}
+
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let episodes = eight();
+    write_trace(&folder.path().join("a.parquet"), &episodes, OptionalColumns::used_by(&episodes));
+    folder
+}
+
+/// n and sum of the cell of TSA.
+fn tsa(folder: &Path, arguments: &[&str]) -> (u64, u64) {
+    run(folder, &[&["report", "--out", "out", "--no-figures"], arguments].concat()).done();
+    let cells = fs::read_to_string(folder.join("out/cells.csv")).unwrap();
+    let line = cells.lines().find(|line| line.starts_with("E1,m,TSA,")).unwrap().to_owned();
+    let fields: Vec<&str> = line.split(',').collect();
+    (fields[3].parse().unwrap(), fields[4].parse().unwrap())
+}
+
+#[test]
+fn a_headline_and_the_losses_count_the_same_episodes() {
+    let folder = folder();
+    let at = folder.path();
+    assert_eq!(tsa(at, &["a.parquet"]), (6, 2));
+    assert_eq!(tsa(at, &["out/episodes.parquet"]), (6, 2));
+    assert_eq!(tsa(at, &["a.parquet", "--lost", "as-failure"]), (8, 2));
+    let stats: Value = run(at, &["stats", "a.parquet", "--json"]).json();
+    let loss = &stats["losses"]["rows"][0];
+    assert_eq!([&loss["n"], &loss["successes"], &loss["lost"]], [&json!(6), &json!(2), &json!(2)]);
+    let cell = stats["cells"].as_array().unwrap().iter().find(|cell| cell["metric"] == "TSA").unwrap();
+    assert_eq!([&cell["n"], &cell["sum"]], [&json!(6), &json!(2)]);
+    let notes = run(at, &["report", "a.parquet", "--out", "out"]).ends(0).stderr;
+    assert!(notes.contains("2 episodes were lost to failures that are not the agent's: in no denominator"), "{notes}");
+    // A file of scores keeps every row, and says which are lost.
+    for name in ["scores.parquet", "scores.csv", "scores.jsonl"] {
+        run(at, &["score", "a.parquet", "-o", name]).done();
+        assert_eq!(tsa(at, &[name]), (6, 2), "{name}");
+        assert_eq!(tsa(at, &[name, "--lost", "as-failure"]), (8, 2), "{name}");
+    }
+}
+
+#[test]
+fn episodes_that_were_never_recorded_are_told_and_can_count_as_failures() {
+    let folder = folder();
+    let at = folder.path();
+    let line = |id: &str, run: u32, model: &str| {
+        let reason = json!({ "step": 3, "status": "timeout", "reason": "x" });
+        let mut line = json!({ "episode_id": id, "model": model, "experiment": "E1", "seed": 1, "run": run });
+        line.as_object_mut().unwrap().extend(reason.as_object().unwrap().clone());
+        format!("{line}\n")
+    };
+    // One of them is in the trace by now, and one is of a model that the traces do not have.
+    let lines = [line("e9", 9, "m"), line("e10", 10, "m"), line("e1", 1, "m"), line("o", 1, "other")];
+    fs::write(at.join("lost.jsonl"), lines.concat()).unwrap();
+    assert_eq!(tsa(at, &["a.parquet"]), (6, 2));
+    assert_eq!(tsa(at, &["a.parquet", "--lost", "as-failure"]), (10, 2));
+    let stats: Value = run(at, &["stats", "a.parquet", "--json"]).json();
+    assert_eq!(stats["losses"]["rows"][0]["lost"], 4);
+    let quality = fs::read_to_string(at.join("out/tables/quality.csv")).unwrap();
+    assert!(quality.lines().nth(1).unwrap().starts_with("E1,m,8,4,24,24,16,6,"), "{quality}");
+    fs::write(at.join("lost.jsonl"), "{\"model\": 7}\n").unwrap();
+    let message = run(at, &["report", "a.parquet", "--out", "out"]).refused();
+    assert!(message.contains("lost.jsonl, line 1: expected a lost episode"), "{message}");
+}
+
+#[test]
+fn quality_is_in_reports_in_info_and_in_check() {
+    let folder = folder();
+    let at = folder.path();
+    run(at, &["report", "a.parquet", "--out", "out"]).done();
+    let table = fs::read_to_string(at.join("out/tables/quality.md")).unwrap();
+    assert!(table.contains("| E1 | m | 8 | 2 | 24 | 2/24 (8.3 %) | timeout 2 | 6: case 6, fence 6 |"), "{table}");
+    assert!(fs::read_to_string(at.join("out/report.html")).unwrap().contains("<section id=\"quality\">"));
+    assert!(at.join("out/tables/quality.tex").is_file());
+    let info: Value = run(at, &["info", "a.parquet", "--json"]).json();
+    let cell = &info["quality"][0];
+    assert_eq!(
+        [&cell["lost"], &cell["statuses"]["timeout"], &cell["repairs"]["fence"]],
+        [&json!(2), &json!(2), &json!(6)]
+    );
+    assert_eq!(cell["cost_nano_usd"]["sum"], json!(24_000_000));
+    assert!(run(at, &["info", "a.parquet"]).done().contains("timeout 2"));
+    run(at, &["check", "a.parquet", "--max-unreadable", "0.1", "--max-lost", "2", "--max-latency", "100"]).done();
+    let failed = run(at, &["check", "a.parquet", "--max-unreadable", "0.05", "--max-lost", "0"]).ends(1).stdout;
+    assert!(failed.contains("E1, m: --max-unreadable: expected at most 0.05, found 0.0833"), "{failed}");
+    assert!(failed.contains("--max-lost: expected at most 0, found 2"), "{failed}");
+    assert!(run(at, &["check", "a.parquet"]).refused().contains("expected a limit to check"));
+    assert_eq!(run(at, &["check", "a.parquet", "--max-unreadable", "5"]).code, 2);
+}
+
+#[test]
+fn what_is_not_recorded_passes_no_check_and_is_not_zero() {
+    let folder = tempfile::tempdir().unwrap();
+    let episodes = [episode("e1", vec![Step { action: Some(Action::Done), ..Step::default() }])];
+    write_trace(&folder.path().join("a.parquet"), &episodes, OptionalColumns::NONE);
+    let failed = run(folder.path(), &["check", "a.parquet", "--max-unreadable", "1"]).ends(1).stdout;
+    assert!(failed.contains("nothing recorded"), "{failed}");
+    run(folder.path(), &["report", "a.parquet", "--out", "out"]).done();
+    let quality = fs::read_to_string(folder.path().join("out/tables/quality.md")).unwrap();
+    assert!(quality.contains("| E1 | m | 1 | -- | 1 | -- | -- | -- | -- | -- | -- |"), "{quality}");
+}

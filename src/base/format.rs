@@ -26,6 +26,16 @@ pub fn p_value(p: Option<f64>) -> String {
     }
 }
 
+/// An e-value: two decimals, whole numbers from 100, and a bound where it is very large or very small.
+pub fn e_value(e: f64) -> String {
+    match e {
+        e if e > 9999.0 => ">9999".to_owned(),
+        e if e >= 100.0 => fixed(Some(e), 0),
+        e if e < 0.01 => "<0.01".to_owned(),
+        e => fixed(Some(e), 2),
+    }
+}
+
 /// `[low, high]` to `places` decimals; [`UNDEFINED`] for none.
 pub fn bounds(bounds: Option<(f64, f64)>, places: usize) -> String {
     bounds.map_or_else(
@@ -36,7 +46,7 @@ pub fn bounds(bounds: Option<(f64, f64)>, places: usize) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{bounds, fixed, p_value};
+    use super::{bounds, e_value, fixed, p_value};
 
     #[test]
     fn zero_has_no_sign_and_nothing_is_not_zero() {
@@ -53,5 +63,11 @@ mod tests {
         let found = [1.0, 0.0391, 0.00027, 1e-30, 0.0].map(|p| p_value(Some(p)));
         assert_eq!(found, ["1.000", "0.039", "0.0003", "<0.0001", "<0.0001"]);
         assert_eq!(p_value(None), "--");
+    }
+
+    #[test]
+    fn an_e_value_has_a_bound_at_either_end() {
+        let found = [0.0, 0.25, 14.4375, 610.446, 9999.4, f64::MAX].map(e_value);
+        assert_eq!(found, ["<0.01", "0.25", "14.44", "610", ">9999", ">9999"]);
     }
 }

@@ -25,6 +25,7 @@ pub mod power;
 mod quantile;
 pub mod random;
 pub mod restricted;
+pub mod sequential;
 pub mod stratified;
 pub mod survival;
 pub mod tarone;

@@ -35,7 +35,7 @@ use crate::report::comparison::{Comparison, choose, compare};
 use crate::report::errata::Errata;
 use crate::report::layout;
 use crate::report::published;
-use crate::report::statistics::{Options, Statistics};
+use crate::report::statistics::{Options, Sequential, Statistics};
 use crate::report::style::Style;
 use crate::score::evidence::{self, Evidence};
 use crate::score::score_traces;
@@ -314,6 +314,18 @@ impl Study {
             statistics.warnings.push(words);
         }
         Ok(statistics)
+    }
+
+    /// What may be said while the study still runs: confidence sequences and e-values.
+    ///
+    /// # Errors
+    /// As [`Study::statistics`].
+    pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
+        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
+        self.check_filter(results.episodes.len())?;
+        let episodes = self.counted(results).results.episodes;
+        let options = Options { design: design_of(&episodes.declared), ..options.clone() };
+        Ok(Sequential::of(&episodes, &options)?)
     }
 
     /// One figure, with the models in the order of a style.

@@ -57,6 +57,7 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
         &["report", "a.parquet", "--style", "paper"],
         &["report", "a.parquet", "--by", "episode_id,model"],
         &["stats", "a.parquet", "--metric", "all"],
+        &["stats", "a.parquet", "--sequential", "--metric", "all"],
         &["info", "a.parquet"],
         &["validate", "a.parquet"],
         &["score", "a.parquet", "--explain", "E1-\u{1b}[31mred\u{1b}[0m-0"],

@@ -137,6 +137,7 @@ fn json_is_json_wherever_it_is_offered() {
         (&["validate", "."], 0),
         (&["schema"], 0),
         (&["stats", "."], 0),
+        (&["stats", ".", "--sequential"], 0),
         (&["report", ".", "--out", "out"], 0),
         (&["compare", ".", "--published", &published], 1),
         (&["definitions", "check", "paper"], 0),

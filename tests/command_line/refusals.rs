@@ -138,6 +138,8 @@ fn bad_usage_says_what_is_wrong_and_what_to_do() {
             (&["report", "a.parquet", "--by", ""], &["group by"]),
             (&["stats", "a.parquet", "--metric", "TSAA"], &["`TSAA`", "did you mean `TSA`?"]),
             (&["stats", "a.parquet", "--confidence", "95"], &["between 0 and 1", "95"]),
+            (&["stats", "a.parquet", "--sequential", "--metric", "TTD"], &["no rate is named `TTD`", "TSA"]),
+            (&["stats", "a.parquet", "--sequential", "--horizon", "50"], &["--horizon", "--sequential"]),
             (&["compare", "a.parquet"], &["--published"]),
             (&["compare", "a.parquet", "--published", "no.csv"], &["no.csv", "No such file"]),
             (&["compare", "a.parquet", "--published", "file"], &["file"]),

@@ -21,6 +21,7 @@ fn no_line_is_wider_than_the_terminal() {
         ["report", "a.parquet", "--no-figures"].as_slice(),
         &["report", "a.parquet", "--no-figures", "--style", "paper"],
         &["stats", "a.parquet", "--metric", "all"],
+        &["stats", "a.parquet", "--sequential", "--metric", "all"],
         &["info", "a.parquet"],
     ] {
         let run = |width: Option<usize>| {

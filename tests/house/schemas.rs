@@ -17,7 +17,7 @@ use mirrorstats::metric::shape::DefinitionFile;
 use mirrorstats::report::bundle::Manifest;
 use mirrorstats::report::comparison::Comparison;
 use mirrorstats::report::errata::Errata;
-use mirrorstats::report::statistics::Statistics;
+use mirrorstats::report::statistics::{Sequential, Statistics};
 use mirrorstats::report::style::Sheet;
 use mirrorstats::score::evidence::Evidence;
 use mirrorstats::stats::diff::Changes;
@@ -54,6 +54,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("rescore", json!(schema_for!(RescoreAnswer))),
         ("score-explain", json!(schema_for!(Evidence))),
         ("stats", json!(schema_for!(Statistics))),
+        ("stats-sequential", json!(schema_for!(Sequential))),
         ("style", json!(schema_for!(Sheet))),
         ("step", Name::Step.document()),
         ("trace", json!(SchemaDocument::current())),

@@ -7,4 +7,5 @@ mod harness;
 mod html;
 mod reconstruction;
 mod report;
+mod sequential;
 mod statistics;

@@ -7,7 +7,7 @@ use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use crate::report::statistics::text::{self, Length};
-use crate::report::statistics::{Options, Statistics};
+use crate::report::statistics::{Options, Sequential, Statistics};
 
 /// The word that stands for every metric.
 const ALL: &str = "all";
@@ -39,6 +39,9 @@ pub struct StatsArgs {
     /// Print every interval, plain means, clusters, and what could have been shown
     #[arg(long)]
     pub full: bool,
+    /// For a study that still runs: intervals and tests of rates that may be looked at after every episode
+    #[arg(long, conflicts_with_all = ["by", "horizon", "full"])]
+    pub sequential: bool,
     /// Print everything as JSON, of every metric
     #[arg(long)]
     pub json: bool,
@@ -46,8 +49,9 @@ pub struct StatsArgs {
 
 /// A metric asked for that the definitions do not have.
 #[derive(Debug, thiserror::Error)]
-#[error("no metric is named `{name}`; the definitions have {known}{suggestion}")]
+#[error("no {kind} is named `{name}`; the definitions have {known}{suggestion}")]
 struct UnknownMetric {
+    kind: &'static str,
     name: String,
     known: String,
     suggestion: String,
@@ -64,11 +68,10 @@ impl StatsArgs {
         let study = self.traces.study(&scoring, &self.grouping)?;
         let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
         let options = Options { confidence, horizon, improvements, ..Options::default() };
-        let statistics = study.statistics(&options)?;
-        let text = if self.json {
-            serde_json::to_string_pretty(&statistics).map_err(Failure::input)? + "\n"
+        let text = if self.sequential {
+            self.sequential_page(&study.sequential(&options)?)?
         } else {
-            text::render(&statistics, &self.chosen(&statistics)?, self.length(), terminal::width())
+            self.page(&study.statistics(&options)?)?
         };
         std::io::stdout().lock().write_all(text.as_bytes())?;
         Ok(Outcome::Done)
@@ -78,15 +81,39 @@ impl StatsArgs {
         if self.full { Length::Full } else { Length::Short }
     }
 
-    fn chosen(&self, statistics: &Statistics) -> Result<Vec<String>, Failure> {
+    fn page(&self, statistics: &Statistics) -> Result<String, Failure> {
+        if self.json {
+            return json(statistics);
+        }
+        let metrics = statistics.cells.iter().map(|cell| cell.metric.as_str());
+        let chosen = self.chosen("metric", metrics, &statistics.headline)?;
+        Ok(text::render(statistics, &chosen, self.length(), terminal::width()))
+    }
+
+    fn sequential_page(&self, sequential: &Sequential) -> Result<String, Failure> {
+        if self.json {
+            return json(sequential);
+        }
+        let rates = sequential.rates.iter().map(|rate| rate.metric.as_str());
+        let chosen = self.chosen("rate", rates, &sequential.headline)?;
+        Ok(text::sequential::render(sequential, &chosen, terminal::width()))
+    }
+
+    /// The metrics to print: those asked for, if they are among `all`, else the headline ones.
+    fn chosen<'a>(
+        &self,
+        kind: &'static str,
+        all: impl Iterator<Item = &'a str>,
+        headline: &[String],
+    ) -> Result<Vec<String>, Failure> {
         let mut known: Vec<&str> = Vec::new();
-        for cell in &statistics.cells {
-            if !known.contains(&cell.metric.as_str()) {
-                known.push(&cell.metric);
+        for metric in all {
+            if !known.contains(&metric) {
+                known.push(metric);
             }
         }
         if self.metrics.is_empty() {
-            return Ok(statistics.headline.clone());
+            return Ok(headline.to_vec());
         }
         if self.metrics.iter().any(|name| name == ALL) {
             return Ok(known.into_iter().map(str::to_owned).collect());
@@ -95,10 +122,14 @@ impl StatsArgs {
             None => Ok(self.metrics.clone()),
             Some(name) => {
                 let suggestion = hint(name, known.iter().copied());
-                Err(Failure::input(UnknownMetric { name: name.clone(), known: known.join(", "), suggestion }))
+                Err(Failure::input(UnknownMetric { kind, name: name.clone(), known: known.join(", "), suggestion }))
             }
         }
     }
+}
+
+fn json(statistics: &impl serde::Serialize) -> Result<String, Failure> {
+    Ok(serde_json::to_string_pretty(statistics).map_err(Failure::input)? + "\n")
 }
 
 fn confidence(text: &str) -> Result<f64, String> {

@@ -139,7 +139,7 @@ impl<'s, 'a> Tested<'s, 'a> {
 }
 
 impl Verdict {
-    fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
+    pub(super) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
         let seen = i128::from(successes) * i128::from(level.denominator());
         let expected = i128::from(level.numerator()) * i128::from(n);
         match is_shown {
@@ -151,7 +151,7 @@ impl Verdict {
 }
 
 /// The levels of a metric in an experiment: chance, then references; those of the rate that it completes where it has none.
-fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+pub(super) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
     let own = own_levels(study, experiment, metric);
     let whole = COMPLETED.iter().find(|(_, completed)| *completed == metric);
     match whole {

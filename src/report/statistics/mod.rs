@@ -17,6 +17,7 @@ mod losses;
 mod matching;
 mod models;
 mod overall;
+mod sequential;
 mod study;
 pub mod text;
 mod warnings;
@@ -35,6 +36,7 @@ pub use losses::{LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
+pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;

@@ -3,6 +3,7 @@
 //! Rule: text from traces is shown, never obeyed ([`visible`]).
 
 mod grid;
+pub mod sequential;
 mod tables;
 
 use std::fmt::Write as _;

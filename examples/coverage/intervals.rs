@@ -1,0 +1,112 @@
+//! How often intervals over several experiments hold the truth.
+
+use mirrorstats::stats::improvement::probability_of_improvement;
+use mirrorstats::stats::interval::Interval;
+use mirrorstats::stats::random::SplitMix64;
+use mirrorstats::stats::stratified::{Stratum, cochran_mantel_haenszel, common_difference, exact};
+
+use crate::{CONFIDENCE, LEVEL, SEED, heading, row, share, successes, tally};
+
+pub fn common_differences() {
+    const STUDIES: usize = 20_000;
+    let note = "20,000 studies each of three experiments with rates 0.2, 0.5, 0.7 of the second side and the same difference.\n\
+                `none` is the share without an interval, coverage that of the others; errors and powers are those of the Cochran-Mantel-Haenszel tests.";
+    let columns = ["episodes; difference", "coverage", "none", "CMH", "corrected", "exact", "mid-p"];
+    heading("Mantel-Haenszel difference", note, &columns);
+    let mut random = SplitMix64::seeded(SEED + 2);
+    for sizes in [[(21, 21); 3], [(7, 7); 3], [(3, 3); 3], [(7, 21), (21, 7), (14, 14)]] {
+        for difference in [0.0, 0.2, 0.3] {
+            let mut found = [0usize; 6];
+            for _ in 0..STUDIES {
+                let draw = |((m, n), rate): ((u64, u64), f64)| Stratum {
+                    first: (successes(&mut random, m, rate + difference), m),
+                    second: (successes(&mut random, n, rate), n),
+                };
+                let strata: Vec<Stratum> = sizes.into_iter().zip([0.2, 0.5, 0.7]).map(draw).collect();
+                let interval = common_difference(&strata, CONFIDENCE).and_then(|common| common.interval);
+                let (cmh, test) = (cochran_mantel_haenszel(&strata), exact(&strata));
+                let is_shown = |p: Option<f64>| p.is_some_and(|p| p <= LEVEL);
+                let counted = [
+                    interval.is_some_and(|interval| interval.contains(difference)),
+                    interval.is_none(),
+                    is_shown(cmh.map(|cmh| cmh.p)),
+                    is_shown(cmh.map(|cmh| cmh.p_corrected)),
+                    is_shown(test.map(|test| test.p)),
+                    is_shown(test.map(|test| test.mid_p)),
+                ];
+                tally(&mut found, &counted);
+            }
+            let mut numbers = found.map(|count| share(count, STUDIES));
+            numbers[0] = share(found[0], STUDIES - found[1]);
+            row(&format!("{}; {difference}", sizes.map(|(m, n)| format!("{m}+{n}")).join(", ")), &numbers);
+        }
+    }
+}
+
+/// What a side may do in an episode: values and their probabilities.
+type Distribution = Vec<(i64, f64)>;
+
+fn rate(of: f64) -> Distribution {
+    vec![(0, 1.0 - of), (1, of)]
+}
+
+/// Steps to a decision that comes with the same probability at each step, 100 at most.
+fn steps(at_each: f64) -> Distribution {
+    let mut left = 1.0;
+    let mut each = |t| {
+        let now = if t == 100 { left } else { left * at_each };
+        left -= now;
+        (t, now)
+    };
+    (1..=100).map(&mut each).collect()
+}
+
+fn drawn(random: &mut SplitMix64, n: usize, from: &Distribution) -> Vec<i64> {
+    let one = |random: &mut SplitMix64| {
+        let mut left = random.unit();
+        let last = from.last().map_or(0, |(value, _)| *value);
+        from.iter()
+            .find(|(_, weight)| {
+                left -= weight;
+                left < 0.0
+            })
+            .map_or(last, |(value, _)| *value)
+    };
+    (0..n).map(|_| one(random)).collect()
+}
+
+fn improvement(first: &Distribution, second: &Distribution) -> f64 {
+    let half = |x: i64, y: i64| f64::from(i8::from(x > y) + i8::from(x >= y)) / 2.0;
+    first.iter().flat_map(|(x, a)| second.iter().map(move |(y, b)| a * b * half(*x, *y))).sum()
+}
+
+pub fn improvements() {
+    const STUDIES: usize = 400;
+    let note = "400 studies each of three experiments. With fewer than 50 values per side there is no interval.";
+    heading(
+        "Probability of improvement, percentile bootstrap",
+        note,
+        &["values; per side and experiment", "truth", "coverage"],
+    );
+    let mut random = SplitMix64::seeded(SEED + 3);
+    for (name, first, second) in [
+        ("rates 0.5 and 0.5", rate(0.5), rate(0.5)),
+        ("rates 0.9 and 0.6", rate(0.9), rate(0.6)),
+        ("rates 0.95 and 0.9", rate(0.95), rate(0.9)),
+        ("steps, 0.05 and 0.05 at each", steps(0.05), steps(0.05)),
+        ("steps, 0.01 and 0.05 at each", steps(0.01), steps(0.05)),
+    ] {
+        let truth = improvement(&first, &second);
+        for n in [17, 21, 42] {
+            let mut study = || -> Option<Interval> {
+                let sides: Vec<_> =
+                    (0..3).map(|_| (drawn(&mut random, n, &first), drawn(&mut random, n, &second))).collect();
+                let strata: Vec<_> = sides.iter().map(|(first, second)| (&first[..], &second[..])).collect();
+                probability_of_improvement(&strata, CONFIDENCE)?.interval
+            };
+            let intervals: Vec<Interval> = (0..STUDIES).filter_map(|_| study()).collect();
+            let covered = intervals.iter().filter(|interval| interval.contains(truth)).count();
+            row(&format!("{name}; {n}"), &[truth, share(covered, intervals.len())]);
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! What `stats --sequential` says of tables of episodes whose answers are known.
+
+#![expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
+
+use indexmap::IndexMap;
+use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use mirrorstats::report::statistics::{Options, Sequential, Verdict, text};
+use mirrorstats::score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+
+use crate::assert_shown;
+
+fn metric(kind: Kind) -> Metric {
+    Metric {
+        title: String::new(),
+        kind,
+        unit: String::new(),
+        better: Better::Higher,
+        section: String::new(),
+        help: String::new(),
+        value: String::new(),
+        when: None,
+        se: StandardError::Sample,
+        chance: None,
+    }
+}
+
+/// TSA, 1/3 by chance in E1 and nothing to compare with in E2; TTD, which is no rate; MCR, a rate without a level.
+fn catalog() -> Catalog {
+    let chance = IndexMap::from([("TSA".to_owned(), Some("1/3".parse().unwrap()))]);
+    let experiment = |order, chance| Experiment { title: String::new(), order, chance, reference: IndexMap::new() };
+    Catalog {
+        name: "test".into(),
+        hash: "0".repeat(64),
+        open: false,
+        lets: IndexMap::new(),
+        metric: [("TSA", Kind::Rate), ("TTD", Kind::Quantity), ("MCR", Kind::Rate)]
+            .map(|(name, kind)| (name.to_owned(), metric(kind)))
+            .into(),
+        experiment: IndexMap::from([
+            ("E1".to_owned(), experiment(1, chance)),
+            ("E2".to_owned(), experiment(2, IndexMap::new())),
+        ]),
+    }
+}
+
+/// Experiment, model, how many of the first of 21 scenes are solved.
+type Block<'a> = (&'a str, &'a str, i32);
+
+const STUDY: [Block; 4] = [("E1", "middle", 13), ("E1", "strong", 21), ("E1", "weak", 5), ("E2", "strong", 7)];
+
+fn sequential(blocks: &[Block]) -> Sequential {
+    let rows = || blocks.iter().flat_map(|block| (0..21).map(move |at| (block, at)));
+    let keys = rows().map(|((experiment, model, _), at)| EpisodeKey {
+        experiment: (*experiment).into(),
+        model: (*model).into(),
+        seed: at / 7,
+        run: at % 7,
+        episode_id: format!("{experiment}/{model}/{at}"),
+    });
+    let solved = || rows().map(|((.., solved), at)| Some(i64::from(at < *solved)));
+    let table = EpisodeTable {
+        catalog: catalog(),
+        keys: keys.collect(),
+        labels: vec![LabelColumn {
+            name: "scene".into(),
+            values: rows().map(|(_, at)| Some(format!("room {at}"))).collect(),
+        }],
+        metrics: vec![
+            MetricColumn::new("TSA", solved()),
+            MetricColumn::new("TTD", rows().map(|(_, at)| Some(i64::from(at)))),
+            MetricColumn::new("MCR", rows().map(|(_, at)| (at > 0).then_some(1))),
+        ],
+        declared: Declared::default(),
+    };
+    Sequential::of(&table, &Options::default()).unwrap()
+}
+
+// The e-values and bounds are those of the tests of `stats::sequential`, where their sources are named.
+#[test]
+fn rates_stand_against_chance_by_e_values() {
+    let found = sequential(&STUDY);
+    assert_eq!(found.headline, ["TSA"]);
+    let of = |model: &str| found.chance.iter().find(|row| row.model == model).unwrap();
+    let (middle, strong) = (of("middle"), of("strong"));
+    assert!((middle.e - 6.1113961330979905).abs() < 1e-9 && middle.verdict == Verdict::NotSeparated, "{middle:?}");
+    assert!(strong.e > 1e8 && strong.verdict == Verdict::Above, "{strong:?}");
+    assert!((middle.p_adjusted - 2.0 * middle.p).abs() < 1e-12, "the second of three in Holm's order");
+    assert_eq!(found.chance.len(), 3, "E2 has no level");
+    let all = found.rates.iter().find(|row| row.model == "strong" && row.experiment == "E1").unwrap();
+    let bounds = all.interval.unwrap();
+    assert!((bounds.low - 0.7845213905698409).abs() < 1e-10 && bounds.high >= 1.0, "{bounds:?}");
+}
+
+// 8 and 8 discordant pairs, all in one direction: 2^8 B(8.5, 0.5) / B(0.5, 0.5) = 50.27 by scipy 1.17.1; 16 give 9171.76.
+#[test]
+fn models_are_told_apart_by_their_discordant_pairs() {
+    let found = sequential(&STUDY);
+    let pairs: Vec<_> = found.models.iter().filter(|pair| pair.metric == "TSA").collect();
+    let named: Vec<_> = pairs.iter().map(|pair| (pair.first.as_str(), pair.second.as_str(), pair.verdict)).collect();
+    let above = Verdict::Above;
+    assert_eq!(named, [("strong", "middle", above), ("strong", "weak", above), ("middle", "weak", above)]);
+    for (pair, e) in pairs.iter().zip([50.2734375, 9171.758880615234, 50.2734375]) {
+        assert!((pair.e / e - 1.0).abs() < 1e-9, "{pair:?}");
+        assert!((pair.p - 1.0 / pair.e).abs() < 1e-15);
+    }
+    let alike = found.models.iter().find(|pair| pair.metric == "MCR").unwrap();
+    assert_eq!((alike.e, alike.p, alike.verdict), (1.0, 1.0, Verdict::NotSeparated));
+}
+
+#[test]
+fn the_text_says_what_it_is_for() {
+    let found = sequential(&STUDY);
+    let blocks = STUDY.map(|(experiment, model, solved)| format!("{experiment} {model} {solved}/21"));
+    assert_shown!(blocks.join("\n"), text::sequential::render(&found, &found.headline, None));
+}
+
+#[test]
+fn names_from_traces_cannot_write_to_the_terminal() {
+    let found = sequential(&[("E1", "b\nc", 0), ("E1", "evil\u{1b}[2J", 21)]);
+    let text = text::sequential::render(&found, &found.headline, None);
+    assert!(!text.contains('\u{1b}') && text.contains("evil\\u{1b}[2J") && text.contains("b\\u{a}c"), "{text}");
+}

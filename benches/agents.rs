@@ -178,7 +178,7 @@ fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: No
     let keys: Vec<Key> = plan.keys();
     let (shares, stop) = (Shares::default(), AtomicBool::new(false));
     let in_flight = NonZeroUsize::new(IN_FLIGHT).unwrap();
-    let settings = Settings { threads, in_flight, frames: true, log: true };
+    let settings = Settings { threads, in_flight, frames: true, log: true, max_unusable: None };
     let recording =
         Recording { config, player, store: &store, progress: &Quiet, stop: &stop, shares: &shares, settings };
     let start = Instant::now();

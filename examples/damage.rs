@@ -112,7 +112,7 @@ fn broken_schemas() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
             "`seed` is text",
             parquet(&[&with(&sound, "seed", Arc::new(seeds))?], None)?,
         ),
-        file("newer-schema.parquet", "newer-schema", "schema version 2", parquet(&[&sound], Some("2"))?),
+        file("newer-schema.parquet", "newer-schema", "schema version 99", parquet(&[&sound], Some("99"))?),
         file("invalid-version.parquet", "invalid-metadata", "schema version `one`", parquet(&[&sound], Some("one"))?),
     ])
 }

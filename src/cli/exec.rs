@@ -32,7 +32,7 @@ impl ExecArgs {
     /// The player that runs a command, called `model` in tables, with its frames below `scratch`.
     ///
     /// # Errors
-    /// For a command without a word.
+    /// For a command without a word, and for one that names a file which cannot be read.
     pub fn player(&self, command: &str, model: Option<&str>, scratch: PathBuf) -> Result<Exec, Failure> {
         if command.trim().is_empty() {
             return Err(Failure::input("--agent exec: needs a command, such as --agent exec:'python3 agent.py'"));
@@ -41,12 +41,13 @@ impl ExecArgs {
             ExecImages::Path => Images::Path,
             ExecImages::Base64 => Images::Base64,
         };
-        Ok(Exec::new(Settings {
+        Exec::new(Settings {
             model: model.unwrap_or("exec").to_owned(),
             command: command.to_owned(),
             images,
             timeout: Duration::from_secs(self.exec_timeout),
             scratch,
-        }))
+        })
+        .map_err(Failure::input)
     }
 }

@@ -56,6 +56,8 @@ pub struct Columns {
     fallbacks: IndexMap<String, Fallback>,
     /// Columns of the schema whose names definitions may use for something else.
     free: Vec<String>,
+    /// The only values of a column of the schema, where there is a list of them.
+    values: IndexMap<String, &'static [&'static str]>,
     stranger: Option<&'static str>,
 }
 
@@ -73,6 +75,18 @@ impl Columns {
     #[must_use]
     pub fn with_help(self, help: &'static str) -> Self {
         Self { stranger: Some(help), ..self }
+    }
+
+    /// The same columns; these of the schema take the values listed and no others, null apart.
+    #[must_use]
+    pub fn with_values<N: Into<String>>(self, lists: impl IntoIterator<Item = (N, &'static [&'static str])>) -> Self {
+        let values = lists.into_iter().map(|(name, values)| (name.into(), values)).collect();
+        Self { values, ..self }
+    }
+
+    /// The only values of a column, null apart; `None` where any is possible.
+    pub fn values(&self, name: &str) -> Option<&'static [&'static str]> {
+        self.values.get(name).copied()
     }
 
     /// What to do about a name that is like none of these.

@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use super::metadata::{Difference, VERSION_KEY};
 use crate::agent::Lost;
 use crate::base::replace::without_name;
 use crate::log::LogError;
@@ -20,6 +21,19 @@ pub enum StoreError {
         path.display()
     )]
     Different { path: PathBuf, what: String, expected: String, found: String },
+    #[error(
+        "the program's files changed since `{}` was recorded (agent.files: expected {expected}, found {found})\n  \
+         help: put the files back as they were, or record into another folder; a file that the program writes itself is \
+         named within a word, such as --log=FILE",
+        path.display()
+    )]
+    Files { path: PathBuf, expected: String, found: String },
+    #[error(
+        "`{}` is a recording of version {found}, and this mirrorstats records version {expected}\n  \
+         help: go on with the mirrorstats that began it, or record into another folder",
+        path.display()
+    )]
+    Version { path: PathBuf, expected: String, found: String },
     #[error("the log `{}` does not belong to this recording: {fault}\n  help: {help}", path.display())]
     ForeignLog { path: PathBuf, fault: String, help: String },
     #[error(
@@ -36,6 +50,16 @@ pub enum StoreError {
 }
 
 impl StoreError {
+    /// The file at `path` was recorded differently.
+    pub(super) fn different(path: &Path, Difference { what, expected, found }: Difference) -> Self {
+        let path = path.to_owned();
+        match what.as_str() {
+            VERSION_KEY if found.parse::<u64>().is_ok() => Self::Version { path, expected, found },
+            "agent.files" => Self::Files { path, expected, found },
+            _ => Self::Different { path, what, expected, found },
+        }
+    }
+
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         move |source| Self::Io { doing, path: path.to_owned(), source: without_name(source) }
     }

@@ -12,7 +12,7 @@ use super::continued;
 use super::error::StoreError;
 use super::folder_lock;
 use super::lock::is_at;
-use super::metadata::{Difference, difference};
+use super::metadata::difference;
 use super::plan::Subject;
 use crate::sim::Experiment;
 use crate::trace::error::TraceError;
@@ -122,12 +122,8 @@ impl RecordingIndex {
 
     /// Refuses a file that was recorded with anything else than this recording.
     pub(super) fn check(&self, path: &Path) -> Result<(), StoreError> {
-        match difference(&self.recording, &recording_of(path)?) {
-            None => Ok(()),
-            Some(Difference { what, expected, found }) => {
-                Err(StoreError::Different { path: path.to_owned(), what, expected, found })
-            }
-        }
+        let difference = difference(&self.recording, &recording_of(path)?);
+        difference.map_or(Ok(()), |difference| Err(StoreError::different(path, difference)))
     }
 
     /// The parts of an experiment, by name.

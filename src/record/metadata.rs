@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 
 use crate::agent::Player;
+use crate::base::palette::Color;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::SCENE_VERSION;
 
@@ -11,7 +12,11 @@ pub(super) const SEEDS: &str = "seeds";
 /// A key that grows with the recording's episodes: what they were recorded with, by fingerprint.
 pub(super) const FINGERPRINTS: &str = "fingerprints";
 
-/// The version of this object's shape.
+/// The key of the version of this object's shape.
+pub(super) const VERSION_KEY: &str = "version";
+
+/// The version of this object's shape: 2 since it declares a palette, a design and fingerprints. A recording of another one
+/// is not continued, since its episodes were not held against the same rules.
 const VERSION: u32 = 2;
 
 /// The value of `mirrorstats.recording`; the store adds the seeds and fingerprints. `condition` is absent for the default
@@ -20,11 +25,12 @@ const VERSION: u32 = 2;
 /// Episodes with equal scenes are pairs. A seed is no cluster: each of its runs has a room of its own.
 pub fn recording(config: &WorldConfig, player: &dyn Player, condition: Option<&str>) -> Value {
     json!({
-        "version": VERSION,
+        VERSION_KEY: VERSION,
         "kind": "recording",
         "design": { "pairs": "scene", "cluster": null },
         "condition": condition.unwrap_or("default"),
         "scene_version": SCENE_VERSION,
+        "palette": Color::ALL.map(Color::name),
         "agent": player.description(),
         "view": { "width": config.eye.width, "height": config.eye.height_px, "fov_y": config.eye.fovy },
         "visibility_threshold_px": config.evidence.mirror_self_px,

@@ -21,6 +21,7 @@
 //! | [`error`] | why a folder cannot be used, why an episode did not come to its end |
 //! | [`failures`] | the list of episodes that failures kept from being recorded |
 //! | [`replies`] | how many replies gave no decision |
+//! | [`unusable`] | when an agent that cannot answer ends its recording |
 //! | [`run`] | threads, episodes under way, stopping |
 //! | [`shares`] | what took the time |
 //!
@@ -42,3 +43,4 @@ pub mod rollout;
 pub mod run;
 pub mod shares;
 pub mod store;
+pub mod unusable;

@@ -58,8 +58,7 @@ impl Replies {
             return None;
         }
         let is_first_in_time = found.first.is_none();
-        let text = row.extra.reply.as_deref().filter(|text| !text.trim().is_empty()).map(beginning);
-        let reply = UnreadableReply { episode_id: key.episode_id(subject), step, status: status.to_owned(), text };
+        let reply = UnreadableReply::of(subject, key, step, row, status);
         found.first = Some((key, step, reply.clone()));
         is_first_in_time.then_some(reply)
     }
@@ -80,6 +79,14 @@ impl Replies {
 
     fn found(&self) -> MutexGuard<'_, Found> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl UnreadableReply {
+    /// The reply of a step, which has this status.
+    pub(super) fn of(subject: &Subject, key: Key, step: i32, row: &Step, status: &str) -> Self {
+        let text = row.extra.reply.as_deref().filter(|text| !text.trim().is_empty()).map(beginning);
+        Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text }
     }
 }
 

@@ -2,10 +2,10 @@
 //!
 //! A thread has one eye and one queue of its own; where agents wait for a network or a program, several of its episodes
 //! are under way, and the eye serves whichever is ready. A scripted agent never waits, so that its episode runs to its
-//! end in one go.
+//! end in one go. An agent that cannot answer stops the recording, as Ctrl-C does.
 
 use std::cell::RefCell;
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -19,6 +19,7 @@ use super::queue::{Held, Next, Queue};
 use super::rollout::{self, Observer, Played, Stage};
 use super::shares::Shares;
 use super::store::Store;
+use super::unusable::{GivenUp, Unusable};
 use crate::agent::{Ended, Player};
 use crate::replay::log::{Log, Seen};
 use crate::sim::camera::Camera;
@@ -53,6 +54,8 @@ pub struct Settings {
     pub frames: bool,
     /// Whether a log is written.
     pub log: bool,
+    /// Replies in a row without a decision that end the recording; `None` for no number.
+    pub max_unusable: Option<NonZeroU32>,
 }
 
 /// What became of the episodes.
@@ -68,6 +71,8 @@ pub struct Tally {
     pub elsewhere: Vec<Key>,
     /// The recording was stopped before its end.
     pub stopped: bool,
+    /// Why it was, if the agent could not answer.
+    pub given_up: Option<GivenUp>,
 }
 
 /// One recording under way: what its threads share.
@@ -97,15 +102,18 @@ impl Recording<'_> {
     /// The first failure that every episode would meet; episodes committed before it stay.
     pub fn run(&self, keys: &[Key]) -> Result<Tally, RecordError> {
         let queue = Queue::new(self.store, keys);
+        let unusable = Unusable::new(self.settings.max_unusable);
         let in_flight = self.settings.in_flight.get();
         let threads = self.settings.threads.get().min(in_flight).min(keys.len().max(1));
         let results = std::thread::scope(|scope| {
-            let queue = &queue;
+            let (queue, unusable) = (&queue, &unusable);
             let share = |at| in_flight / threads + usize::from(at < in_flight % threads);
-            let workers: Vec<_> = (0..threads).map(|at| scope.spawn(move || self.thread(queue, share(at)))).collect();
+            let workers: Vec<_> =
+                (0..threads).map(|at| scope.spawn(move || self.thread(queue, unusable, share(at)))).collect();
             workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
         });
-        let mut tally = Tally { elsewhere: queue.elsewhere(), stopped: queue.has_more(), ..Tally::default() };
+        let (elsewhere, given_up) = (queue.elsewhere(), unusable.given_up());
+        let mut tally = Tally { elsewhere, given_up, stopped: queue.has_more(), ..Tally::default() };
         for result in results {
             let part = result?;
             tally.recorded.extend(part.recorded);
@@ -119,9 +127,9 @@ impl Recording<'_> {
     }
 
     /// One thread: its eye, and up to `each` episodes under way.
-    fn thread(&self, queue: &Queue<'_>, each: usize) -> Result<Tally, RecordError> {
+    fn thread(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let start = Instant::now();
-        let result = self.episodes(queue, each);
+        let result = self.episodes(queue, unusable, each);
         self.shares.thread(start);
         if result.is_err() {
             self.stop.store(true, Ordering::Relaxed);
@@ -129,7 +137,7 @@ impl Recording<'_> {
         result
     }
 
-    fn episodes(&self, queue: &Queue<'_>, each: usize) -> Result<Tally, RecordError> {
+    fn episodes(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let is_needed = self.settings.frames || self.player.looks();
         let start = Instant::now();
         let eye =
@@ -140,7 +148,7 @@ impl Recording<'_> {
         runtime.block_on(async {
             let play = |key, lock| {
                 let eye = eye.as_ref();
-                async move { (key, self.episode(key, lock, eye).await) }
+                async move { (key, self.episode(key, lock, eye, unusable).await) }
             };
             let mut under_way = FuturesUnordered::new();
             loop {
@@ -188,7 +196,13 @@ impl Recording<'_> {
     }
 
     /// One episode, from its scene to its commit.
-    async fn episode(&self, key: Key, _lock: EpisodeLock, eye: Option<&RefCell<Camera>>) -> Result<usize, RecordError> {
+    async fn episode(
+        &self,
+        key: Key,
+        _lock: EpisodeLock,
+        eye: Option<&RefCell<Camera>>,
+        unusable: &Unusable,
+    ) -> Result<usize, RecordError> {
         let start = Instant::now();
         let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
         let episode = rollout::head(self.config, &scene, key, self.subject);
@@ -203,8 +217,7 @@ impl Recording<'_> {
         } else {
             None
         };
-        let frames = self.settings.frames;
-        let mut observer = Observers { key, progress: self.progress, shares: self.shares, frames, log };
+        let mut observer = Observers { key, recording: self, unusable, in_a_row: 0, log };
         let played = rollout::play(&stage, &mut world, agent.as_mut(), key, episode, &mut observer).await;
         let committed = match &played {
             Ok(played) => self.commit(key, played, observer.log),
@@ -268,13 +281,13 @@ fn panicked() -> RecordError {
     RecordError::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
 }
 
-/// Counts steps, and writes the log if there is one.
+/// Counts steps and unusable replies, and writes the log if there is one.
 struct Observers<'a> {
     key: Key,
-    progress: &'a dyn Progress,
-    shares: &'a Shares,
-    /// Whether the log has frames.
-    frames: bool,
+    recording: &'a Recording<'a>,
+    unusable: &'a Unusable,
+    /// The episode's unusable replies in a row so far.
+    in_a_row: u32,
     log: Option<Log>,
 }
 
@@ -282,19 +295,25 @@ impl Observer for Observers<'_> {
     fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError> {
         let start = Instant::now();
         if let Some(log) = &mut self.log {
-            log.seen(&Seen { frame: seen.frame.filter(|_| self.frames), ..*seen }).map_err(RecordError::fatal)?;
+            let frame = seen.frame.filter(|_| self.recording.settings.frames);
+            log.seen(&Seen { frame, ..*seen }).map_err(RecordError::fatal)?;
         }
-        self.shares.writing(start);
+        self.recording.shares.writing(start);
         Ok(())
     }
 
     fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError> {
-        self.progress.step(self.key, t, row);
+        let Recording { subject, progress, shares, stop, .. } = self.recording;
+        progress.step(self.key, t, row);
+        if self.unusable.add(subject, self.key, t, row, &mut self.in_a_row) {
+            stop.store(true, Ordering::Relaxed);
+            return Err(RecordError::Stopped);
+        }
         let start = Instant::now();
         if let Some(log) = &mut self.log {
             log.done(t, row).map_err(RecordError::fatal)?;
         }
-        self.shares.writing(start);
+        shares.writing(start);
         Ok(())
     }
 }

@@ -255,7 +255,7 @@ mod tests {
             repairs: [("fence".to_owned(), 5), ("case".to_owned(), 2)].into(),
             latencies: [(100, 30), (900, 10)].into(),
             prompt_tokens: Total { replies: 40, sum: 48_000 },
-            completion_tokens: Total { replies: 40, sum: 3_220 },
+            completion_tokens: Total { replies: 40, sum: 3_240 },
             cost_nano_usd: Total { replies: 40, sum: 12_345_678 },
         };
         let untold = Quality { episodes: 1, steps: 7, ..Quality::default() };
@@ -276,7 +276,7 @@ mod tests {
         let table = QualityTable::of(&cells("near")).unwrap();
         insta::assert_snapshot!(table.csv(), @r"
         experiment,model,condition,episodes,lost,steps,replies,ok,repaired,parse_failed,schema_invalid,refusal,truncated,empty,rate_limited,server_error,timeout,unusable,other_status,repairs,latency_median_ms,latency_95_ms,prompt_tokens,completion_tokens,cost_usd
-        E1,'=m,near,2,1,40,40,30,6,0,0,4,0,0,0,0,0,4,0,case 2; fence 5,100,900,48000,3220,0.012345678
+        E1,'=m,near,2,1,40,40,30,6,0,0,4,0,0,0,0,0,4,0,case 2; fence 5,100,900,48000,3240,0.012345678
         E1,n_1,near,1,,7,,,,,,,,,,,,,,,,,,,
         ");
         assert!(table.latex().contains(r"n\_1 & near & 1 & "), "{}", table.latex());

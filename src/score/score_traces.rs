@@ -99,7 +99,9 @@ pub fn schema_columns() -> Columns {
         let level = if column.constant { Level::Episode } else { Level::Step };
         type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
     };
-    let mut columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
+    let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
+    let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
+    let mut columns = columns.with_values(lists);
     set_fallbacks(&mut columns, |_| false);
     COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
     columns

@@ -96,6 +96,36 @@ fn repairs_are_named_and_change_no_word() {
     }
 }
 
+#[test]
+fn a_lone_surrogate_is_a_repair_and_a_pair_is_none() {
+    use Repair::{CodeFence, SingleQuotes, Surrogate, SurroundingText};
+    let with = |escape: &str| GOOD.replace("a wall", &format!("a wall {escape}!"));
+    let seen = |raw: &str| {
+        let reading = read(raw);
+        assert_eq!((reading.action, reading.fault), (Some(Action::TurnLeft), None), "{raw}");
+        (reading.status, reading.repairs, reading.words.view_description.unwrap())
+    };
+    let repaired = |repairs: Vec<Repair>, text: &str| (Status::Repaired, repairs, text.to_owned());
+    for escape in [r"\ud800", r"\uDBFF", r"\udc00", r"\udfff"] {
+        assert_eq!(seen(&with(escape)), repaired(vec![Surrogate], "a wall \u{fffd}!"), "{escape}");
+    }
+    assert_eq!(seen(&with(r"\ude00\ud83d")), repaired(vec![Surrogate], "a wall \u{fffd}\u{fffd}!"));
+    assert_eq!(seen(&with(r"\ud83d\ud83d\ude00")), repaired(vec![Surrogate], "a wall \u{fffd}\u{1f600}!"));
+    assert_eq!(seen(&with(r"\ud83d\ude00")), (Status::Ok, Vec::new(), "a wall \u{1f600}!".to_owned()));
+    assert_eq!(seen(&with(r"\\ud83d")), (Status::Ok, Vec::new(), r"a wall \ud83d!".to_owned()));
+    let cut = with(r"\ud83d");
+    for (raw, repairs) in [
+        (format!("```json\n{cut}\n```"), vec![CodeFence, Surrogate]),
+        (format!("I see: {cut}"), vec![SurroundingText, Surrogate]),
+        (cut.replace('"', "'"), vec![SingleQuotes, Surrogate]),
+    ] {
+        assert_eq!(seen(&raw), repaired(repairs, "a wall \u{fffd}!"), "{raw}");
+    }
+    assert_eq!(Repair::joined(&[CodeFence, Surrogate]).as_deref(), Some("code_fence+surrogate"));
+    // What cannot be read is no better for it.
+    assert_eq!(read(r"I see \ud83d").status, Status::ParseFailed);
+}
+
 /// A whole reply that decides otherwise than [`GOOD`].
 fn draft() -> String {
     GOOD.replace("\"action\": \"a\"", "\"action\": \"w\"")

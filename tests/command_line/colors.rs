@@ -264,13 +264,13 @@ fn what_a_footer_declares_is_all_there_is() {
     for (claim, help) in [
         ("Teal", "did you mean `teal`?"),
         ("magneta", "did you mean `magenta`?"),
-        ("red", "use a name of the palette, or correct the palette in the footer"),
+        ("red", "use a name of the palette, or add the colour to the palette"),
         ("none", "`unknown`, or null where the reply gave none"),
     ] {
         write(&at.join("b.parquet"), Colors { claims: [None, None, None, Some(claim)], ..sound }, Some(palette));
         let (code, found) = findings(at, &["b.parquet"]);
         assert_eq!((code, found.len(), &found[0]["code"]), (1, 1, &json!("invalid-color")), "{claim}");
-        assert_eq!(found[0]["expected"], "a colour of the palette in the footer (teal, magenta), `unknown`, or null");
+        assert_eq!(found[0]["expected"], "a colour of the palette (teal, magenta), `unknown`, or null");
         assert_eq!(found[0]["help"], help);
         let message = refused(at, &["b.parquet"]);
         assert!(message.contains(&format!("found `{claim}`\n  help: {help}")), "{message}");

@@ -27,6 +27,15 @@ fn a_filter_that_keeps_nothing_is_refused_with_the_values_there_are() {
 }
 
 #[test]
+fn a_filter_by_a_value_that_a_column_never_has_is_refused_at_the_value() {
+    let folder = two_files();
+    let said = run(folder.path(), &["score", ".", "--where", "any(action = 'turn_lft')"]).refused();
+    let expected = "error: `action` never is 'turn_lft'\n --> --where:1:14\n";
+    assert!(said.starts_with(expected) && said.contains("^^^^^^^^^^ not one of its values"), "{said}");
+    assert!(said.contains("help: did you mean 'turn_left'?"), "{said}");
+}
+
+#[test]
 fn a_table_for_programs_may_be_empty_and_a_note_says_why() {
     let folder = two_files();
     let answer = run(folder.path(), &["score", "a.parquet", "--where", "seed = 9", "--metrics", "TSA"]);

@@ -293,7 +293,7 @@ fn base_knows_no_arrow_starts_no_thread_and_opens_files_to_replace_them_alone() 
 }
 
 /// Files outside `trace` that open files, or read Parquet; none of them opens a trace.
-const OPENS_OTHER_FILES: [&str; 12] = [
+const OPENS_OTHER_FILES: [&str; 13] = [
     // Files that appear whole or not at all.
     "src/base/replace/",
     // Logs.
@@ -311,6 +311,8 @@ const OPENS_OTHER_FILES: [&str; 12] = [
     "src/study/scores.rs",
     // Whether a trace is still the file that was read; locks.
     "src/record/",
+    // The files that an agent's command names, for their hashes.
+    "src/agent/exec/files.rs",
     // Answers of models.
     "src/agent/vlm/journal.rs",
 ];

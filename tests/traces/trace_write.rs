@@ -110,6 +110,37 @@ fn repairs_have_a_column_where_replies_are_read() {
 }
 
 #[test]
+fn a_palette_in_the_recording_holds_for_what_is_written() {
+    let metadata = |palette: serde_json::Value| TraceMetadata {
+        recording: Some(serde_json::json!({ "palette": palette })),
+        ..TraceMetadata::default()
+    };
+    let claiming = |id: &str, color: &str| {
+        let mut episode = Episode { body_color: "teal".into(), ..episode(id, 1) };
+        episode.steps[0].self_color = Some(color.into());
+        episode
+    };
+    let mut encoder = TraceEncoder::new(Vec::new(), &metadata(serde_json::json!(["teal", "magenta"]))).unwrap();
+    for color in ["teal", "magenta", "unknown"] {
+        encoder.write(&claiming(color, color)).unwrap();
+    }
+    for (color, help) in [
+        ("magneta", "did you mean `magenta`?"),
+        ("Teal", "did you mean `teal`?"),
+        ("red", "use a name of the palette, or add the colour to the palette"),
+        ("none", "`unknown`, or null where the reply gave none"),
+    ] {
+        let error = encoder.write(&claiming("x", color)).unwrap_err().to_string();
+        let why = format!(
+            "expected `self_color` to be a colour of the palette (teal, magenta), `unknown`, or null, found `{color}` ({help})"
+        );
+        assert!(error.contains(&why), "{error}");
+    }
+    let error = TraceEncoder::new(Vec::new(), &metadata(serde_json::json!(["Teal"]))).err().unwrap().to_string();
+    assert!(error.contains("`palette` in `mirrorstats.recording` to be a list of lower-case names"), "{error}");
+}
+
+#[test]
 fn an_id_is_taken_once() {
     let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata::default()).unwrap();
     encoder.write(&episode("a", 1)).unwrap();

@@ -5,6 +5,7 @@
 //! | [`message`] | the lines that a program is sent |
 //! | [`program`] | running it, and the names of what can go wrong |
 //! | [`group`] | that nothing of it stays behind |
+//! | [`files`] | the files that the command names, by what they hold |
 //!
 //! One process plays one episode. A reply is read as that of a model is: what is not the object asked for is a step
 //! without a decision. A program that ends, hangs or talks out of turn loses its episode, as a broken network does.
@@ -12,6 +13,7 @@
 //! Rule: a program sees the words and the frame that a model gets. It inherits the environment, keys included, but no
 //! value of a variable that holds a key is kept of what it says.
 
+pub mod files;
 pub mod group;
 pub mod message;
 pub mod program;
@@ -24,6 +26,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use tempfile::TempDir;
 
+use self::files::Unreadable;
 use self::group::Groups;
 use self::message::{EndMessage, Image, Message, ObservationMessage, PROTOCOL, Position, TaskMessage};
 use self::program::{Failure, Program};
@@ -83,6 +86,8 @@ pub struct Exec {
 #[derive(Debug)]
 struct Shared {
     settings: Settings,
+    /// The hash of the files that the command names, as they are when the recording starts.
+    files: Option<String>,
     groups: Arc<Groups>,
     secrets: Vec<Secret>,
     /// Why no further episode makes sense, once there is such a reason.
@@ -91,9 +96,13 @@ struct Shared {
 
 impl Exec {
     /// A player that runs the command once per episode.
-    pub fn new(settings: Settings) -> Self {
+    ///
+    /// # Errors
+    /// When a file that the command names cannot be read.
+    pub fn new(settings: Settings) -> Result<Self, Unreadable> {
+        let files = files::fingerprint(&settings.command)?;
         let (groups, secrets, stop) = (Arc::default(), from_every_key_variable(), OnceLock::new());
-        Self { shared: Arc::new(Shared { settings, groups, secrets, stop }) }
+        Ok(Self { shared: Arc::new(Shared { settings, files, groups, secrets, stop }) })
     }
 }
 
@@ -102,12 +111,14 @@ impl Player for Exec {
         &self.shared.settings.model
     }
 
-    /// The command by its hash: as typed it may hold paths of a machine, or a key.
+    /// The command by its hash, as typed it may hold paths of a machine, or a key; the files that it names by theirs, null
+    /// if it names none.
     fn description(&self) -> serde_json::Value {
         let Settings { model, command, images, .. } = &self.shared.settings;
         serde_json::json!({
             "exec": model,
             "command": hash::of_bytes(command.as_bytes()),
+            "files": self.shared.files,
             "protocol": PROTOCOL,
             "images": images.name(),
             "prompts": prompt::hashes(),

@@ -13,12 +13,15 @@
 
 mod object;
 mod repair;
+mod surrogates;
 mod thoughts;
 
 use serde_json::{Value, json};
 
 use repair::NoObject;
 pub use repair::Repair;
+#[cfg(feature = "sim")]
+pub(in crate::agent) use surrogates::without_lone_surrogates;
 
 use super::{Family, Reply, Status, Usage, Words, prompt};
 use crate::base::palette::Color;
@@ -67,6 +70,17 @@ impl Reading {
             self_color: None,
             words: Words::default(),
         }
+    }
+
+    /// The same where what carried the text had a lone surrogate in it, which is part of the reply's repairs.
+    #[cfg(feature = "sim")]
+    #[must_use]
+    pub(in crate::agent) fn with_surrogate_repaired(mut self) -> Self {
+        if matches!(self.status, Status::Ok | Status::Repaired) && !self.repairs.contains(&Repair::Surrogate) {
+            self.repairs.insert(0, Repair::Surrogate);
+            self.status = Status::Repaired;
+        }
+        self
     }
 
     /// The reply of an agent: this reading, the text it was read from, and what that cost.

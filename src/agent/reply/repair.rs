@@ -1,11 +1,13 @@
-//! The repairs a reply may get before it counts as unreadable, each with a name, none of which changes a word.
+//! The repairs a reply may get before it counts as unreadable, each with a name, none of which changes a word: half a
+//! character that was cut in two is none.
 //!
 //! They come in a fixed order, each on top of those before it, until the text is one JSON object:
 //! take the text out of a code fence; drop the thoughts before the answer, and take that out of a code fence; take the one
 //! object out of the text around it; drop commas before a closing bracket; turn strings in single quotes into strings in
-//! double quotes.
+//! double quotes; put U+FFFD in the place of a lone surrogate.
 
 use super::object::Object;
+use super::surrogates::without_lone_surrogates;
 use super::thoughts::{self, Thoughts};
 
 /// What was repaired.
@@ -21,6 +23,8 @@ pub enum Repair {
     TrailingComma,
     /// Strings were in single quotes.
     SingleQuotes,
+    /// A string had half of a pair of surrogates (`\ud83d` without `\ude00`), which is no character.
+    Surrogate,
 }
 
 impl Repair {
@@ -32,6 +36,7 @@ impl Repair {
             Self::SurroundingText => "surrounding_text",
             Self::TrailingComma => "trailing_comma",
             Self::SingleQuotes => "single_quotes",
+            Self::Surrogate => "surrogate",
         }
     }
 }
@@ -74,13 +79,14 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
     };
     let mut text = raw.trim().to_owned();
     let mut repairs = Vec::new();
-    let steps: [(Repair, Change); 6] = [
+    let steps: [(Repair, Change); 7] = [
         (Repair::CodeFence, without_fence),
         (Repair::Thoughts, without_thoughts),
         (Repair::CodeFence, without_fence),
         (Repair::SurroundingText, without_surroundings),
         (Repair::TrailingComma, without_trailing_commas),
         (Repair::SingleQuotes, with_double_quotes),
+        (Repair::Surrogate, without_lone_surrogates),
     ];
     for (repair, change) in steps {
         if repair == Repair::Thoughts {

@@ -99,8 +99,9 @@ impl VlmAgent {
                     completion_tokens: count(answer.completion_tokens),
                     cost_usd,
                 };
-                let reply = reply::read(&answer.text, self.task.family, answer.ending).into_reply(answer.text, usage);
-                Ok(Reply { model: answer.model, ..reply })
+                let reading = reply::read(&answer.text, self.task.family, answer.ending);
+                let reading = if answer.has_lone_surrogate { reading.with_surrogate_repaired() } else { reading };
+                Ok(Reply { model: answer.model, ..reading.into_reply(answer.text, usage) })
             }
         }
     }

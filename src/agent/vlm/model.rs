@@ -158,7 +158,7 @@ impl Vlm {
 
     /// What a body says, and what it cost.
     pub(super) fn read(&self, body: &str) -> Option<(Answer, Option<f64>)> {
-        let answer = self.choice.backend.dialect.answer(&serde_json::from_str(body).ok()?)?;
+        let answer = self.choice.backend.dialect.read(body).ok()??;
         let cost = answer
             .cost_usd
             .or_else(|| self.choice.model.prices.cost_usd(answer.prompt_tokens?, answer.completion_tokens?));

@@ -183,9 +183,8 @@ impl Provider {
             return Err(server(format!("expected the content type application/json, found {found}")));
         }
         let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
-        let value: Value =
-            serde_json::from_str(&text).map_err(|fault| server(format!("the answer is not JSON: {fault}")))?;
-        let answer = self.dialect.answer(&value).ok_or_else(|| server(unexpected(&self.without_secret(&text))))?;
+        let answer = self.dialect.read(&text).map_err(|fault| server(format!("the answer is not JSON: {fault}")))?;
+        let answer = answer.ok_or_else(|| server(unexpected(&self.without_secret(&text))))?;
         Ok(self.received(answer, text, latency))
     }
 
@@ -197,7 +196,7 @@ impl Provider {
         if !ABOUT_CONTENT.contains(&status) {
             return None;
         }
-        let answer = self.dialect.answer(&serde_json::from_str(said).ok()?)?;
+        let answer = self.dialect.read(said).ok()??;
         (answer.ending == Ending::Refused).then_some(answer)
     }
 

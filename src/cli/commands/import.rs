@@ -1,6 +1,7 @@
 //! `mirrorstats import`: JSON lines of steps, of whatever harness, as a trace.
 
 use std::fmt;
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -13,7 +14,8 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
 use crate::study::known_experiments;
-use crate::trace::import::{self, Text};
+use crate::trace::colors::palette::Palette;
+use crate::trace::import::{self, Limits, Text};
 use crate::trace::inputs::Input;
 use crate::trace::schema::Kind;
 
@@ -33,6 +35,10 @@ pub struct ImportArgs {
     /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
     definitions: String,
+    /// The colours that there are, which the trace then declares: names with commas between them, a file of names, or
+    /// `default`, the ten colours of the study
+    #[arg(long, value_name = "NAMES|FILE|default")]
+    palette: Option<String>,
     /// Answer as JSON
     #[arg(long)]
     json: bool,
@@ -71,8 +77,10 @@ impl ImportArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let experiments = known_experiments(&self.definitions)?;
         self.check_places()?;
+        let palette = self.palette.as_deref().map(palette).transpose()?;
+        let limits = Limits { experiments: experiments.as_deref(), palette: palette.as_ref() };
         let mut texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
-        let imported = import::import(&mut texts, &self.out, experiments.as_deref()).map_err(Failure::input)?;
+        let imported = import::import(&mut texts, &self.out, limits).map_err(Failure::input)?;
         let own = imported.own.into_iter().map(|own| OwnColumn { name: own.name, kind: own.kind });
         let answer = ImportAnswer {
             out: Input::new(&self.out).name,
@@ -91,8 +99,25 @@ impl ImportArgs {
             return Err(Failure::Rendered(words.to_owned()));
         }
         replace::check_target(&self.out, &self.steps, "the steps themselves").map_err(Failure::input)?;
-        output::check_target(&self.out, [&self.definitions])
+        output::check_target(&self.out, [&self.definitions].into_iter().chain(&self.palette))
     }
+}
+
+/// The palette that is typed, or in the file that is named. A text with a comma is no name of a file.
+fn palette(typed: &str) -> Result<Palette, Failure> {
+    if typed == "default" {
+        return Ok(Palette::of_study());
+    }
+    let is_file = !typed.contains(',') && (typed.contains(['/', '\\', '.']) || Path::new(typed).is_file());
+    let names = if is_file {
+        fs::read_to_string(typed)
+            .map_err(|error| Failure::input(format!("--palette {typed}: cannot read it: {error}")))?
+    } else {
+        typed.to_owned()
+    };
+    let names = names.split([',', '\n']).map(str::trim).filter(|name| !name.is_empty());
+    let help = "name the colours with commas between them, or in a file one per line; or `default`";
+    Palette::of_names(names).map_err(|fault| Failure::input(format!("--palette {typed}: {fault}\n  help: {help}")))
 }
 
 fn text(path: &Path) -> Result<Text, Failure> {

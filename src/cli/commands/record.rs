@@ -1,7 +1,7 @@
 //! `mirrorstats record`: agents in the mirror world, one trace and one log per model and experiment.
 
 use std::collections::BTreeSet;
-use std::num::NonZeroUsize;
+use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,8 +31,8 @@ use crate::sim::config::WorldConfig;
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
 /// The same command again continues where it stopped. Several at once divide the episodes among themselves. Ctrl-C ends a
-/// recording when the steps under way are done, a second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's, and
-/// with 130 if it was interrupted.
+/// recording when the steps under way are done, a second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's,
+/// with 2 if the agent could not go on, and with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
 pub struct RecordArgs {
@@ -64,6 +64,12 @@ pub struct RecordArgs {
     /// Episodes under way at once [default: as many as the agent makes worth while]
     #[arg(long, value_name = "N")]
     in_flight: Option<NonZeroUsize>,
+    /// Stop after this many replies in a row without a decision
+    #[arg(long, value_name = "N", default_value = "20", conflicts_with = "keep_going")]
+    max_unusable: NonZeroU32,
+    /// Go on however many replies in a row give no decision
+    #[arg(long)]
+    keep_going: bool,
     /// Write no log
     #[arg(long)]
     no_log: bool,
@@ -162,7 +168,7 @@ impl RecordArgs {
         assembled.map_err(Failure::input)?;
         let missing: BTreeSet<Key> = todo.iter().copied().collect();
         let found: Vec<Key> = planned.iter().copied().filter(|key| !missing.contains(key)).collect();
-        let Tally { recorded, elsewhere, lost, steps, stopped } = tally;
+        let Tally { recorded, elsewhere, lost, steps, stopped, given_up } = tally;
         let all = [found.as_slice(), &recorded, &elsewhere].concat();
         let lost_here = lost.len();
         let lost = store.note_lost(&all, lost).map_err(Failure::input)?;
@@ -184,7 +190,10 @@ impl RecordArgs {
         if self.json {
             output::print_json(&answer)?;
         }
-        outcome_of(&answer, player)
+        match player.stopped().or_else(|| given_up.map(|given_up| given_up.to_string())) {
+            Some(reason) => Err(Failure::input(reason)),
+            None => Ok(outcome_of(&answer)),
+        }
     }
 
     fn player(&self) -> Result<Arc<dyn Player>, Failure> {
@@ -215,19 +224,17 @@ impl RecordArgs {
             }),
             frames: !self.no_frames,
             log: !self.no_log,
+            max_unusable: (!self.keep_going).then_some(self.max_unusable),
         }
     }
 }
 
-/// How a recording that ran to its end, or was stopped, is told from outside.
-fn outcome_of(answer: &RecordAnswer, player: &dyn Player) -> Result<Outcome, Failure> {
-    if let Some(reason) = player.stopped() {
-        return Err(Failure::input(reason));
-    }
+/// How a recording that ran to its end, or was interrupted, is told from outside.
+fn outcome_of(answer: &RecordAnswer) -> Outcome {
     match (answer.stopped, answer.lost.is_empty()) {
-        (true, _) => Ok(Outcome::Interrupted),
-        (false, true) => Ok(Outcome::Done),
-        (false, false) => Ok(Outcome::CheckFailed),
+        (true, _) => Outcome::Interrupted,
+        (false, true) => Outcome::Done,
+        (false, false) => Outcome::CheckFailed,
     }
 }
 

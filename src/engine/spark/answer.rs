@@ -157,6 +157,7 @@ mod tests {
     use crate::engine::spark::source::Sources;
     use crate::metric::definitions::Definitions;
     use crate::score::score_traces::schema_columns;
+    use crate::trace::colors::palette::Palette;
     use crate::trace::diagnostic::Code;
 
     #[test]
@@ -177,5 +178,22 @@ mod tests {
             );
             assert!(found.ends_with("\n  found `Red\\u{a0}`\n  help: did you mean `red`?"), "{found}");
         }
+    }
+
+    #[test]
+    fn a_color_outside_of_the_palette_is_refused_with_the_nearest_one() {
+        let definitions = Definitions::load("paper", &schema_columns()).unwrap();
+        let palette = Palette::of_names(["teal", "magenta"]).ok();
+        let sources = Sources::Files { names: vec!["a.parquet".to_owned()], groups: Vec::new(), rows: 1, palette };
+        let job = Job { definitions: &definitions, labels: &[], sources: &sources };
+        let columns = request::columns(&definitions.plan, &[]);
+        let names = columns.iter().map(|(name, _)| name.as_str());
+        let rules = check::rules(names, &definitions.catalog, sources.palette());
+        let is_wanted = |rule: &check::Rule| rule.code == Code::InvalidColor && rule.column == "body_color";
+        let rule = rules.iter().position(is_wanted).unwrap();
+        let fault = Fault { episode: Some("e".to_owned()), rule, found: "`magneta`".to_owned() };
+        let expected = "invalid-color: a.parquet, episode `e`, column `body_color`\n  \
+                        expected a colour of the palette (teal, magenta)\n  found `magneta`\n  help: did you mean `magenta`?";
+        assert_eq!(finding(fault, job).unwrap().to_string(), expected);
     }
 }

@@ -192,7 +192,7 @@ mod tests {
             [experiment."\\' UNION SELECT * FROM secrets -- "]
             title = "x"
             [metric.M]
-            value = "any(action = '\\'' FROM secrets; --' or regexp_like(self_color, '`secrets`\\''|--'))"
+            value = "any(selected_cube = '\\'' FROM secrets; --' or regexp_like(self_color, '`secrets`\\''|--'))"
             "#;
         let definitions = [
             Definitions::load("paper", &schema_columns()),

@@ -131,9 +131,11 @@ impl Scope<'_, '_> {
     }
 
     pub(super) fn null_if(&mut self, value: &Expr, other: &Expr, whole: &Expr) -> Option<Bound> {
-        let (value, other) = (self.bind(value), self.bind(other));
-        let value = value?;
-        let equal = self.compared(Comparison::Equal, value, other?, whole)?;
+        let (a, b) = (self.bind(value), self.bind(other));
+        let (a, b) = (a?, b?);
+        self.check_equality((a, value), (b, other))?;
+        let (value, other) = (a, b);
+        let equal = self.compared(Comparison::Equal, value, other, whole)?;
         let ty = value.ty.unwrap_or(Type::Bool);
         let null = self.null_of(ty);
         Some(

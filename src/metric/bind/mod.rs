@@ -7,6 +7,7 @@
 mod calls;
 mod scope;
 mod types;
+mod values;
 
 use std::collections::HashMap;
 

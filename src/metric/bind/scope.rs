@@ -57,7 +57,7 @@ impl Scope<'_, '_> {
                 Some(self.negated_if(*negated, is))
             }
             ExprKind::Distinct { left, right, negated } => {
-                let (left, right) = self.pair(left, right, expr, "compared")?;
+                let (left, right) = self.pair(left, right, expr)?;
                 let distinct = self.combine(&[left, right], Type::Bool, |nodes| Op::Distinct(nodes[0], nodes[1]));
                 Some(self.negated_if(*negated, distinct))
             }
@@ -69,10 +69,14 @@ impl Scope<'_, '_> {
                 let between = self.combine(&[above?, below?], Type::Bool, |nodes| Op::And(nodes[0], nodes[1]));
                 Some(self.negated_if(*negated, between))
             }
-            ExprKind::InList { operand, list, negated } => {
-                let operand = self.bind(operand);
+            ExprKind::InList { operand: asked, list, negated } => {
+                let operand = self.bind(asked);
                 let items: Vec<_> = list.iter().map(|item| self.bind(item)).collect();
                 let (operand, items) = (operand?, items.into_iter().collect::<Option<Vec<Bound>>>()?);
+                let checked: Vec<_> = (items.iter().zip(list))
+                    .map(|(item, written)| self.check_equality((operand, asked), (*item, written)))
+                    .collect();
+                checked.into_iter().collect::<Option<()>>()?;
                 let equal: Vec<_> =
                     items.into_iter().map(|item| self.compared(Comparison::Equal, operand, item, expr)).collect();
                 let equal: Vec<Bound> = equal.into_iter().collect::<Option<_>>()?;
@@ -183,8 +187,10 @@ impl Scope<'_, '_> {
         right: &Expr,
         whole: &Expr,
     ) -> Option<Bound> {
-        let (left, right) = (self.bind(left), self.bind(right));
-        self.compared(comparison, left?, right?, whole)
+        let (a, b) = (self.bind(left), self.bind(right));
+        let (a, b) = (a?, b?);
+        self.check_comparison(comparison, (a, left), (b, right))?;
+        self.compared(comparison, a, b, whole)
     }
 
     /// A comparison of two operands that have been bound, each once however often it is compared.
@@ -252,13 +258,15 @@ impl Scope<'_, '_> {
         otherwise: Option<&Expr>,
         whole: &Expr,
     ) -> Option<Bound> {
-        let operand = operand.map(|operand| self.bind(operand));
+        let operand = operand.map(|operand| (self.bind(operand), operand));
         let whens: Vec<Option<Bound>> = branches
             .iter()
             .map(|(when, _)| match operand {
-                Some(operand) => {
+                Some((operand, asked)) => {
                     let bound = self.bind(when);
-                    self.compared(Comparison::Equal, operand?, bound?, when)
+                    let (operand, bound) = (operand?, bound?);
+                    self.check_equality((operand, asked), (bound, when))?;
+                    self.compared(Comparison::Equal, operand, bound, when)
                 }
                 None => self.truth(when),
             })

@@ -153,9 +153,12 @@ impl Scope<'_, '_> {
         Some((bounds?, ty))
     }
 
-    pub(super) fn pair(&mut self, left: &Expr, right: &Expr, whole: &Expr, what: &str) -> Option<(Bound, Bound)> {
-        let (left, right) = (self.bind(left), self.bind(right));
-        let (both, _) = self.unified(&[left?, right?], whole, what)?;
+    /// Two operands that are asked to be the same.
+    pub(super) fn pair(&mut self, left: &Expr, right: &Expr, whole: &Expr) -> Option<(Bound, Bound)> {
+        let (a, b) = (self.bind(left), self.bind(right));
+        let (a, b) = (a?, b?);
+        self.check_equality((a, left), (b, right))?;
+        let (both, _) = self.unified(&[a, b], whole, "compared")?;
         Some((both[0], both[1]))
     }
 }

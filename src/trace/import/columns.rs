@@ -6,6 +6,7 @@
 use indexmap::IndexMap;
 
 use super::fault::{Fault, Place};
+use super::limits::Limits;
 use super::line::{Members, Value};
 use crate::base::suggest::nearest;
 use crate::trace::schema::rules::{Known, Requirement, Rule, rules_of};
@@ -45,13 +46,13 @@ const SEE: &str = "`mirrorstats schema step` prints what a step may hold";
 
 impl Columns {
     /// Checks a line against the schema and against the lines before it.
-    pub(super) fn check(&mut self, members: &Members, place: &Place, experiments: Option<&[String]>) -> Vec<Fault> {
+    pub(super) fn check(&mut self, members: &Members, place: &Place, limits: Limits<'_>) -> Vec<Fault> {
         let mut faults = Vec::new();
         for (key, value) in members {
             let fault = match schema::column(key) {
                 Some(column) => {
                     self.note_known(column);
-                    misfit(column, value, experiments)
+                    misfit(column, value, limits)
                 }
                 None => self.check_own(key, value, place),
             };
@@ -163,7 +164,7 @@ fn kind_of(value: &Value) -> Result<Option<Kind>, Box<Fault>> {
 }
 
 /// What is wrong with the value of a column of the schema, if anything is.
-fn misfit(column: &Column, value: &Value, experiments: Option<&[String]>) -> Option<Fault> {
+fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
     let refused = |help: &str| Some(Fault::new(expected(column), value.shown(), help));
     match (column.stored.kind(), value) {
         (_, Value::Null) if column.nullable => None,
@@ -186,7 +187,8 @@ fn misfit(column: &Column, value: &Value, experiments: Option<&[String]>) -> Opt
             }
         }
         (Kind::String, Value::Text(text)) => {
-            let rules = rules_of(column, Known { palette: None, experiments });
+            let Limits { experiments, palette } = limits;
+            let rules = rules_of(column, Known { palette, experiments });
             rules.iter().find(|rule| !rule.allows(text)).map(|rule| odd_text(column, rule, text, value.shown()))
         }
         _ => refused(SEE),

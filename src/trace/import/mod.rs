@@ -15,6 +15,7 @@ mod columns;
 mod error;
 mod fault;
 mod index;
+mod limits;
 mod line;
 mod rows;
 pub mod schema;
@@ -29,11 +30,13 @@ use serde_json::json;
 pub use columns::Own;
 pub use error::ImportError;
 pub use fault::Fault;
+pub use limits::Limits;
 pub use text::Text;
 
 use super::diagnostic::Severity;
 use super::error::TraceError;
 use super::inputs::Input;
+use super::schema::colors::palette::Palette;
 use super::validate::validate;
 use super::write::unwritable;
 use crate::base::replace::NewFile;
@@ -54,25 +57,25 @@ pub struct Imported {
     pub own: Vec<Own>,
 }
 
-/// Makes the trace at `out` of the steps in these texts; experiments are checked against `experiments` if it is given.
+/// Makes the trace at `out` of the steps in these texts, whose values are held against `limits`.
 ///
 /// # Errors
 /// [`ImportError::Faults`] for lines that are no steps and for episodes that are not whole; a text that cannot be read
 /// again; whatever `validate` finds in what was written. There is no file at `out` then that was not there before.
-pub fn import(texts: &mut [Text], out: &Path, experiments: Option<&[String]>) -> Result<Imported, ImportError> {
+pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Imported, ImportError> {
     let mut columns = Columns::default();
     let mut index = Index::default();
     let mut faults = Faults::default();
     for (at, text) in texts.iter_mut().enumerate() {
-        survey(at, text, experiments, &mut columns, &mut index, &mut faults)?;
+        survey(at, text, limits, &mut columns, &mut index, &mut faults)?;
     }
     faults.extend(columns.faults());
     faults.none()?;
     let names: Vec<_> = texts.iter().map(Text::shared_name).collect();
     let steps = index.into_steps(&names, &mut faults);
     faults.none()?;
-    let file = write(texts, &columns, &steps, out)?;
-    check(&file, out, experiments)?;
+    let file = write(texts, &columns, &steps, out, limits.palette)?;
+    check(&file, out, limits.experiments)?;
     file.commit().map_err(|error| unwritable(out, error))?;
     Ok(Imported {
         episodes: steps.chunk_by(|a, b| a.episode == b.episode).count(),
@@ -86,7 +89,7 @@ pub fn import(texts: &mut [Text], out: &Path, experiments: Option<&[String]>) ->
 fn survey(
     at: usize,
     text: &mut Text,
-    experiments: Option<&[String]>,
+    limits: Limits<'_>,
     columns: &mut Columns,
     index: &mut Index,
     faults: &mut Faults,
@@ -102,7 +105,7 @@ fn survey(
                 continue;
             }
         };
-        let found = columns.check(&members, &line.place, experiments);
+        let found = columns.check(&members, &line.place, limits);
         if found.is_empty() {
             faults.extend(index.add(at, &line, &members));
         }
@@ -120,9 +123,18 @@ fn survey(
 }
 
 /// The second pass: the rows of every episode, in a temporary file beside `out`.
-fn write(texts: &mut [Text], columns: &Columns, steps: &[index::Step], out: &Path) -> Result<NewFile, ImportError> {
+fn write(
+    texts: &mut [Text],
+    columns: &Columns,
+    steps: &[index::Step],
+    out: &Path,
+    palette: Option<&Palette>,
+) -> Result<NewFile, ImportError> {
     let hashes = texts.iter_mut().map(Text::hash).collect::<Result<Vec<_>, _>>()?;
-    let recording = json!({ "kind": "import", "sources": hashes });
+    let mut recording = json!({ "kind": "import", "sources": hashes });
+    if let Some(palette) = palette {
+        recording["palette"] = json!(palette.names());
+    }
     let file = NewFile::create(out).map_err(|error| unwritable(out, error))?;
     let failed = |error: ParquetError| TraceError::Write { file: out.display().to_string(), source: Box::new(error) };
     let mut rows = rows::Rows::new(file, columns, &recording).map_err(failed)?;

@@ -151,7 +151,7 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
 /// For what the schema forbids, as [`TraceEncoder::write`](super::TraceEncoder::write).
 pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows, TraceError> {
     let (columns, undeclared) = columns.split();
-    write::check(episode, &undeclared)?;
+    write::check(episode, &undeclared, None)?;
     let mut gathered = Gathered::of_columns(columns.iter().copied());
     write::gather(&mut gathered, &columns, episode);
     let rows = gathered.take().map_err(TraceError::Memory)?;

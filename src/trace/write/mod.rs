@@ -1,6 +1,7 @@
 //! Writes traces: whole episodes into row groups, and a file that appears whole or not at all.
 //!
-//! Rule: what this writer makes passes `validate` without a note, and the same episodes give the same bytes.
+//! Rule: what this writer makes passes `validate` without a note, and the same episodes give the same bytes. A palette that
+//! the recording declares holds for what is written, too.
 //! The optional columns of a file are declared when it is created, so that memory stays flat; a value for a
 //! column that was not declared is refused, never dropped.
 
@@ -18,6 +19,7 @@ use parquet::errors::ParquetError;
 use self::row_groups::{Gathered, RowGroups};
 use super::episode::Episode;
 use super::error::TraceError;
+use super::schema::colors::palette::{Declared, Palette};
 use super::schema::rules::{Known, Requirement, Rule, rules_of};
 use super::schema::{COLUMNS, Column, Value};
 use crate::base::escape::visible;
@@ -90,6 +92,7 @@ pub struct TraceEncoder<W: Write + Send> {
     columns: Vec<&'static Column>,
     gathered: Gathered,
     undeclared: Vec<&'static Column>,
+    palette: Option<Palette>,
     seen: HashSet<String>,
 }
 
@@ -97,21 +100,24 @@ impl<W: Write + Send> TraceEncoder<W> {
     /// Starts a trace.
     ///
     /// # Errors
-    /// Whatever writing gives.
+    /// For a `palette` of the recording that is no list of colours, and whatever writing gives.
     pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        let recording = metadata.recording.as_ref().map(ToString::to_string);
+        let palette = Declared::of("stream", recording.as_deref()).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
         let file = RowGroups::new(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
-        Ok(Self { file, columns, gathered, undeclared, seen: HashSet::new() })
+        Ok(Self { file, columns, gathered, undeclared, palette, seen: HashSet::new() })
     }
 
     /// Adds an episode; t is 1, 2, ... in the order of its steps.
     ///
     /// # Errors
     /// [`TraceError::Refused`] for what the schema forbids: no step, an id that was there before, an empty name, a
-    /// negative count, a value in an optional column that was not declared. Otherwise whatever writing gives.
+    /// negative count, a colour outside of the palette, a value in an optional column that was not declared. Otherwise
+    /// whatever writing gives.
     pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
-        check(episode, &self.undeclared)?;
+        check(episode, &self.undeclared, self.palette.as_ref())?;
         if !self.seen.insert(episode.episode_id.clone()) {
             return refused(episode, "an id of its own".into(), "the id of an episode before it".into());
         }
@@ -138,16 +144,16 @@ fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episod
     gathered.rows += episode.steps.len();
 }
 
-fn check(episode: &Episode, undeclared: &[&'static Column]) -> Result<(), TraceError> {
+fn check(episode: &Episode, undeclared: &[&'static Column], palette: Option<&Palette>) -> Result<(), TraceError> {
     let steps = episode.steps.len();
     if steps == 0 || i32::try_from(steps).is_err() {
         return refused(episode, format!("1 to {} steps", i32::MAX), steps.to_string());
     }
     for column in COLUMNS {
-        let rules = rules_of(column, Known::default());
+        let rules = rules_of(column, Known { palette, experiments: None });
         let broken = |value| rules.iter().find(|rule| !rule.allows_value(value)).map(|rule| (rule, value));
         if let Some((rule, value)) = column.of_steps(episode).flatten().find_map(broken) {
-            return refused(episode, format!("`{}` {}", column.name, expected(rule)), shown(value));
+            return refused(episode, format!("`{}` {}", column.name, expected(rule)), found(rule, value));
         }
     }
     match undeclared.iter().find(|column| has_value(column, episode)) {
@@ -166,6 +172,16 @@ fn expected(rule: &Rule<'_>) -> String {
         Requirement::Count => "not to be below zero".to_owned(),
         Requirement::OneOf(_) => format!("to be one of {}", rule.expected()),
         _ => format!("to be {}", rule.expected()),
+    }
+}
+
+/// What breaks a rule, and for a colour what to write instead.
+fn found(rule: &Rule<'_>, value: Value<'_>) -> String {
+    match (rule.asks, value) {
+        (Requirement::Color(color, palette), Value::Text(text)) => {
+            format!("{} ({})", shown(value), color.help(text, palette))
+        }
+        _ => shown(value),
     }
 }
 

@@ -162,7 +162,7 @@ fn the_example_in_python_plays() {
 fn replies_of_a_program_that_cannot_be_read_are_told() {
     let bench = Bench::new();
     bench.program("printf 'I go \\033[31mon.\\n'");
-    let output = bench.record(&[]).output().unwrap();
+    let output = bench.record(&["--keep-going"]).output().unwrap();
     let (code, answer, said) = outcome(&output);
     assert_eq!(code, Some(0), "{said}");
     assert!(

@@ -1,9 +1,12 @@
 //! Programs that fail: their episode is lost, named, counted, and recorded by the same command later.
 
+use std::fs;
 use std::time::Instant;
 
 use super::recordings::{Bench, FORWARD, done, outcome, three_steps};
+use crate::harness::files::{assert_same, contents};
 use crate::harness::program::run;
+use crate::harness::traces::recording;
 
 /// That a program which does this at its second observation loses its episode, for a reason with these words.
 fn loses(answer: &str, words: &[&str], expected: &[&str]) {
@@ -94,6 +97,33 @@ fn another_command_is_another_agent() {
 }
 
 #[test]
+fn an_edited_program_is_another_agent() {
+    let bench = Bench::new();
+    bench.program(&three_steps());
+    assert_eq!(outcome(&bench.record(&["--runs", "2", "--shard", "1/2"]).output().unwrap()).0, Some(0));
+    let script = fs::read(bench.path("program.sh")).unwrap();
+    let before = contents(&bench.path("runs"));
+    let footer = recording(&bench.path("runs/E1-exec.parquet"))["agent"].clone();
+    // One line: the place of the word and the hash of what the file holds.
+    let hash = |bytes: &[u8]| mirrorstats::base::hash::of_bytes(bytes);
+    assert_eq!(footer["files"], hash(format!("2 {}\n", hash(&script)).as_bytes()));
+    assert!(!footer.to_string().contains("program.sh"), "{footer}");
+
+    bench.program(&format!(": edited; {}", three_steps()));
+    for more in [&["--runs", "2"][..], &["--runs", "2", "--dry-run"]] {
+        let (code, _, said) = outcome(&bench.record(more).output().unwrap());
+        assert_eq!(code, Some(2), "{said}");
+        assert!(said.contains("the program's files changed since `runs/E1-exec.parquet` was recorded (agent.files: "));
+        assert!(said.contains("help: put the files back as they were, or record into another folder"), "{said}");
+        assert_same(&contents(&bench.path("runs")), &before);
+    }
+    // With the files as they were it goes on.
+    fs::write(bench.path("program.sh"), script).unwrap();
+    let (code, answer, said) = outcome(&bench.record(&["--runs", "2"]).output().unwrap());
+    assert_eq!((code, &answer["found"], &answer["recorded"]), (Some(0), &1.into(), &1.into()), "{said}");
+}
+
+#[test]
 fn no_key_of_the_environment_is_kept_of_what_a_program_says() {
     let bench = Bench::new();
     let key = "sk-loopback-0123456789";
@@ -126,7 +156,9 @@ fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     };
     bench.program(&fails("[24]"));
     let words = ["--runs", "4", "--threads", "1"];
-    let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
+    // Its file is not named by a word, so that another one is the same agent.
+    let record = |words: &[&str]| bench.record_of("exec:sh -c '. ./program.sh'", words).output().unwrap();
+    let (code, answer, said) = outcome(&record(&words));
     assert_eq!((code, &answer["recorded"]), (Some(1), &2.into()), "{said}");
     assert!(said.contains("lost 2 episodes") && said.contains("lost.jsonl"), "{said}");
     let runs = |bench: &Bench| bench.lost().iter().map(|lost| lost["run"].as_i64().unwrap()).collect::<Vec<_>>();
@@ -139,11 +171,11 @@ fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
 
     // One of them is recorded, another is lost again; a run that asks for neither leaves the list as it is.
     bench.program(&fails("4"));
-    assert_eq!(outcome(&bench.record(&words).output().unwrap()).0, Some(1));
+    assert_eq!(outcome(&record(&words)).0, Some(1));
     assert_eq!(runs(&bench), [4]);
-    assert_eq!(outcome(&bench.record(&["--runs", "1"]).output().unwrap()).0, Some(0));
+    assert_eq!(outcome(&record(&["--runs", "1"])).0, Some(0));
     assert_eq!(runs(&bench), [4]);
     bench.program(&three_steps());
-    assert_eq!(outcome(&bench.record(&words).output().unwrap()).0, Some(0));
+    assert_eq!(outcome(&record(&words)).0, Some(0));
     assert_eq!(bench.leftovers(), Vec::<String>::new());
 }

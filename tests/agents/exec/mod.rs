@@ -7,3 +7,4 @@ mod failures;
 mod processes;
 mod recordings;
 mod spending;
+mod unusable;

@@ -65,6 +65,31 @@ fn replies_end_in_their_status_with_every_provider() {
 }
 
 #[test]
+fn a_lone_surrogate_in_an_answer_is_a_repair_with_every_provider() {
+    for dialect in PROVIDERS {
+        // The text of the answer, and its first escape in the body itself or in the reply within.
+        for (escape, text) in [(r"\ud83d", "\u{fffd}"), (r"\\ud83d", "\u{fffd}"), (r"\ud83d\ude00", "\u{1f600}")] {
+            let body = spoken(dialect, &decision("w").replace("a wall", "HERE"), endings(dialect).0).to_string();
+            let answer = http("200 OK", JSON, body.replace("HERE", escape).as_bytes());
+            let bench = Bench::new(Limits::default());
+            let server = Server::start(move |_, _| answer.clone());
+            let vlm = bench.vlm(&server, dialect, OnOutage::StandStill);
+            // The second time from the journal.
+            for _ in 0..2 {
+                let reply = Bench::play(&vlm, "E1-m-s1-r1", 1).remove(0).unwrap();
+                let is_pair = text != "\u{fffd}";
+                let expected =
+                    if is_pair { (Status::Ok, None) } else { (Status::Repaired, Some("surrogate".to_owned())) };
+                assert_eq!((reply.status, Repair::joined(&reply.repairs)), expected, "{escape}, {dialect:?}");
+                assert_eq!(reply.words.view_description.as_deref(), Some(text), "{escape}, {dialect:?}");
+                assert_eq!(reply.self_color.as_deref(), Some("red"));
+            }
+            assert_eq!(server.count(), 1, "{escape}, {dialect:?}");
+        }
+    }
+}
+
+#[test]
 fn failures_of_the_server_end_in_their_status_with_every_provider() {
     for dialect in PROVIDERS {
         let fine = whole(dialect, &decision("w"));

@@ -26,7 +26,7 @@ fn a_recording_of_which_nothing_could_be_read_says_so_everywhere() {
     let reply = format!("I go on.\n\u{1b}[31m{KEY} {}", "on and ".repeat(100));
     let server = Server::start(move |_, _| whole(Dialect::OpenaiCompatible, &reply));
     let folder = short();
-    let output = folder.record(&server, "own", "--seeds 2 --runs 5 --json").output().unwrap();
+    let output = folder.record(&server, "own", "--seeds 2 --runs 5 --json --keep-going").output().unwrap();
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(0), "{said}");
     let start = r"`I go on.\u{a}\u{1b}[31m[key] on and on and";

@@ -83,7 +83,9 @@ fn the_footer_says_what_replay_must_know_and_nothing_of_the_machine() {
     let bench = Bench::new();
     bench.recorded("runs", "--agent random --experiment E1 --seeds 2 --runs 1");
     let (_, recording) = read(&bench, "runs/E1-random.parquet");
-    assert_eq!(recording["version"], 1);
+    assert_eq!(recording["version"], 2);
+    let colors = ["blue", "brown", "cyan", "green", "orange", "pink", "purple", "red", "white", "yellow"];
+    assert_eq!(recording["palette"], json!(colors));
     assert_eq!(recording["view"], json!({ "width": 64, "height": 48, "fov_y": 110.0 }));
     assert_eq!(recording["visibility_threshold_px"], 60);
     assert_eq!(recording["agent"], json!({ "scripted": "random" }));

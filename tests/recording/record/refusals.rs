@@ -1,10 +1,15 @@
 //! What cannot be recorded is refused with one sentence and its remedy, and leaves nothing behind.
 
 use std::fs;
+use std::path::Path;
+
+use mirrorstats::trace::merge;
+use serde_json::{Value, json};
 
 use super::recordings::Bench;
 use crate::harness::files::{assert_same, fixture};
-use crate::harness::program::stderr;
+use crate::harness::program::{run, stderr};
+use crate::harness::traces::{episodes, recording};
 
 /// That this is refused with these words, and with nothing else said.
 fn refused(bench: &Bench, out: &str, words: &str, expected: &[&str]) {
@@ -82,6 +87,54 @@ fn episodes_of_another_world_or_another_agent_are_not_mixed() {
         &words.replace("random", "frozen"),
         &["agent.scripted", "expected \"frozen\", found \"random\""],
     );
+}
+
+/// Changes what the trace says of its recording.
+fn alter(trace: &Path, change: impl FnOnce(&mut serde_json::Map<String, Value>)) {
+    let mut recording = recording(trace);
+    change(recording.as_object_mut().unwrap());
+    merge::write(trace, Some(&recording), &merge::read(trace).unwrap()).unwrap();
+}
+
+#[test]
+fn a_recording_without_a_palette_is_of_another_version() {
+    let bench = Bench::new();
+    let words = "--agent random --experiment E1 --seeds 1 --runs 1";
+    bench.recorded("runs", words);
+    let trace = bench.path("runs/E1-random.parquet");
+    alter(&trace, |recording| {
+        recording.remove("palette");
+        recording["version"] = 1.into();
+    });
+    let before = bench.files("runs");
+    let expected = [
+        "`runs/E1-random.parquet` is a recording of version 1, and this mirrorstats records version 2",
+        "help: go on with the mirrorstats that began it, or record into another folder",
+    ];
+    refused(&bench, "runs", &words.replace("--runs 1", "--runs 2"), &expected);
+    assert_same(&bench.files("runs"), &before);
+    // It can be scored and replayed as before.
+    run(bench.folder.path(), &["score", "runs"]).done();
+    run(bench.folder.path(), &["replay", "runs/E1-random.parquet"]).done();
+}
+
+#[test]
+fn a_colour_outside_of_the_palette_is_refused_wherever_the_recording_is_read() {
+    let bench = Bench::new();
+    bench.recorded("runs", "--agent random --experiment E1 --seeds 1 --runs 1");
+    let trace = bench.path("runs/E1-random.parquet");
+    let body = episodes(&trace).remove(0).body_color;
+    // A palette without the body's colour, and with one that is like it.
+    let near = format!("{body}s");
+    alter(&trace, |recording| recording["palette"] = json!([near, "unheard"]));
+    for verb in ["score", "stats"] {
+        let said = run(bench.folder.path(), &[verb, "runs"]).refused();
+        let expected = format!("a colour of the palette ({near}, unheard)\n  found `{body}` (");
+        assert!(said.contains("invalid-color: runs/E1-random.parquet") && said.contains(&expected), "{said}");
+        assert!(said.contains(&format!("help: did you mean `{near}`?")), "{said}");
+    }
+    let checked = run(bench.folder.path(), &["validate", "runs"]).ends(1);
+    assert!(checked.stdout.contains(&format!("did you mean `{near}`?")), "{}", checked.stdout);
 }
 
 #[test]

@@ -113,7 +113,7 @@ fn a_folder_that_is_no_report_is_refused() {
     assert!(said.contains("expected a report's folder"), "{said}");
     let manifest = fs::read_to_string(at.join("old/manifest.json")).unwrap();
     for (from, to, expected) in [
-        ("\"schema_version\": 1", "\"schema_version\": 99", "newer than 1"),
+        ("\"schema_version\": 2", "\"schema_version\": 99", "newer than 2"),
         ("\"path\": \"a.parquet\"", "\"path\": \"/etc/a.parquet\"", "leads out of its folder"),
         ("\"path\": \"a.parquet\"", "\"path\": \"../a.parquet\"", "leads out of its folder"),
         ("\"inputs\"", "\"sources\"", "missing field `inputs`"),

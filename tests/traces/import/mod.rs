@@ -1,5 +1,6 @@
 //! `mirrorstats import` at the process boundary: what becomes a trace, and that nothing else does.
 
+mod palette;
 mod refusals;
 mod round_trip;
 

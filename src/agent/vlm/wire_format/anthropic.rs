@@ -39,6 +39,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let usage = &body["usage"];
     Some(Answer {
         text: words.collect(),
+        has_lone_surrogate: false,
         ending,
         prompt_tokens: tokens(&usage["input_tokens"]),
         completion_tokens: tokens(&usage["output_tokens"]),

@@ -56,6 +56,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let completion = [&usage["candidatesTokenCount"], &usage["thoughtsTokenCount"]].map(tokens);
     Some(Answer {
         text: first.map(words).unwrap_or_default(),
+        has_lone_surrogate: false,
         ending,
         prompt_tokens: tokens(&usage["promptTokenCount"]),
         completion_tokens: match completion {

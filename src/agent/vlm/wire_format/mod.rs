@@ -11,7 +11,7 @@ mod refusal;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::agent::reply::Ending;
+use crate::agent::reply::{Ending, without_lone_surrogates};
 
 /// A language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -51,6 +51,8 @@ pub struct Question<'a> {
 pub struct Answer {
     /// The text of the reply; empty where there is none.
     pub text: String,
+    /// Whether the body had a lone surrogate in it, for which the text has U+FFFD.
+    pub has_lone_surrogate: bool,
     /// How it ended.
     pub ending: Ending,
     /// Tokens of the request, where counted.
@@ -99,6 +101,21 @@ impl Dialect {
             Self::Gemini => gemini::body(question),
             Self::AnthropicMessages => anthropic::body(question),
         }
+    }
+
+    /// What the text of a body says; lone surrogates in it are replaced, which strict JSON does not have. `None` if it is
+    /// not of this language.
+    ///
+    /// # Errors
+    /// When the text is not JSON.
+    pub fn read(self, body: &str) -> serde_json::Result<Option<Answer>> {
+        let fault = match serde_json::from_str(body) {
+            Ok(value) => return Ok(self.answer(&value)),
+            Err(fault) => fault,
+        };
+        let value = without_lone_surrogates(body).and_then(|body| serde_json::from_str(&body).ok()).ok_or(fault)?;
+        let of_reply = |answer: Answer| Answer { has_lone_surrogate: answer.text.contains('\u{fffd}'), ..answer };
+        Ok(self.answer(&value).map(of_reply))
     }
 
     /// What the body of an answer says; `None` if it is not of this language. An error that refuses what the request is

@@ -38,6 +38,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let (reply, ending) = choices.first().map_or((String::new(), Ending::Whole), reply);
     Some(Answer {
         text: reply,
+        has_lone_surrogate: false,
         ending,
         prompt_tokens: tokens(&usage["prompt_tokens"]),
         completion_tokens: tokens(&usage["completion_tokens"]),

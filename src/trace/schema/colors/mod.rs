@@ -58,7 +58,7 @@ impl ColorColumn {
     /// What the column holds, for a message.
     pub(crate) fn expected(self, palette: Option<&Palette>) -> String {
         let colors = match palette {
-            Some(palette) => format!("a colour of the palette in the footer ({})", palette.names().join(", ")),
+            Some(palette) => format!("a colour of the palette ({})", palette.names().join(", ")),
             None => "the lower-case name of a colour".to_owned(),
         };
         let word = self.word.map(|word| format!(", `{word}`")).unwrap_or_default();
@@ -78,7 +78,7 @@ impl ColorColumn {
         let Some(palette) = palette else { return did_you_mean(study_color(text).unwrap_or(&likely)) };
         match palette.nearest(text) {
             Some(color) => did_you_mean(color),
-            None => "use a name of the palette, or correct the palette in the footer".to_owned(),
+            None => "use a name of the palette, or add the colour to the palette".to_owned(),
         }
     }
 }
@@ -150,16 +150,13 @@ mod tests {
         for (text, help) in [
             ("Teal", "did you mean `teal`?"),
             ("magneta", "did you mean `magenta`?"),
-            ("red", "use a name of the palette, or correct the palette in the footer"),
+            ("red", "use a name of the palette, or add the colour to the palette"),
         ] {
             assert!(!body.may_hold(text, Some(&palette)), "{text}");
             assert_eq!(body.help(text, Some(&palette)), help);
         }
         assert!(!body.may_hold("unknown", Some(&palette)));
-        assert_eq!(
-            claim.expected(Some(&palette)),
-            "a colour of the palette in the footer (teal, magenta), `unknown`, or null"
-        );
+        assert_eq!(claim.expected(Some(&palette)), "a colour of the palette (teal, magenta), `unknown`, or null");
         assert_eq!(body.expected(None), "the lower-case name of a colour");
     }
 }

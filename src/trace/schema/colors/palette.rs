@@ -5,7 +5,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use serde_json::Value;
 
-use super::spelling::{WORDS, is_well_spelled, most_like};
+use super::spelling::{WORDS, did_you_mean, is_well_spelled, most_like, normal, study_color};
 use crate::base::escape::visible;
 use crate::base::palette::Color;
 use crate::trace::diagnostic::{Code, Finding};
@@ -14,6 +14,22 @@ use crate::trace::schema::RECORDING_KEY;
 /// The colours of a recording; never empty.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Palette(Vec<String>);
+
+/// Why names are no palette.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum NoPalette {
+    #[error("expected at least one colour, found none")]
+    Empty,
+    #[error("expected lower-case names of colours, found `{}`{}", visible(found), hint(meant.as_deref()))]
+    NoColor { found: String, meant: Option<String> },
+    #[error("expected each colour once, found `{0}` twice")]
+    Twice(String),
+}
+
+fn hint(meant: Option<&str>) -> String {
+    meant.map_or_else(String::new, |meant| format!("; {}", did_you_mean(meant)))
+}
 
 /// The colours that a file declares.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -59,10 +75,36 @@ impl Palette {
         Self(names)
     }
 
+    /// The ten colours of the study.
+    pub fn of_study() -> Self {
+        Self(Color::ALL.map(|color| color.name().to_owned()).to_vec())
+    }
+
+    /// The palette of these names, in their order.
+    ///
+    /// # Errors
+    /// For no name at all, one that is not spelled as colours are, `none`, `unknown`, and a name that is there twice.
+    pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, NoPalette> {
+        let mut palette: Vec<String> = Vec::new();
+        for name in names {
+            if !is_color(name) {
+                let meant = Some(study_color(name).map_or_else(|| normal(name), str::to_owned));
+                return Err(NoPalette::NoColor {
+                    found: name.to_owned(),
+                    meant: meant.filter(|meant| is_color(meant)),
+                });
+            }
+            if palette.iter().any(|before| before == name) {
+                return Err(NoPalette::Twice(name.to_owned()));
+            }
+            palette.push(name.to_owned());
+        }
+        if palette.is_empty() { Err(NoPalette::Empty) } else { Ok(Self(palette)) }
+    }
+
     fn read(file: &str, palette: &Value) -> Result<Self, Box<Finding>> {
         let names: Option<Vec<String>> = serde_json::from_value(palette.clone()).ok();
-        let is_color = |name: &String| !name.is_empty() && !WORDS.contains(&name.as_str()) && is_well_spelled(name);
-        match names.filter(|names| !names.is_empty() && names.iter().all(is_color)) {
+        match names.filter(|names| !names.is_empty() && names.iter().all(|name| is_color(name))) {
             Some(names) => Ok(Self(names)),
             None => Err(Box::new(invalid(file, palette))),
         }
@@ -79,7 +121,7 @@ impl Palette {
     }
 
     /// The names, in the order of the footer.
-    pub(crate) fn names(&self) -> &[String] {
+    pub fn names(&self) -> &[String] {
         &self.0
     }
 
@@ -94,6 +136,11 @@ impl Palette {
     }
 }
 
+/// Whether a name may stand in a palette.
+fn is_color(name: &str) -> bool {
+    !name.is_empty() && !WORDS.contains(&name) && is_well_spelled(name)
+}
+
 fn invalid(file: &str, palette: &Value) -> Finding {
     const LONGEST: usize = 80;
     let shown: String = palette.to_string().chars().take(LONGEST).collect();
@@ -104,7 +151,8 @@ fn invalid(file: &str, palette: &Value) -> Finding {
 
 #[cfg(test)]
 mod tests {
-    use super::Declared;
+    use super::{Declared, Palette};
+    use crate::base::palette::Color;
 
     #[test]
     fn a_palette_is_read_where_there_is_one() {
@@ -126,6 +174,23 @@ mod tests {
         assert!(!has(r#"{"kind":"import"}"#, "pink"));
         assert!(has(r#"{"scene_version":1,"palette":["teal"]}"#, "teal"));
         assert!(!has(r#"{"scene_version":1,"palette":["teal"]}"#, "pink"));
+    }
+
+    #[test]
+    fn names_are_a_palette_or_it_is_said_why_not() {
+        let palette = |names: &[&'static str]| Palette::of_names(names.iter().copied());
+        assert_eq!(palette(&["teal", "dark red"]).unwrap().names(), ["teal", "dark red"]);
+        assert_eq!(Palette::of_study(), palette(&Color::ALL.map(Color::name)).unwrap());
+        for (names, words) in [
+            (&[][..], "expected at least one colour, found none"),
+            (&["Teal"], "expected lower-case names of colours, found `Teal`; did you mean `teal`?"),
+            (&["re d"], "expected lower-case names of colours, found `re d`; did you mean `red`?"),
+            (&["none"], "expected lower-case names of colours, found `none`"),
+            (&[""], "expected lower-case names of colours, found ``"),
+            (&["red", "red"], "expected each colour once, found `red` twice"),
+        ] {
+            assert_eq!(palette(names).unwrap_err().to_string(), words);
+        }
     }
 
     #[test]

@@ -1,0 +1,86 @@
+//! Programs that cannot answer: the recording ends and says so, whole episodes stay, and no other one is committed.
+
+use std::fs;
+
+use super::recordings::{Bench, FORWARD, outcome, three_steps};
+use crate::harness::program::program;
+
+/// The sentence about the program of these tests.
+fn sentence(in_a_row: u32, last: &str) -> String {
+    format!(
+        "error: the agent `exec` gave {in_a_row} replies in a row without a decision; the last: {last}\n  \
+         help: --max-unusable N allows more in a row, --keep-going any number"
+    )
+}
+
+#[test]
+fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
+    let bench = Bench::new();
+    bench.program("echo 'I cannot see.'");
+    let words = ["--runs", "2", "--threads", "1"];
+    let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    let last = "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 20)";
+    assert!(said.contains(&sentence(20, last)), "{said}");
+    assert_eq!((&answer["recorded"], &answer["steps"], &answer["stopped"]), (&0.into(), &0.into(), &true.into()));
+    assert!(!bench.path("runs/E1-exec.parquet").exists() && bench.lost().is_empty());
+    // The program was told, and its episode is nowhere.
+    assert_eq!(bench.heard().last().unwrap()["reason"], "stopped");
+    assert_eq!(bench.leftovers(), Vec::<String>::new());
+
+    let few = [&words[..], &["--max-unusable", "3"]].concat();
+    let (code, _, said) = outcome(&bench.record(&few).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains(&sentence(3, "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 3)")), "{said}");
+
+    let all = [&words[..], &["--keep-going"]].concat();
+    let (code, answer, said) = outcome(&bench.record(&all).output().unwrap());
+    assert_eq!((code, &answer["recorded"], &answer["steps"]), (Some(0), &2.into(), &40.into()), "{said}");
+}
+
+#[test]
+fn replies_in_a_row_count_over_episodes_and_whole_ones_stay() {
+    let bench = Bench::new();
+    // The first episode ends with two replies that are none; the second has nothing else.
+    let first = format!("case $n in 1[0-8]|?) echo '{FORWARD}' ;; *) echo no ;; esac");
+    bench.program(&format!("[ $n = 1 ] && echo x >> count; if [ $(wc -l < count) = 1 ]; then {first}; else echo; fi"));
+    let words = ["--runs", "3", "--threads", "1", "--max-unusable", "4"];
+    let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains(&sentence(4, "empty: no text (E1/exec/s1/r2, step 2)")), "{said}");
+    assert_eq!((&answer["recorded"], &answer["steps"]), (&1.into(), &20.into()), "{said}");
+    assert_eq!(bench.texts("runs/E1-exec.parquet", "episode_id").len(), 20);
+    assert!(said.contains("stopped, 2 episodes to go: the same command continues"), "{said}");
+}
+
+#[test]
+fn one_episode_in_flight_that_cannot_answer_is_enough() {
+    let bench = Bench::new();
+    // The second episode never answers; the first does, and takes its time.
+    bench.program(&format!("if [ \"$run\" = 2 ]; then echo no; else sleep 0.05; echo '{FORWARD}'; fi"));
+    let script = fs::read_to_string(bench.path("program.sh")).unwrap();
+    let task = "case \"$line\" in *'/r2\"'*) run=2 ;; esac\n  case \"$line\" in";
+    fs::write(bench.path("program.sh"), script.replacen("case \"$line\" in", task, 1)).unwrap();
+    let words = ["--runs", "2", "--threads", "1", "--in-flight", "2", "--max-unusable", "6"];
+    let (code, _, said) = outcome(&bench.record(&words).output().unwrap());
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.contains(&sentence(6, "parse_failed: `no` (E1/exec/s1/r2, step 6)")), "{said}");
+    assert!(!bench.path("runs/E1-exec.parquet").exists());
+}
+
+#[test]
+fn the_limit_is_a_number_from_one_or_none() {
+    let bench = Bench::new();
+    bench.program(&three_steps());
+    for (words, expected) in [
+        (&["--max-unusable", "0"][..], "--max-unusable"),
+        (&["--max-unusable", "5", "--keep-going"], "cannot be used with"),
+    ] {
+        let (code, _, said) = outcome(&bench.record(words).output().unwrap());
+        assert!(code == Some(2) && said.contains(expected), "{said}");
+    }
+    // A scripted agent never meets it.
+    let words = "record --agent frozen --no-frames --no-log --config small.toml --experiment E1 --seeds 1 --runs 1 --max-unusable 1";
+    let output = program(bench.folder.path()).args(words.split(' ')).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+}

@@ -321,7 +321,7 @@ impl Study {
     /// # Errors
     /// As [`Study::statistics`].
     pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
-        let results = self.score()?;
+        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;
         let episodes = self.counted(results).results.episodes;
         let options = Options { design: design_of(&episodes.declared), ..options.clone() };

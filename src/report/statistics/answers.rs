@@ -1,6 +1,7 @@
 //! The answers that a reader came for, a line each: who is above chance, who differs from whom, what the mirror changes.
 //!
-//! Rule: an answer names what a test shows after Holm's adjustment, and nothing else; the numbers stand in the tables.
+//! Rule: an answer names what a test shows after Holm's adjustment, and nothing else; the numbers stand in the tables. What
+//! would not fit into a line is counted.
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
@@ -10,6 +11,9 @@ use super::chance::COMPLETED;
 use super::compare::Sign;
 use super::study::named;
 use super::{ChanceRow, Contrast, Family, Role, Statistics, Verdict};
+
+/// The most pairs that an experiment's answer names; more are counted.
+const MOST_NAMED: usize = 6;
 
 /// One question about one metric, and its answer over all experiments.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -42,7 +46,7 @@ pub(super) fn answers(statistics: &Statistics) -> Vec<Answer> {
         let families = statistics.models.iter().filter(|family| family.metric == *metric);
         let overall: Vec<_> = statistics.overall.iter().filter(|row| row.metric == *metric).collect();
         let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
-        let overall = (!overall.is_empty()).then(|| differing("over all experiments", separated));
+        let overall = (!overall.is_empty()).then(|| differing("over all experiments", overall.len(), separated));
         let parts: Vec<String> = families.map(differing_in).chain(overall).collect();
         answers.extend(Answer::new("Who differs from whom?", metric, &parts));
     }
@@ -88,11 +92,15 @@ fn names(models: &[String], all: usize) -> String {
 
 fn differing_in(family: &Family) -> String {
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
-    differing(&family.experiment, separated.map(|test| (&*test.first, &*test.second)))
+    differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)))
 }
 
-/// The separated pairs, by the better model.
-fn differing<'n>(about: &str, separated: impl Iterator<Item = (&'n str, &'n str)>) -> String {
+/// The separated pairs of `all`, by the better model.
+fn differing<'n>(about: &str, all: usize, separated: impl Iterator<Item = (&'n str, &'n str)>) -> String {
+    let separated: Vec<_> = separated.collect();
+    if separated.len() > MOST_NAMED {
+        return format!("{about} {} of {all} pairs", separated.len());
+    }
     let mut better: IndexMap<&str, Vec<&str>> = IndexMap::new();
     for (first, second) in separated {
         better.entry(first).or_default().push(second);
@@ -118,14 +126,16 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast]) -> String {
         found.map(|contrast| named(&contrast.model, contrast.condition.as_deref())).collect()
     };
     let phrase = |what: &str, sign| {
-        let models = those(sign);
+        let models = those(Some(sign));
         (!models.is_empty()).then(|| format!("{what} {}", names(&models, group.len())))
     };
-    let parts = [
-        phrase("higher for", Some(Sign::Higher)),
-        phrase("lower for", Some(Sign::Lower)),
-        phrase("no change shown for", None),
-    ];
+    let rest = those(None).len();
+    let unshown = match (rest, group.len()) {
+        (0, _) => None,
+        (rest, all) if rest == all => Some("no change shown".to_owned()),
+        (rest, _) => Some(format!("no change shown for {rest} more")),
+    };
+    let parts = [phrase("higher for", Sign::Higher), phrase("lower for", Sign::Lower), unshown];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     format!("{baseline} - {against} {}", parts.join(", "))
 }

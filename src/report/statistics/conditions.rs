@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::compare::{Compared, Comparison, adjust};
 use super::matching::{Matched, Matching, Scenes};
 use super::study::{Block, Study};
+use crate::score::table::MetricColumn;
 
 /// How much a model's mean differs between two experiments, by pairs where their scenes agree.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -32,32 +33,28 @@ impl Contrast {
     /// Every model and metric: the first experiment of the definitions that has episodes, minus each later one.
     pub(super) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
         let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
+        let scenes: Vec<Scenes> = baseline.blocks.iter().map(|block| Scenes::of(study, block)).collect();
         let mut contrasts = Vec::new();
-        for first in &baseline.blocks {
-            let scenes = Scenes::of(study, first);
-            for second in others.iter().flat_map(|other| &other.blocks).filter(|other| other.is_same_subject(first)) {
-                let matched = Matched::of(&scenes, &Scenes::of(study, second));
-                let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
-                let under = |column| Self::of(first, second, &matched, column, compared.under(column));
-                contrasts.extend(study.table.metrics.iter().map(under));
+        for other in others {
+            let mut family = Vec::new();
+            for (first, scenes) in baseline.blocks.iter().zip(&scenes) {
+                for second in other.blocks.iter().filter(|block| block.is_same_subject(first)) {
+                    let matched = Matched::of(scenes, &Scenes::of(study, second));
+                    let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
+                    let under = |column| Self::of(first, second, &matched, column, compared.under(column));
+                    family.extend(study.table.metrics.iter().map(under));
+                }
             }
-        }
-        for column in &study.table.metrics {
-            for other in others {
-                let is_of = |it: &&mut Self| it.metric == column.name && it.against == other.name;
-                adjust(contrasts.iter_mut().filter(is_of).map(|it| &mut it.comparison), confidence);
+            for column in &study.table.metrics {
+                let of_metric = family.iter_mut().filter(|it: &&mut Self| it.metric == column.name);
+                adjust(of_metric.map(|it| &mut it.comparison), confidence);
             }
+            contrasts.extend(family);
         }
         contrasts
     }
 
-    fn of(
-        first: &Block,
-        second: &Block,
-        matched: &Matched,
-        column: &crate::score::table::MetricColumn,
-        comparison: Comparison,
-    ) -> Self {
+    fn of(first: &Block, second: &Block, matched: &Matched, column: &MetricColumn, comparison: Comparison) -> Self {
         Self {
             model: first.model.to_owned(),
             condition: first.condition(),

@@ -83,6 +83,13 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
         ),
         (
             format!(
+                "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
+                 {percent} interval, or McNemar's over the pairs of all; two-sided by minimum likelihood; Holm over all pairs"
+            ),
+            tables::overall(statistics, shown, is_full),
+        ),
+        (
+            format!(
                 "Between conditions: first experiment minus the other, by the same methods; Holm over the models; {percent} \
                  intervals not adjusted"
             ),
@@ -99,13 +106,6 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
     ];
     let further = || {
         [
-            (
-                format!(
-                    "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
-                     {percent} interval, or McNemar's over the pairs of all; two-sided by minimum likelihood; Holm over all pairs"
-                ),
-                tables::overall(statistics, shown),
-            ),
             (
                 format!(
                     "How often one model decides earlier than another, averaged over experiments; who never decides is the \

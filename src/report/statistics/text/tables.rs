@@ -131,9 +131,10 @@ fn compared(found: &Comparison) -> Vec<String> {
     line
 }
 
-/// Two models over all experiments.
-pub(super) fn overall(statistics: &Statistics, shown: Shown) -> Grid {
-    let lines = statistics.overall.iter().filter(|row| shown(&row.metric)).map(|row| {
+/// Two models over all experiments: all of them where `is_full`, else those that are told apart.
+pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Grid {
+    let rows = statistics.overall.iter().filter(|row| shown(&row.metric) && (is_full || row.separated));
+    let lines = rows.map(|row| {
         let test = match row.method {
             OverallMethod::MantelHaenszel => "exact conditional",
             OverallMethod::PooledMcnemar => "McNemar, pooled",

@@ -9,6 +9,7 @@ pub mod clustered;
 pub mod columns;
 pub mod contrast;
 pub mod diff;
+pub mod feasible;
 pub mod group;
 pub mod holm;
 pub mod interval;

@@ -1,0 +1,203 @@
+//! Which values each node of a plan can have: an interval, and whether null is among them.
+//!
+//! Rule: never less than what some trace gives. Truth values are 0 and 1; texts and floats have no interval of
+//! their own, and what compares them is open.
+
+use crate::metric::columns::Type;
+use crate::metric::overflow::{arithmetic, hull};
+use crate::metric::plan::{Aggregate, Arithmetic, Constant, NodeId, Op, Plan};
+
+/// Integers from the first to the second.
+type Range = (i128, i128);
+
+/// All integers of 64 bits.
+const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
+
+const TRUTHS: Range = (0, 1);
+
+/// What a node can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Possible {
+    /// The values; `None` where there never is one.
+    values: Option<Range>,
+    /// Whether there may be none.
+    pub(super) may_be_null: bool,
+}
+
+impl Possible {
+    /// Never a value.
+    pub(super) const NULL: Self = Self { values: None, may_be_null: true };
+
+    /// False or null.
+    pub(super) const NOT_TRUE: Self = Self { values: Some((0, 0)), may_be_null: true };
+
+    const fn always(values: Range) -> Self {
+        Self { values: Some(values), may_be_null: false }
+    }
+
+    const fn maybe(values: Range) -> Self {
+        Self { values: Some(values), may_be_null: true }
+    }
+
+    /// The smallest and the largest value, within 64 bits.
+    pub(super) fn range(&self) -> (i64, i64) {
+        let (low, high) = self.values.unwrap_or((0, 0));
+        let fit = |value: i128| i64::try_from(value.clamp(ALL.0, ALL.1)).expect("clamped to 64 bits");
+        (fit(low), fit(high))
+    }
+
+    /// The value, if it can have no other and is never null.
+    pub(super) fn only_value(&self) -> Option<i64> {
+        let (low, high) = self.range();
+        (self.values.is_some() && !self.may_be_null && low == high).then_some(low)
+    }
+
+    fn can_be_true(self) -> bool {
+        self.values.is_some_and(|(_, high)| high > 0)
+    }
+
+    fn is_true(self) -> bool {
+        !self.may_be_null && self.values.is_some_and(|(low, _)| low > 0)
+    }
+
+    fn is_false(self) -> bool {
+        !self.may_be_null && !self.can_be_true()
+    }
+
+    fn truth(can_be_false: bool, can_be_true: bool) -> Self {
+        Self::always((i128::from(!can_be_false), i128::from(can_be_true)))
+    }
+
+    fn or(self, other: Self) -> Self {
+        let values = hull_of(self.values.into_iter().chain(other.values));
+        Self { values, may_be_null: self.may_be_null || other.may_be_null }
+    }
+
+    fn map(self, to: impl Fn(Range) -> Range) -> Self {
+        Self { values: self.values.map(to), ..self }
+    }
+}
+
+fn hull_of(ranges: impl Iterator<Item = Range>) -> Option<Range> {
+    let ranges: Vec<Range> = ranges.collect();
+    (!ranges.is_empty()).then(|| hull(ranges))
+}
+
+/// What each node can be in episodes of 1 to `steps` steps; `assumed` nodes are what is assumed of them.
+pub(super) fn of_plan(plan: &Plan, steps: u32, assumed: &[(NodeId, Possible)]) -> Vec<Possible> {
+    let mut found = Vec::with_capacity(plan.nodes().len());
+    for id in plan.ids() {
+        let node = plan.node(id);
+        let known = assumed.iter().find(|(node, _)| *node == id).map(|(_, possible)| *possible);
+        let possible = known.unwrap_or_else(|| of_op(&node.op, node.ty, steps.into(), |of| found[of.index()]));
+        found.push(possible.map(|(low, high)| (low.max(ALL.0), high.min(ALL.1))));
+    }
+    found
+}
+
+fn of_op(op: &Op, ty: Type, steps: i128, of: impl Fn(NodeId) -> Possible) -> Possible {
+    match op {
+        Op::Column(_) => Possible::maybe(if ty == Type::Bool { TRUTHS } else { ALL }),
+        Op::Time | Op::Length => Possible::always((1, steps)),
+        Op::Constant(constant) => of_constant(constant),
+        Op::Spread(x) | Op::IntFromBool(x) | Op::FloatFromInt(x) => of(*x),
+        Op::Not(x) => of(*x).map(|(low, high)| (1 - high, 1 - low)),
+        Op::And(x, y) => both(of(*x), of(*y)),
+        Op::Or(x, y) => {
+            let not = |x: Possible| x.map(|(low, high)| (1 - high, 1 - low));
+            not(both(not(of(*x)), not(of(*y))))
+        }
+        Op::Compare(_, x, y) => of_two(of(*x), of(*y), |_, _| TRUTHS),
+        Op::Distinct(..) => Possible::always(TRUTHS),
+        Op::IsNull(x) => Possible::truth(of(*x).values.is_some(), of(*x).may_be_null),
+        Op::IsTrue(x) => Possible::truth(!of(*x).is_true(), of(*x).can_be_true()),
+        Op::IsFalse(x) => {
+            let can_be_false = of(*x).values.is_some_and(|(low, _)| low == 0);
+            Possible::truth(!of(*x).is_false(), can_be_false)
+        }
+        Op::Arithmetic(op, x, y) => of_arithmetic(*op, of(*x), of(*y)),
+        Op::Negate(x) => of(*x).map(|(low, high)| (-high, -low)),
+        Op::Case { branches, otherwise } => of_case(branches, otherwise.map(&of), &of),
+        Op::Coalesce(values) => of_coalesce(values.iter().map(|value| of(*value))),
+        Op::Matches(x, _) => of(*x).map(|_| TRUTHS),
+        Op::Aggregate(aggregate, x) => of_aggregate(*aggregate, of(*x), steps),
+        Op::At(x, moment) => {
+            let values = of(*x).values.filter(|_| of(*moment).values.is_some());
+            Possible { values, may_be_null: true }
+        }
+    }
+}
+
+fn of_constant(constant: &Constant) -> Possible {
+    match constant {
+        Constant::Null => Possible::NULL,
+        Constant::Bool(truth) => Possible::always((i128::from(*truth), i128::from(*truth))),
+        Constant::Int(value) => Possible::always(((*value).into(), (*value).into())),
+        Constant::Float(_) | Constant::Text(_) => Possible::always(ALL),
+    }
+}
+
+/// Kleene's conjunction: one false operand decides.
+fn both(x: Possible, y: Possible) -> Possible {
+    if x.is_false() || y.is_false() {
+        return Possible::always((0, 0));
+    }
+    let may_be_null = x.may_be_null || y.may_be_null;
+    let values = match (x.values, y.values) {
+        (Some((a, b)), Some((c, d))) => Some((a.min(c), b.min(d))),
+        (Some((0, _)), None) | (None, Some((0, _))) => Some((0, 0)),
+        _ => None,
+    };
+    Possible { values, may_be_null }
+}
+
+fn of_two(x: Possible, y: Possible, to: impl Fn(Range, Range) -> Range) -> Possible {
+    let values = x.values.zip(y.values).map(|(x, y)| to(x, y));
+    Possible { values, may_be_null: x.may_be_null || y.may_be_null }
+}
+
+fn of_arithmetic(op: Arithmetic, x: Possible, y: Possible) -> Possible {
+    let divides = matches!(op, Arithmetic::Quotient | Arithmetic::Remainder);
+    let by_zero = divides && y.values.is_some_and(|(low, high)| low <= 0 && high >= 0);
+    let found = of_two(x, y, |x, y| arithmetic(op, x, y));
+    Possible { may_be_null: found.may_be_null || by_zero, ..found }
+}
+
+fn of_case(branches: &[(NodeId, NodeId)], otherwise: Option<Possible>, of: impl Fn(NodeId) -> Possible) -> Possible {
+    let mut found: Option<Possible> = None;
+    let mut add = |possible: Possible| found = Some(found.map_or(possible, |found| found.or(possible)));
+    let mut is_decided = false;
+    for (when, then) in branches.iter().filter(|(when, _)| of(*when).can_be_true()) {
+        add(of(*then));
+        is_decided = of(*when).is_true();
+        if is_decided {
+            break;
+        }
+    }
+    if !is_decided {
+        add(otherwise.unwrap_or(Possible::NULL));
+    }
+    found.expect("a branch decides, or the last value is among them")
+}
+
+fn of_coalesce(values: impl Iterator<Item = Possible>) -> Possible {
+    let mut found = Possible::NULL;
+    for value in values {
+        found = Possible { may_be_null: value.may_be_null, ..found.or(value) };
+        if !value.may_be_null {
+            break;
+        }
+    }
+    found
+}
+
+fn of_aggregate(aggregate: Aggregate, x: Possible, steps: i128) -> Possible {
+    match aggregate {
+        Aggregate::First | Aggregate::Last if !x.can_be_true() => Possible::NULL,
+        Aggregate::First | Aggregate::Last => Possible { values: Some((1, steps)), may_be_null: !x.is_true() },
+        Aggregate::Any | Aggregate::All => Possible::truth(!x.is_true(), x.can_be_true()),
+        Aggregate::Count => Possible::always((i128::from(x.is_true()), if x.can_be_true() { steps } else { 0 })),
+        Aggregate::Min | Aggregate::Max => x,
+        Aggregate::Sum => x.map(|(low, high)| (low.min(low * steps), high.max(high * steps))),
+    }
+}

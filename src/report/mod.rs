@@ -4,6 +4,7 @@
 //! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`figures`](crate::figures) draws, [`html`] makes the page of all
 //! of it, [`bundle`] writes the folder.
 
+pub mod audit;
 pub mod bundle;
 pub mod changes;
 pub mod comparison;

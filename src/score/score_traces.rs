@@ -101,6 +101,11 @@ pub fn schema_columns() -> Columns {
     COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect()
 }
 
+/// Whether a column of this name has a value in each row of each trace.
+pub fn has_value(name: &str) -> bool {
+    COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
+}
+
 /// The columns that definitions may name over these traces: those of the schema, and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns = schema_columns().with_help("`mirrorstats schema` and `mirrorstats info` list the columns");

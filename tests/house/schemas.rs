@@ -14,6 +14,7 @@ use mirrorstats::cli::commands::schema::Name;
 use mirrorstats::log::message::{Decision, EpisodeMessage};
 use mirrorstats::metric::explain::Explanation;
 use mirrorstats::metric::shape::DefinitionFile;
+use mirrorstats::report::audit::Audit;
 use mirrorstats::report::bundle::Manifest;
 use mirrorstats::report::comparison::Comparison;
 use mirrorstats::report::errata::Errata;
@@ -35,6 +36,7 @@ fn folder() -> PathBuf {
 fn current() -> Vec<(&'static str, Value)> {
     #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
     let mut schemas = vec![
+        ("audit", json!(schema_for!(Audit))),
         ("comparison", json!(schema_for!(Comparison))),
         ("decision", json!(schema_for!(Decision))),
         ("definitions-check", json!(schema_for!(CheckAnswer))),

@@ -1,5 +1,6 @@
 //! The verbs: one file each.
 
+pub mod audit;
 pub mod compare;
 pub mod definitions;
 pub mod diff;
@@ -38,6 +39,7 @@ pub enum Command {
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
+    Audit(audit::AuditArgs),
     Diff(diff::DiffArgs),
     Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
@@ -71,6 +73,7 @@ impl Command {
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
+            Self::Audit(args) => args.run(),
             Self::Diff(args) => args.run(),
             Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),

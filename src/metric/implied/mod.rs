@@ -8,7 +8,7 @@ mod possible;
 
 use indexmap::IndexMap;
 
-use self::possible::Possible;
+use self::possible::{Possible, Traces};
 use super::catalog::Kind;
 use super::plan::{Comparison, Constant, NodeId, Op, Output, Plan};
 
@@ -49,16 +49,16 @@ pub struct Restricted {
 }
 
 /// What is known of each metric of a plan, in episodes of 1 to `steps` steps.
-pub fn implied(plan: &Plan, steps: u32) -> IndexMap<String, Implied> {
-    let possible = possible::of_plan(plan, steps, &[]);
-    let reader = Reader { plan, steps, possible };
+///
+/// `has_value` tells whether a column has a value in each row of each trace.
+pub fn implied(plan: &Plan, steps: u32, has_value: fn(&str) -> bool) -> IndexMap<String, Implied> {
+    let reader = Reader { plan, traces: Traces { plan, steps, has_value } };
     plan.outputs.iter().map(|output| (output.name.clone(), reader.read(output))).collect()
 }
 
 struct Reader<'p> {
     plan: &'p Plan,
-    steps: u32,
-    possible: Vec<Possible>,
+    traces: Traces<'p>,
 }
 
 impl Reader<'_> {
@@ -76,8 +76,8 @@ impl Reader<'_> {
         Implied { range, defined, restricts }
     }
 
-    fn possible(&self, node: NodeId) -> &Possible {
-        &self.possible[node.index()]
+    fn possible(&self, node: NodeId) -> Possible {
+        self.traces.of_node(node, &[])
     }
 
     /// The condition and the value of a metric with `when`.
@@ -149,8 +149,7 @@ impl Reader<'_> {
         {
             assumed.push((missing, Possible::NULL));
         }
-        let found = possible::of_plan(self.plan, self.steps, &assumed);
-        found[value.index()].only_value()
+        self.traces.of_node(value, &assumed).only_value()
     }
 }
 
@@ -158,11 +157,11 @@ impl Reader<'_> {
 mod tests {
     use super::{Defined, Implied, Restricted, implied};
     use crate::metric::definitions::Definitions;
-    use crate::score::score_traces::schema_columns;
+    use crate::score::score_traces::{has_value, schema_columns};
 
     fn of(metrics: &str) -> Implied {
         let plan = Definitions::from_toml("test", metrics, &schema_columns()).unwrap().plan;
-        implied(&plan, 100).pop().unwrap().1
+        implied(&plan, 100, has_value).pop().unwrap().1
     }
 
     fn check(metrics: &str, range: (i64, i64), defined: Defined, restricts: Option<(&str, Option<i64>)>) {
@@ -178,7 +177,7 @@ mod tests {
     #[test]
     fn the_papers_metrics_are_understood() {
         let definitions = Definitions::load("paper", &schema_columns()).unwrap();
-        let found = implied(&definitions.plan, 100);
+        let found = implied(&definitions.plan, 100, has_value);
         let told: Vec<String> = found.iter().map(|(name, of)| format!("{name} {of:?}")).collect();
         insta::assert_snapshot!(told.join("\n"));
     }

@@ -83,21 +83,85 @@ fn hull_of(ranges: impl Iterator<Item = Range>) -> Option<Range> {
     (!ranges.is_empty()).then(|| hull(ranges))
 }
 
-/// What each node can be in episodes of 1 to `steps` steps; `assumed` nodes are what is assumed of them.
-pub(super) fn of_plan(plan: &Plan, steps: u32, assumed: &[(NodeId, Possible)]) -> Vec<Possible> {
-    let mut found = Vec::with_capacity(plan.nodes().len());
-    for id in plan.ids() {
-        let node = plan.node(id);
-        let known = assumed.iter().find(|(node, _)| *node == id).map(|(_, possible)| *possible);
-        let possible = known.unwrap_or_else(|| of_op(&node.op, node.ty, steps.into(), |of| found[of.index()]));
-        found.push(possible.map(|(low, high)| (low.max(ALL.0), high.min(ALL.1))));
-    }
-    found
+/// The most moments that are taken apart into those that are and those that are not.
+const MOST_MOMENTS: usize = 6;
+
+/// What all evaluations go by.
+#[derive(Clone, Copy)]
+pub(super) struct Traces<'p> {
+    pub(super) plan: &'p Plan,
+    /// The most steps of an episode.
+    pub(super) steps: u32,
+    /// Whether a column has a value in each row of each trace.
+    pub(super) has_value: fn(&str) -> bool,
 }
 
-fn of_op(op: &Op, ty: Type, steps: i128, of: impl Fn(NodeId) -> Possible) -> Possible {
+impl Traces<'_> {
+    /// What a node can be; `assumed` nodes are what is assumed of them.
+    ///
+    /// Each first and last moment that the node needs is taken to be there, and taken not to be: so it is known that
+    /// `x is not null and x > 3` is never null.
+    pub(super) fn of_node(&self, node: NodeId, assumed: &[(NodeId, Possible)]) -> Possible {
+        let needed = self.plan.needed_by([node]);
+        let is_moment = |id: &&NodeId| matches!(self.plan.node(**id).op, Op::Aggregate(Aggregate::First | Aggregate::Last, _));
+        let moments: Vec<NodeId> = needed.iter().filter(is_moment).copied().take(MOST_MOMENTS).collect();
+        let there = Possible::always((1, self.steps.into()));
+        let cases = (0..1_usize << moments.len()).map(|case| {
+            let is_there = |at: usize| if case >> at & 1 == 1 { there } else { Possible::NULL };
+            let taken = moments.iter().enumerate().map(|(at, moment)| (*moment, is_there(at)));
+            self.evaluate(&needed, &assumed.iter().copied().chain(taken).collect::<Vec<_>>())
+        });
+        cases.reduce(Possible::or).expect("there is one case at least")
+    }
+
+    /// The last of these nodes, evaluated from the first.
+    fn evaluate(&self, needed: &[NodeId], assumed: &[(NodeId, Possible)]) -> Possible {
+        let mut found = vec![Possible::NULL; self.plan.nodes().len()];
+        let mut last = Possible::NULL;
+        for &id in needed {
+            let known = assumed.iter().find(|(node, _)| *node == id).map(|(_, possible)| *possible);
+            last = known.unwrap_or_else(|| self.of_op(id, |of| found[of.index()]));
+            last = last.map(|(low, high)| (low.max(ALL.0), high.min(ALL.1)));
+            found[id.index()] = last;
+        }
+        last
+    }
+
+    fn of_op(&self, id: NodeId, of: impl Fn(NodeId) -> Possible) -> Possible {
+        let node = self.plan.node(id);
+        match &node.op {
+            Op::Column(name) => {
+                let values = if node.ty == Type::Bool { TRUTHS } else { ALL };
+                Possible { values: Some(values), may_be_null: !(self.has_value)(name) }
+            }
+            Op::At(x, moment) => self.at(*x, *moment, of),
+            op => of_op(op, self.steps.into(), of),
+        }
+    }
+
+    /// The first and the last step where a predicate holds are steps, and what it asks to be there is there.
+    fn at(&self, x: NodeId, moment: NodeId, of: impl Fn(NodeId) -> Possible) -> Possible {
+        let values = of(x).values.filter(|_| of(moment).values.is_some());
+        let is_there = match self.plan.node(moment).op {
+            Op::Aggregate(Aggregate::First | Aggregate::Last, holds) => !of(x).may_be_null || self.asks_for(holds, x),
+            _ => false,
+        };
+        Possible { values, may_be_null: of(moment).may_be_null || !is_there }
+    }
+
+    /// Whether a predicate can hold only where `x` has a value.
+    fn asks_for(&self, predicate: NodeId, x: NodeId) -> bool {
+        match self.plan.node(predicate).op {
+            Op::And(a, b) => self.asks_for(a, x) || self.asks_for(b, x),
+            Op::Not(missing) => self.plan.node(missing).op == Op::IsNull(x),
+            _ => false,
+        }
+    }
+}
+
+fn of_op(op: &Op, steps: i128, of: impl Fn(NodeId) -> Possible) -> Possible {
     match op {
-        Op::Column(_) => Possible::maybe(if ty == Type::Bool { TRUTHS } else { ALL }),
+        Op::Column(_) | Op::At(..) => Possible::maybe(ALL),
         Op::Time | Op::Length => Possible::always((1, steps)),
         Op::Constant(constant) => of_constant(constant),
         Op::Spread(x) | Op::IntFromBool(x) | Op::FloatFromInt(x) => of(*x),
@@ -121,10 +185,6 @@ fn of_op(op: &Op, ty: Type, steps: i128, of: impl Fn(NodeId) -> Possible) -> Pos
         Op::Coalesce(values) => of_coalesce(values.iter().map(|value| of(*value))),
         Op::Matches(x, _) => of(*x).map(|_| TRUTHS),
         Op::Aggregate(aggregate, x) => of_aggregate(*aggregate, of(*x), steps),
-        Op::At(x, moment) => {
-            let values = of(*x).values.filter(|_| of(*moment).values.is_some());
-            Possible { values, may_be_null: true }
-        }
     }
 }
 

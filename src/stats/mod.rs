@@ -8,6 +8,7 @@ pub mod chance;
 pub mod clustered;
 pub mod columns;
 pub mod contrast;
+pub mod design;
 pub mod diff;
 pub mod feasible;
 pub mod group;

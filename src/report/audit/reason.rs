@@ -39,7 +39,7 @@ pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>,
     };
     let samples: Vec<Sample> = ns.iter().filter(|n| **n > 0).map(|n| question.sample(*n)).collect();
     if samples.is_empty() {
-        return Reason::of_mean(format!("undefined, as it is defined in no episode{because}"));
+        return Reason::of_mean(format!("undefined: there is no episode{because}"));
     }
     let kind = definitions.catalog.metric[&refused.metric].kind;
     let cell = Cell { print, samples, kind, among: format!("{}{because}", episodes(&ns)) };

@@ -13,6 +13,7 @@ pub mod errata;
 pub mod html;
 pub mod layout;
 pub mod order;
+pub mod plan;
 pub mod published;
 pub mod statistics;
 pub mod style;

@@ -18,6 +18,8 @@ use mirrorstats::report::audit::Audit;
 use mirrorstats::report::bundle::Manifest;
 use mirrorstats::report::comparison::Comparison;
 use mirrorstats::report::errata::Errata;
+use mirrorstats::report::plan::Plan;
+use mirrorstats::report::plan::register::RegisteredPlan;
 use mirrorstats::report::statistics::Statistics;
 use mirrorstats::report::style::Sheet;
 use mirrorstats::score::evidence::Evidence;
@@ -48,6 +50,8 @@ fn current() -> Vec<(&'static str, Value)> {
         ("import", json!(schema_for!(ImportAnswer))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
+        ("plan", json!(schema_for!(Plan))),
+        ("plan-register", json!(schema_for!(RegisteredPlan))),
         ("recover", json!(schema_for!(RecoverAnswer))),
         ("report", json!(schema_for!(ReportAnswer))),
         ("renormalize", json!(schema_for!(RenormalizeAnswer))),

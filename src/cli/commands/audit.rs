@@ -81,7 +81,7 @@ fn table(path: &Path) -> Result<NamedTable, Failure> {
 fn rounding_parser() -> impl clap::builder::TypedValueParser<Value = Rounding> {
     let names = Rounding::ALL.map(Rounding::name);
     PossibleValuesParser::new(names).map(|name| {
-        let named = Rounding::ALL.into_iter().find(|rounding| rounding.name() == name);
-        named.expect("only names of roundings are possible")
+        let rounding = Rounding::ALL.into_iter().find(|rounding| rounding.name() == name);
+        rounding.expect("only names of roundings are possible")
     })
 }

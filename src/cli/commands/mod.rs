@@ -9,6 +9,7 @@ pub mod figure;
 pub mod filmstrip;
 pub mod import;
 pub mod info;
+pub mod plan;
 pub mod query;
 #[cfg(feature = "sim")]
 pub mod record;
@@ -40,6 +41,7 @@ pub enum Command {
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
     Audit(audit::AuditArgs),
+    Plan(plan::PlanArgs),
     Diff(diff::DiffArgs),
     Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
@@ -74,6 +76,7 @@ impl Command {
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
             Self::Audit(args) => args.run(),
+            Self::Plan(args) => args.run(),
             Self::Diff(args) => args.run(),
             Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),

@@ -165,8 +165,7 @@ mod tests {
     }
 
     fn check(metrics: &str, range: (i64, i64), defined: Defined, restricts: Option<(&str, Option<i64>)>) {
-        let restricts =
-            restricts.map(|(metric, elsewhere)| Restricted { metric: metric.to_owned(), elsewhere });
+        let restricts = restricts.map(|(metric, elsewhere)| Restricted { metric: metric.to_owned(), elsewhere });
         assert_eq!(of(metrics), Implied { range, defined, restricts }, "{metrics}");
     }
 
@@ -185,10 +184,17 @@ mod tests {
     #[test]
     fn conditions_are_read_off_the_plan() {
         let rate = "[metric.R]\nvalue = \"any(mirror_visible)\"\n[metric.M]\nvalue = \"length()\"\n";
-        for (when, is) in [("R = 1", true), ("R", true), ("1 = R", true), ("R <> 1", false), ("R = 0", false), ("not R", false)] {
+        for (when, is) in
+            [("R = 1", true), ("R", true), ("1 = R", true), ("R <> 1", false), ("R = 0", false), ("not R", false)]
+        {
             check(&format!("{rate}when = \"{when}\""), (1, 100), whenever("R", is), None);
         }
-        check(&format!("{rate}when = \"R = 1 and t_mean\"").replace("t_mean", "length() > 3"), (1, 100), Defined::Sometimes, None);
+        check(
+            &format!("{rate}when = \"R = 1 and t_mean\"").replace("t_mean", "length() > 3"),
+            (1, 100),
+            Defined::Sometimes,
+            None,
+        );
         check(rate, (1, 100), Defined::Always, None);
     }
 
@@ -202,7 +208,9 @@ mod tests {
     #[test]
     fn a_value_outside_is_known_only_where_it_follows() {
         let metrics = |value: &str, when: &str| {
-            format!("[let]\ndone = \"first(action = 'done')\"\n[metric.V]\nvalue = \"{value}\"\n[metric.M]\nvalue = \"V\"\nwhen = \"{when}\"")
+            format!(
+                "[let]\ndone = \"first(action = 'done')\"\n[metric.V]\nvalue = \"{value}\"\n[metric.M]\nvalue = \"V\"\nwhen = \"{when}\""
+            )
         };
         let late = metrics("coalesce(done > 5, false)", "done is not null");
         check(&late, (0, 1), Defined::Sometimes, Some(("V", Some(0))));

@@ -103,7 +103,8 @@ impl Traces<'_> {
     /// `x is not null and x > 3` is never null.
     pub(super) fn of_node(&self, node: NodeId, assumed: &[(NodeId, Possible)]) -> Possible {
         let needed = self.plan.needed_by([node]);
-        let is_moment = |id: &&NodeId| matches!(self.plan.node(**id).op, Op::Aggregate(Aggregate::First | Aggregate::Last, _));
+        let is_moment =
+            |id: &&NodeId| matches!(self.plan.node(**id).op, Op::Aggregate(Aggregate::First | Aggregate::Last, _));
         let moments: Vec<NodeId> = needed.iter().filter(is_moment).copied().take(MOST_MOMENTS).collect();
         let there = Possible::always((1, self.steps.into()));
         let cases = (0..1_usize << moments.len()).map(|case| {
@@ -198,12 +199,12 @@ fn of_constant(constant: &Constant) -> Possible {
 }
 
 /// Kleene's conjunction: one false operand decides.
-fn both(x: Possible, y: Possible) -> Possible {
-    if x.is_false() || y.is_false() {
+fn both(left: Possible, right: Possible) -> Possible {
+    if left.is_false() || right.is_false() {
         return Possible::always((0, 0));
     }
-    let may_be_null = x.may_be_null || y.may_be_null;
-    let values = match (x.values, y.values) {
+    let may_be_null = left.may_be_null || right.may_be_null;
+    let values = match (left.values, right.values) {
         (Some((a, b)), Some((c, d))) => Some((a.min(c), b.min(d))),
         (Some((0, _)), None) | (None, Some((0, _))) => Some((0, 0)),
         _ => None,

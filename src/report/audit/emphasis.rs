@@ -19,10 +19,10 @@ pub(super) fn infeasible(
     sheet: Option<&TableSheet>,
     terms: Terms<'_>,
 ) -> Vec<(usize, InfeasibleCell)> {
-    let by_print = |sheet: &&TableSheet| terms.style.sheet.print_of(sheet).emphasis == EmphasisRule::PrintedMean;
+    let by_print = |sheet: &TableSheet| terms.style.sheet.print_of(sheet).emphasis == EmphasisRule::PrintedMean;
     let cells = &table.published.cells;
     let is_plain = cells.iter().all(|(_, cell)| cell.emphasis == Emphasis::Plain);
-    if is_plain || sheet.filter(by_print).is_none() {
+    if is_plain || !sheet.is_some_and(by_print) {
         return Vec::new();
     }
     let mut columns: BTreeMap<(&str, &str), Vec<usize>> = BTreeMap::new();
@@ -59,7 +59,9 @@ fn told(table: &NamedTable, at: usize, expected: Emphasis) -> InfeasibleCell {
         cell: name.clone(),
         published: format!("{} {found}", super::reason::shown(cell.mean, cell.se)),
         field: Field::Emphasis,
-        reason: format!("{found}, but among the printed means of its column {mean} is {expected} by the rule of the style"),
+        reason: format!(
+            "{found}, but among the printed means of its column {mean} is {expected} by the rule of the style"
+        ),
         nearest: vec![expected.to_owned()],
         feasible_rounded: Vec::new(),
     }

@@ -34,8 +34,8 @@ impl Episodes {
     }
 
     /// The first key that names none of these rows of experiment and model.
-    pub fn stranger<'r>(&self, rows: impl Iterator<Item = (&'r str, &'r str)> + Clone) -> Option<&str> {
-        let names = |key: &str| rows.clone().any(|(e, m)| key == e || key.split_once('/') == Some((e, m)));
+    pub fn stranger(&self, rows: &[(&str, &str)]) -> Option<&str> {
+        let names = |key: &str| rows.iter().any(|&(e, m)| key == e || key.split_once('/') == Some((e, m)));
         self.named.keys().map(String::as_str).find(|key| !names(key))
     }
 }
@@ -60,7 +60,9 @@ impl FromStr for Episodes {
                 None => found.others.replace(n),
             };
             if earlier.is_some() {
-                return Err(EpisodesError::Twice { row: key.map_or("all other rows".to_owned(), |key| format!("`{key}`")) });
+                return Err(EpisodesError::Twice {
+                    row: key.map_or("all other rows".to_owned(), |key| format!("`{key}`")),
+                });
             }
         }
         Ok(found)
@@ -77,8 +79,8 @@ mod tests {
         let of = |experiment, model| episodes.of(experiment, model);
         assert_eq!([of("E1", "a"), of("E2", "a"), of("E3", "a"), of("E3", "GPT 5.1")], [21, 20, 21, 19].map(Some));
         assert_eq!("E2=20".parse::<Episodes>().unwrap().of("E1", "a"), None);
-        assert_eq!(episodes.stranger([("E2", "a"), ("E3", "GPT 5.1")].into_iter()), None);
-        assert_eq!(episodes.stranger([("E3", "GPT 5.1")].into_iter()), Some("E2"));
+        assert_eq!(episodes.stranger(&[("E2", "a"), ("E3", "GPT 5.1")]), None);
+        assert_eq!(episodes.stranger(&[("E3", "GPT 5.1")]), Some("E2"));
     }
 
     #[test]

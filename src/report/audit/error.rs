@@ -47,8 +47,8 @@ pub(super) fn check(tables: &[NamedTable], terms: Terms<'_>) -> Result<(), Audit
         }
     }
     let cells = tables.iter().flat_map(|table| &table.published.cells);
-    let rows = cells.map(|(name, _)| (name.experiment.as_str(), name.model.as_str()));
-    let stranger = terms.episodes.stranger(rows);
+    let rows: Vec<(&str, &str)> = cells.map(|(name, _)| (name.experiment.as_str(), name.model.as_str())).collect();
+    let stranger = terms.episodes.stranger(&rows);
     stranger.map_or(Ok(()), |key| Err(AuditError::NoSuchRow { key: visible(key) }))
 }
 

@@ -213,7 +213,8 @@ impl<'t> Auditor<'t> {
 
     fn roundings_of(&mut self, table: usize) -> Vec<RoundingCount> {
         let roundings = self.terms.roundings;
-        let count = |&rounding: &Rounding| RoundingCount { rounding, infeasible: self.infeasible_in(&[(table, rounding)]) };
+        let count =
+            |&rounding: &Rounding| RoundingCount { rounding, infeasible: self.infeasible_in(&[(table, rounding)]) };
         roundings.iter().map(count).collect()
     }
 

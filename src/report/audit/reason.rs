@@ -74,9 +74,12 @@ impl Cell {
         let nearest = nearest(sides);
         let what = match self.kind {
             Kind::Rate => "count".to_owned(),
-            Kind::Quantity => format!("sum of integers from {} to {}", self.samples[0].range.0, self.samples[0].range.1),
+            Kind::Quantity => {
+                format!("sum of integers from {} to {}", self.samples[0].range.0, self.samples[0].range.1)
+            }
         };
-        let words = format!("no {what} over {} has a mean that prints {}{}", self.among, self.print.mean, listed(&nearest));
+        let words =
+            format!("no {what} over {} has a mean that prints {}{}", self.among, self.print.mean, listed(&nearest));
         Some(Reason { field: Field::Mean, words, nearest })
     }
 
@@ -96,7 +99,8 @@ impl Cell {
         }
         let nearest = nearest(sides);
         let mean = self.print.mean;
-        let words = format!("with the mean {mean} over {}, no standard error prints {se}{}", self.among, listed(&nearest));
+        let words =
+            format!("with the mean {mean} over {}, no standard error prints {se}{}", self.among, listed(&nearest));
         Some(Reason { field: Field::Se, words, nearest })
     }
 
@@ -127,14 +131,18 @@ fn listed(nearest: &[String]) -> String {
 fn conflict(row: &Row, refused: &Refused, question: &Question<'_>, ns: &BTreeSet<u64>) -> Reason {
     if let Some(earlier) = refused.accepted.first() {
         let other = shown(earlier.cell.mean, earlier.cell.se);
-        return Reason::of_mean(format!("no data prints this and {other}, which another table prints for the same cell"));
+        return Reason::of_mean(format!(
+            "no data prints this and {other}, which another table prints for the same cell"
+        ));
     }
     let allowed = |world: &World| ns.iter().filter_map(|n| question.allowed(*n, world)).collect::<Vec<_>>();
-    let allowed: Vec<(i128, i128)> = refused.worlds.iter().flat_map(allowed).filter(|(low, high)| low <= high).collect();
+    let allowed: Vec<(i128, i128)> =
+        refused.worlds.iter().flat_map(allowed).filter(|(low, high)| low <= high).collect();
     let restricted = question.definitions.implied[&refused.metric].restricts.as_ref();
     let whole = restricted.map(|restricted| beside(row, &restricted.metric)).unwrap_or_default();
     let (low, high) = (allowed.iter().map(|span| span.0).min(), allowed.iter().map(|span| span.1).max());
-    let bounds = low.zip(high).map(|(low, high)| format!(": it can be true in {}", between(low, high))).unwrap_or_default();
+    let bounds =
+        low.zip(high).map(|(low, high)| format!(": it can be true in {}", between(low, high))).unwrap_or_default();
     let ns: BTreeSet<u64> = ns.iter().copied().filter(|n| *n > 0).collect();
     let among = format!("{}{}", episodes(&ns), condition(row, &refused.metric, question.definitions));
     Reason::of_mean(format!("feasible by itself over {among}, but not beside {whole} of the same row{bounds}"))

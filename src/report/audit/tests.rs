@@ -28,13 +28,8 @@ fn audited_under(files: &[(&str, &str)], style: &str, roundings: &[Rounding]) ->
     let implied = implied(&definitions.plan, 100, has_value);
     let episodes: Episodes = "21".parse().unwrap();
     let style = Style::load(style).unwrap();
-    let terms = Terms {
-        catalog: &definitions.catalog,
-        implied: &implied,
-        episodes: &episodes,
-        style: &style,
-        roundings,
-    };
+    let terms =
+        Terms { catalog: &definitions.catalog, implied: &implied, episodes: &episodes, style: &style, roundings };
     audit(&tables, terms).unwrap()
 }
 
@@ -103,7 +98,10 @@ fn draws(seed: u64) -> impl FnMut(u64) -> u64 {
 }
 
 /// The cells of one row of random episodes: metric, mean and standard error with two digits.
-fn random_row(rounding: Rounding, draw: &mut impl FnMut(u64) -> u64) -> Vec<(&'static str, Option<Decimal>, Option<Decimal>)> {
+fn random_row(
+    rounding: Rounding,
+    draw: &mut impl FnMut(u64) -> u64,
+) -> Vec<(&'static str, Option<Decimal>, Option<Decimal>)> {
     let mut columns: [(&str, Moments); 8] =
         ["TSA", "TTD", "MCR", "MTATO", "CAAL", "TSA-C", "MGD", "CR"].map(|metric| (metric, Moments::default()));
     let (able, quick) = (draw(10), 5 + draw(96));
@@ -113,8 +111,16 @@ fn random_row(rounding: Rounding, draw: &mut impl FnMut(u64) -> u64) -> Vec<(&'s
         let finished = success == 1 || rate(5) == 1;
         let steps = 1 + i64::try_from(draw(quick)).unwrap();
         let gaze = i64::try_from(draw(20)).unwrap();
-        let values = [Some(success), Some(steps), Some(consults), (success == 1).then_some(consults), Some(attributes),
-            finished.then_some(success), Some(gaze), Some(confabulates)];
+        let values = [
+            Some(success),
+            Some(steps),
+            Some(consults),
+            (success == 1).then_some(consults),
+            Some(attributes),
+            finished.then_some(success),
+            Some(gaze),
+            Some(confabulates),
+        ];
         for ((_, moments), value) in columns.iter_mut().zip(values) {
             *moments = value.map_or(*moments, |value| moments.with(value).unwrap());
         }

@@ -48,7 +48,12 @@ fn push_cells(text: &mut String, audit: &Audit, width: Option<usize>) {
     let _ = writeln!(text, "{}", fitted(&table, NAMES, width));
     for (at, cell) in audit.infeasible.iter().enumerate() {
         let number = format!("[{}] ", at + 1);
-        push_wrapped(text, &format!("{number}{}{}", visible(&cell.reason), other_roundings(cell, audit)), width, number.len());
+        push_wrapped(
+            text,
+            &format!("{number}{}{}", visible(&cell.reason), other_roundings(cell, audit)),
+            width,
+            number.len(),
+        );
     }
 }
 

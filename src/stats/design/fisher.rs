@@ -1,6 +1,6 @@
 //! Episodes of two models that are no pairs: Fisher's exact test.
 
-use super::binomial::{from_mode, probabilities};
+use super::binomial::{from_mode, likely, probabilities};
 use super::{Power, Rates, TIE};
 
 /// The exact two-sided test of no difference between two rates over as many episodes each, by probability: a table
@@ -13,26 +13,24 @@ pub struct Fisher {
     pub rates: Rates,
 }
 
-/// What is left out of the sum over totals: far less than anything printed.
-const NEGLIGIBLE: f64 = 1e-18;
-
 impl Power for Fisher {
     fn power(&mut self, n: u64) -> f64 {
-        let (lower, higher) = (probabilities(n, self.rates.lower), probabilities(n, self.rates.higher));
+        let (first, second) = (probabilities(n, self.rates.lower), probabilities(n, self.rates.higher));
+        let (of_first, of_second) = (likely(&first), likely(&second));
         let rejected = |total: u64| -> f64 {
-            let (first, last) = (total.saturating_sub(n), total.min(n));
-            let of = |successes: u64| {
-                let at = |count: u64| usize::try_from(count).expect("a count of episodes");
-                lower[at(successes)] * higher[at(total - successes)]
-            };
-            if (first..=last).map(of).sum::<f64>() < NEGLIGIBLE {
-                return 0.0;
-            }
+            let fewest = total.saturating_sub(n);
             let rejects = rejections(n, total, self.level);
-            (first..=last).zip(rejects).filter(|(_, rejects)| *rejects).map(|(successes, _)| of(successes)).sum()
+            let from = (*of_first.start()).max(total.saturating_sub(*of_second.end()));
+            let to = (*of_first.end()).min(total.saturating_sub(*of_second.start()));
+            let counts = (from..=to).filter(|successes| rejects[at(successes - fewest)]);
+            counts.map(|successes| first[at(successes)] * second[at(total - successes)]).sum()
         };
-        (0..=2 * n).map(rejected).sum()
+        (of_first.start() + of_second.start()..=of_first.end() + of_second.end()).map(rejected).sum()
     }
+}
+
+fn at(count: u64) -> usize {
+    usize::try_from(count).expect("a count of episodes")
 }
 
 /// Which numbers of successes of the first model reject, given the total; from the fewest possible up.

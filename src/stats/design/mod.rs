@@ -1,7 +1,7 @@
 //! How many episodes a comparison needs, and what a number of episodes can show: exact power by enumeration.
 //!
 //! Rule: the tests are those of a report, at a fixed level, and their power is a sum over every outcome; nothing is
-//! simulated. Power of an exact test rises in a sawtooth, so a size is looked for one by one from below.
+//! simulated. Power of an exact test rises in a sawtooth, so a size is tried one by one from below.
 
 pub mod binomial;
 mod fisher;
@@ -14,6 +14,7 @@ use serde::{Deserialize, Serialize};
 pub use self::fisher::Fisher;
 pub use self::mcnemar::McNemar;
 pub use self::one_rate::OneRate;
+pub use super::quantile::settled;
 
 /// How near a p value may exceed the level and count as equal to it: rounding of sums, nothing more.
 const TIE: f64 = 1e-12;
@@ -88,14 +89,25 @@ impl Clusters {
 
     /// The fewest runs per seed with which the power is at least `wanted`; `None` where no number of episodes up to
     /// [`MOST_EPISODES`] has it.
-    pub fn runs_for(self, wanted: f64, test: &mut impl Power) -> Option<u64> {
-        let mut known: Option<(u64, f64)> = None;
-        (1..=MOST_EPISODES / self.seeds.max(1)).find(|runs| {
-            let n = self.effective(*runs);
-            let power = known.filter(|(of, _)| *of == n).map_or_else(|| test.power(n), |(_, power)| power);
-            known = Some((n, power));
-            power >= wanted
-        })
+    ///
+    /// Doubling and bisection find about where; then runs are tried one by one from a fifth, and from twenty, below.
+    pub fn runs_for(self, wanted: f64, test: &mut dyn Power) -> Option<u64> {
+        const NEAR: u64 = 20;
+        let most = MOST_EPISODES / self.seeds.max(1);
+        let mut has_power = |runs: u64| test.power(self.effective(runs)) >= wanted;
+        let doubled = std::iter::successors(Some(1), |runs| (*runs < most).then(|| (2 * runs).min(most)));
+        let mut enough = doubled.into_iter().find(|runs| has_power(*runs))?;
+        let mut too_few = enough / 2;
+        while enough - too_few > 1 {
+            let middle = u64::midpoint(too_few, enough);
+            if has_power(middle) {
+                enough = middle;
+            } else {
+                too_few = middle;
+            }
+        }
+        let from = enough.saturating_sub(NEAR.max(enough / 5)).max(1);
+        (from..=enough).find(|runs| has_power(*runs))
     }
 }
 
@@ -108,7 +120,7 @@ pub fn smallest(wanted: f64, most: f64, mut power: impl FnMut(f64) -> f64) -> Op
     }
     let (mut low, mut high) = (0.0, most);
     for _ in 0..40 {
-        let middle = (low + high) / 2.0;
+        let middle = f64::midpoint(low, high);
         if power(middle) >= wanted {
             high = middle;
         } else {

@@ -1,7 +1,7 @@
 //! One model against a level fixed beforehand, such as chance: the exact binomial test.
 
 use super::Power;
-use super::binomial::probabilities;
+use super::binomial::{likely, probabilities};
 use crate::base::ratio::Ratio;
 use crate::stats::chance;
 
@@ -18,8 +18,9 @@ pub struct OneRate {
 
 impl Power for OneRate {
     fn power(&mut self, n: u64) -> f64 {
-        let true_ones = probabilities(n, self.rate);
-        let rejects = |successes: u64| chance::two_sided(successes, n, self.chance).is_some_and(|p| p <= self.level);
-        (0..=n).zip(true_ones).filter(|(successes, _)| rejects(*successes)).map(|(_, probability)| probability).sum()
+        let probabilities = probabilities(n, self.rate);
+        let rejects = |successes: &u64| chance::two_sided(*successes, n, self.chance).is_some_and(|p| p <= self.level);
+        let counts = likely(&probabilities).filter(rejects);
+        counts.map(|successes| probabilities[usize::try_from(successes).expect("a count of episodes")]).sum()
     }
 }

@@ -101,3 +101,15 @@ fn rates_stay_within_zero_and_one() {
     close(least, 0.3);
     close(most, 1.0);
 }
+
+/// The search skips no size that the power has before the one it gives.
+#[test]
+fn no_smaller_size_has_the_power() {
+    for difference in [0.2, 0.25, 0.35, 0.45, 0.6] {
+        let rates = Rates::apart(difference, None).unwrap();
+        let clusters = Clusters { seeds: 1, icc: 0.0 };
+        let found = clusters.runs_for(0.8, &mut pairs(0.05, rates)).unwrap();
+        let mut test = pairs(0.05, rates);
+        assert_eq!((1..=found).find(|n| test.power(*n) >= 0.8), Some(found), "{difference}");
+    }
+}

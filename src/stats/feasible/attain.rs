@@ -60,12 +60,8 @@ impl Search {
     fn removes_largest(&mut self, Question { count, most, sum, squares }: Question) -> bool {
         let mut largest = most.min(sum).min(squares.isqrt());
         while largest * count >= sum && greatest_squares(largest, sum) >= squares {
-            let others = Question {
-                count: count - 1,
-                most: largest,
-                sum: sum - largest,
-                squares: squares - largest * largest,
-            };
+            let others =
+                Question { count: count - 1, most: largest, sum: sum - largest, squares: squares - largest * largest };
             if self.succeeds(others) {
                 return true;
             }
@@ -111,7 +107,7 @@ fn has_pair(most: i128, sum: i128, squares: i128) -> bool {
         return false;
     }
     let root = apart.isqrt();
-    root * root == apart && root <= sum && (sum + root) / 2 <= most
+    root * root == apart && root <= sum && i128::midpoint(sum, root) <= most
 }
 
 #[cfg(test)]
@@ -131,7 +127,9 @@ mod tests {
 
     #[test]
     fn the_search_agrees_with_enumeration() {
-        for (count, low, high) in [(1, 1, 9), (2, 0, 12), (3, 1, 14), (4, 0, 11), (5, -3, 6), (6, 1, 8), (9, 0, 4), (12, 0, 3)] {
+        for (count, low, high) in
+            [(1, 1, 9), (2, 0, 12), (3, 1, 14), (4, 0, 11), (5, -3, 6), (6, 1, 8), (9, 0, 4), (12, 0, 3)]
+        {
             let known = enumerated(count, low, high);
             let count = i128::try_from(count).unwrap();
             let mut search = Search::default();

@@ -61,7 +61,8 @@ fn means_out_of_range_have_no_sum() {
 #[test]
 fn small_samples_agree_with_enumeration() {
     let moments = |values: [i64; 4]| values.into_iter().fold(Moments::default(), |m, v| m.with(v).unwrap());
-    let multisets = (0..7).flat_map(|a| (a..7).flat_map(move |b| (b..7).flat_map(move |c| (c..7).map(move |d| [a, b, c, d]))));
+    let multisets =
+        (0..7).flat_map(|a| (a..7).flat_map(move |b| (b..7).flat_map(move |c| (c..7).map(move |d| [a, b, c, d]))));
     let all: Vec<Moments> = multisets.map(moments).collect();
     for (rounding, form) in Rounding::ALL.into_iter().flat_map(|rule| [(rule, OfSample), (rule, Population)]) {
         let mut known: BTreeMap<(i64, i64), bool> = BTreeMap::new();

@@ -37,7 +37,9 @@ pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>,
     let Some(print) = refused.cell.print() else {
         return Reason::of_mean(format!("printed as undefined, but defined in {}{because}", episodes(&ns)));
     };
-    let samples: Vec<Sample> = ns.iter().filter(|n| **n > 0).map(|n| question.sample(*n)).collect();
+    // A number that is printed has at least one value behind it.
+    let ns: BTreeSet<u64> = ns.into_iter().filter(|n| *n > 0).collect();
+    let samples: Vec<Sample> = ns.iter().map(|n| question.sample(*n)).collect();
     if samples.is_empty() {
         return Reason::of_mean(format!("undefined: there is no episode{because}"));
     }
@@ -143,8 +145,7 @@ fn conflict(row: &Row, refused: &Refused, question: &Question<'_>, ns: &BTreeSet
     let (low, high) = (allowed.iter().map(|span| span.0).min(), allowed.iter().map(|span| span.1).max());
     let bounds =
         low.zip(high).map(|(low, high)| format!(": it can be true in {}", between(low, high))).unwrap_or_default();
-    let ns: BTreeSet<u64> = ns.iter().copied().filter(|n| *n > 0).collect();
-    let among = format!("{}{}", episodes(&ns), condition(row, &refused.metric, question.definitions));
+    let among = format!("{}{}", episodes(ns), condition(row, &refused.metric, question.definitions));
     Reason::of_mean(format!("feasible by itself over {among}, but not beside {whole} of the same row{bounds}"))
 }
 

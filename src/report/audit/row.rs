@@ -156,15 +156,23 @@ pub(super) struct Question<'q> {
 impl Question<'_> {
     /// The counts that print so, with the world that each is of; one count per world unless all are asked for.
     fn counts_in(&self, worlds: &[World], all: bool, search: &mut Search) -> Vec<(usize, Count)> {
+        let needs = self.definitions.needs(self.metric);
+        let mut known: BTreeMap<Vec<Option<Count>>, Vec<Count>> = BTreeMap::new();
         let mut found = Vec::new();
         for (at, world) in worlds.iter().enumerate() {
-            for n in self.defined_in(world) {
-                let counts = self.counts(n, world, all, search);
-                let is_done = !all && counts.first().is_some_and(|count| count.n > 0);
-                found.extend(counts.into_iter().map(|count| (at, count)));
-                if is_done {
-                    break;
-                }
+            let of_needs = needs.iter().map(|metric| world.get(*metric).copied()).collect();
+            let counts = known.entry(of_needs).or_insert_with(|| self.counts_of_world(world, all, search));
+            found.extend(counts.iter().map(|count| (at, *count)));
+        }
+        found
+    }
+
+    fn counts_of_world(&self, world: &World, all: bool, search: &mut Search) -> Vec<Count> {
+        let mut found = Vec::new();
+        for n in self.defined_in(world) {
+            found.extend(self.counts(n, world, all, search));
+            if !all && found.last().is_some_and(|count| count.n > 0) {
+                break;
             }
         }
         found
@@ -191,9 +199,12 @@ impl Question<'_> {
         }
         let Some(prints) = self.prints() else { return Vec::new() };
         let sample = self.sample(n);
+        let span = self.allowed(n, world).unwrap_or(sample.all_sums());
+        if !sample.reaches(span, &prints) {
+            return Vec::new();
+        }
         let (low, high) = sample.sums(&prints);
-        let (least, most) = self.allowed(n, world).unwrap_or((low, high));
-        let sums = low.max(least)..=high.min(most);
+        let sums = low.max(span.0)..=high.min(span.1);
         let mut fitting = sums.filter(|sum| sample.with_sum(*sum, &prints, search).is_some());
         let counts = |sum| Count { n, sum };
         if all { fitting.map(counts).collect() } else { fitting.next().map(counts).into_iter().collect() }

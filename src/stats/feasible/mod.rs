@@ -43,12 +43,27 @@ type Span = (i128, i128);
 impl Sample {
     /// The sums that print as all these means.
     pub fn sums(&self, prints: &[Print]) -> Span {
+        let mean = |sum, print: &Print| self.mean(sum, print);
+        prints.iter().fold(self.all_sums(), |span, print| printing_as(span, print.mean, |sum| mean(sum, print)))
+    }
+
+    /// The sums that so many values of the range can have.
+    pub fn all_sums(&self) -> Span {
         let n = i128::from(self.n);
-        let whole = (n * i128::from(self.range.0), n * i128::from(self.range.1));
-        prints.iter().fold(whole, |span, print| {
-            let mean = |sum| print.rounding.ratio(sum, n, print.mean.places());
-            printing_as(span, print.mean, mean)
+        (n * i128::from(self.range.0), n * i128::from(self.range.1))
+    }
+
+    /// Whether the printed means lie between those of the ends of a span: two divisions, where [`Sample::sums`]
+    /// bisects.
+    pub fn reaches(&self, (least, most): Span, prints: &[Print]) -> bool {
+        prints.iter().all(|print| {
+            compare(self.mean(least, print), print.mean) != Ordering::Greater
+                && compare(self.mean(most, print), print.mean) != Ordering::Less
         })
+    }
+
+    fn mean(&self, sum: i128, print: &Print) -> Option<Decimal> {
+        print.rounding.ratio(sum, self.n.into(), print.mean.places())
     }
 
     /// Moments of values with this sum that print as all these standard errors; `None` where no values do.
@@ -77,9 +92,8 @@ impl Sample {
 
     /// The sums whose means print nearest below and above a mean, where the range has such.
     pub fn sums_beside(&self, print: &Print) -> [Option<i128>; 2] {
-        let n = i128::from(self.n);
-        let (least, most) = (n * i128::from(self.range.0), n * i128::from(self.range.1));
-        let is_below = |sum| compare(print.rounding.ratio(sum, n, print.mean.places()), print.mean) == Ordering::Less;
+        let (least, most) = self.all_sums();
+        let is_below = |sum| compare(self.mean(sum, print), print.mean) == Ordering::Less;
         let above = first_not((least, most), is_below);
         [(above > least).then(|| above - 1), (above <= most).then_some(above)]
     }

@@ -49,7 +49,8 @@ fn expected<'c>(cells: impl Iterator<Item = &'c PrintedCell>, metric: &str, term
 fn told(table: &NamedTable, at: usize, expected: Emphasis) -> InfeasibleCell {
     let word = |emphasis: Emphasis| match emphasis {
         Emphasis::Plain => "plain",
-        marked => marked.word(),
+        Emphasis::Bold => "bold",
+        Emphasis::Underline => "underlined",
     };
     let (name, cell) = &table.published.cells[at];
     let (found, expected) = (word(cell.emphasis), word(expected));
@@ -59,9 +60,7 @@ fn told(table: &NamedTable, at: usize, expected: Emphasis) -> InfeasibleCell {
         cell: name.clone(),
         published: format!("{} {found}", super::reason::shown(cell.mean, cell.se)),
         field: Field::Emphasis,
-        reason: format!(
-            "{found}, but among the printed means of its column {mean} is {expected} by the rule of the style"
-        ),
+        reason: format!("{found}, but by the rule of the style the printed mean {mean} is {expected} in its column"),
         nearest: vec![expected.to_owned()],
         feasible_rounded: Vec::new(),
     }

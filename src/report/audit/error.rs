@@ -2,7 +2,7 @@
 
 use super::{NamedTable, Terms};
 use crate::base::escape::visible;
-use crate::base::number::MOST_PLACES;
+use crate::base::number::Decimal;
 use crate::base::suggest::hint;
 use crate::report::published::CellLabel;
 
@@ -17,23 +17,21 @@ pub enum AuditError {
     #[error("--n: `{key}` names no row of the tables; expected an experiment, or EXPERIMENT/MODEL")]
     NoSuchRow { key: String },
     #[error(
-        "{table}: {experiment}, {model}, {metric}: expected at most {MOST_PLACES} digits behind the point and a number \
-         below 10^9, found `{found}`"
+        "{table}: {experiment}, {model}, {metric}: expected a number of at most {MOST_DIGITS} digits, found `{found}`"
     )]
     TooManyDigits { table: String, experiment: String, model: String, metric: String, found: String },
 }
 
-/// Numbers from here on leave too little of 128 bits.
-const TOO_LARGE: i128 = 1_000_000_000;
+/// The most digits of a number, the one before the point among them: more would leave 128 bits.
+pub(super) const MOST_DIGITS: u32 = 9;
 
 /// That tables can be audited under these terms.
 pub(super) fn check(tables: &[NamedTable], terms: Terms<'_>) -> Result<(), AuditError> {
     for table in tables {
         for (name, cell) in &table.published.cells {
             check_cell(table, name, terms)?;
-            let is_long = |number: &crate::base::number::Decimal| {
-                let scale = 10_i128.checked_pow(number.places());
-                number.places() > MOST_PLACES || scale.is_none_or(|scale| number.units().abs() / scale >= TOO_LARGE)
+            let is_long = |number: &Decimal| {
+                number.places() >= MOST_DIGITS || number.units().unsigned_abs() >= 10_u128.pow(MOST_DIGITS)
             };
             if let Some(number) = [cell.mean, cell.se].into_iter().flatten().find(is_long) {
                 return Err(AuditError::TooManyDigits {

@@ -34,7 +34,7 @@ pub(super) fn reason(row: &Row, refused: &Refused, definitions: Definitions<'_>,
     let question = Question { row_n: row.n, metric: &refused.metric, cells: &cells, definitions };
     let ns: BTreeSet<u64> = refused.worlds.iter().flat_map(|world| question.defined_in(world)).collect();
     let because = condition(row, &refused.metric, definitions);
-    let Some(print) = refused.cell.print() else {
+    let Some(print) = refused.cell.numbers() else {
         return Reason::of_mean(format!("printed as undefined, but defined in {}{because}", episodes(&ns)));
     };
     // A number that is printed has at least one value behind it.

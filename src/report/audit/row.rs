@@ -17,6 +17,10 @@ use crate::report::published::PrintedCell;
 use crate::stats::feasible::attain::Search;
 use crate::stats::feasible::{Print, Sample};
 
+/// No value is farther from zero where mean and standard error have at most [`MOST_DIGITS`](super::error::MOST_DIGITS)
+/// digits: a value is at most n standard errors from the mean.
+const LARGEST_VALUE: i64 = 3_000_000_000_000;
+
 /// What all rows go by.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Definitions<'d> {
@@ -229,22 +233,23 @@ impl Question<'_> {
 
     /// What is known of `n` values of the metric.
     pub(super) fn sample(&self, n: u64) -> Sample {
+        let (low, high) = self.definitions.implied[self.metric].range;
         Sample {
             n,
-            range: self.definitions.implied[self.metric].range,
+            range: (low.max(-LARGEST_VALUE), high.min(LARGEST_VALUE)),
             form: self.definitions.catalog.metric[self.metric].se,
         }
     }
 
     /// The numbers of the cells; `None` where one prints none.
     pub(super) fn prints(&self) -> Option<Vec<Print>> {
-        self.cells.iter().map(RowCell::print).collect()
+        self.cells.iter().map(RowCell::numbers).collect()
     }
 }
 
 impl RowCell {
     /// Its numbers; `None` where it is printed as undefined.
-    pub(super) fn print(&self) -> Option<Print> {
+    pub(super) fn numbers(&self) -> Option<Print> {
         Some(Print { mean: self.cell.mean?, se: self.cell.se, rounding: self.rounding })
     }
 

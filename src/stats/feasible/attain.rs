@@ -4,7 +4,8 @@
 //! smallest where the integers differ by at most one, and largest where all but one are 0 or h. Between the two not
 //! every value of that parity is attained (n = 4, t = 4: 4, 6, 8, 10, 16), so the search removes the largest integer
 //! and asks the same of the others. Both ends are attained and bound every branch; a large remainder succeeds at
-//! the first try, and what failed is remembered.
+//! the first try, and what failed is remembered. A search of more than [`MOST_STEPS`], which only few values over a huge
+//! range take, gives up and calls the value attained: nothing is called impossible that was not shown to be.
 
 use std::collections::HashSet;
 
@@ -17,10 +18,14 @@ struct Question {
     squares: i128,
 }
 
+/// The most values that one search tries.
+const MOST_STEPS: u32 = 1_000_000;
+
 /// Searches that may share what they found out.
 #[derive(Debug, Default)]
 pub struct Search {
     failed: HashSet<Question>,
+    steps: u32,
 }
 
 impl Search {
@@ -32,6 +37,10 @@ impl Search {
             sum: sum - count * low,
             squares: squares - 2 * low * sum + count * low * low,
         };
+        self.steps = 0;
+        if self.failed.len() > MOST_STEPS as usize {
+            self.failed.clear();
+        }
         self.succeeds(shifted)
     }
 
@@ -58,8 +67,12 @@ impl Search {
     }
 
     fn removes_largest(&mut self, Question { count, most, sum, squares }: Question) -> bool {
-        let mut largest = most.min(sum).min(squares.isqrt());
+        let mut largest = largest_that_leaves(count, most.min(sum), sum, squares);
         while largest * count >= sum && greatest_squares(largest, sum) >= squares {
+            self.steps += 1;
+            if self.steps > MOST_STEPS {
+                return true;
+            }
             let others =
                 Question { count: count - 1, most: largest, sum: sum - largest, squares: squares - largest * largest };
             if self.succeeds(others) {
@@ -81,6 +94,22 @@ pub fn ends(count: i128, (low, high): (i128, i128), sum: i128) -> Option<(i128, 
     }
     let back = |squares: i128| squares + 2 * low * sum - count * low * low;
     Some((back(least_squares(count, shifted)), back(greatest_squares(high - low, shifted))))
+}
+
+/// The largest integer up to `most` that leaves the others enough of the squares; by bisection, as the least that it
+/// and the others have grows with it from the mean on.
+fn largest_that_leaves(count: i128, most: i128, sum: i128, squares: i128) -> i128 {
+    let leaves = |largest: i128| largest * largest + least_squares(count - 1, sum - largest) <= squares;
+    let (mut low, mut high) = ((sum + count - 1) / count, most);
+    while low < high {
+        let middle = low + (high - low + 1) / 2;
+        if leaves(middle) {
+            low = middle;
+        } else {
+            high = middle - 1;
+        }
+    }
+    low
 }
 
 /// All integers as near to each other as the sum lets them be.
@@ -151,6 +180,16 @@ mod tests {
         let mut search = Search::default();
         let attained: Vec<i128> = (0..=20).filter(|&squares| search.is_attained(4, (0, 9), 4, squares)).collect();
         assert_eq!(attained, [4, 6, 8, 10, 16]);
+    }
+
+    #[test]
+    fn huge_ranges_come_to_an_end() {
+        let range = (-3_000_000_000_000, 3_000_000_000_000);
+        let mut search = Search::default();
+        // 3 integers with the sum 0: their squares add up to 2 (a² + ab + b²), which is never 2 modulo 3 twice over.
+        assert!(!search.is_attained(3, range, 0, 2 * 2));
+        assert!(search.is_attained(3, range, 0, 2 * 7_000_000_000_000_003));
+        assert!(search.is_attained(5, range, 1, 10_000_000_000_001));
     }
 
     #[test]

@@ -129,10 +129,10 @@ impl Sample {
     }
 }
 
-/// The part of a span that prints as `target`; `print` ascends.
-fn printing_as(span: Span, target: Decimal, print: impl Fn(i128) -> Option<Decimal>) -> Span {
-    let from = first_not(span, |value| compare(print(value), target) == Ordering::Less);
-    let beyond = first_not((from, span.1), |value| compare(print(value), target) != Ordering::Greater);
+/// The part of a span that prints as `target`; `shown` ascends.
+fn printing_as(span: Span, target: Decimal, shown: impl Fn(i128) -> Option<Decimal>) -> Span {
+    let from = first_not(span, |value| compare(shown(value), target) == Ordering::Less);
+    let beyond = first_not((from, span.1), |value| compare(shown(value), target) != Ordering::Greater);
     (from, beyond - 1)
 }
 

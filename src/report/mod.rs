@@ -2,7 +2,8 @@
 //!
 //! Rule: this room sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
 //! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`figures`](crate::figures) draws, [`html`] makes the page of all
-//! of it, [`bundle`] writes the folder.
+//! of it, [`bundle`] writes the folder. [`audit`] asks of published tables whether any data gives them, [`plan`] how
+//! many episodes a comparison takes.
 
 pub mod audit;
 pub mod bundle;

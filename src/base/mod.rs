@@ -11,4 +11,5 @@ pub mod number;
 pub mod palette;
 pub mod ratio;
 pub mod replace;
+pub mod rounding;
 pub mod suggest;

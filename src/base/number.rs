@@ -24,6 +24,21 @@ impl Decimal {
         Self { units: 0, places }
     }
 
+    /// `units / 10^places`.
+    pub fn of_units(units: i128, places: u32) -> Self {
+        Self { units, places }
+    }
+
+    /// The number in units of its last digit: 57 for `0.57`.
+    pub fn units(self) -> i128 {
+        self.units
+    }
+
+    /// Digits behind the point.
+    pub fn places(self) -> u32 {
+        self.places
+    }
+
     /// `above / below` rounded once, ties to even.
     ///
     /// `None` unless `below` is positive, and where 128 bits do not suffice.

@@ -17,6 +17,7 @@ pub mod explain;
 pub mod fault;
 pub mod file;
 mod functions;
+pub mod implied;
 mod keys;
 pub mod names;
 pub mod origin;

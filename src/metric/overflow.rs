@@ -71,7 +71,7 @@ fn range(op: &Op, rows: i128, column: impl Fn(&str) -> Option<(i64, i64)>, of: i
     }
 }
 
-fn arithmetic(op: Arithmetic, (a, b): Range, (c, d): Range) -> Range {
+pub(super) fn arithmetic(op: Arithmetic, (a, b): Range, (c, d): Range) -> Range {
     match op {
         Arithmetic::Add => (a + c, b + d),
         Arithmetic::Subtract => (a - d, b - c),
@@ -83,7 +83,7 @@ fn arithmetic(op: Arithmetic, (a, b): Range, (c, d): Range) -> Range {
 }
 
 /// The smallest range around some.
-fn hull(ranges: impl IntoIterator<Item = Range>) -> Range {
+pub(super) fn hull(ranges: impl IntoIterator<Item = Range>) -> Range {
     ranges.into_iter().reduce(|(a, b), (c, d)| (a.min(c), b.max(d))).unwrap_or((0, 0))
 }
 

@@ -2,8 +2,10 @@
 //!
 //! Rule: this room sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
 //! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`figures`](crate::figures) draws, [`html`] makes the page of all
-//! of it, [`bundle`] writes the folder.
+//! of it, [`bundle`] writes the folder. [`audit`] asks of published tables whether any data gives them, [`plan`] how
+//! many episodes a comparison takes.
 
+pub mod audit;
 pub mod bundle;
 pub mod changes;
 pub mod comparison;
@@ -12,6 +14,7 @@ pub mod errata;
 pub mod html;
 pub mod layout;
 pub mod order;
+pub mod plan;
 pub mod published;
 pub mod quality;
 pub mod statistics;

@@ -124,6 +124,11 @@ fn set_fallbacks(columns: &mut Columns, is_read: impl Fn(&str) -> bool) {
     }
 }
 
+/// Whether a column of this name has a value in each row of each trace.
+pub fn has_value(name: &str) -> bool {
+    COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
+}
+
 /// The columns that definitions may name over these traces: those of the schema, and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns = schema_columns().with_help("`mirrorstats schema` and `mirrorstats info` list the columns");

@@ -1,5 +1,6 @@
 //! The program at the process boundary: exit codes, what is said where, and that nothing is left half done.
 
+mod audit;
 mod colors;
 mod extended;
 mod filters;
@@ -13,6 +14,7 @@ mod hostile;
 mod options;
 #[cfg(target_os = "linux")]
 mod outputs;
+mod plan;
 mod quality;
 mod refusals;
 #[cfg(unix)]

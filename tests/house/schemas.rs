@@ -14,9 +14,12 @@ use mirrorstats::cli::commands::schema::Name;
 use mirrorstats::log::message::{Decision, EpisodeMessage};
 use mirrorstats::metric::explain::Explanation;
 use mirrorstats::metric::shape::DefinitionFile;
+use mirrorstats::report::audit::Audit;
 use mirrorstats::report::bundle::Manifest;
 use mirrorstats::report::comparison::Comparison;
 use mirrorstats::report::errata::Errata;
+use mirrorstats::report::plan::Plan;
+use mirrorstats::report::plan::register::RegisteredPlan;
 use mirrorstats::report::statistics::{Sequential, Statistics};
 use mirrorstats::report::style::Sheet;
 use mirrorstats::score::evidence::Evidence;
@@ -35,6 +38,7 @@ fn folder() -> PathBuf {
 fn current() -> Vec<(&'static str, Value)> {
     #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
     let mut schemas = vec![
+        ("audit", json!(schema_for!(Audit))),
         ("comparison", json!(schema_for!(Comparison))),
         ("decision", json!(schema_for!(Decision))),
         ("definitions-check", json!(schema_for!(CheckAnswer))),
@@ -46,6 +50,8 @@ fn current() -> Vec<(&'static str, Value)> {
         ("import", json!(schema_for!(ImportAnswer))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
+        ("plan", json!(schema_for!(Plan))),
+        ("plan-register", json!(schema_for!(RegisteredPlan))),
         ("recover", json!(schema_for!(RecoverAnswer))),
         ("report", json!(schema_for!(ReportAnswer))),
         ("renormalize", json!(schema_for!(RenormalizeAnswer))),

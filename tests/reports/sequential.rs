@@ -61,7 +61,6 @@ fn sequential(blocks: &[Block]) -> Sequential {
     let table = EpisodeTable {
         catalog: catalog(),
         keys: keys.collect(),
-        declared: Declared::default(),
         labels: vec![LabelColumn {
             name: "scene".into(),
             values: rows().map(|(_, at)| Some(format!("room {at}"))).collect(),

@@ -1,5 +1,6 @@
 //! The verbs: one file each.
 
+pub mod audit;
 pub mod check;
 pub mod compare;
 pub mod definitions;
@@ -9,6 +10,7 @@ pub mod figure;
 pub mod filmstrip;
 pub mod import;
 pub mod info;
+pub mod plan;
 pub mod query;
 #[cfg(feature = "sim")]
 pub mod record;
@@ -39,6 +41,8 @@ pub enum Command {
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
     Compare(compare::CompareArgs),
+    Audit(audit::AuditArgs),
+    Plan(plan::PlanArgs),
     Diff(diff::DiffArgs),
     Rescore(rescore::RescoreArgs),
     Validate(validate::ValidateCommand),
@@ -73,6 +77,8 @@ impl Command {
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
             Self::Compare(args) => args.run(),
+            Self::Audit(args) => args.run(),
+            Self::Plan(args) => args.run(),
             Self::Diff(args) => args.run(),
             Self::Rescore(args) => args.run(),
             Self::Validate(command) => command.run(),

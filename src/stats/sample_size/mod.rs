@@ -1,0 +1,134 @@
+//! How many episodes a comparison needs, and what a number of episodes can show: exact power by enumeration.
+//!
+//! Rule: the tests are those of a report, at a fixed level, and their power is a sum over every outcome; nothing is
+//! simulated. Power of an exact test rises in a sawtooth, so a size is tried one by one from below.
+
+pub mod binomial;
+mod fisher;
+mod mcnemar;
+mod one_rate;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use self::fisher::Fisher;
+pub use self::mcnemar::McNemar;
+pub use self::one_rate::OneRate;
+pub use super::quantile::settled;
+
+/// How near a p value may exceed the level and count as equal to it: rounding of sums, nothing more.
+const TIE: f64 = 1e-12;
+
+/// The most episodes per arm that a search goes to.
+pub const MOST_EPISODES: u64 = 2_000;
+
+/// A test whose power is known for each number of episodes.
+pub trait Power {
+    /// The probability that the test rejects with `n` episodes per model.
+    fn power(&mut self, n: u64) -> f64;
+}
+
+/// Two rates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Rates {
+    /// The lower one.
+    pub lower: f64,
+    /// The higher one.
+    pub higher: f64,
+}
+
+impl Rates {
+    /// Rates that are `difference` apart, from `baseline` up, or around 1/2 where none is given: there a difference is
+    /// hardest to show.
+    ///
+    /// `None` where they are not within 0 and 1.
+    pub fn apart(difference: f64, baseline: Option<f64>) -> Option<Self> {
+        let lower = baseline.unwrap_or((1.0 - difference) / 2.0);
+        let rates = Self { lower, higher: lower + difference };
+        (difference >= 0.0 && lower >= 0.0 && rates.higher <= 1.0 + TIE).then_some(rates)
+    }
+
+    /// The higher minus the lower.
+    pub fn difference(self) -> f64 {
+        self.higher - self.lower
+    }
+
+    /// The share of pairs of which one succeeds and the other does not, where success is independent within a pair.
+    pub fn independent_discordance(self) -> f64 {
+        self.lower * (1.0 - self.higher) + self.higher * (1.0 - self.lower)
+    }
+
+    /// The shares of discordant pairs that there can be with these rates: from the difference up.
+    pub fn possible_discordance(self) -> (f64, f64) {
+        let sum = self.lower + self.higher;
+        (self.difference(), sum.min(2.0 - sum))
+    }
+}
+
+/// How far episodes of one seed resemble each other.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Clusters {
+    /// The number of seeds, each a cluster of as many episodes.
+    pub seeds: u64,
+    /// The intraclass correlation: 0 for independent episodes.
+    pub icc: f64,
+}
+
+impl Clusters {
+    /// The independent episodes that `runs` per seed are worth, rounded down: n / (1 + (runs - 1) icc) (Kish 1965).
+    #[expect(
+        clippy::cast_precision_loss,
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a number of episodes, no larger than before"
+    )]
+    pub fn effective(self, runs: u64) -> u64 {
+        let design_effect = 1.0 + runs.saturating_sub(1) as f64 * self.icc;
+        ((self.seeds * runs) as f64 / design_effect + TIE) as u64
+    }
+
+    /// The fewest runs per seed with which the power is at least `wanted`; `None` where no number of episodes up to
+    /// [`MOST_EPISODES`] has it.
+    ///
+    /// Doubling and bisection find about where; then runs are tried one by one from a fifth, and from twenty, below.
+    pub fn runs_for(self, wanted: f64, test: &mut dyn Power) -> Option<u64> {
+        const NEAR: u64 = 20;
+        let most = MOST_EPISODES / self.seeds.max(1);
+        let mut has_power = |runs: u64| test.power(self.effective(runs)) >= wanted;
+        let doubled = std::iter::successors(Some(1), |runs| (*runs < most).then(|| (2 * runs).min(most)));
+        let mut enough = doubled.into_iter().find(|runs| has_power(*runs))?;
+        let mut too_few = enough / 2;
+        while enough - too_few > 1 {
+            let middle = u64::midpoint(too_few, enough);
+            if has_power(middle) {
+                enough = middle;
+            } else {
+                too_few = middle;
+            }
+        }
+        let from = enough.saturating_sub(NEAR.max(enough / 5)).max(1);
+        (from..=enough).find(|runs| has_power(*runs))
+    }
+}
+
+/// The smallest argument in [0, `most`] at which `power` reaches `wanted`, by bisection; `None` where even `most` does not.
+///
+/// `power` must rise with its argument. Forty halvings leave an error below 10^-12.
+pub fn smallest(wanted: f64, most: f64, mut power: impl FnMut(f64) -> f64) -> Option<f64> {
+    if power(most) < wanted {
+        return None;
+    }
+    let (mut low, mut high) = (0.0, most);
+    for _ in 0..40 {
+        let middle = f64::midpoint(low, high);
+        if power(middle) >= wanted {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    Some(high)
+}
+
+#[cfg(test)]
+mod tests;

@@ -70,7 +70,6 @@ fn sequential(blocks: &[Block]) -> Sequential {
             MetricColumn::new("TTD", rows().map(|(_, at)| Some(i64::from(at)))),
             MetricColumn::new("MCR", rows().map(|(_, at)| (at > 0).then_some(1))),
         ],
-        declared: Declared::default(),
     };
     Sequential::of(&table, &Options::default()).unwrap()
 }

@@ -14,6 +14,8 @@ pub mod output;
 pub mod quality;
 #[cfg(feature = "sim")]
 pub mod recording;
+#[cfg(feature = "sim")]
+mod registration;
 pub mod scoring;
 pub mod spark;
 mod terminal;

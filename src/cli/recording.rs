@@ -280,7 +280,7 @@ mod tests {
 
     #[test]
     fn who_is_waited_for_is_said() {
-        let key = Key { experiment: Experiment::E1, seed: 1, run: 3 };
+        let key = Key::first(Experiment::E1, 1, 3);
         let one = Held { key, process: Some(4711), count: 1 };
         let expected = "waiting for E1/a/s1/r3: process 4711 records it into the same folder; Ctrl-C ends the waiting";
         assert_eq!(waiting("E1/a/s1/r3", one), expected);
@@ -297,7 +297,7 @@ mod tests {
             let extra = Extra { reply_status: Some(status.to_owned()), ..Extra::default() };
             Step { action: None, self_color: None, selected_cube: None, mirror_visible: false, extra }
         };
-        let key = Key { experiment: Experiment::E1, seed: 1, run: 1 };
+        let key = Key::first(Experiment::E1, 1, 1);
         bar.step(key, 1, &row("ok"));
         assert_eq!((bar.message().as_str(), bar.has_news()), ("0 of 2 episodes", false));
         for (t, status) in [(2, "refusal"), (3, "parse_failed"), (4, "refusal")] {

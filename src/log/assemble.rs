@@ -16,8 +16,13 @@ use super::{METADATA, METADATA_KEY, topic};
 use crate::base::replace::NewFile;
 use crate::trace::episode::Episode;
 
-/// What orders the episodes of a log: seed and run.
-pub type Place = (i32, i32);
+/// What orders the episodes of a log: seed, run and repetition.
+pub type Place = (i32, i32, i32);
+
+/// Where an episode is in its log.
+pub fn place(head: &Episode) -> Place {
+    (head.seed, head.run, head.repetition.unwrap_or(1))
+}
 
 /// A writer whose bytes depend on nothing but what is written.
 pub(super) fn writer<W: Write + Seek>(out: W) -> mcap::McapResult<Writer<W>> {
@@ -132,7 +137,7 @@ impl Source {
 
     /// Which episode comes next.
     fn place(&self) -> Option<Place> {
-        self.begin.as_ref().map(|(head, _)| (head.seed, head.run))
+        self.begin.as_ref().map(|(head, _)| place(head))
     }
 
     /// Goes on to the next episode's first message.
@@ -163,7 +168,7 @@ impl Source {
             return Err(LogError::Damaged { file: self.path.display().to_string(), fault });
         }
         log.flush().map_err(LogError::writing(out))?;
-        self.last = Some((head.seed, head.run));
+        self.last = Some(place(&head));
         self.advance()
     }
 

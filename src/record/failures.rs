@@ -76,7 +76,7 @@ mod tests {
     use crate::trace::lost::list_of;
 
     fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
-        let key = Key { experiment: Experiment::E1, seed: 1, run };
+        let key = Key::first(Experiment::E1, 1, run);
         let lost = Lost { status: Some(Status::Timeout), cause: cause.to_owned() };
         lost_episode(key, &Subject::of(model), Some(4), lost)
     }

@@ -31,8 +31,11 @@ pub struct RecordingIndex {
     traces: Mutex<BTreeMap<Experiment, InTrace>>,
 }
 
-/// The episodes of a trace, by seed and run.
-type Places = Arc<BTreeSet<(i32, i32)>>;
+/// The seed, run and repetition of an episode.
+pub type Place = (i32, i32, i32);
+
+/// The episodes of a trace.
+type Places = Arc<BTreeSet<Place>>;
 
 /// What was read of a trace, good for as long as this file has its name. An open file's place on the disk is not used for
 /// another one.
@@ -70,7 +73,7 @@ impl RecordingIndex {
     ///
     /// # Errors
     /// When a trace, part or log cannot be read or was recorded differently, or the log is not that of the trace.
-    pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError> {
+    pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<Place>, StoreError> {
         let episodes = self.episodes(experiment)?;
         self.check_log(experiment, &episodes)?;
         Ok(places(&episodes))
@@ -90,7 +93,7 @@ impl RecordingIndex {
         }
         // An episode that is in the trace and a part is the same one: the trace was put together, and the process ended
         // before it removed the part.
-        episodes.sort_by_key(|episode| (episode.seed, episode.run));
+        episodes.sort_by_key(|episode| (episode.seed, episode.run, episode.repetition));
         episodes.dedup_by(|later, earlier| later.episode_id == earlier.episode_id);
         Ok(episodes)
     }
@@ -138,7 +141,7 @@ impl RecordingIndex {
             let path = entry.map_err(StoreError::io("read", &parts))?.path();
             let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
             let rest = name.strip_prefix(&prefix).and_then(|rest| rest.strip_suffix(".parquet"));
-            if rest.is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_digit() || b"-r".contains(&byte))) {
+            if rest.is_some_and(|rest| rest.bytes().all(|byte| byte.is_ascii_digit() || b"-rx".contains(&byte))) {
                 found.push(path);
             }
         }
@@ -163,6 +166,11 @@ fn unreachable_fault(path: &Path) -> StoreError {
     StoreError::io("read", path)(io::Error::other("the file cannot be opened as a trace"))
 }
 
-fn places(episodes: &[EpisodeRows]) -> BTreeSet<(i32, i32)> {
-    episodes.iter().map(|episode| (narrow(episode.seed), narrow(episode.run))).collect()
+fn places(episodes: &[EpisodeRows]) -> BTreeSet<Place> {
+    episodes.iter().map(|episode| place(episode)).collect()
+}
+
+/// Where an episode is among those of its experiment.
+pub(super) fn place(episode: &EpisodeRows) -> Place {
+    (narrow(episode.seed), narrow(episode.run), narrow(episode.repetition))
 }

@@ -6,6 +6,7 @@ use crate::agent::Player;
 use crate::base::palette::Color;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::SCENE_VERSION;
+use crate::trace::declared::Registration;
 
 /// A key that grows with the recording's episodes.
 pub(super) const SEEDS: &str = "seeds";
@@ -23,8 +24,13 @@ const VERSION: u32 = 2;
 /// one.
 ///
 /// Episodes with equal scenes are pairs. A seed is no cluster: each of its runs has a room of its own.
-pub fn recording(config: &WorldConfig, player: &dyn Player, condition: Option<&str>) -> Value {
-    json!({
+pub fn recording(
+    config: &WorldConfig,
+    player: &dyn Player,
+    condition: Option<&str>,
+    registration: Option<&Registration>,
+) -> Value {
+    let mut recording = json!({
         VERSION_KEY: VERSION,
         "kind": "recording",
         "design": { "pairs": "scene", "cluster": null },
@@ -36,7 +42,11 @@ pub fn recording(config: &WorldConfig, player: &dyn Player, condition: Option<&s
         "visibility_threshold_px": config.evidence.mirror_self_px,
         "world": config,
         "world_hash": config.hash(),
-    })
+    });
+    if let Some(registration) = registration {
+        recording["registration"] = json!(registration);
+    }
+    recording
 }
 
 /// Where two recordings differ.

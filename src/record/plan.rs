@@ -17,6 +17,8 @@ pub struct Plan {
     pub seeds: i32,
     /// Runs 1 to this for each seed (7 in the paper).
     pub runs: i32,
+    /// How often each scene is played.
+    pub repeats: i32,
     /// The share that this process records.
     pub shard: Shard,
 }
@@ -30,6 +32,8 @@ pub struct Key {
     pub seed: i32,
     /// The run within it.
     pub run: i32,
+    /// Which time its scene is played, from 1.
+    pub repetition: i32,
 }
 
 /// Whose episodes they are: a model, under a condition where one is named.
@@ -57,9 +61,16 @@ impl Subject {
 }
 
 impl Key {
-    /// The episode's id: `E1/oracle/s1/r3`, under a condition `E1/oracle@near/s1/r3`.
+    /// The first time that a scene is played.
+    pub const fn first(experiment: Experiment, seed: i32, run: i32) -> Self {
+        Self { experiment, seed, run, repetition: FIRST }
+    }
+
+    /// The episode's id: `E1/oracle/s1/r3`, under a condition `E1/oracle@near/s1/r3`, the second time `E1/oracle/s1/r3/x2`.
     pub fn episode_id(self, subject: &Subject) -> String {
-        format!("{}/{}/s{}/r{}", self.experiment.name(), subject.slug(), self.seed, self.run)
+        let Self { experiment, seed, run, repetition } = self;
+        let again = if repetition > FIRST { format!("/x{repetition}") } else { String::new() };
+        format!("{}/{}/s{seed}/r{run}{again}", experiment.name(), subject.slug())
     }
 
     /// The name of a file of the episode, without its ending: `E1-oracle-s1-r3`.
@@ -71,7 +82,8 @@ impl Key {
     pub fn agent_seed(self) -> u64 {
         let part = |value: i32| u64::from(value.unsigned_abs());
         let experiment = self.experiment as u64 + 1;
-        (experiment << 56) ^ (part(self.seed) << 24) ^ part(self.run) ^ 0x6d69_7272_6f72
+        let again = part(self.repetition - FIRST) << 10;
+        (experiment << 56) ^ (part(self.seed) << 24) ^ again ^ part(self.run) ^ 0x6d69_7272_6f72
     }
 }
 
@@ -90,11 +102,14 @@ pub fn slug(model: &str) -> String {
 }
 
 impl Plan {
-    /// The episodes of this share, by experiment, seed and run.
+    /// The episodes of this share, by experiment, seed, run and repetition.
     pub fn keys(&self) -> Vec<Key> {
-        let all = self.experiments.iter().flat_map(|experiment| {
-            (FIRST..=self.seeds)
-                .flat_map(move |seed| (FIRST..=self.runs).map(move |run| Key { experiment: *experiment, seed, run }))
+        let (seeds, runs, repeats) = (self.seeds, self.runs, self.repeats);
+        let all = self.experiments.iter().flat_map(move |experiment| {
+            let scenes = (FIRST..=seeds).flat_map(move |seed| (FIRST..=runs).map(move |run| (seed, run)));
+            scenes.flat_map(move |(seed, run)| {
+                (FIRST..=repeats).map(move |repetition| Key { experiment: *experiment, seed, run, repetition })
+            })
         });
         all.enumerate().filter(|(at, _)| self.shard.has(*at)).map(|(_, key)| key).collect()
     }
@@ -167,7 +182,7 @@ impl FromStr for Experiments {
 
 #[cfg(test)]
 mod tests {
-    use super::{Experiments, Plan, Shard, slug};
+    use super::{Experiments, Key, Plan, Shard, Subject, slug};
     use crate::sim::Experiment::{E1, E2, E3, E5};
 
     #[test]
@@ -185,7 +200,7 @@ mod tests {
     fn shards_share_all_episodes_and_no_episode_twice() {
         let plan = |shard: &str| {
             let shard = shard.parse().unwrap();
-            Plan { experiments: vec![E1, E5], seeds: 3, runs: 7, shard }.keys()
+            Plan { experiments: vec![E1, E5], seeds: 3, runs: 7, repeats: 1, shard }.keys()
         };
         let mut parts: Vec<_> = (1..=4).flat_map(|at| plan(&format!("{at}/4"))).collect();
         parts.sort_unstable();
@@ -194,6 +209,20 @@ mod tests {
         for wrong in ["0/4", "5/4", "1", "a/b", "1/0"] {
             assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn the_first_time_has_the_name_and_the_chances_that_it_always_had() {
+        let first = Key::first(E1, 1, 3);
+        let again = Key { repetition: 2, ..first };
+        let subject = Subject::of("oracle");
+        assert_eq!((first.episode_id(&subject), again.episode_id(&subject)), ("E1/oracle/s1/r3".into(), "E1/oracle/s1/r3/x2".into()));
+        assert_eq!(first.agent_seed(), (1 << 56) ^ (1 << 24) ^ 3 ^ 0x6d69_7272_6f72);
+        let keys = Plan { experiments: vec![E1], seeds: 2, runs: 999, repeats: 99, shard: Shard::WHOLE }.keys();
+        let mut seeds: Vec<u64> = keys.iter().map(|key| key.agent_seed()).collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        assert_eq!(seeds.len(), keys.len());
     }
 
     #[test]

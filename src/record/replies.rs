@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn the_first_is_so_by_its_place_and_told_once() {
         let replies = Replies::default();
-        let key = |run| Key { experiment: Experiment::E1, seed: 1, run };
+        let key = |run| Key::first(Experiment::E1, 1, run);
         assert_eq!(replies.add(&Subject::of("m"), key(2), 1, &row("ok", None)), None);
         assert_eq!(replies.answer().first_unreadable, None);
         let told = replies.add(&Subject::of("m"), key(2), 3, &row("parse_failed", Some("later"))).unwrap();

@@ -72,6 +72,7 @@ pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) ->
         experiment: key.experiment.name().to_owned(),
         seed: key.seed,
         run: key.run,
+        repetition: Some(key.repetition),
         body_color: scene.body_color.name().to_owned(),
         stated_color: scene.stated_color.map(|color| color.name().to_owned()),
         distractors: Some(i8::try_from(scene.others.len()).unwrap_or(i8::MAX)),
@@ -176,7 +177,7 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
         prompt_tokens: reply.usage.prompt_tokens,
         completion_tokens: reply.usage.completion_tokens,
         cost_usd: reply.usage.cost_usd,
-        frame_time: Some(frame_time(key.seed, key.run, t)),
+        frame_time: Some(frame_time(key.seed, key.run, key.repetition, t)),
         ..Extra::default()
     };
     Step {

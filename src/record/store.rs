@@ -23,7 +23,7 @@ use super::error::StoreError;
 use super::failures::{self, LostEpisode};
 use super::fingerprint::Fingerprint;
 use super::folder_lock::FolderLock;
-use super::index::{RecordingIndex, narrow, recording_of};
+use super::index::{Place, RecordingIndex, place, recording_of};
 use super::lock::{Attempt, EpisodeLock};
 use super::metadata::{FINGERPRINTS, SEEDS};
 use super::plan::{Key, Subject};
@@ -93,7 +93,7 @@ impl Store {
     ///
     /// # Errors
     /// When a trace or part cannot be read, or was recorded differently.
-    pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError> {
+    pub fn recorded(&self, experiment: Experiment) -> Result<BTreeSet<Place>, StoreError> {
         // A part that another process is taking over into the trace is in neither for a moment.
         let _lock = self.folder_lock.lock()?;
         self.index.recorded(experiment)
@@ -122,7 +122,7 @@ impl Store {
     /// Whether an episode is in the trace, or waits for it as a part.
     fn is_recorded(&self, key: Key) -> Result<bool, StoreError> {
         // In this order: a part is removed only when its episode is in the trace.
-        Ok(self.part(key).exists() || self.index.in_trace(key.experiment)?.contains(&(key.seed, key.run)))
+        Ok(self.part(key).exists() || self.index.in_trace(key.experiment)?.contains(&(key.seed, key.run, key.repetition)))
     }
 
     /// Brings the list of lost episodes up to date: these are recorded, those were lost now. Gives those of them that no
@@ -214,7 +214,7 @@ impl Store {
             let log = part.with_extension("mcap");
             if log.exists() {
                 let episode = merge::read(part)?;
-                logs.extend(episode.first().map(|episode| ((narrow(episode.seed), narrow(episode.run)), log)));
+                logs.extend(episode.first().map(|episode| (place(episode), log)));
             }
         }
         if logs.is_empty() {

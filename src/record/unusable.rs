@@ -107,7 +107,7 @@ mod tests {
         let unusable = Unusable::new(NonZeroU32::new(most));
         let mut in_episodes = [0; 4];
         let add = |(run, status): &(i32, &str)| {
-            let key = Key { experiment: Experiment::E1, seed: 1, run: *run };
+            let key = Key::first(Experiment::E1, 1, *run);
             unusable.add(&Subject::of("m"), key, 7, &row(status), &mut in_episodes[usize::try_from(*run).unwrap()])
         };
         let at = replies.iter().position(add);

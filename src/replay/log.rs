@@ -36,6 +36,7 @@ pub type LogFault = Box<dyn std::error::Error + Send + Sync>;
 pub struct Log {
     seed: i32,
     run: i32,
+    repetition: i32,
     file: EpisodeLog,
 }
 
@@ -45,8 +46,9 @@ impl Log {
     /// # Errors
     /// When it cannot be written.
     pub fn begin(path: &Path, episode: &Episode) -> Result<Self, LogFault> {
-        let (seed, run) = (episode.seed, episode.run);
-        Ok(Self { seed, run, file: EpisodeLog::create(path, episode, &CENSUS, time(seed, run, 0))? })
+        let (seed, run, repetition) = (episode.seed, episode.run, episode.repetition.unwrap_or(1));
+        let file = EpisodeLog::create(path, episode, &CENSUS, time(seed, run, repetition, 0))?;
+        Ok(Self { seed, run, repetition, file })
     }
 
     /// Adds what is seen before a step.
@@ -81,20 +83,22 @@ impl Log {
     }
 
     fn time(&self, t: i32) -> u64 {
-        time(self.seed, self.run, t)
+        time(self.seed, self.run, self.repetition, t)
     }
 }
 
-/// When a step's frame was seen, ns: no clock, but a place of its own on the time line of the log.
-pub fn frame_time(seed: i32, run: i32, t: i32) -> i64 {
+/// When a step's frame was seen, ns: no clock, but a place of its own on the time line of the log. Another time of the same
+/// scene comes some thousandths of a second later.
+pub fn frame_time(seed: i32, run: i32, repetition: i32, t: i32) -> i64 {
     const SECOND: i64 = 1_000_000_000;
+    const MILLISECOND: i64 = 1_000_000;
     let episode = i64::from(seed) * 1_000 + i64::from(run);
-    (episode * 1_000 + i64::from(t)) * SECOND
+    (episode * 1_000 + i64::from(t)) * SECOND + i64::from(repetition - 1) * MILLISECOND
 }
 
 /// The time of a step in the log, which never lies before 0.
-fn time(seed: i32, run: i32, t: i32) -> u64 {
-    u64::try_from(frame_time(seed, run, t)).unwrap_or(0)
+fn time(seed: i32, run: i32, repetition: i32, t: i32) -> u64 {
+    u64::try_from(frame_time(seed, run, repetition, t)).unwrap_or(0)
 }
 
 fn placed(placed: &snapshot::Placed) -> Placed {

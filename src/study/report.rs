@@ -121,6 +121,7 @@ impl Study {
         if let Some(undeclared) = undeclared(&results.episodes) {
             notes.push(undeclared);
         }
+        notes.extend(registered(&results.episodes));
         let total = lost.total();
         if total > 0 {
             let (noun, verb) = if total == 1 { ("episode", "was") } else { ("episodes", "were") };
@@ -134,6 +135,19 @@ impl Study {
         }
         notes
     }
+}
+
+/// Whether what is analysed is what was registered before the recording; `None` where no plan was.
+fn registered(episodes: &EpisodeTable) -> Option<String> {
+    let plan = episodes.declared.registration.as_ref()?;
+    let short = |hash: &str| hash.chars().take(12).collect::<String>();
+    let own = &episodes.catalog.hash;
+    let verdict = match &plan.definitions {
+        None => "it names no definitions".to_owned(),
+        Some(hash) if hash == own => "the definitions are those that it names".to_owned(),
+        Some(hash) => format!("the definitions are others ({}) than those that it names ({})", short(own), short(hash)),
+    };
+    Some(format!("the recording follows the registered plan {}: {verdict}", short(&plan.sha256)))
 }
 
 /// What the traces do not declare, in one line; `None` where they declare it.

@@ -34,6 +34,16 @@ pub enum Cluster {
     Seed,
 }
 
+/// A plan that was registered before the recording.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Registration {
+    /// SHA-256 of the plan.
+    pub sha256: String,
+    /// SHA-256 of the definitions that it names.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub definitions: Option<String>,
+}
+
 /// What some files declare together.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Declared {
@@ -46,9 +56,9 @@ pub struct Declared {
     /// The parts of each fingerprint, by its name in the column `fingerprint`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub fingerprints: BTreeMap<String, Value>,
-    /// The hash of the plan that was registered before the recording, where all files say the same.
+    /// The plan that was registered before the recording, where all files name the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub registration: Option<String>,
+    pub registration: Option<Registration>,
     /// Episodes that failures kept from being recorded: in no trace.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unrecorded: Vec<LostEpisode>,
@@ -72,7 +82,7 @@ impl Declared {
                 .filter(|cluster| *cluster == "seed")
                 .map(|_| Cluster::Seed),
             fingerprints: fingerprints.into_iter().collect(),
-            registration: recording["registration"].as_str().map(str::to_owned),
+            registration: serde_json::from_value(recording["registration"].clone()).unwrap_or_default(),
             unrecorded: Vec::new(),
         }
     }
@@ -103,9 +113,9 @@ mod tests {
         let import = Declared::of_recording(Some(r#"{"kind":"import","design":{"cluster":"seed"}}"#));
         assert_eq!((import.origin, import.cluster), (Some(Origin::Import), Some(Cluster::Seed)));
         let recording = Declared::of_recording(Some(
-            r#"{"kind":"recording","fingerprints":{"a":{"model":"m"}},"registration":"r"}"#,
+            r#"{"kind":"recording","fingerprints":{"a":{"model":"m"}},"registration":{"sha256":"r"}}"#,
         ));
-        assert_eq!(recording.registration.as_deref(), Some("r"));
+        assert_eq!(recording.registration.as_ref().map(|plan| plan.sha256.as_str()), Some("r"));
         let both = import.clone().joined(recording);
         assert_eq!((both.origin, both.cluster, both.registration), (None, None, None));
         assert_eq!(both.fingerprints["a"]["model"], "m");

@@ -15,7 +15,7 @@ const ALL: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
 
 /// `runs` runs of each of `seeds` seeds.
 fn episodes(agent: Scripted, experiments: &[Experiment], seeds: i32, runs: i32) -> Vec<(Scripted, Key)> {
-    let key = |experiment, seed| (1..=runs).map(move |run| (agent, Key { experiment, seed, run }));
+    let key = |experiment, seed| (1..=runs).map(move |run| (agent, Key::first(experiment, seed, run)));
     experiments.iter().flat_map(|&experiment| (1..=seeds).flat_map(move |seed| key(experiment, seed))).collect()
 }
 

@@ -3,6 +3,10 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "sim")]
+use crate::cli::registration;
+#[cfg(feature = "sim")]
+use crate::sim::config::WorldConfig;
 use crate::base::ratio::Ratio;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
@@ -56,6 +60,10 @@ pub struct PlanArgs {
     /// Write the plan, the hash of the definitions and its own hash to a new file
     #[arg(long, value_name = "FILE")]
     pub register: Option<PathBuf>,
+    /// The world configuration that a registered plan names by its hash [default: the built-in one]
+    #[cfg(feature = "sim")]
+    #[arg(long, value_name = "FILE", requires = "register")]
+    pub config: Option<PathBuf>,
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
@@ -119,8 +127,26 @@ impl PlanArgs {
             return Err(Failure::input(UsageError::Registered { file: file.display().to_string() }));
         }
         let definitions = NamedHash { name: catalog.name, sha256: catalog.hash };
-        let registered = RegisteredPlan::new(plan.clone(), definitions, Vec::new(), Vec::new());
+        let (experiments, prompts) = self.recorded()?;
+        let registered = RegisteredPlan::new(plan.clone(), definitions, experiments, prompts);
         output::write_file(file, registered.to_json().as_bytes())
+    }
+
+    /// The hashes of what will be recorded: the world and the prompts.
+    #[cfg(feature = "sim")]
+    fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
+        let config = match &self.config {
+            Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
+            None => WorldConfig::default(),
+        };
+        let world = NamedHash { name: registration::WORLD.to_owned(), sha256: config.hash() };
+        Ok((vec![world], registration::prompts()))
+    }
+
+    /// Nothing, in a program that cannot record.
+    #[cfg(not(feature = "sim"))]
+    fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
+        Ok((Vec::new(), Vec::new()))
     }
 }
 

@@ -7,6 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use serde_json::Value;
+
 use crate::agent::Player;
 use crate::agent::scripted::{Renamed, Scripted};
 use crate::base::escape::visible;
@@ -17,9 +19,10 @@ use crate::cli::exec::ExecArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
+use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
 use crate::record::error::StoreError;
-use crate::record::index::RecordingIndex;
+use crate::record::index::{Place, RecordingIndex};
 use crate::record::plan::{Experiments, Key, Plan, Shard, Subject};
 use crate::record::run::{Recording, Settings, Tally};
 use crate::record::shares::Shares;
@@ -49,6 +52,10 @@ pub struct RecordArgs {
     /// Runs 1 to this for each seed
     #[arg(long, value_name = "N", default_value_t = 7, value_parser = clap::value_parser!(i32).range(1..=999))]
     runs: i32,
+    /// Play each scene so often: how much verdicts differ from one time to the next is the noise that a difference has to
+    /// exceed
+    #[arg(long, value_name = "K", default_value_t = 1, value_parser = clap::value_parser!(i32).range(1..=99))]
+    repeats: i32,
     /// Record one share of the episodes, such as 3/16; shares may go into one folder
     #[arg(long, value_name = "I/N", default_value = "1/1")]
     shard: Shard,
@@ -58,6 +65,10 @@ pub struct RecordArgs {
     /// What the study varies besides the model, by name: a column of traces and tables, and part of each episode's id
     #[arg(long, value_name = "NAME", value_parser = condition)]
     condition: Option<String>,
+    /// A plan that `mirrorstats plan --register` wrote: traces carry its hash, and reports say whether what was analysed is
+    /// what was registered
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
     /// A world configuration in TOML over the built-in one
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
@@ -104,13 +115,13 @@ impl RecordArgs {
             None => WorldConfig::default(),
         };
         let plan =
-            Plan { experiments: self.experiment.0.clone(), seeds: self.seeds, runs: self.runs, shard: self.shard };
+            Plan { experiments: self.experiment.0.clone(), seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard };
         if self.dry_run {
             return self.forecast(&config, &plan);
         }
         let player = self.player()?;
         let subject = self.subject(player.as_ref());
-        let recording = metadata::recording(&config, player.as_ref(), self.condition.as_deref());
+        let recording = self.recording(&config, player.as_ref())?;
         let store = Store::open(&self.out, subject.clone(), recording).map_err(Failure::input)?;
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         stop_at_interrupt(stop, Arc::clone(&player))?;
@@ -125,7 +136,7 @@ impl RecordArgs {
             None => self.player()?,
         };
         let subject = self.subject(player.as_ref());
-        let recording = metadata::recording(config, player.as_ref(), self.condition.as_deref());
+        let recording = self.recording(config, player.as_ref())?;
         let there = RecordingIndex::new(&self.out, subject.clone(), recording);
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
@@ -210,6 +221,12 @@ impl RecordArgs {
         }
     }
 
+    /// What the traces say of how they were recorded.
+    fn recording(&self, config: &WorldConfig, player: &dyn Player) -> Result<Value, Failure> {
+        let registered = self.plan.as_deref().map(|file| registration(file, config)).transpose()?;
+        Ok(metadata::recording(config, player, self.condition.as_deref(), registered.as_ref()))
+    }
+
     /// Whose episodes they are.
     fn subject(&self, player: &dyn Player) -> Subject {
         Subject { model: player.model().to_owned(), condition: self.condition.clone() }
@@ -258,13 +275,13 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
 fn unrecorded(
     plan: &Plan,
     planned: &[Key],
-    recorded: impl Fn(Experiment) -> Result<BTreeSet<(i32, i32)>, StoreError>,
+    recorded: impl Fn(Experiment) -> Result<BTreeSet<Place>, StoreError>,
 ) -> Result<Vec<Key>, Failure> {
     let mut todo = Vec::with_capacity(planned.len());
     for experiment in &plan.experiments {
         let done = recorded(*experiment).map_err(Failure::input)?;
         let own = planned.iter().filter(|key| key.experiment == *experiment);
-        todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run))));
+        todo.extend(own.filter(|key| !done.contains(&(key.seed, key.run, key.repetition))));
     }
     Ok(todo)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::row::{Definitions, Question, Refused, Row, World};
+use super::row::{Definitions, LARGEST_VALUE, Question, Refused, Row, World};
 use crate::base::number::Decimal;
 use crate::metric::catalog::Kind;
 use crate::metric::implied::Defined;
@@ -76,9 +76,12 @@ impl Cell {
         let nearest = nearest(sides);
         let what = match self.kind {
             Kind::Rate => "count".to_owned(),
-            Kind::Quantity => {
-                format!("sum of integers from {} to {}", self.samples[0].range.0, self.samples[0].range.1)
-            }
+            Kind::Quantity => match self.samples[0].range {
+                (low, high) if low > -LARGEST_VALUE && high < LARGEST_VALUE => {
+                    format!("sum of integers from {low} to {high}")
+                }
+                _ => "sum of integers".to_owned(),
+            },
         };
         let words =
             format!("no {what} over {} has a mean that prints {}{}", self.among, self.print.mean, listed(&nearest));

@@ -19,7 +19,7 @@ use crate::stats::feasible::{Print, Sample};
 
 /// No value is farther from zero where mean and standard error have at most [`MOST_DIGITS`](super::error::MOST_DIGITS)
 /// digits: a value is at most n standard errors from the mean.
-const LARGEST_VALUE: i64 = 3_000_000_000_000;
+pub(super) const LARGEST_VALUE: i64 = 3_000_000_000_000;
 
 /// What all rows go by.
 #[derive(Clone, Copy, Debug)]

@@ -17,6 +17,7 @@ mod losses;
 mod matching;
 mod models;
 mod overall;
+mod retest;
 mod sequential;
 mod study;
 pub mod text;
@@ -35,6 +36,7 @@ pub use durations::{CENSORED, CorrectRow, DurationRow};
 pub use losses::{LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
+pub use retest::RetestRow;
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 
@@ -109,6 +111,9 @@ pub struct Statistics {
     pub clusters: Vec<ClusterRow>,
     /// Durations with censoring.
     pub durations: Vec<DurationRow>,
+    /// Verdicts on scenes that a model played more than once.
+    #[serde(default)]
+    pub retests: Vec<RetestRow>,
     /// Episodes lost to infrastructure.
     pub losses: Losses,
 }
@@ -146,6 +151,7 @@ impl Statistics {
             conditions: Contrast::all(&study, horizon, confidence),
             clusters: ClusterRow::all(&study, confidence),
             durations: DurationRow::all(&study, horizon, confidence),
+            retests: RetestRow::all(&study),
             losses: Losses::of(&study, options.lost.as_ref(), confidence),
             headline,
         };

@@ -235,7 +235,7 @@ pub const METADATA: &[MetadataKey] = &[
     },
     MetadataKey {
         key: "mirrorstats.recording.registration",
-        doc: "SHA-256 of the plan that was registered before the recording.",
+        doc: "The plan that was registered before the recording: its `sha256`, and that of the `definitions` that it names.",
     },
     MetadataKey {
         key: CHECKSUMS_KEY,

@@ -38,6 +38,8 @@ pub struct EpisodeRows {
     pub seed: i64,
     /// The run within its seed.
     pub run: i64,
+    /// Which time its scene is played, from 1.
+    pub repetition: i64,
     rows: RecordBatch,
 }
 
@@ -129,6 +131,8 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
         (column("episode_id", &DataType::Utf8)?, column("seed", &DataType::Int64)?, column("run", &DataType::Int64)?);
     let (ids, seeds, runs) =
         (ids.as_string::<i32>(), seeds.as_primitive::<Int64Type>(), runs.as_primitive::<Int64Type>());
+    let repetitions = rows.column_by_name("repetition").and_then(|column| cast(column, &DataType::Int64).ok());
+    let repetitions = repetitions.map(|column| column.as_primitive::<Int64Type>().clone());
     let mut found = Vec::new();
     let mut start = 0;
     for end in 1..=ids.len() {
@@ -137,6 +141,7 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
                 episode_id: ids.value(start).to_owned(),
                 seed: seeds.value(start),
                 run: runs.value(start),
+                repetition: repetitions.as_ref().filter(|column| column.is_valid(start)).map_or(1, |column| column.value(start)),
                 rows: rows.slice(start, end - start),
             });
             start = end;
@@ -155,8 +160,8 @@ pub fn rows(episode: &Episode, columns: &OptionalColumns) -> Result<EpisodeRows,
     let mut gathered = Gathered::of_columns(columns.iter().copied());
     write::gather(&mut gathered, &columns, episode);
     let rows = gathered.take().map_err(TraceError::Memory)?;
-    let (seed, run) = (episode.seed.into(), episode.run.into());
-    Ok(EpisodeRows { episode_id: episode.episode_id.clone(), seed, run, rows })
+    let (seed, run, repetition) = (episode.seed.into(), episode.run.into(), episode.repetition.unwrap_or(1).into());
+    Ok(EpisodeRows { episode_id: episode.episode_id.clone(), seed, run, repetition, rows })
 }
 
 /// Replaces the trace at `path` by one of these episodes, in this order.

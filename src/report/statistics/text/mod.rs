@@ -102,6 +102,10 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
             ),
             tables::durations(statistics, shown),
         ),
+        (
+            "The same scene played again: verdicts that differ by chance alone, which a difference has to exceed".to_owned(),
+            tables::retests(statistics, shown),
+        ),
         ("Lost to infrastructure".to_owned(), tables::losses(statistics, shown)),
     ];
     let further = || {

@@ -223,6 +223,21 @@ pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Grid {
     Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
 }
 
+pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.retests.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let numbers = [
+            row.scenes.to_string(),
+            row.episodes.to_string(),
+            format!("{}/{}", row.unstable, row.scenes),
+            fixed(Some(row.flipped), 3),
+        ];
+        let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
+        names.into_iter().chain(numbers).collect()
+    });
+    let numbers = ["scenes", "episodes", "not always the same", "flipped from one time to the next"];
+    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+}
+
 pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Grid {
     let lines = statistics.losses.rows.iter().filter(|row| shown(&row.metric)).map(|row| {
         let lossy = row.lossy;

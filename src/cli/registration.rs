@@ -38,7 +38,9 @@ pub(super) fn registration(file: &Path, config: &WorldConfig) -> Result<Registra
     })?;
     if !plan.is_unchanged() {
         let words = "the plan was changed after it was registered: its hash is not that of its content";
-        return Err(Failure::input(format!("{shown}: {words}\n  help: take the file as it was registered, or register anew")));
+        return Err(Failure::input(format!(
+            "{shown}: {words}\n  help: take the file as it was registered, or register anew"
+        )));
     }
     check(&shown.to_string(), &plan, config)?;
     Ok(Registration { sha256: plan.sha256, definitions: Some(plan.definitions.sha256) })
@@ -47,12 +49,14 @@ pub(super) fn registration(file: &Path, config: &WorldConfig) -> Result<Registra
 fn check(file: &str, plan: &RegisteredPlan, config: &WorldConfig) -> Result<(), Failure> {
     let refused = |what: &str, expected: &str, found: &str| {
         let help = "record what was registered, or register another plan";
-        let words = format!("{file}: expected {what} as registered ({expected}), found another ({found})\n  help: {help}");
+        let words =
+            format!("{file}: expected {what} as registered ({expected}), found another ({found})\n  help: {help}");
         Err(Failure::input(words))
     };
     let short = |hash: &str| hash.chars().take(12).collect::<String>();
     for registered in &plan.prompts {
-        let own = prompts().into_iter().find(|own| own.name == registered.name).map(|own| own.sha256).unwrap_or_default();
+        let own =
+            prompts().into_iter().find(|own| own.name == registered.name).map(|own| own.sha256).unwrap_or_default();
         if own != registered.sha256 {
             return refused(&format!("the prompt `{}`", registered.name), &short(&registered.sha256), &short(&own));
         }

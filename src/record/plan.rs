@@ -216,7 +216,10 @@ mod tests {
         let first = Key::first(E1, 1, 3);
         let again = Key { repetition: 2, ..first };
         let subject = Subject::of("oracle");
-        assert_eq!((first.episode_id(&subject), again.episode_id(&subject)), ("E1/oracle/s1/r3".into(), "E1/oracle/s1/r3/x2".into()));
+        assert_eq!(
+            (first.episode_id(&subject), again.episode_id(&subject)),
+            ("E1/oracle/s1/r3".into(), "E1/oracle/s1/r3/x2".into())
+        );
         assert_eq!(first.agent_seed(), (1 << 56) ^ (1 << 24) ^ 3 ^ 0x6d69_7272_6f72);
         let keys = Plan { experiments: vec![E1], seeds: 2, runs: 999, repeats: 99, shard: Shard::WHOLE }.keys();
         let mut seeds: Vec<u64> = keys.iter().map(|key| key.agent_seed()).collect();

@@ -122,7 +122,8 @@ impl Store {
     /// Whether an episode is in the trace, or waits for it as a part.
     fn is_recorded(&self, key: Key) -> Result<bool, StoreError> {
         // In this order: a part is removed only when its episode is in the trace.
-        Ok(self.part(key).exists() || self.index.in_trace(key.experiment)?.contains(&(key.seed, key.run, key.repetition)))
+        Ok(self.part(key).exists()
+            || self.index.in_trace(key.experiment)?.contains(&(key.seed, key.run, key.repetition)))
     }
 
     /// Brings the list of lost episodes up to date: these are recorded, those were lost now. Gives those of them that no

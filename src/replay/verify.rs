@@ -113,7 +113,7 @@ impl Recorded {
             answer.episodes += 1;
             answer.steps += episode.steps.len();
             answer.divergences.extend(divergence);
-            logs.push((assemble::place(episode), part));
+            logs.push((assemble::place(&episode), part));
             if outputs.recount.is_some() {
                 *answer.flipped.get_or_insert(0) += counts.flipped(&episode);
                 rewritten.push(rows.with_columns(&counts.columns()).map_err(ReplayError::other)?);

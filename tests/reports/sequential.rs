@@ -60,6 +60,7 @@ fn sequential(blocks: &[Block]) -> Sequential {
     let solved = || rows().map(|((.., solved), at)| Some(i64::from(at < *solved)));
     let table = EpisodeTable {
         catalog: catalog(),
+        declared: Declared::default(),
         keys: keys.collect(),
         labels: vec![LabelColumn {
             name: "scene".into(),

@@ -3,17 +3,17 @@
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-#[cfg(feature = "sim")]
-use crate::cli::registration;
-#[cfg(feature = "sim")]
-use crate::sim::config::WorldConfig;
 use crate::base::ratio::Ratio;
 use crate::cli::outcome::{Failure, Outcome};
+#[cfg(feature = "sim")]
+use crate::cli::registration;
 use crate::cli::{output, terminal};
 use crate::metric::definitions::Definitions;
 use crate::report::plan::register::{NamedHash, RegisteredPlan};
 use crate::report::plan::{Given, Plan, PlanRequest, plan, text};
 use crate::score::score_traces::schema_columns;
+#[cfg(feature = "sim")]
+use crate::sim::config::WorldConfig;
 use crate::stats::sample_size::Clusters;
 use crate::study::StudyError;
 

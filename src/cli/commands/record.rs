@@ -114,8 +114,13 @@ impl RecordArgs {
             Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
             None => WorldConfig::default(),
         };
-        let plan =
-            Plan { experiments: self.experiment.0.clone(), seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard };
+        let plan = Plan {
+            experiments: self.experiment.0.clone(),
+            seeds: self.seeds,
+            runs: self.runs,
+            repeats: self.repeats,
+            shard: self.shard,
+        };
         if self.dry_run {
             return self.forecast(&config, &plan);
         }

@@ -36,8 +36,8 @@ pub use durations::{CENSORED, CorrectRow, DurationRow};
 pub use losses::{LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
-pub use retest::RetestRow;
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
+pub use retest::RetestRow;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
 
 use crate::score::table::EpisodeTable;

@@ -141,7 +141,10 @@ fn episodes(rows: &RecordBatch) -> Result<Vec<EpisodeRows>, String> {
                 episode_id: ids.value(start).to_owned(),
                 seed: seeds.value(start),
                 run: runs.value(start),
-                repetition: repetitions.as_ref().filter(|column| column.is_valid(start)).map_or(1, |column| column.value(start)),
+                repetition: repetitions
+                    .as_ref()
+                    .filter(|column| column.is_valid(start))
+                    .map_or(1, |column| column.value(start)),
                 rows: rows.slice(start, end - start),
             });
             start = end;

@@ -119,3 +119,69 @@ fn scenes_are_shared_by_the_first_three_experiments_and_by_all_agents() {
     assert_eq!(scenes("frozen", "E4"), scenes("random", "E4"));
     assert_eq!(texts(&bench, "random/E1-random.parquet", "decision"), ["selected_cube"]);
 }
+
+#[test]
+fn the_same_scene_is_played_again_and_its_flips_are_the_noise_floor() {
+    let bench = Bench::new();
+    let words = "--agent random --experiment E1,E3 --seeds 1 --runs 3";
+    bench.recorded("once", &format!("{words} --no-log"));
+    let files = bench.recorded("again", &format!("{words} --repeats 3"));
+    assert_eq!(bench.recorded("again", &format!("{words} --repeats 3")), files);
+    let trace = "again/E1-random.parquet";
+    let ids = texts(&bench, trace, "episode_id");
+    assert_eq!((ids.len(), ids[0].as_str(), ids[1].as_str()), (9, "E1/random/s1/r1", "E1/random/s1/r1/x2"));
+    assert_eq!(texts(&bench, trace, "scene"), texts(&bench, "once/E1-random.parquet", "scene"));
+    // The first time is the recording without repeats, and the agent's chances differ between times.
+    let actions = |name: &str, id: &str| {
+        let rows = rows(&bench.path(name));
+        let (ids, actions) = (column(&rows, "episode_id"), column(&rows, "action"));
+        let of_id = ids.as_string::<i32>().iter().zip(actions.as_string::<i32>().iter());
+        of_id.filter(|(own, _)| *own == Some(id)).map(|(_, action)| format!("{action:?}")).collect::<String>()
+    };
+    assert_eq!(actions(trace, &ids[0]), actions("once/E1-random.parquet", &ids[0]));
+    assert_ne!(actions(trace, &ids[0]), actions(trace, &ids[1]));
+    let at = bench.folder.path();
+    run(at, &["replay", "again/E1-random.parquet"]).done();
+    let stats: Value = run(at, &["stats", "again", "--json"]).json();
+    let retest = stats["retests"].as_array().unwrap().iter().find(|row| row["metric"] == "TSA").unwrap();
+    assert_eq!((retest["scenes"].as_u64(), retest["episodes"].as_u64()), (Some(3), Some(9)));
+    let flipped = retest["flipped"].as_f64().unwrap();
+    let unstable = retest["unstable"].as_f64().unwrap();
+    // Of three times, two that differ are two pairs of three.
+    assert!((flipped - unstable * 2.0 / 3.0 / 3.0).abs() < 1e-12, "{retest}");
+    assert!(run(at, &["stats", "once", "--json"]).json()["retests"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn a_registered_plan_is_in_the_trace_and_reports_say_whether_it_was_followed() {
+    let bench = Bench::new();
+    let at = bench.folder.path();
+    let plan = ["plan", "--difference", "0.5", "--register", "plan.json", "--config", "small.toml"];
+    run(at, &plan).done();
+    let registered: Value = serde_json::from_str(&fs::read_to_string(bench.path("plan.json")).unwrap()).unwrap();
+    assert_eq!(registered["prompts"].as_array().unwrap().len(), 2);
+    let words = "--agent random --experiment E1 --seeds 1 --runs 2 --no-log --plan plan.json";
+    bench.recorded("runs", words);
+    let carried = recording(&bench.path("runs/E1-random.parquet"))["registration"].clone();
+    assert_eq!(carried["sha256"], registered["sha256"]);
+    let followed = run(at, &["report", "runs", "--out", "out"]).ends(0).stderr;
+    assert!(
+        followed.contains("follows the registered plan") && followed.contains("are those that it names"),
+        "{followed}"
+    );
+    let other = run(at, &["report", "runs", "--out", "out", "--definitions", "extended"]).ends(0).stderr;
+    assert!(other.contains("the definitions are others"), "{other}");
+    // Another plan, or none, does not go on with the recording; a changed plan and another world are refused.
+    let refused = |out: &str, words: &str| {
+        let answer = bench.record(out, words).output().unwrap();
+        assert_eq!(answer.status.code(), Some(2), "{answer:?}");
+        String::from_utf8(answer.stderr).unwrap()
+    };
+    assert!(refused("runs", &words.replace(" --plan plan.json", "")).contains("registration"));
+    write_small_world(at, "mirror.width = 1.2\n");
+    assert!(refused("other", words).contains("expected the world as registered"));
+    let changed = fs::read_to_string(bench.path("plan.json")).unwrap().replacen("0.5", "0.4", 1);
+    fs::write(bench.path("plan.json"), changed).unwrap();
+    assert!(refused("other", words).contains("changed after it was registered"));
+    assert!(!bench.path("other/E1-random.parquet").exists());
+}

@@ -155,6 +155,16 @@ impl Progress for Bar<'_> {
         self.line.set_message(self.message());
     }
 
+    fn model_changed(&self, id: &str, t: i32, before: &str, after: &str) {
+        self.say(&format!(
+            "{}: from step {t} on the provider answers as `{}` and not as `{}`; the episode keeps the first name, the next \
+             one has another fingerprint",
+            visible(id),
+            visible(after),
+            visible(before)
+        ));
+    }
+
     fn lost(&self, id: &str, reason: &str) {
         self.say(&format!("lost {}: {}", visible(id), visible(reason)));
     }

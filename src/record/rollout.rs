@@ -87,6 +87,8 @@ pub struct Played {
     pub episode: Episode,
     /// The id of the model as the provider returned it with the first answer; `None` where nothing is returned.
     pub model: Option<String>,
+    /// Another id that came later in the episode, and the step of its first answer.
+    pub other_model: Option<(i32, String)>,
 }
 
 /// Plays an episode to its end: `done`, or the last step of the budget.
@@ -102,7 +104,8 @@ pub async fn play(
     observer: &mut dyn Observer,
 ) -> Result<Played, RecordError> {
     let budget = i32::try_from(stage.config.episode.steps).unwrap_or(i32::MAX);
-    let (mut bumped, mut history, mut model) = (false, None, None);
+    let (mut bumped, mut history) = (false, None);
+    let (mut model, mut other_model): (Option<String>, _) = (None, None);
     for t in 1..=budget {
         if stage.stop.load(Ordering::Relaxed) {
             return Err(RecordError::Stopped);
@@ -123,7 +126,12 @@ pub async fn play(
         stage.shares.visibility(start);
         let reply = agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: Some(t), lost })?;
         let action = reply.action;
-        model = model.or_else(|| reply.model.clone());
+        if let Some(answering) = &reply.model {
+            let first = model.get_or_insert_with(|| answering.clone());
+            if first != answering && other_model.is_none() {
+                other_model = Some((t, answering.clone()));
+            }
+        }
         history = Some((action, reply.words.summary.clone()));
         let mut row = row(world, key, t, &visibility, reply);
         observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
@@ -137,7 +145,7 @@ pub async fn play(
             break;
         }
     }
-    Ok(Played { episode, model })
+    Ok(Played { episode, model, other_model })
 }
 
 fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {

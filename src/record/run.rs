@@ -34,6 +34,8 @@ pub trait Progress: Sync {
     fn step(&self, episode: Key, t: i32, row: &Step);
     /// An episode is committed.
     fn episode(&self, id: &str, steps: usize);
+    /// A provider answered in the name of another model from this step on; the episode keeps the first one.
+    fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
     /// An episode is lost, for this reason.
     fn lost(&self, id: &str, reason: &str);
     /// Nothing is left to do but episodes that other processes have; this one is among them. Told again and again.
@@ -238,6 +240,9 @@ impl Recording<'_> {
             log.end(&episode).map_err(RecordError::fatal)?;
         }
         self.store.commit(key, &episode, &fingerprint).map_err(RecordError::fatal)?;
+        if let (Some(before), Some((t, after))) = (&played.model, &played.other_model) {
+            self.progress.model_changed(&episode.episode_id, *t, before, after);
+        }
         self.shares.writing(start);
         Ok(())
     }

@@ -220,6 +220,8 @@ pub struct Outputs<'a> {
     pub timelines: bool,
     /// What to read of the replies of the episodes that the first definitions keep.
     pub quality: Option<&'a QualityReader>,
+    /// Columns whose values are taken as they are, unless the first definitions read them.
+    pub unchecked: &'a [&'a str],
 }
 
 /// What one scan gives.
@@ -266,8 +268,10 @@ pub fn score_each<const N: usize>(
     let first = definitions.first().filter(|_| outputs.timelines);
     let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
     let mut projection = projection(traces, &definitions, &plan, outputs.labels)?;
+    take_as_they_are(&mut projection, outputs.unchecked, definitions.first());
     if let Some(quality) = outputs.quality {
-        let new = quality.columns().iter().filter(|name| !projection.steps.contains(name)).cloned().collect::<Vec<_>>();
+        let known = |name: &&String| projection.steps.contains(name) || projection.unchecked.contains(name);
+        let new = quality.columns().iter().filter(|name| !known(name)).cloned().collect::<Vec<_>>();
         projection.unchecked.extend(new);
         let condition = quality.constants().filter(|name| !projection.constants.contains(name));
         projection.constants.extend(condition);
@@ -288,6 +292,15 @@ pub fn score_each<const N: usize>(
         quality.iter_mut().zip(replies).for_each(|(quality, part)| quality.merge(part));
     })?;
     Ok(Scored { tables, timelines: found.map(in_key_order), quality })
+}
+
+/// Moves columns that these definitions do not read to those whose values are not checked.
+fn take_as_they_are(projection: &mut Projection, columns: &[&str], definitions: Option<&&Definitions>) {
+    let (read, _) = definitions.map(|definitions| PhysicalPlan::of(&[&definitions.plan]).columns()).unwrap_or_default();
+    let is_free = |name: &String| columns.contains(&name.as_str()) && !read.contains(name);
+    let (free, steps) = std::mem::take(&mut projection.steps).into_iter().partition::<Vec<_>, _>(is_free);
+    projection.steps = steps;
+    projection.unchecked.extend(free);
 }
 
 /// The columns of the table that definitions give.
@@ -437,7 +450,7 @@ mod tests {
         let some = definitions(&traces, &Request { metrics, ..Request::of("paper") }).unwrap();
         let threads = NonZeroUsize::new(2).unwrap();
         let labels = ["body_color".to_owned()];
-        let outputs = Outputs { labels: &labels, timelines: true, quality: None };
+        let outputs = Outputs { labels: &labels, timelines: true, ..Outputs::default() };
         let found = score_each(&traces, [&seed, &some], outputs, threads).unwrap();
         for (table, definitions) in found.tables.iter().zip([&seed, &some]) {
             assert_eq!(*table, score(&traces, definitions, outputs.labels, threads).unwrap());

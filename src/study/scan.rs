@@ -20,6 +20,7 @@ use crate::stats::losses::INFRASTRUCTURE;
 use crate::trace;
 use crate::trace::declared::Declared;
 use crate::trace::open::TraceSet;
+use crate::trace::replies::REPLY_STATUS;
 
 /// What a scan gives beside the episode table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -90,22 +91,29 @@ impl Study {
         Ok(results)
     }
 
-    /// What became of the replies of all episodes, lost ones counted; empty where the traces do not record it.
+    /// Whether there is anything to say of the replies: the traces record it, or episodes were lost.
+    ///
+    /// # Errors
+    /// Scores, which have no replies; a list of lost episodes that cannot be read.
+    pub fn has_quality(&self) -> Result<bool, StudyError> {
+        let reader = QualityReader::of(self.source.traces()?);
+        Ok(!reader.columns().is_empty() || !trace::lost::beside(&self.inputs)?.is_empty())
+    }
+
+    /// What became of the replies of all episodes, lost ones counted.
     ///
     /// # Errors
     /// Scores, which have no replies; whatever is wrong with the traces or the list of lost episodes.
     pub fn quality(&self) -> Result<QualityByCell, StudyError> {
         let traces = self.source.traces()?;
         let reader = QualityReader::of(traces);
-        if reader.columns().is_empty() && trace::lost::beside(&self.inputs)?.is_empty() {
-            return Ok(QualityByCell::default());
-        }
         let columns = score_traces::trace_columns(traces);
         let all = Definitions::from_toml("all", "open = true", &columns)?;
         let nobody = all.clone().filtered("nobody", "false", &columns)?;
         let lost = lost_episodes(traces)?;
         let labels: Vec<String> = traces.declares(CONDITION).then(|| CONDITION.to_owned()).into_iter().collect();
-        let wanted = score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader) };
+        let wanted =
+            score_traces::Outputs { labels: &labels, timelines: false, quality: Some(&reader), unchecked: &UNCHECKED };
         let definitions = [&all, lost.as_ref().unwrap_or(&nobody)];
         let Scored { tables: [episodes, ended], quality, .. } =
             score_traces::score_each(traces, definitions, wanted, self.threads)?;
@@ -151,7 +159,8 @@ impl Study {
         let definitions = self.question.bind(traces)?;
         let reader = outputs.quality.then(|| QualityReader::of(traces));
         let timelines = outputs.timelines || outputs.outcomes;
-        let wanted = score_traces::Outputs { labels: &labels, timelines, quality: reader.as_ref() };
+        let quality = reader.as_ref();
+        let wanted = score_traces::Outputs { labels: &labels, timelines, quality, unchecked: &UNCHECKED };
         let lost = if outputs.losses { lost_episodes(traces)? } else { None };
         let Some(lost) = lost else {
             let Scored { tables: [episodes], timelines, quality } =
@@ -171,6 +180,9 @@ impl Study {
         }
     }
 }
+
+/// Columns that are looked at besides what the definitions ask for: a slip in them keeps no trace from being scored.
+const UNCHECKED: [&str; 1] = [REPLY_STATUS];
 
 /// What the infrastructure ended: episodes without `done`, their last reply lost. `None` where the traces do not record
 /// it.

@@ -14,6 +14,7 @@ use crate::cli::quality::{self, CellAnswer};
 use crate::cli::terminal;
 use crate::cli::text_table::{aligned_right, counted, listing};
 use crate::report::tables::fit::{fitted, wrapped};
+use crate::score::quality::QualityByCell;
 use crate::trace::info::{Cell, Info, SeedRun, info};
 
 /// Summarise traces: episodes, steps, models, experiments, coverage, files
@@ -44,7 +45,7 @@ impl InfoCommand {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let study = self.input.open()?;
         let info = info(study.traces()?, self.input.threads.count()).map_err(Failure::input)?;
-        let quality = study.quality()?;
+        let quality = if study.has_quality()? { study.quality()? } else { QualityByCell::default() };
         let mut out = io::stdout().lock();
         if self.json {
             writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: quality::answers(&quality) }))?;

@@ -1,6 +1,7 @@
 //! A model behind a provider, against servers on loopback that behave and misbehave.
 
 mod bench;
+mod fingerprints;
 mod keys;
 mod killed;
 mod languages;

@@ -36,7 +36,8 @@ pub fn copy(experiment: &str, change: impl FnOnce(&mut Vec<Episode>, &mut Value)
     let original = recorded(experiment);
     let (mut episodes, mut recording) = (episodes(&original), recording(&original));
     change(&mut episodes, &mut recording);
-    let rows: Vec<_> = episodes.iter().map(|episode| merge::rows(episode, &OptionalColumns::all()).unwrap()).collect();
+    let columns = OptionalColumns::recorded(&recording);
+    let rows: Vec<_> = episodes.iter().map(|episode| merge::rows(episode, &columns).unwrap()).collect();
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("copy.parquet");
     let recording = Some(recording).filter(|recording| !recording.is_null());

@@ -1,0 +1,53 @@
+//! The model that answers is part of what an episode was recorded with.
+
+use mirrorstats::agent::vlm::wire_format::Dialect;
+use serde_json::Value;
+
+use super::recordings::Folder;
+use super::server::{Server, decision, ok, spoken};
+use crate::harness::program::{run, stderr};
+use crate::harness::traces::{recording, texts};
+
+/// An answer in the name of a model.
+fn answer(model: &str, action: &str) -> Vec<u8> {
+    let mut body = spoken(Dialect::OpenaiCompatible, &decision(action), "stop");
+    body["model"] = Value::from(model);
+    ok(&body)
+}
+
+/// Three episodes of one step each, but for the first, of two; `models` answer in turn.
+fn record(models: [&'static str; 4]) -> (Folder, String) {
+    let folder = Folder::new();
+    let server = Server::start(move |at, _| answer(models[at.min(3)], if at == 0 { "a" } else { "done" }));
+    let words = "--seeds 1 --runs 3 --in-flight 1 --threads 1 --out runs";
+    let output = folder.record(&server, "own", words).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let told = stderr(&output);
+    (folder, told)
+}
+
+#[test]
+fn another_model_id_starts_a_fingerprint_with_the_next_episode() {
+    let (folder, told) = record(["m-1", "m-2", "m-2", "m-2"]);
+    assert!(told.contains("from step 2 on the provider answers as `m-2` and not as `m-1`"), "{told}");
+    let trace = folder.path().join("runs/E1-own.parquet");
+    let mut names: Vec<String> = texts(&trace, "fingerprint").into_iter().flatten().collect();
+    names.dedup();
+    assert_eq!(names.len(), 2);
+    let parts = &recording(&trace)["fingerprints"];
+    assert_eq!([&parts[&names[0]]["model"], &parts[&names[1]]["model"]], ["m-1", "m-2"]);
+    assert!(parts[&names[0]]["prompts"].is_string() && parts[&names[0]]["sampling"].is_string());
+    let message = run(folder.path(), &["report", "runs", "--out", "out"]).refused();
+    assert!(message.contains("they differ in model (m-1, m-2)"), "{message}");
+    run(folder.path(), &["report", "runs", "--out", "out", "--pool"]).done();
+}
+
+#[test]
+fn one_model_is_one_fingerprint() {
+    let (folder, told) = record(["m-1"; 4]);
+    assert!(!told.contains("the provider answers as"), "{told}");
+    let mut names = texts(&folder.path().join("runs/E1-own.parquet"), "fingerprint");
+    names.dedup();
+    assert_eq!(names.len(), 1);
+    run(folder.path(), &["report", "runs", "--out", "out"]).done();
+}

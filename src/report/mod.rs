@@ -14,6 +14,7 @@ pub mod layout;
 pub mod order;
 pub mod published;
 pub mod quality;
+pub mod sensitivity;
 pub mod statistics;
 pub mod style;
 pub mod table;

@@ -20,6 +20,7 @@ pub mod report;
 pub mod rescore;
 pub mod schema;
 pub mod score;
+pub mod sensitivity;
 pub mod sql;
 pub mod stats;
 pub mod validate;
@@ -38,6 +39,7 @@ pub enum Command {
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
+    Sensitivity(sensitivity::SensitivityArgs),
     Compare(compare::CompareArgs),
     Diff(diff::DiffArgs),
     Rescore(rescore::RescoreArgs),
@@ -72,6 +74,7 @@ impl Command {
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
+            Self::Sensitivity(args) => args.run(),
             Self::Compare(args) => args.run(),
             Self::Diff(args) => args.run(),
             Self::Rescore(args) => args.run(),

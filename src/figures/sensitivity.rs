@@ -175,29 +175,32 @@ impl Panel<'_, '_> {
         plot.x_axis(sheet, &self.numbers_below(frame.width / many(stages)));
         plot.x_title(sheet, "threshold, px");
         plot.y_axis(sheet, &self.numbers_beside(has_numbers));
-        let places = self.places(&plot);
-        for (member, places) in self.field.roster.0.iter().zip(&places) {
-            self.line(sheet, *member, places);
+        let stages = self.places(&plot);
+        let of_member = |at: usize| stages.iter().map(|places| places[at]).collect::<Vec<_>>();
+        for (at, member) in self.field.roster.0.iter().enumerate() {
+            self.line(sheet, *member, &of_member(at));
         }
-        for (member, places) in self.field.roster.0.iter().zip(&places) {
-            self.markers(sheet, *member, places);
+        for (at, member) in self.field.roster.0.iter().enumerate() {
+            self.markers(sheet, *member, &of_member(at));
         }
     }
 
-    /// The thresholds, as many as there is room for.
+    /// The thresholds, as many as there is room for; the first and the last go first.
     fn numbers_below(&self, column: f64) -> Vec<Tick> {
-        let lettering = lettering::tick();
-        let mut taken = f64::NEG_INFINITY;
-        let tick = |(at, stage): (usize, &Stage<'_>)| {
-            let text = stage.px.map_or_else(|| short(self.field.input.reference), |px| px.to_string());
-            let (middle, half) = (column * many(at), lettering.width(&text) / 2.0);
-            let fits = middle - half >= taken + NUMBER_GAP;
-            if fits {
-                taken = middle + half;
+        let stages = self.field.input.stages;
+        let label = |stage: &Stage<'_>| stage.px.map_or_else(|| short(self.field.input.reference), |px| px.to_string());
+        let mut ticks: Vec<Tick> = (0..stages.len()).map(|at| Tick { at: many(at), text: String::new() }).collect();
+        let mut taken: Vec<(f64, f64)> = Vec::new();
+        for at in [0].into_iter().chain(stages.len().checked_sub(1)).chain(1..stages.len().saturating_sub(1)) {
+            let text = label(&stages[at]);
+            let (middle, half) = (column * many(at), lettering::tick().width(&text) / 2.0 + NUMBER_GAP / 2.0);
+            let (left, right) = (middle - half, middle + half);
+            if taken.iter().all(|(from, to)| right <= *from || *to <= left) {
+                taken.push((left, right));
+                ticks[at].text = text;
             }
-            Tick { at: many(at), text: if fits { text } else { String::new() } }
-        };
-        self.field.input.stages.iter().enumerate().map(tick).collect()
+        }
+        ticks
     }
 
     fn numbers_beside(&self, has_numbers: bool) -> Vec<Tick> {
@@ -207,7 +210,9 @@ impl Panel<'_, '_> {
         };
         ticks.retain(|tick| self.top.is_none_or(|top| tick.at <= top * 1.05));
         if !has_numbers {
-            ticks.iter_mut().for_each(|tick| tick.text.clear());
+            for tick in &mut ticks {
+                tick.text.clear();
+            }
         }
         ticks
     }
@@ -217,21 +222,17 @@ impl Panel<'_, '_> {
         matrix.reading(self.experiment, model, id(matrix, self.metric)?).mean()
     }
 
-    /// Where each model's markers are, per stage; those with the same value side by side.
+    /// Where the models' markers are: per stage one place per model; those with the same value side by side.
     fn places(&self, plot: &Plot) -> Vec<Vec<Option<Point>>> {
-        let (members, stages) = (&self.field.roster.0, self.field.input.stages.len());
-        let mut places = vec![vec![None; stages]; members.len()];
-        for stage in 0..stages {
-            let means =
-                members.iter().enumerate().filter_map(|(at, member)| Some((at, self.mean(stage, member.model)?)));
-            let means: Vec<(usize, f64)> = means.collect();
-            let exact: Vec<Point> = means.iter().map(|(_, mean)| plot.at(many(stage), *mean)).collect();
-            let room = plot.frame.width / many(stages) * COLUMN_ROOM;
-            for ((at, _), place) in means.iter().zip(dodge::abreast(&exact, APART, room)) {
-                places[*at][stage] = Some(place);
-            }
-        }
-        places
+        let members = &self.field.roster.0;
+        let room = plot.frame.width / many(self.field.input.stages.len()) * COLUMN_ROOM;
+        let of_stage = |stage: usize| {
+            let means: Vec<Option<f64>> = members.iter().map(|member| self.mean(stage, member.model)).collect();
+            let exact: Vec<Point> = means.iter().flatten().map(|mean| plot.at(many(stage), *mean)).collect();
+            let mut apart = dodge::abreast(&exact, APART, room).into_iter();
+            means.iter().map(|mean| mean.and_then(|_| apart.next())).collect()
+        };
+        (0..self.field.input.stages.len()).map(of_stage).collect()
     }
 
     /// From threshold to threshold; the definitions as they are stand apart, and an undefined mean is a gap.

@@ -177,9 +177,9 @@ impl Trial {
         let columns = score_traces::trace_columns(traces);
         let as_is = question.bind(traces)?;
         let bound = |px: u32| under(question, px, &columns);
-        let moves = Moves::between(&bound(1)?, &bound(2)?);
+        let dependent = Dependent::between(&bound(1)?, &bound(2)?);
         let (moved, unmoved): (Vec<String>, Vec<String>) =
-            metrics(&as_is).partition(|name| moves.metrics.contains(name));
+            metrics(&as_is).partition(|name| dependent.metrics.contains(name));
         if moved.is_empty() {
             return Err(StudyError::NothingMoves { name: EVIDENCE, metrics: unmoved.join(", ") });
         }
@@ -199,7 +199,7 @@ impl Trial {
             reference: Reference { is_recorded, px: recorded_px(traces) },
             moved,
             unmoved,
-            is_filter_moved: moves.filter,
+            is_filter_moved: dependent.filter,
         })
     }
 
@@ -239,12 +239,12 @@ fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions,
 }
 
 /// What differs between two definitions that differ in the evidence alone: what depends on it.
-struct Moves {
+struct Dependent {
     metrics: BTreeSet<String>,
     filter: bool,
 }
 
-impl Moves {
+impl Dependent {
     /// Equal steps of one plan are one step, so what two definitions compute in different steps differs.
     fn between(one: &Definitions, other: &Definitions) -> Self {
         let plan = PhysicalPlan::of(&[&one.plan, &other.plan]);

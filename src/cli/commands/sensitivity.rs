@@ -51,8 +51,8 @@ impl SensitivityArgs {
         // A name of no known format should not cost a pass over the traces.
         let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;
         let study = self.traces.study(&self.scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let targets = self.out.iter().flat_map(|out| files(out)).chain(self.figure.clone());
-        targets.map(|path| output::check_target(&path, study.files_read(None))).collect::<Result<(), _>>()?;
+        let mut targets = self.out.iter().flat_map(|out| files(out)).chain(self.figure.clone());
+        targets.try_for_each(|path| output::check_target(&path, study.files_read(None)))?;
         let report = study.sensitivity(&self.thresholds)?;
         output::notes(&report.notes);
         if let (Some(path), Some(format)) = (&self.figure, format) {

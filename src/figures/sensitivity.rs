@@ -26,6 +26,8 @@ const GAP: f64 = 12.0;
 const APART: f64 = 4.5;
 /// The share of a column that markers side by side may take.
 const COLUMN_ROOM: f64 = 0.66;
+/// How far the last number may stand out of its plot, px.
+const OVERHANG: f64 = 4.0;
 /// Between two numbers below a plot, px.
 const NUMBER_GAP: f64 = 3.0;
 
@@ -133,6 +135,19 @@ impl<'a> Field<'a> {
         top
     }
 
+    /// What stands below a threshold.
+    fn label(&self, stage: &Stage<'_>) -> String {
+        stage.px.map_or_else(|| short(self.input.reference), |px| px.to_string())
+    }
+
+    /// From threshold to threshold in a plot of `width` px: half as much is left at both ends, or what the last number takes.
+    fn column(&self, width: f64) -> f64 {
+        let last = self.input.stages.last().map_or(0.0, |stage| lettering::tick().width(&self.label(stage)));
+        let count = self.input.stages.len();
+        let rim = (width / many(count) / 2.0).max(last / 2.0 - OVERHANG);
+        (width - 2.0 * rim) / many(count.max(2) - 1)
+    }
+
     fn signs(&self) -> Vec<(Swatch, String)> {
         vec![
             (Swatch::None, format!("{}: {}", short(self.input.reference), self.input.reference)),
@@ -169,10 +184,11 @@ struct Panel<'f, 'a> {
 
 impl Panel<'_, '_> {
     fn draw(&self, sheet: &mut Sheet, frame: Frame, has_numbers: bool) {
-        let stages = self.field.input.stages.len();
         let y = self.top.map_or(-0.05..1.05, |top| -0.05 * top..1.05 * top);
-        let plot = Plot::new(frame, -0.5..many(stages) - 0.5, y);
-        plot.x_axis(sheet, &self.numbers_below(frame.width / many(stages)));
+        let column = self.field.column(frame.width);
+        let rim = (frame.width / column - many(self.field.input.stages.len() - 1)) / 2.0;
+        let plot = Plot::new(frame, -rim..many(self.field.input.stages.len() - 1) + rim, y);
+        plot.x_axis(sheet, &self.numbers_below(column));
         plot.x_title(sheet, "threshold, px");
         plot.y_axis(sheet, &self.numbers_beside(has_numbers));
         let stages = self.places(&plot);
@@ -188,11 +204,10 @@ impl Panel<'_, '_> {
     /// The thresholds, as many as there is room for; the first and the last go first.
     fn numbers_below(&self, column: f64) -> Vec<Tick> {
         let stages = self.field.input.stages;
-        let label = |stage: &Stage<'_>| stage.px.map_or_else(|| short(self.field.input.reference), |px| px.to_string());
         let mut ticks: Vec<Tick> = (0..stages.len()).map(|at| Tick { at: many(at), text: String::new() }).collect();
         let mut taken: Vec<(f64, f64)> = Vec::new();
         for at in [0].into_iter().chain(stages.len().checked_sub(1)).chain(1..stages.len().saturating_sub(1)) {
-            let text = label(&stages[at]);
+            let text = self.field.label(&stages[at]);
             let (middle, half) = (column * many(at), lettering::tick().width(&text) / 2.0 + NUMBER_GAP / 2.0);
             let (left, right) = (middle - half, middle + half);
             if taken.iter().all(|(from, to)| right <= *from || *to <= left) {
@@ -225,7 +240,7 @@ impl Panel<'_, '_> {
     /// Where the models' markers are: per stage one place per model; those with the same value side by side.
     fn places(&self, plot: &Plot) -> Vec<Vec<Option<Point>>> {
         let members = &self.field.roster.0;
-        let room = plot.frame.width / many(self.field.input.stages.len()) * COLUMN_ROOM;
+        let room = self.field.column(plot.frame.width) * COLUMN_ROOM;
         let of_stage = |stage: usize| {
             let means: Vec<Option<f64>> = members.iter().map(|member| self.mean(stage, member.model)).collect();
             let exact: Vec<Point> = means.iter().flatten().map(|mean| plot.at(many(stage), *mean)).collect();

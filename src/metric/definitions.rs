@@ -310,3 +310,30 @@ fn experiments(document: &Document) -> IndexMap<String, Experiment> {
     experiments.sort_by(|(a, first), (b, second)| first.order.cmp(&second.order).then_with(|| a.cmp(b)));
     experiments.into_iter().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Definitions, ReplaceError};
+    use crate::score::score_traces::schema_columns;
+
+    #[test]
+    fn a_replaced_condition_is_what_an_edited_file_says() {
+        let columns = schema_columns();
+        let paper = Definitions::load("paper", &columns).unwrap();
+        let replaced = paper.with_condition_let("visible", "test", "mirror_self_px >= 7", &columns).unwrap();
+        let text = "include = [\"paper\"]\n[let]\nvisible = \"mirror_self_px >= 7\"\n";
+        let edited = Definitions::from_toml("edited", text, &columns).unwrap();
+        assert_eq!((&replaced.catalog.hash, &replaced.plan), (&edited.catalog.hash, &edited.plan));
+        assert_ne!(replaced.catalog.hash, paper.catalog.hash);
+    }
+
+    #[test]
+    fn only_a_condition_on_steps_is_replaced_and_by_no_fault() {
+        let columns = schema_columns();
+        let paper = Definitions::load("paper", &columns).unwrap();
+        let error = |name: &str, text: &str| paper.with_condition_let(name, "test", text, &columns).unwrap_err();
+        assert!(matches!(error("seen", "true"), ReplaceError::NoLet { .. }));
+        assert!(matches!(error("done", "true"), ReplaceError::NoCondition { .. }));
+        assert!(matches!(error("visible", "mirror_self_pix > 1"), ReplaceError::Faults(_)));
+    }
+}

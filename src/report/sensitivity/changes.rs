@@ -86,18 +86,18 @@ fn change(subject: Subject, shown: &[Shown], levels: &[Level], reference: &Refer
     Change { question, metric, about, recorded: says[0].clone(), thresholds, sentence }
 }
 
-/// What the thresholds say that say something else, each run of thresholds once.
+/// What the thresholds say that say something else, each once with its runs of thresholds.
 fn others(thresholds: &[Says], recorded: &str) -> Vec<String> {
     let mut at = 0;
-    let mut words = Vec::new();
+    let mut places: IndexMap<&str, Vec<String>> = IndexMap::new();
     for run in thresholds.chunk_by(|a, b| a.says == b.says) {
         let (starts, ends) = (at == 0, at + run.len() == thresholds.len());
         at += run.len();
         if run[0].says != recorded {
-            words.push(format!("{} {}", run[0].says, place(run, starts, ends)));
+            places.entry(&run[0].says).or_default().push(place(run, starts, ends));
         }
     }
-    words
+    places.into_iter().map(|(says, places)| format!("{says} {}", places.join(" and "))).collect()
 }
 
 fn place(run: &[Says], starts: bool, ends: bool) -> String {
@@ -196,6 +196,7 @@ mod tests {
         check(&[(1, "a"), (10, "b"), (60, "b")], &["b from 10 px on"]);
         check(&[(1, "b"), (10, "a"), (60, "c")], &["b at 1 px", "c at 60 px"]);
         check(&[(1, "a"), (10, "b"), (20, "b"), (60, "a")], &["b from 10 to 20 px"]);
+        check(&[(1, "b"), (10, "b"), (20, "a"), (60, "b")], &["b up to 10 px and at 60 px"]);
         check(&[(1, "b"), (10, "b")], &["b at every threshold"]);
         check(&[(1, "b")], &["b at every threshold"]);
     }

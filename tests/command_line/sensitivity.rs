@@ -9,7 +9,7 @@ use mirrorstats::study::Thresholds;
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use mirrorstats::trace::write::write_episodes;
 use proptest::prelude::*;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::assert_shown;
 use crate::harness::files::{assert_same, contents, fixture};
@@ -60,6 +60,14 @@ fn a_threshold_that_matters_is_told_in_sentences() {
     assert_shown!(arguments.join(" "), answer.done());
     let none = run(folder.path(), &["sensitivity", ".", "--where", "experiment = 'E1'", "--thresholds", "60"]).done();
     assert!(none.ends_with("\nNo conclusion changes.\n"), "{none}");
+    let filtered = run(folder.path(), &["sensitivity", ".", "--where", "MCR = 1", "--thresholds", "1,60", "--json"]);
+    assert!(filtered.stderr.contains("note: the filter depends on `visible`"), "{}", filtered.stderr);
+    let cells = filtered.json()["cells"].as_array().unwrap().clone();
+    let episodes = |threshold: Value| {
+        let of = cells.iter().filter(|cell| cell["threshold"] == threshold && cell["metric"] == "MCR");
+        of.map(|cell| cell["episodes"].as_u64().unwrap()).sum::<u64>()
+    };
+    assert_eq!([episodes(Value::Null), episodes(json!(1)), episodes(json!(60))], [12, 48, 12]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! How cells move with the threshold of mirror evidence, and where a conclusion changes.
 //!
 //! Rule: no episode is scored and nothing is tested here. What each threshold gave comes as cells and statistics
-//! ([`Level`]); this room lines them up, for people and for programs.
+//! ([`Level`]); this module lines them up, for people and for programs.
 
 mod changes;
 mod table;

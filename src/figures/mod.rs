@@ -11,6 +11,7 @@ pub mod e5_outcomes;
 pub mod film_strip;
 pub mod gaze;
 pub mod kit;
+pub mod sensitivity;
 
 mod completion_gap;
 mod decision_curve;

@@ -4,7 +4,7 @@ use indexmap::IndexMap;
 
 use super::bind::{self, Binding};
 use super::catalog::{Catalog, Experiment, Kind, Metric};
-use super::columns::Columns;
+use super::columns::{Columns, Level, Type};
 use super::fault::{Fault, Faults, Source};
 use super::file::{self, Document, FileError};
 use super::origin::Written;
@@ -50,6 +50,40 @@ impl Definitions {
     pub fn filtered(self, shown: &str, condition: &str, columns: &Columns) -> Result<Self, Faults> {
         let source = Source { name: shown.to_owned(), text: condition.to_owned() };
         Self::check(self.document, columns, Some(&Written::whole(source.into())))
+    }
+
+    /// The same definitions with the expression of the `let` of this name replaced, every check made anew; without a filter
+    /// and with all metrics.
+    ///
+    /// # Errors
+    /// No such `let`; one that is not a truth value per step; every fault of the expression, in a source named `shown`.
+    pub fn with_condition_let(
+        &self,
+        name: &str,
+        shown: &str,
+        expression: &str,
+        columns: &Columns,
+    ) -> Result<Self, ReplaceError> {
+        let node = self.plan.lets.iter().find(|(known, _)| known == name).map(|(_, node)| self.plan.node(*node));
+        match node {
+            Some(node) if node.ty == Type::Bool && node.level == Level::Step => {}
+            Some(node) => {
+                let found = format!("{}, {}", node.ty.name(), per(node.level));
+                return Err(ReplaceError::NoCondition { name: name.to_owned(), found });
+            }
+            None => {
+                let known: Vec<&str> = self.plan.lets.iter().map(|(known, _)| known.as_str()).collect();
+                let found = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                return Err(ReplaceError::NoLet { name: name.to_owned(), found });
+            }
+        }
+        let mut document = self.document.clone();
+        let written = Written::whole(Source { name: shown.to_owned(), text: expression.to_owned() }.into());
+        if let Some((text, place)) = document.lets.get_mut(name) {
+            *place = written.everywhere();
+            *text = written;
+        }
+        Ok(Self::check(document, columns, None)?)
     }
 
     /// Keeps the metrics of these names.
@@ -101,6 +135,45 @@ impl Definitions {
         plan.lets = binding.lets;
         plan.filter = binding.filter;
         Ok(Self { catalog, plan, document })
+    }
+}
+
+/// Why a `let` cannot be replaced by a condition on steps.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplaceError {
+    /// There is none of this name.
+    #[error(
+        "expected a `let` named `{name}`, which says at which steps there is evidence, found {found}\n  \
+         help: name the condition in the definition file, `{name} = \"mirror_visible\"` under `[let]`, and use it in the metrics"
+    )]
+    NoLet {
+        /// The name.
+        name: String,
+        /// Those that there are.
+        found: String,
+    },
+    /// It is something else.
+    #[error(
+        "expected the `let` `{name}` to be true or false, one value per step, found {found}\n  \
+         help: let `{name}` say at which steps there is evidence, such as \"mirror_visible\""
+    )]
+    NoCondition {
+        /// The name.
+        name: String,
+        /// Its type and level.
+        found: String,
+    },
+    /// The definitions have faults with the new expression.
+    #[error(transparent)]
+    Faults(#[from] Faults),
+}
+
+/// How often an expression has a value, in words.
+const fn per(level: Level) -> &'static str {
+    match level {
+        Level::Constant => "a constant",
+        Level::Episode => "one value per episode",
+        Level::Step => "one value per step",
     }
 }
 
@@ -236,4 +309,31 @@ fn experiments(document: &Document) -> IndexMap<String, Experiment> {
         .collect();
     experiments.sort_by(|(a, first), (b, second)| first.order.cmp(&second.order).then_with(|| a.cmp(b)));
     experiments.into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Definitions, ReplaceError};
+    use crate::score::score_traces::schema_columns;
+
+    #[test]
+    fn a_replaced_condition_is_what_an_edited_file_says() {
+        let columns = schema_columns();
+        let paper = Definitions::load("paper", &columns).unwrap();
+        let replaced = paper.with_condition_let("visible", "test", "mirror_self_px >= 7", &columns).unwrap();
+        let text = "include = [\"paper\"]\n[let]\nvisible = \"mirror_self_px >= 7\"\n";
+        let edited = Definitions::from_toml("edited", text, &columns).unwrap();
+        assert_eq!((&replaced.catalog.hash, &replaced.plan), (&edited.catalog.hash, &edited.plan));
+        assert_ne!(replaced.catalog.hash, paper.catalog.hash);
+    }
+
+    #[test]
+    fn only_a_condition_on_steps_is_replaced_and_by_no_fault() {
+        let columns = schema_columns();
+        let paper = Definitions::load("paper", &columns).unwrap();
+        let error = |name: &str, text: &str| paper.with_condition_let(name, "test", text, &columns).unwrap_err();
+        assert!(matches!(error("seen", "true"), ReplaceError::NoLet { .. }));
+        assert!(matches!(error("done", "true"), ReplaceError::NoCondition { .. }));
+        assert!(matches!(error("visible", "mirror_self_pix > 1"), ReplaceError::Faults(_)));
+    }
 }

@@ -17,6 +17,7 @@ pub mod order;
 pub mod plan;
 pub mod published;
 pub mod quality;
+pub mod sensitivity;
 pub mod statistics;
 pub mod style;
 pub mod table;

@@ -48,7 +48,7 @@ pub fn score_pair(
         reader.add_to(&mut wide);
     }
     let projection = projection(traces, &definitions, &wide, labels)?;
-    let headers = definitions.map(|definitions| header(definitions, labels));
+    let headers = definitions.map(|definitions| header(definitions, labels)).into();
     let mut evidence = [BTreeMap::new(), BTreeMap::new()];
     let tables = collect(
         traces,
@@ -67,6 +67,7 @@ pub fn score_pair(
             }
         },
     )?;
+    let tables = tables.try_into().expect("a table per header");
     Ok(ScoredPair { tables, evidence })
 }
 

@@ -224,11 +224,11 @@ pub struct Outputs<'a> {
     pub unchecked: &'a [&'a str],
 }
 
-/// What one scan gives.
+/// What one scan gives, with the tables as an array of known length or as a vector.
 #[derive(Clone, Debug)]
-pub struct Scored<const N: usize> {
+pub struct Scored<T> {
     /// A table per definitions, each with the episodes that its own filter keeps.
-    pub tables: [EpisodeTable; N],
+    pub tables: T,
     /// The timelines of the first definitions, in the order of their keys; `None` where they were not asked for, or the
     /// definitions do not name their moments.
     pub timelines: Option<Vec<Timeline>>,
@@ -263,11 +263,26 @@ pub fn score_each<const N: usize>(
     definitions: [&Definitions; N],
     outputs: Outputs<'_>,
     threads: NonZeroUsize,
-) -> Result<Scored<N>, ScoreError> {
-    let mut plan = PhysicalPlan::of(&definitions.map(|definitions| &definitions.plan));
+) -> Result<Scored<[EpisodeTable; N]>, ScoreError> {
+    let Scored { tables, timelines, quality } = score_all(traces, &definitions, outputs, threads)?;
+    let tables = tables.try_into().expect("a table per definitions");
+    Ok(Scored { tables, timelines, quality })
+}
+
+/// As [`score_each`], for a number of definitions that is not known before.
+///
+/// # Errors
+/// As [`score_each`].
+pub fn score_all(
+    traces: &TraceSet,
+    definitions: &[&Definitions],
+    outputs: Outputs<'_>,
+    threads: NonZeroUsize,
+) -> Result<Scored<Vec<EpisodeTable>>, ScoreError> {
+    let mut plan = PhysicalPlan::of(&definitions.iter().map(|definitions| &definitions.plan).collect::<Vec<_>>());
     let first = definitions.first().filter(|_| outputs.timelines);
     let timelines = first.and_then(|definitions| TimelineReader::of(&mut plan, definitions));
-    let mut projection = projection(traces, &definitions, &plan, outputs.labels)?;
+    let mut projection = projection(traces, definitions, &plan, outputs.labels)?;
     take_as_they_are(&mut projection, outputs.unchecked, definitions.first());
     if let Some(quality) = outputs.quality {
         let known = |name: &&String| projection.steps.contains(name) || projection.unchecked.contains(name);
@@ -276,7 +291,7 @@ pub fn score_each<const N: usize>(
         let condition = quality.constants().filter(|name| !projection.constants.contains(name));
         projection.constants.extend(condition);
     }
-    let headers = definitions.map(|definitions| header(definitions, outputs.labels));
+    let headers = definitions.iter().map(|definitions| header(definitions, outputs.labels)).collect();
     let mut found = timelines.as_ref().map(|_| Vec::new());
     let mut quality = outputs.quality.map(|_| QualityByCell::default());
     let read = |batch: &EpisodeBatch| {
@@ -324,20 +339,20 @@ pub fn unscored(
     let projection = projection(traces, &[definitions], &PhysicalPlan::of(&[&definitions.plan]), labels)?;
     let header = Header { catalog: definitions.catalog.clone(), labels: labels.to_vec(), metrics: Vec::new() };
     let nothing = |_: &EpisodeBatch| Ok((vec![BatchScores { kept: None, metrics: Vec::new() }], ()));
-    let [table] = collect(traces, &projection, [header], threads, nothing, |()| {})?;
-    Ok(table)
+    let mut tables = collect(traces, &projection, vec![header], threads, nothing, |()| {})?;
+    Ok(tables.pop().expect("a table per header"))
 }
 
 /// The tables of what `score` gives for each batch; what else it gives goes to `other`, in the order of the files.
-pub(super) fn collect<T: Send, const N: usize>(
+pub(super) fn collect<T: Send>(
     traces: &TraceSet,
     projection: &Projection,
-    headers: [Header; N],
+    headers: Vec<Header>,
     threads: NonZeroUsize,
     score: impl Fn(&EpisodeBatch) -> Result<(Vec<BatchScores>, T), EngineError> + Sync,
     mut other: impl FnMut(T),
-) -> Result<[EpisodeTable; N], ScoreError> {
-    let mut builders = headers.map(TableBuilder::new);
+) -> Result<Vec<EpisodeTable>, ScoreError> {
+    let mut builders: Vec<TableBuilder> = headers.into_iter().map(TableBuilder::new).collect();
     traces.scan(
         projection,
         threads,
@@ -354,7 +369,7 @@ pub(super) fn collect<T: Send, const N: usize>(
             Ok(())
         },
     )?;
-    Ok(builders.map(TableBuilder::finish))
+    Ok(builders.into_iter().map(TableBuilder::finish).collect())
 }
 
 /// The episodes that a filter keeps.
@@ -455,6 +470,8 @@ mod tests {
         for (table, definitions) in found.tables.iter().zip([&seed, &some]) {
             assert_eq!(*table, score(&traces, definitions, outputs.labels, threads).unwrap());
         }
+        let all = score_all(&traces, &[&seed, &some], outputs, threads).unwrap();
+        assert_eq!((all.tables.as_slice(), &all.timelines), (found.tables.as_slice(), &found.timelines));
         assert_eq!(found.tables.map(|table| table.len()), [280, 840]);
         assert_eq!(found.timelines, score_each(&traces, [&seed], outputs, threads).unwrap().timelines);
         assert_eq!(found.timelines.unwrap().len(), 280);

@@ -7,7 +7,7 @@ use super::provenance::ProvenanceError;
 use crate::base::replace::TargetIsInput;
 use crate::engine::spark::SparkError;
 use crate::figures::{EncodeError, FigureError};
-use crate::metric::definitions::UnknownMetric;
+use crate::metric::definitions::{ReplaceError, UnknownMetric};
 use crate::metric::fault::Faults;
 use crate::metric::file::FileError;
 use crate::report::bundle::BundleError;
@@ -58,6 +58,50 @@ pub enum StudyError {
     NoSteps {
         /// The file.
         scores: String,
+    },
+    /// Traces that do not record what a threshold is of.
+    #[error(
+        "expected traces with the column `{column}`, to which a threshold applies: {problem}\n  \
+         help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats info` lists the columns"
+    )]
+    NoPixels {
+        /// The column.
+        column: &'static str,
+        /// What is the matter with it.
+        problem: String,
+    },
+    /// Steps that do not record what a threshold is of.
+    #[error(
+        "{column}: expected a value at every step, found {steps} without one, for example in `{episode}`: a threshold does \
+         not say what they show\n  \
+         help: --where \"all({column} is not null)\" keeps the episodes that have them"
+    )]
+    PixelsMissing {
+        /// The column.
+        column: &'static str,
+        /// How many, and in how many episodes.
+        steps: String,
+        /// The first such episode.
+        episode: String,
+    },
+    /// Metrics none of which a threshold moves.
+    #[error(
+        "expected a metric that depends on the `let` `{name}`, found none among {metrics}\n  \
+         help: ask for other metrics with --metrics, or let the definitions use `{name}`"
+    )]
+    NothingMoves {
+        /// The `let`.
+        name: &'static str,
+        /// The metrics.
+        metrics: String,
+    },
+    /// Evidence that cannot be replaced.
+    #[error("{definitions}: {source}")]
+    EvidenceLet {
+        /// The definition file.
+        definitions: String,
+        /// Why.
+        source: ReplaceError,
     },
     /// A file is not the one that was opened.
     #[error(

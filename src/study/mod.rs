@@ -24,6 +24,7 @@ mod report;
 mod rescore;
 mod scan;
 mod scores;
+mod sensitivity;
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -58,6 +59,7 @@ pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
 pub use scan::{Outputs, Results};
 pub use scores::write as write_scores;
+pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, ThresholdsError};
 
 use design::design_of;
 use inputs::Stamp;

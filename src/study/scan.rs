@@ -125,7 +125,7 @@ impl Study {
     }
 
     /// Adds to the episodes what is known of them besides their rows.
-    fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
+    pub(super) fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
         if let Source::Traces(traces) = &self.source {
             let unrecorded = losses::unrecorded(&self.inputs, &results.episodes)?;
             results.episodes.declared = Declared { unrecorded, ..Declared::of(traces) };
@@ -186,7 +186,7 @@ const UNCHECKED: [&str; 1] = [REPLY_STATUS];
 
 /// What the infrastructure ended: episodes without `done`, their last reply lost. `None` where the traces do not record
 /// it.
-fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
+pub(super) fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
     let status = traces.column("reply_status");
     if status.is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some()) {
         return Ok(None);
@@ -201,7 +201,7 @@ fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
 
 impl Results {
     /// The episode table alone.
-    fn of(episodes: EpisodeTable) -> Self {
+    pub(super) fn of(episodes: EpisodeTable) -> Self {
         let (timelines, outcomes, lost, quality, inputs) = (None, None, None, None, Vec::new());
         Self { episodes, timelines, outcomes, lost, quality, inputs }
     }

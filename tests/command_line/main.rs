@@ -20,6 +20,7 @@ mod refusals;
 #[cfg(unix)]
 mod reports;
 mod scores;
+mod sensitivity;
 mod widths;
 
 use harness::files::{contents, fixture};

@@ -20,6 +20,7 @@ use mirrorstats::report::comparison::Comparison;
 use mirrorstats::report::errata::Errata;
 use mirrorstats::report::plan::Plan;
 use mirrorstats::report::plan::register::RegisteredPlan;
+use mirrorstats::report::sensitivity::Sensitivity;
 use mirrorstats::report::statistics::{Sequential, Statistics};
 use mirrorstats::report::style::Sheet;
 use mirrorstats::score::evidence::Evidence;
@@ -59,6 +60,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("reply-exploration", Name::ReplyExploration.document()),
         ("rescore", json!(schema_for!(RescoreAnswer))),
         ("score-explain", json!(schema_for!(Evidence))),
+        ("sensitivity", json!(schema_for!(Sensitivity))),
         ("stats", json!(schema_for!(Statistics))),
         ("stats-sequential", json!(schema_for!(Sequential))),
         ("style", json!(schema_for!(Sheet))),

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use cast::Cast;
 use mirrorstats::base::number;
-use mirrorstats::figures::{FigureError, FigureName, Input, draw};
+use mirrorstats::figures::{FigureError, FigureName, Input, draw, sensitivity};
 use mirrorstats::stats::interval::wilson;
 use resvg::usvg::roxmltree::{Document, Node};
 use resvg::usvg::{self, Rect, fontdb};
@@ -52,16 +52,48 @@ fn overlap(a: Rect, b: Rect) -> bool {
 
 fn check_layout(label: &str, cast: &Cast) {
     for name in FigureName::ALL {
-        let (size, texts) = texts(&svg(name, cast));
-        assert!(texts.len() > 3, "{name} {label}");
-        for (at, (words, ink)) in texts.iter().enumerate() {
-            let is_inside =
-                ink.left() >= 0.0 && ink.top() >= 0.0 && ink.right() <= size.width() && ink.bottom() <= size.height();
-            assert!(is_inside, "{name} {label}: `{words}` leaves the frame: {ink:?} of {size:?}");
-            for (others, other) in &texts[at + 1..] {
-                assert!(!overlap(*ink, *other), "{name} {label}: `{words}` over `{others}`: {ink:?} {other:?}");
-            }
+        check_texts(&format!("{name} {label}"), &svg(name, cast));
+    }
+}
+
+fn check_texts(label: &str, svg: &str) {
+    let (size, texts) = texts(svg);
+    assert!(texts.len() > 3, "{label}");
+    for (at, (words, ink)) in texts.iter().enumerate() {
+        let is_inside =
+            ink.left() >= 0.0 && ink.top() >= 0.0 && ink.right() <= size.width() && ink.bottom() <= size.height();
+        assert!(is_inside, "{label}: `{words}` leaves the frame: {ink:?} of {size:?}");
+        for (others, other) in &texts[at + 1..] {
+            assert!(!overlap(*ink, *other), "{label}: `{words}` over `{others}`: {ink:?} {other:?}");
         }
+    }
+}
+
+/// The figure of thresholds, each with the same cells.
+fn check_thresholds(label: &str, cast: &Cast, px: &[u32]) {
+    let px = [None].into_iter().chain(px.iter().copied().map(Some));
+    let stages: Vec<_> = px.map(|px| sensitivity::Stage { px, cells: &cast.cells }).collect();
+    let metrics = ["MCR", "CR", "TTD", "MTATO"].map(str::to_owned);
+    let reference = "recorded (60 and 1000 px)";
+    let input = sensitivity::Input { stages: &stages, metrics: &metrics, order: &[], reference };
+    let svg = sensitivity::draw(&input).unwrap().inline_svg();
+    check_texts(&format!("sensitivity {label}"), &svg);
+    let known = cast.cells.groups.iter().flat_map(|group| cast.cells.metrics.iter().zip(&group.moments));
+    let known = known.filter(|(metric, moments)| metrics.contains(metric) && moments.n > 0).count();
+    assert_eq!(svg.matches("data-threshold=").count(), known * stages.len(), "{label}");
+}
+
+#[test]
+fn no_text_of_thresholds_leaves_the_frame_or_overlaps_another() {
+    for count in [1, 8, 20] {
+        let cast = cast::made_up(&cast::names(count, 17));
+        for px in [&[60][..], &[1, 10, 30, 60, 120, 240], &[1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 20_000, 100_000]]
+        {
+            check_thresholds(&format!("{count} {px:?}"), &cast, px);
+        }
+    }
+    for kept in [&["E1"][..], &["E1", "E4"], &["E1", "E2", "E3"]] {
+        check_thresholds(&format!("{kept:?}"), &cast::paper().without(|e, _| !kept.contains(&e)), &[1, 60, 240]);
     }
 }
 

@@ -22,6 +22,7 @@ pub mod report;
 pub mod rescore;
 pub mod schema;
 pub mod score;
+pub mod sensitivity;
 pub mod sql;
 pub mod stats;
 pub mod validate;
@@ -40,6 +41,7 @@ pub enum Command {
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
+    Sensitivity(sensitivity::SensitivityArgs),
     Compare(compare::CompareArgs),
     Audit(audit::AuditArgs),
     Plan(plan::PlanArgs),
@@ -76,6 +78,7 @@ impl Command {
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
+            Self::Sensitivity(args) => args.run(),
             Self::Compare(args) => args.run(),
             Self::Audit(args) => args.run(),
             Self::Plan(args) => args.run(),

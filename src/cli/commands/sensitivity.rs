@@ -1,0 +1,97 @@
+//! `sensitivity`: how every cell moves with the threshold of mirror evidence, and where a conclusion changes.
+
+use std::fs;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{output, terminal};
+use crate::figures::FigureFormat;
+use crate::study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
+
+/// Tell how every cell moves with the threshold of mirror evidence, and where a conclusion changes
+///
+/// Needs traces that record `mirror_self_px`. A threshold replaces the `let` named `visible` of the definitions by
+/// `mirror_self_px >= K`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct SensitivityArgs {
+    /// The traces.
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    /// The least numbers of pixels that count as evidence, separated by commas
+    #[arg(long, value_name = "PIXELS", default_value = DEFAULT_THRESHOLDS)]
+    pub thresholds: Thresholds,
+    /// How the metrics are defined.
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    /// Let a cell hold episodes that were recorded differently
+    #[arg(long)]
+    pub pool: bool,
+    /// Write sensitivity.csv, .md and .tex, and the figure in every format, into this folder
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Write the figure here; the ending says the format
+    #[arg(long, value_name = "FILE")]
+    pub figure: Option<PathBuf>,
+    /// Print the answer as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The name of the files in the folder.
+const NAME: &str = "sensitivity";
+
+impl SensitivityArgs {
+    /// Scores under every threshold, prints and writes.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces, the definitions, the thresholds or the outputs.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        // A name of no known format should not cost a pass over the traces.
+        let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;
+        let study = self.traces.study(&self.scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
+        let mut targets = self.out.iter().flat_map(|out| files(out)).chain(self.figure.clone());
+        targets.try_for_each(|path| output::check_target(&path, study.files_read(None)))?;
+        let report = study.sensitivity(&self.thresholds)?;
+        output::notes(&report.notes);
+        if let (Some(path), Some(format)) = (&self.figure, format) {
+            output::write_file(path, &format.encode(&report.figure).map_err(Failure::input)?)?;
+        }
+        if let Some(out) = &self.out {
+            write(out, &report)?;
+        }
+        if self.json {
+            return output::print_json(&report.found);
+        }
+        io::stdout().lock().write_all(report.found.render(terminal::now()).as_bytes())?;
+        Ok(Outcome::Done)
+    }
+}
+
+/// The files of the folder: the tables, then the figure.
+fn files(out: &Path) -> Vec<PathBuf> {
+    let tables = ["csv", "md", "tex"].map(|ending| out.join(format!("{NAME}.{ending}")));
+    let figures = FigureFormat::ALL.iter().map(|format| figure(out, *format));
+    tables.into_iter().chain(figures).collect()
+}
+
+fn figure(out: &Path, format: FigureFormat) -> PathBuf {
+    out.join("figures").join(format!("{NAME}.{}", format.ending()))
+}
+
+fn write(out: &Path, report: &SensitivityReport) -> Result<(), Failure> {
+    let folder = out.join("figures");
+    fs::create_dir_all(&folder)
+        .map_err(|error| Failure::Rendered(format!("error: cannot make the folder `{}`: {error}", folder.display())))?;
+    let found = &report.found;
+    let tables = [("csv", found.csv()), ("md", found.markdown()), ("tex", found.latex())];
+    for (ending, text) in tables {
+        output::write_file(&out.join(format!("{NAME}.{ending}")), text.as_bytes())?;
+    }
+    for format in FigureFormat::ALL {
+        let bytes = format.encode(&report.figure).map_err(Failure::input)?;
+        output::write_file(&figure(out, *format), &bytes)?;
+    }
+    Ok(())
+}

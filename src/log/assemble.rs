@@ -144,7 +144,7 @@ impl Source {
     fn advance(&mut self) -> Result<(), LogError> {
         while let Some(message) = self.messages.next().transpose()? {
             if let Some(EpisodeMessage::Begin(head)) = self.episode_message(&message)? {
-                self.begin = Some((head, message));
+                self.begin = Some((*head, message));
                 return Ok(());
             }
         }

@@ -12,7 +12,7 @@ use crate::trace::episode::{Action, Episode, Extra, Step};
 #[serde(tag = "event", rename_all = "lowercase", deny_unknown_fields)]
 pub enum EpisodeMessage {
     /// An episode begins.
-    Begin(Episode),
+    Begin(Box<Episode>),
     /// It has ended, by `done` or with its last step.
     End {
         /// Its id.

@@ -201,7 +201,7 @@ impl Salvage {
                     let topic = self.channels.get(&header.channel_id).map_or("", String::as_str);
                     match (event(topic, &data), &mut self.open) {
                         (Ok(Event::Episode(EpisodeMessage::Begin(head))), open) => {
-                            *open = Some((head, Vec::new(), None));
+                            *open = Some((*head, Vec::new(), None));
                         }
                         (Ok(Event::Decision(row)), Some((_, rows, _))) => rows.extend(row.into_step()),
                         _ => {}
@@ -227,7 +227,7 @@ impl Salvage {
         match event(topic, data) {
             Ok(Event::Episode(EpisodeMessage::Begin(head))) => {
                 self.close("the next episode begins before its end");
-                self.open = Some((head, Vec::new(), None));
+                self.open = Some((*head, Vec::new(), None));
             }
             Ok(Event::Episode(EpisodeMessage::End { episode_id, steps, fingerprint })) => {
                 self.end(&episode_id, steps, fingerprint);

@@ -109,7 +109,7 @@ impl EpisodeLog {
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
         let mut log = Self { path: path.to_owned(), out, channels, sequence: 0 };
         let channel = log.channels.episode;
-        log.json(channel, time, &EpisodeMessage::Begin(head.clone()))?;
+        log.json(channel, time, &EpisodeMessage::Begin(Box::new(head.clone())))?;
         Ok(log)
     }
 

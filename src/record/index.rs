@@ -167,7 +167,7 @@ fn unreachable_fault(path: &Path) -> StoreError {
 }
 
 fn places(episodes: &[EpisodeRows]) -> BTreeSet<Place> {
-    episodes.iter().map(|episode| place(episode)).collect()
+    episodes.iter().map(place).collect()
 }
 
 /// Where an episode is among those of its experiment.

@@ -188,7 +188,7 @@ impl Store {
         let mut recording = self.index.recording().clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
-        recording[FINGERPRINTS] = self.fingerprints(&trace, &parts)?;
+        recording[FINGERPRINTS] = Self::fingerprints(&trace, &parts)?;
         self.assemble_log(experiment, &parts, &recording)?;
         merge::write_in(&self.parts(), &trace, Some(&recording), &episodes)?;
         for part in parts.iter().chain(log_parts.iter().filter(|part| part.exists())) {
@@ -198,7 +198,7 @@ impl Store {
     }
 
     /// What the episodes of a trace and of parts were recorded with.
-    fn fingerprints(&self, trace: &Path, parts: &[PathBuf]) -> Result<Value, StoreError> {
+    fn fingerprints(trace: &Path, parts: &[PathBuf]) -> Result<Value, StoreError> {
         let mut all = BTreeMap::new();
         for path in trace.exists().then_some(trace).into_iter().chain(parts.iter().map(PathBuf::as_path)) {
             if let Some(Value::Object(some)) = recording_of(path)?.get_mut(FINGERPRINTS).map(Value::take) {

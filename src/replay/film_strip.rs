@@ -104,7 +104,7 @@ impl Strip {
             }
         }
         // A log without frames tells the story, but shows nothing: the trace renders it again.
-        Ok(head.filter(|_| !frames.is_empty()).map(|head| Reel { episode: Episode { steps, ..head }, frames }))
+        Ok(head.filter(|_| !frames.is_empty()).map(|head| Reel { episode: Episode { steps, ..*head }, frames }))
     }
 
     fn in_traces(&self, traces: &[Input]) -> Result<Option<Reel>, ReplayError> {

@@ -390,7 +390,9 @@ mod tests {
 
     fn of(latencies: &[i64]) -> Quality {
         let mut quality = Quality { episodes: 1, steps: latencies.len() as u64, ..Quality::default() };
-        latencies.iter().for_each(|latency| *quality.latencies.entry(*latency).or_default() += 1);
+        for latency in latencies {
+            *quality.latencies.entry(*latency).or_default() += 1;
+        }
         quality
     }
 
@@ -409,7 +411,7 @@ mod tests {
         let key = CellKey { experiment: "E1".into(), model: "m".into(), condition: "default".into() };
         let part = |status: &str, lost| {
             let statuses = [(status.to_owned(), 2)].into();
-            QualityByCell([(key.clone(), Quality { statuses, lost, ..of(&[5]) })].into())
+            QualityByCell([(key.clone(), Quality { lost, statuses, ..of(&[5]) })].into())
         };
         let mut all = part("ok", None);
         all.merge(part("refusal", Some(1)));

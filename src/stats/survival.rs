@@ -248,7 +248,7 @@ mod tests {
             let found = curve(durations).restricted_mean(horizon, 0.95).unwrap();
             assert_eq!(found.horizon, horizon);
             close(found.mean, mean);
-            let n = durations.len() as f64;
+            let n = f64::from(u32::try_from(durations.len()).unwrap());
             close(found.se, se * (n / (n - 1.0)).sqrt());
             let interval = found.interval.unwrap();
             assert!(interval.contains(found.mean) && interval.high <= 100.0);

@@ -104,7 +104,7 @@ fn settings(traces: Option<&TraceSet>, names: [&str; 2]) -> String {
     };
     let [Some(one), Some(other)] = names.map(recording) else { return String::new() };
     let found = ["world", "agent"].into_iter().filter_map(|key| first_difference(key, &one[key], &other[key]));
-    found.map(|words| format!("; {words}")).collect()
+    found.fold(String::new(), |words, found| words + "; " + &found)
 }
 
 /// The innermost key in which two values differ, and what each has.

@@ -111,7 +111,7 @@ mod tests {
     #[test]
     fn each_list_beside_the_traces_is_read_once() {
         let folder = tempfile::tempdir().unwrap();
-        let inputs = ["a.parquet", "b.parquet"].map(|name| Input::new(&folder.path().join(name)));
+        let inputs = ["a.parquet", "b.parquet"].map(|name| Input::new(folder.path().join(name)));
         assert!(beside(&inputs).unwrap().is_empty());
         std::fs::write(list_of(folder.path()), format!("{LINE}\n")).unwrap();
         let found = beside(&inputs).unwrap();

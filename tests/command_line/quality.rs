@@ -27,8 +27,8 @@ fn step(action: Option<Action>, status: &str, cube: &str) -> Step {
 fn eight() -> Vec<Episode> {
     let turn = || step(Some(Action::TurnLeft), "ok", "none");
     let done = |cube| step(Some(Action::Done), "repaired", cube);
-    let lost = || step(None, "timeout", "none");
-    let last = [done("red"), done("red"), done("blue"), done("blue"), done("blue"), done("blue"), lost(), lost()];
+    let cut = || step(None, "timeout", "none");
+    let last = [done("red"), done("red"), done("blue"), done("blue"), done("blue"), done("blue"), cut(), cut()];
     let whole = |(run, last): (i32, Step)| Episode { run, ..episode(&format!("e{run}"), vec![turn(), turn(), last]) };
     (1..).zip(last).map(whole).collect()
 }

@@ -24,7 +24,7 @@ use mirrorstats::agent::vlm::wire_format::Dialect;
 use mirrorstats::agent::vlm::{OnOutage, Vlm};
 use mirrorstats::agent::{Agent, Decision, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
 use mirrorstats::record::metadata;
-use mirrorstats::record::plan::{Key, Plan, Shard};
+use mirrorstats::record::plan::{Key, Plan, Shard, Subject};
 use mirrorstats::record::queue::Held;
 use mirrorstats::record::run::{Progress, Recording, Settings};
 use mirrorstats::record::shares::{Shares, Spent};
@@ -53,6 +53,7 @@ impl Agent for AtOnce {
             words: Words::default(),
             raw: Some(REPLY.to_owned()),
             usage: Usage::default(),
+            model: None,
         };
         Box::pin(std::future::ready(Ok(reply)))
     }
@@ -164,6 +165,8 @@ impl Progress for Quiet {
 
     fn episode(&self, _: &str, _: usize) {}
 
+    fn model_changed(&self, _: &str, _: i32, _: &str, _: &str) {}
+
     fn lost(&self, id: &str, reason: &str) {
         eprintln!("lost {id}: {reason}");
     }
@@ -173,14 +176,17 @@ impl Progress for Quiet {
 
 /// Steps a second of a recording, and where its time went.
 fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> (f64, Spent) {
-    let store = Store::open(&folder.join("runs"), player.model(), metadata::recording(config, player)).unwrap();
-    let plan = Plan { experiments: vec![Experiment::E5], seeds: 1, runs: 64, shard: Shard::WHOLE };
+    let subject = Subject::of(player.model());
+    let store =
+        Store::open(&folder.join("runs"), subject.clone(), metadata::recording(config, player, None, None)).unwrap();
+    let plan = Plan { experiments: vec![Experiment::E5], seeds: 1, runs: 64, repeats: 1, shard: Shard::WHOLE };
     let keys: Vec<Key> = plan.keys();
     let (shares, stop) = (Shares::default(), AtomicBool::new(false));
     let in_flight = NonZeroUsize::new(IN_FLIGHT).unwrap();
     let settings = Settings { threads, in_flight, frames: true, log: true, max_unusable: None };
+    let (store, subject) = (&store, &subject);
     let recording =
-        Recording { config, player, store: &store, progress: &Quiet, stop: &stop, shares: &shares, settings };
+        Recording { config, player, subject, store, progress: &Quiet, stop: &stop, shares: &shares, settings };
     let start = Instant::now();
     let tally = recording.run(&keys).unwrap();
     #[expect(clippy::cast_precision_loss, reason = "some thousand steps")]

@@ -145,6 +145,7 @@ impl PlanArgs {
 
     /// Nothing, in a program that cannot record.
     #[cfg(not(feature = "sim"))]
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "a program that records reads a file")]
     fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
         Ok((Vec::new(), Vec::new()))
     }

@@ -136,7 +136,7 @@ fn the_same_scene_is_played_again_and_its_flips_are_the_noise_floor() {
         let rows = rows(&bench.path(name));
         let (ids, actions) = (column(&rows, "episode_id"), column(&rows, "action"));
         let of_id = ids.as_string::<i32>().iter().zip(actions.as_string::<i32>().iter());
-        of_id.filter(|(own, _)| *own == Some(id)).map(|(_, action)| format!("{action:?}")).collect::<String>()
+        of_id.filter(|(own, _)| *own == Some(id)).map(|(_, action)| action.map(str::to_owned)).collect::<Vec<_>>()
     };
     assert_eq!(actions(trace, &ids[0]), actions("once/E1-random.parquet", &ids[0]));
     assert_ne!(actions(trace, &ids[0]), actions(trace, &ids[1]));

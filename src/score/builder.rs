@@ -14,7 +14,7 @@ use arrow::datatypes::{ArrowNativeType as _, DataType, Float64Type, Int32Type, I
 
 use super::order::order;
 use super::table::{
-    EpisodeKey, EpisodeKeys, EpisodeTable, Header, JoinError, KeyRef, LabelColumn, MetricColumn, MetricValues,
+    EpisodeKey, EpisodeKeys, EpisodeTable, Header, JoinError, KeyRef, LOST, LabelColumn, MetricColumn, MetricValues,
     TextColumn, narrow,
 };
 use crate::trace::declared::Declared;
@@ -65,11 +65,6 @@ impl TableBuilder {
             }
         }
         self.metrics.iter_mut().zip(metrics).for_each(|(builder, column)| builder.extend(column));
-    }
-
-    pub(super) fn push_row(&mut self, table: &EpisodeTable, row: usize) {
-        let labels = table.labels.iter().map(|label| label.values.get(row));
-        self.push(table.keys.get(row), labels, table.metrics.iter().map(|metric| metric.get(row)));
     }
 
     /// All rows, in the order of their keys.
@@ -206,6 +201,11 @@ fn column<'a>(episodes: &'a RecordBatch, name: &str) -> &'a ArrayRef {
     episodes.column_by_name(name).expect("the projection asks for this column")
 }
 
+/// Whether scores need not have this label: older ones do not, and it is left out where it says nothing.
+fn may_be_absent(label: &str) -> bool {
+    label == LOST || schema::column(label).is_some_and(|column| column.since > 1)
+}
+
 /// What a label means where there is no value.
 fn default_text(name: &str) -> Option<&'static str> {
     schema::column(name).and_then(Column::default_text)
@@ -235,18 +235,31 @@ impl EpisodeTable {
         }
         let columns = |table: &Self| {
             let Header { labels, metrics, .. } = table.header();
-            labels.into_iter().chain(metrics).collect::<Vec<_>>()
+            let own = labels.into_iter().filter(|label| !may_be_absent(label));
+            own.chain(metrics).collect::<Vec<_>>()
         };
         if columns(&self) != columns(other) {
             return Err(JoinError::Columns(columns(&self).join(", "), columns(other).join(", ")));
         }
+        let Header { mut labels, .. } = self.header();
+        let more: Vec<String> = other.header().labels.into_iter().filter(|label| !labels.contains(label)).collect();
+        labels.extend(more);
         let ids: HashSet<&str> = self.keys.iter().map(|key| key.episode_id).collect();
         if let Some(twice) = other.keys.iter().find(|key| ids.contains(key.episode_id)) {
             return Err(JoinError::Episode(twice.episode_id.to_owned()));
         }
-        let mut builder = TableBuilder::new(self.header());
+        let mut builder = TableBuilder::new(Header { labels: labels.clone(), ..self.header() });
         for table in [&self, other] {
-            (0..table.len()).for_each(|row| builder.push_row(table, row));
+            let columns: Vec<_> = labels.iter().map(|name| (table.label(name), default_text(name))).collect();
+            for row in 0..table.len() {
+                let label = |(column, default): &(Option<&TextColumn>, Option<&'static str>)| match column {
+                    Some(column) => column.get(row).map(str::to_owned),
+                    None => default.map(str::to_owned),
+                };
+                let labels: Vec<Option<String>> = columns.iter().map(label).collect();
+                let metrics = table.metrics.iter().map(|metric| metric.get(row));
+                builder.push(table.keys.get(row), labels.iter().map(Option::as_deref), metrics);
+            }
         }
         let declared = self.declared.clone().joined(other.declared.clone());
         Ok(Self { declared, ..builder.finish() })

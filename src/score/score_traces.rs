@@ -435,7 +435,11 @@ fn experiments(definitions: &[&Definitions]) -> Option<Vec<String>> {
 pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     let constant = |name: &str| COLUMNS.iter().any(|column| column.name == name && column.constant);
     let problem = column_problem(traces, label);
-    let is_known_anyway = schema::column(label).is_some_and(|column| column.default_text().is_some());
+    // What version 2 brought is null in older traces, or has a meaning where there is no value.
+    let is_known_anyway = schema::column(label).is_some_and(|known| {
+        let found = traces.column(label);
+        known.default_text().is_some() || known.since > 1 && found.is_some_and(|found| found.conflict.is_none())
+    });
     if constant(label) && (problem.is_none() || is_known_anyway) {
         return Ok(());
     }

@@ -39,6 +39,9 @@ pub struct EpisodeKeys {
 /// The label of what a study varies besides the model.
 pub const CONDITION: &str = "condition";
 
+/// The label of episodes that were lost to failures which are not the agent's.
+pub const LOST: &str = "lost";
+
 /// What names an episode. The derived order is the order of the table.
 #[derive(Clone, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EpisodeKey {

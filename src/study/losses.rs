@@ -11,15 +11,14 @@ use super::scan::Results;
 use crate::metric::catalog::{Better, Catalog, Kind};
 use crate::score::builder::TableBuilder;
 use crate::score::quality::{CellKey, QualityByCell};
-use crate::score::table::{EpisodeTable, KeyRef, LabelColumn};
+use crate::score::table::{EpisodeTable, KeyRef, LOST, LabelColumn};
 use crate::stats::group::CONDITION;
 use crate::stats::losses::LostCounts;
 use crate::trace::inputs::Input;
 use crate::trace::lost::{self, LostEpisode};
 use crate::trace::schema::{self, Column};
 
-/// The label of lost episodes, and what it says.
-const LOST: &str = "lost";
+/// What the label of lost episodes says.
 const YES: &str = "true";
 
 /// What lost episodes count as.

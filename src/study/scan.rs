@@ -6,14 +6,14 @@ use std::thread;
 
 use super::error::StudyError;
 use super::inputs::Source;
-use super::{Backend, Study, backend, input_hashes, losses, scores};
+use super::{Backend, STANDING_LABELS, Study, backend, input_hashes, losses, scores};
 use crate::figures::e5_outcomes::Outcomes;
 use crate::figures::{FigureName, gaze};
 use crate::metric::definitions::Definitions;
 use crate::report::bundle;
 use crate::score::quality::{QualityByCell, QualityReader};
 use crate::score::score_traces::{self, Scored};
-use crate::score::table::{EpisodeKey, EpisodeTable};
+use crate::score::table::{EpisodeKey, EpisodeTable, LabelColumn};
 use crate::score::timeline::Timeline;
 use crate::stats::group::CONDITION;
 use crate::stats::losses::INFRASTRUCTURE;
@@ -21,6 +21,7 @@ use crate::trace;
 use crate::trace::declared::Declared;
 use crate::trace::open::TraceSet;
 use crate::trace::replies::REPLY_STATUS;
+use crate::trace::schema::{self, Column};
 
 /// What a scan gives beside the episode table.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -130,6 +131,8 @@ impl Study {
             let unrecorded = losses::unrecorded(&self.inputs, &results.episodes)?;
             results.episodes.declared = Declared { unrecorded, ..Declared::of(traces) };
         }
+        let asked = self.question.labels();
+        results.episodes.labels.retain(|label| asked.contains(&label.name) || says_something(label));
         losses::label(results);
         Ok(())
     }
@@ -179,6 +182,12 @@ impl Study {
             Backend::Native | Backend::Polars => backend::polars(self.source.traces()?, &self.question, self.threads),
         }
     }
+}
+
+/// Whether a label that nobody asked for tells one episode from another, or from those of older traces.
+fn says_something(label: &LabelColumn) -> bool {
+    let default = schema::column(&label.name).and_then(Column::default_text);
+    !STANDING_LABELS.contains(&label.name.as_str()) || label.values.iter().any(|text| text.is_some() && text != default)
 }
 
 /// Columns that are looked at besides what the definitions ask for: a slip in them keeps no trace from being scored.

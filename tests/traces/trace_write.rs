@@ -1,13 +1,20 @@
 //! The writer: what it writes, what it refuses, and that a file appears whole or not at all.
 
 use std::fs;
+use std::num::NonZeroUsize;
+use std::sync::Arc;
 
+use arrow::array::{Int64Array, RecordBatch};
+use arrow::datatypes::{DataType, Field, Schema};
+use mirrorstats::metric::definitions::Definitions;
+use mirrorstats::score::score_traces;
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::merge;
 use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
-use parquet::file::metadata::RowGroupMetaData;
+use parquet::file::metadata::{KeyValue, RowGroupMetaData};
+use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 
 use crate::harness::traces;
@@ -91,7 +98,7 @@ fn repairs_have_a_column_where_replies_are_read() {
     let repaired = with_extra(episode("a", 2), Extra { reply_repair: Some("code_fence".into()), ..Extra::default() });
     let columns = |agent: serde_json::Value| OptionalColumns::recorded(&serde_json::json!({ "agent": agent }));
     let scripted = columns(serde_json::json!({ "scripted": "oracle" }));
-    assert_eq!(scripted, OptionalColumns::all(), "a scripted agent's replies are not read");
+    assert_ne!(scripted, columns(serde_json::json!({ "id": "x" })), "a scripted agent's replies are not read");
     let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns: scripted }).unwrap();
     let error = encoder.write(&repaired).unwrap_err().to_string();
     assert!(error.contains("`reply_repair`, which was not declared"), "{error}");
@@ -104,7 +111,7 @@ fn repairs_have_a_column_where_replies_are_read() {
     writer.write(&episode("b", 1)).unwrap();
     writer.finish().unwrap();
     let set = TraceSet::open(&[Input::new(&path)]).unwrap();
-    assert_eq!(*set.column_names().last().unwrap(), "reply_repair");
+    assert!(set.column_names().contains(&"reply_repair") && !set.column_names().contains(&"mark_color"));
     let back: Vec<_> = merge::read(&path).unwrap().iter().map(|rows| rows.episode().unwrap()).collect();
     assert_eq!(back, [repaired, episode("b", 1)]);
 }
@@ -162,4 +169,48 @@ fn a_file_appears_when_it_is_finished() {
     let missing = folder.path().join("no/such/folder/a.parquet");
     let error = write_episodes(&missing, None, &[]).unwrap_err().to_string();
     assert!(error.starts_with("cannot write the trace"), "{error}");
+}
+
+#[test]
+fn a_trace_is_of_the_oldest_version_that_has_its_columns() {
+    let folder = tempfile::tempdir().unwrap();
+    let version = |name: &str, condition: Option<&str>| {
+        let path = folder.path().join(name);
+        let named = Episode { condition: condition.map(str::to_owned), ..episode("a", 1) };
+        write_episodes(&path, None, &[named]).unwrap();
+        let set = TraceSet::open(&[Input::new(&path)]).unwrap();
+        set.files()[0].metadata_value("mirrorstats.schema_version").map(str::to_owned)
+    };
+    assert_eq!(version("old.parquet", None).as_deref(), Some("1"));
+    assert_eq!(version("new.parquet", Some("near")).as_deref(), Some("2"));
+}
+
+#[test]
+fn a_name_that_version_2_brought_stays_a_column_of_its_own_in_a_trace_of_version_1() {
+    let folder = tempfile::tempdir().unwrap();
+    // Not constant in an episode, and no text, as the schema's own would be.
+    let own = |version: &str| {
+        let path = folder.path().join(format!("{version}.parquet"));
+        let plain = folder.path().join("plain.parquet");
+        write_episodes(&plain, None, &[episode("a", 2)]).unwrap();
+        let rows = traces::rows(&plain);
+        let mut fields: Vec<_> = rows.schema().fields().iter().cloned().collect();
+        fields.push(Arc::new(Field::new("condition", DataType::Int64, true)));
+        let mut columns = rows.columns().to_vec();
+        columns.push(Arc::new(Int64Array::from(vec![1, 2])));
+        let batch = RecordBatch::try_new(Arc::new(Schema::new(fields)), columns).unwrap();
+        let pair = KeyValue::new("mirrorstats.schema_version".to_owned(), version.to_owned());
+        let properties = WriterProperties::builder().set_key_value_metadata(Some(vec![pair])).build();
+        traces::write_rows(&path, &[batch], Some(properties));
+        TraceSet::open(&[Input::new(&path)])
+    };
+    let old = own("1").unwrap();
+    assert!(!old.declares("condition"));
+    let definitions = "open = true\n[metric.X]\nvalue = \"sum(condition)\"\n";
+    let columns = score_traces::trace_columns(&old);
+    let definitions = Definitions::from_toml("own", definitions, &columns).unwrap();
+    let table = score_traces::score(&old, &definitions, &[], NonZeroUsize::MIN).unwrap();
+    assert_eq!(table.metrics[0].get(0), Some(3));
+    let error = own("2").unwrap_err().to_string();
+    assert!(error.contains("wrong-type") && error.contains("condition"), "{error}");
 }

@@ -77,6 +77,17 @@ fn a_condition_is_a_column_of_traces_tables_and_figures() {
     assert!(fs::read_to_string(bench.path("asked/cells.csv")).unwrap().contains("E1,default,TSA,2,"));
     // A trace without the column means the default condition.
     let glimpses = fixture("glimpses.parquet").display().to_string();
+    assert!(run(at, &["score", &glimpses]).done().starts_with("episode_id,model,experiment,seed,run,TSA,"));
+    assert!(
+        run(at, &["score", "wide"]).done().starts_with("episode_id,model,experiment,seed,run,scene,fingerprint,TSA,")
+    );
+    // Older and newer traces together, and files of scores of either.
+    let both = run(at, &["score", &glimpses, "narrow"]).done();
+    assert!(both.starts_with("episode_id,model,experiment,seed,run,condition,scene,fingerprint,TSA,"), "{both}");
+    run(at, &["score", &glimpses, "-o", "old.csv"]).done();
+    run(at, &["score", "narrow", "-o", "new.csv"]).done();
+    assert_eq!(run(at, &["score", "old.csv", "new.csv"]).done().lines().count(), both.lines().count());
+    run(at, &["stats", "old.csv", "new.csv"]).done();
     let by = run(at, &["stats", &glimpses, "--by", "experiment,condition", "--json"]).json();
     assert_eq!(by["cells"][0]["key"]["condition"], "default");
 }

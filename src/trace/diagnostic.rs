@@ -88,7 +88,7 @@ codes! {
     /// The footer's metadata of mirrorstats cannot be read.
     InvalidMetadata, Error, "invalid-metadata":
         "`mirrorstats.schema_version` is a whole number from 1; a `palette` in `mirrorstats.recording` lists colours",
-        "correct or remove that key in the footer; a file without it is read as version 1";
+        "correct or remove that key in the footer; a file without it is read as the newest version";
     /// The file was written under a newer schema.
     NewerSchema, Error, "newer-schema":
         "the schema version is one that this program knows", "update mirrorstats to read this file";
@@ -113,7 +113,7 @@ codes! {
     OutOfRange, Error, "out-of-range": "an integer fits the schema's type", "correct the number, or use smaller ones";
     /// A number of pixels, tokens, ... is below zero.
     NegativeCount, Error, "negative-count":
-        "what is counted (px, ms, tokens, USD, agents) is not below zero", "use null where the count is not known";
+        "what is counted (px, mm, ms, tokens, USD, agents) is not below zero", "use null where the count is not known";
     /// An episode's first t is not 1.
     TStart, Error, "t-start": "an episode's first t is 1", "number the steps from 1; t = 0 is not a step";
     /// An episode's t leaves numbers out.
@@ -151,6 +151,10 @@ codes! {
     UnseenColor, Note, "unseen-color":
         "a claimed colour is that of a body or of a selected cube in the inputs",
         "nothing to do where the agent said so: the claim counts as a wrong one";
+    /// A title or a chance level of an experiment is another in the definitions than in the footer.
+    ExperimentOverridden, Note, "experiment-overridden":
+        "the footer and the definitions say the same of an experiment",
+        "nothing to do where that is meant: the definitions count";
     /// An episode's rows lie in more than one row group.
     SplitEpisode, Note, "split-episode":
         "an episode's rows are in one row group",

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::write::OptionalColumns;
+use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 use serde_json::{Value, json};
 
 use crate::harness::program::run;
@@ -131,4 +131,21 @@ fn what_is_not_recorded_passes_no_check_and_is_not_zero() {
     run(folder.path(), &["report", "a.parquet", "--out", "out"]).done();
     let quality = fs::read_to_string(folder.path().join("out/tables/quality.md")).unwrap();
     assert!(quality.contains("| E1 | m | 1 | -- | 1 | -- | -- | -- | -- | -- | -- |"), "{quality}");
+}
+
+#[test]
+fn an_experiment_that_the_definitions_describe_otherwise_is_a_note() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    let experiment = json!({ "name": "E1", "title": "Other", "chance": { "TSA": "1/4" } });
+    let recording = Some(json!({ "experiment": experiment }));
+    let metadata = TraceMetadata { recording, columns: OptionalColumns::NONE };
+    let mut writer = TraceWriter::create(&path, &metadata).unwrap();
+    writer.write(&episode("e1", vec![Step { action: Some(Action::Done), ..Step::default() }])).unwrap();
+    writer.finish().unwrap();
+    let told = run(folder.path(), &["validate", "a.parquet"]).done();
+    assert!(told.contains("the chance level of TSA of `E1` as the definitions give it: 1/3"), "{told}");
+    assert!(told.contains("found `Other`") && told.contains("0 errors, 2 notes"), "{told}");
+    let findings: Value = run(folder.path(), &["validate", "a.parquet", "--json"]).json();
+    assert_eq!(findings["findings"][0]["code"], "experiment-overridden");
 }

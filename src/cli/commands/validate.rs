@@ -6,7 +6,7 @@ use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::text_table::counted;
-use crate::study::known_experiments;
+use crate::study::{known_experiments, overridden_experiments};
 use crate::trace::diagnostic::Severity;
 use crate::trace::inputs;
 use crate::trace::validate::{Validation, validate};
@@ -37,7 +37,9 @@ impl ValidateCommand {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let experiments = known_experiments(&self.definitions)?;
         let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
-        let report = validate(&inputs, experiments.as_deref(), self.input.threads.count()).map_err(Failure::input)?;
+        let threads = self.input.threads.count();
+        let mut report = validate(&inputs, experiments.as_deref(), threads).map_err(Failure::input)?;
+        report.findings.extend(overridden_experiments(&self.definitions, &inputs)?);
         let mut out = io::stdout().lock();
         if self.json {
             writeln!(out, "{:#}", serde_json::json!(report))?;

@@ -3,7 +3,7 @@
 //! Rule: values stay in columns. Texts are interned, so that only small integers are sorted; ids are kept once, in the
 //! order in which they come, and the sorted column points at them.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 use arrow::array::{
     Array, ArrayRef, AsArray as _, BooleanArray, BooleanBufferBuilder, DictionaryArray, Int32Array, Int64Array,
@@ -14,8 +14,7 @@ use arrow::datatypes::{ArrowNativeType as _, DataType, Float64Type, Int32Type, I
 
 use super::order::order;
 use super::table::{
-    EpisodeKey, EpisodeKeys, EpisodeTable, Header, JoinError, KeyRef, LOST, LabelColumn, MetricColumn, MetricValues,
-    TextColumn, narrow,
+    EpisodeKey, EpisodeKeys, EpisodeTable, Header, KeyRef, LabelColumn, MetricColumn, MetricValues, TextColumn, narrow,
 };
 use crate::trace::declared::Declared;
 use crate::trace::scan::EPISODE_COLUMNS;
@@ -201,13 +200,8 @@ fn column<'a>(episodes: &'a RecordBatch, name: &str) -> &'a ArrayRef {
     episodes.column_by_name(name).expect("the projection asks for this column")
 }
 
-/// Whether scores need not have this label: older ones do not, and it is left out where it says nothing.
-fn may_be_absent(label: &str) -> bool {
-    label == LOST || schema::column(label).is_some_and(|column| column.since > 1)
-}
-
 /// What a label means where there is no value.
-fn default_text(name: &str) -> Option<&'static str> {
+pub(super) fn default_text(name: &str) -> Option<&'static str> {
     schema::column(name).and_then(Column::default_text)
 }
 
@@ -221,68 +215,6 @@ fn shown(column: &ArrayRef, row: usize) -> Option<String> {
         DataType::Int64 => Some(column.as_primitive::<Int64Type>().value(row).to_string()),
         DataType::Float64 => Some(column.as_primitive::<Float64Type>().value(row).to_string()),
         other => unreachable!("a scan gives no column of {other}"),
-    }
-}
-
-impl EpisodeTable {
-    /// The rows of two tables, in the order of their keys.
-    ///
-    /// # Errors
-    /// When they differ in their definitions or columns, or have an episode in common.
-    pub fn joined(self, other: &Self) -> Result<Self, JoinError> {
-        if self.catalog.hash != other.catalog.hash {
-            return Err(JoinError::Definitions(self.catalog.name, other.catalog.name.clone()));
-        }
-        let columns = |table: &Self| {
-            let Header { labels, metrics, .. } = table.header();
-            let own = labels.into_iter().filter(|label| !may_be_absent(label));
-            own.chain(metrics).collect::<Vec<_>>()
-        };
-        if columns(&self) != columns(other) {
-            return Err(JoinError::Columns(columns(&self).join(", "), columns(other).join(", ")));
-        }
-        let Header { mut labels, .. } = self.header();
-        let more: Vec<String> = other.header().labels.into_iter().filter(|label| !labels.contains(label)).collect();
-        labels.extend(more);
-        let ids: HashSet<&str> = self.keys.iter().map(|key| key.episode_id).collect();
-        if let Some(twice) = other.keys.iter().find(|key| ids.contains(key.episode_id)) {
-            return Err(JoinError::Episode(twice.episode_id.to_owned()));
-        }
-        let mut builder = TableBuilder::new(Header { labels: labels.clone(), ..self.header() });
-        for table in [&self, other] {
-            let columns: Vec<_> = labels.iter().map(|name| (table.label(name), default_text(name))).collect();
-            for row in 0..table.len() {
-                let label = |(column, default): &(Option<&TextColumn>, Option<&'static str>)| match column {
-                    Some(column) => column.get(row).map(str::to_owned),
-                    None => default.map(str::to_owned),
-                };
-                let labels: Vec<Option<String>> = columns.iter().map(label).collect();
-                let metrics = table.metrics.iter().map(|metric| metric.get(row));
-                builder.push(table.keys.get(row), labels.iter().map(Option::as_deref), metrics);
-            }
-        }
-        let declared = self.declared.clone().joined(other.declared.clone());
-        Ok(Self { declared, ..builder.finish() })
-    }
-}
-
-impl EpisodeTable {
-    /// The same episodes with a label, unless it is the default one, as part of the model's name: `model [label]`; and for
-    /// each row where it was before.
-    pub fn with_labelled_models(&self, label: &str) -> (Self, Vec<usize>) {
-        let labels = self.label(label);
-        let name = |row: usize| {
-            let model = self.keys.get(row).model;
-            let label = labels.and_then(|labels| labels.get(row)).filter(|text| Some(*text) != default_text(label));
-            label.map_or_else(|| model.to_owned(), |label| format!("{model} [{label}]"))
-        };
-        let model: TextColumn = (0..self.len()).map(|row| Some(name(row))).collect();
-        let keys = EpisodeKeys { model, ..self.keys.clone() };
-        let rows: Vec<usize> = match order(&keys) {
-            Some(order) => order.into_iter().map(|row| row as usize).collect(),
-            None => (0..self.len()).collect(),
-        };
-        (Self { keys, ..self.clone() }.taken(&rows), rows)
     }
 }
 

@@ -15,6 +15,7 @@ pub mod evaluate;
 pub mod evidence;
 pub mod flips;
 pub mod format;
+mod joined;
 mod order;
 pub mod physical;
 pub mod quality;

@@ -46,9 +46,10 @@ impl Outputs {
         Self { timelines, outcomes, ..Self::default() }
     }
 
-    /// Whether anything beside the scores needs the steps.
-    const fn needs_steps(self) -> bool {
-        self.timelines || self.outcomes || self.losses || self.quality
+    /// Whether anything beside the scores needs the steps of these traces.
+    fn needs_steps(self, traces: &TraceSet) -> bool {
+        let has_losses = self.losses && traces.column(REPLY_STATUS).is_some();
+        self.timelines || self.outcomes || self.quality || has_losses
     }
 }
 
@@ -145,7 +146,7 @@ impl Study {
                 let scored = Results::of(self.scored_elsewhere()?);
                 // The other engine computes scores alone; what else is asked for comes from a scan.
                 match source {
-                    Source::Traces(traces) if outputs.needs_steps() => {
+                    Source::Traces(traces) if outputs.needs_steps(traces) => {
                         Results { episodes: scored.episodes, ..self.scan_traces(traces, outputs)? }
                     }
                     _ => scored,

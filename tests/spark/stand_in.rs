@@ -16,7 +16,8 @@ fn folder(script: &str) -> tempfile::TempDir {
     fs::create_dir_all(program.parent().unwrap()).unwrap();
     fs::write(&program, format!("#!/bin/sh\nfor last; do :; done\nplace=$(dirname \"$last\")\n{script}\n")).unwrap();
     fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-    write(&folder.path().join("a.parquet"), &[episode("a", "E1", 1)], OptionalColumns::NONE);
+    let episodes = [episode("a", "E1", 1)];
+    write(&folder.path().join("a.parquet"), &episodes, OptionalColumns::used_by(&episodes));
     folder
 }
 

@@ -77,9 +77,15 @@ impl ScoreArgs {
             return Ok(Outcome::Done);
         }
         let format = self.output.as_deref().map(format_of).transpose()?;
-        let job = self.spark_job()?;
-        self.check_target(job.read().to_vec())?;
-        self.deliver(&job.score()?, format)?;
+        if are_uris(&self.traces.traces)? {
+            let job = self.spark_job()?;
+            self.check_target(job.read().to_vec())?;
+            self.deliver(&job.score()?, format)?;
+            return Ok(Outcome::Done);
+        }
+        let study = self.traces.study_on(&self.engine, &self.scoring, &GroupingArgs::default())?;
+        self.check_target(study.files_read(None))?;
+        self.deliver(&study.score()?.episodes, format)?;
         Ok(Outcome::Done)
     }
 

@@ -4,7 +4,7 @@
 //! smallest where the integers differ by at most one, and largest where all but one are 0 or h. Between the two not
 //! every value of that parity is attained (n = 4, t = 4: 4, 6, 8, 10, 16), so the search removes the largest integer
 //! and asks the same of the others. Both ends are attained and bound every branch; a large remainder succeeds at
-//! the first try, and what failed is remembered. A search of more than [`MOST_STEPS`], which only few values over a huge
+//! the first try, and what failed is remembered. A search of more than `MOST_STEPS`, which only few values over a huge
 //! range take, gives up and calls the value attained: nothing is called impossible that was not shown to be.
 
 use std::collections::HashSet;

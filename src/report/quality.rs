@@ -8,26 +8,13 @@ use std::fmt::Write as _;
 use super::tables::{csv, latex, markdown};
 use crate::base::escape::visible;
 use crate::base::format::fixed;
-use crate::score::quality::{CellKey, Quality, QualityByCell};
+use crate::score::quality::{CellKey, Quality, QualityByCell, REPLY_STATUSES};
 use crate::stats::cell::KeyValue;
 
 /// The name of its files.
 pub const NAME: &str = "quality";
 /// What stands where nothing is recorded.
 const UNKNOWN: &str = "--";
-/// The statuses, in the order of the columns of the CSV file.
-const STATUSES: [&str; 10] = [
-    "ok",
-    "repaired",
-    "parse_failed",
-    "schema_invalid",
-    "refusal",
-    "truncated",
-    "empty",
-    "rate_limited",
-    "server_error",
-    "timeout",
-];
 /// The shares of replies whose latency is told.
 const MEDIAN: f64 = 0.5;
 const SLOW: f64 = 0.95;
@@ -121,17 +108,13 @@ fn row(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
             quality.lost.map_or_else(|| UNKNOWN.to_owned(), |lost| lost.to_string()),
             quality.steps.to_string(),
             if_recorded(share(quality.unusable(), quality.replies())),
-            if_recorded(listed(quality.statuses.iter().filter(|(status, _)| !is_read(status)))),
+            if_recorded(listed(quality.unread())),
             if_recorded(repaired(quality)),
             latency(quality),
             tokens(quality),
             cost(quality),
         ])
         .collect()
-}
-
-fn is_read(status: &str) -> bool {
-    ["ok", "repaired"].contains(&status)
 }
 
 /// `12/340 (3.5 %)`.
@@ -200,7 +183,7 @@ fn csv_text(cells: &QualityByCell) -> String {
         "cost_usd",
     ];
     let mut writer = ::csv::Writer::from_writer(Vec::new());
-    csv::write(&mut writer, head.chain(STATUSES).chain(tail).map(str::to_owned));
+    csv::write(&mut writer, head.chain(REPLY_STATUSES).chain(tail).map(str::to_owned));
     for (key, quality) in &cells.0 {
         csv::write(&mut writer, csv_record(key, quality, keys));
     }
@@ -215,7 +198,7 @@ fn csv_record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
     let count = |count: u64| if recorded { count.to_string() } else { String::new() };
     let optional = |number: Option<i64>| number.map_or_else(String::new, |number| number.to_string());
     let total = |replies: u64, sum: String| if replies > 0 { sum } else { String::new() };
-    let known: u64 = STATUSES.iter().map(|status| quality.of_status(status)).sum();
+    let known: u64 = REPLY_STATUSES.iter().map(|status| quality.of_status(status)).sum();
     let repairs: BTreeMap<_, _> = quality.repairs.iter().collect();
     let repairs = repairs.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join("; ");
     let Quality { prompt_tokens, completion_tokens, cost_nano_usd, .. } = quality;
@@ -226,7 +209,7 @@ fn csv_record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
             quality.steps.to_string(),
             count(quality.replies()),
         ])
-        .chain(STATUSES.map(|status| count(quality.of_status(status))))
+        .chain(REPLY_STATUSES.map(|status| count(quality.of_status(status))))
         .chain([
             count(quality.unusable()),
             count(quality.replies() - known),

@@ -15,6 +15,7 @@ use super::table::CONDITION;
 use crate::trace::open::TraceSet;
 use crate::trace::replies::{REPLY_STATUS, ReplyCounts};
 use crate::trace::scan::EpisodeBatch;
+pub use crate::trace::schema::REPLY_STATUSES;
 use crate::trace::schema::{self, Column, Kind};
 
 /// The columns that quality is read from, where traces have them.
@@ -93,7 +94,12 @@ impl Quality {
 
     /// Replies that gave no decision.
     pub fn unusable(&self) -> u64 {
-        self.statuses.iter().filter(|(status, _)| !ReplyCounts::is_read(status)).map(|(_, replies)| replies).sum()
+        self.unread().map(|(_, replies)| replies).sum()
+    }
+
+    /// The statuses of replies that gave no decision, and how many have each.
+    pub fn unread(&self) -> impl Iterator<Item = (&String, &u64)> {
+        self.statuses.iter().filter(|(status, _)| !ReplyCounts::is_read(status))
     }
 
     /// Replies of a status.

@@ -3,18 +3,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::{Block, Experiment, Study};
+use super::study::{Block, CENSORED, Experiment, Study};
 use crate::score::table::MetricColumn;
 use crate::stats::competing::{Ending, Incidence, Outcome};
 use crate::stats::coverage::{self, Withheld};
 use crate::stats::interval::Interval;
 use crate::stats::survival::{Duration, End, MedianInterval, RestrictedMean, Survival, common_horizon};
-
-/// Which metrics are durations that end with a decision, and which metric is defined where there was one, 1 where that
-/// was correct.
-///
-/// The one place where statistics know a metric by name: a definition file does not say that a quantity is censored.
-pub const CENSORED: [(&str, &str); 1] = [("TTD", "TSA-C")];
 
 /// One duration of one experiment and model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

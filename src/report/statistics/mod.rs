@@ -32,13 +32,14 @@ pub use chance::{COMPLETED, ChanceRow, Role, Verdict};
 pub use clusters::ClusterRow;
 pub use compare::{Comparison, Method, Sign};
 pub use conditions::Contrast;
-pub use durations::{CENSORED, CorrectRow, DurationRow};
+pub use durations::{CorrectRow, DurationRow};
 pub use losses::{LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
 pub use retest::RetestRow;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
+pub use study::CENSORED;
 
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;

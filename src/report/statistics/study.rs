@@ -3,11 +3,16 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use super::durations::CENSORED;
 use crate::metric::catalog::{Better, Kind, Metric};
 use crate::score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use crate::stats::design::Design;
 use crate::stats::moments::{MomentOverflow, Moments};
+
+/// Which metrics are durations that end with a decision, and which metric is defined where there was one, 1 where that
+/// was correct.
+///
+/// The one place where statistics know a metric by name: a definition file does not say that a quantity is censored.
+pub const CENSORED: [(&str, &str); 1] = [("TTD", "TSA-C")];
 
 /// What stands for no condition.
 const DEFAULT_CONDITION: &str = "default";

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use super::error::StudyError;
-use super::scan::Results;
+use super::results::Results;
 use crate::figures::{self, Figure, FigureError, FigureFormat, FigureName, Input};
 use crate::report::bundle::OutputFile;
 use crate::report::style::Style;

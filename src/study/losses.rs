@@ -7,7 +7,7 @@ use std::collections::{BTreeSet, HashSet};
 
 use super::Study;
 use super::error::StudyError;
-use super::scan::Results;
+use super::results::Results;
 use crate::metric::catalog::{Better, Catalog, Kind};
 use crate::score::builder::TableBuilder;
 use crate::score::quality::{CellKey, QualityByCell};

@@ -23,6 +23,7 @@ mod pooled;
 mod provenance;
 mod report;
 mod rescore;
+mod results;
 mod scan;
 mod scores;
 mod sensitivity;
@@ -59,7 +60,7 @@ pub use overridden::overridden_experiments;
 pub use provenance::ProvenanceError;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
-pub use scan::{Outputs, Results};
+pub use results::{Outputs, Results};
 pub use scores::write as write_scores;
 pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, ThresholdsError};
 

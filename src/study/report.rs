@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::error::StudyError;
 use super::figure_inputs::{Drawings, FigureInputs};
 use super::losses::Counted;
-use super::scan::{Outputs, Results};
+use super::results::{Outputs, Results};
 use super::{LostAs, Study, scores};
 use crate::figures::FigureName;
 use crate::report::bundle::{self, Bundle, Manifest, OutputFile};

@@ -11,7 +11,8 @@ use serde_json::Value;
 
 use super::error::StudyError;
 use super::losses::Counted;
-use super::scan::{Results, lost_episodes};
+use super::results::Results;
+use super::scan::lost_episodes;
 use super::{Question, Study};
 use crate::figures::Figure;
 use crate::figures::sensitivity::{self as drawing, Stage};

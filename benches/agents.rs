@@ -50,6 +50,7 @@ impl Agent for AtOnce {
             action: Some(Action::TurnLeft),
             self_color: None,
             selected_cube: None,
+            mark_report: None,
             words: Words::default(),
             raw: Some(REPLY.to_owned()),
             usage: Usage::default(),
@@ -163,7 +164,7 @@ struct Quiet;
 impl Progress for Quiet {
     fn step(&self, _: Key, _: i32, _: &Step) {}
 
-    fn episode(&self, _: &str, _: usize) {}
+    fn episode(&self, _: Key, _: &str, _: usize) {}
 
     fn model_changed(&self, _: &str, _: i32, _: &str, _: &str) {}
 
@@ -177,8 +178,12 @@ impl Progress for Quiet {
 /// Steps a second of a recording, and where its time went.
 fn measure(config: &WorldConfig, player: &dyn Player, folder: &Path, threads: NonZeroUsize) -> (f64, Spent) {
     let subject = Subject::of(player.model());
-    let store =
-        Store::open(&folder.join("runs"), subject.clone(), metadata::recording(config, player, None, None)).unwrap();
+    let store = Store::open(
+        &folder.join("runs"),
+        subject.clone(),
+        metadata::Recordings::new(&[Experiment::E5], config, player, None, None),
+    )
+    .unwrap();
     let plan = Plan { experiments: vec![Experiment::E5], seeds: 1, runs: 64, repeats: 1, shard: Shard::WHOLE };
     let keys: Vec<Key> = plan.keys();
     let (shares, stop) = (Shares::default(), AtomicBool::new(false));

@@ -141,6 +141,8 @@ pub mod cli;
 #[doc(hidden)]
 pub mod engine;
 #[doc(hidden)]
+pub mod experiment;
+#[doc(hidden)]
 pub mod figures;
 #[doc(hidden)]
 pub mod log;

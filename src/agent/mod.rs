@@ -22,29 +22,21 @@ use std::sync::Arc;
 
 use crate::base::frame::Frame;
 use crate::base::names::names;
+use crate::experiment::Experiment;
 use crate::trace::episode::Action;
 use reply::Repair;
 
 /// What an agent is told once, before the first step.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Task {
-    /// Which of the two prompts of the paper is in force.
-    pub family: Family,
+    /// What is asked, and how: its prompt and the keys of a reply.
+    pub experiment: Experiment,
     /// The false colour of the first line of the prompt in E3.
     pub stated_color: Option<String>,
     /// Steps after which the episode ends by itself (100 in the paper).
     pub step_budget: i32,
     /// The only source of chance for an agent; differs from episode to episode, equal from recording to recording.
     pub seed: u64,
-}
-
-/// The two prompt families (paper, appendix "Prompt Templates").
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Family {
-    /// E1 to E4: find out one's colour, then select the cube of that colour.
-    CubeSelection,
-    /// E5: explore; no cube is asked for.
-    Exploration,
 }
 
 /// What an agent perceives before it acts.
@@ -81,6 +73,8 @@ pub struct Reply {
     pub self_color: Option<String>,
     /// The cube: a colour, `none`, or `None` where the reply gave none.
     pub selected_cube: Option<String>,
+    /// The mark on the own body: a colour, `none`, or `None` where the reply gave none.
+    pub mark_report: Option<String>,
     /// The words around the decision, as given.
     pub words: Words,
     /// The whole reply, as it came.

@@ -1,18 +1,15 @@
-//! The words that go with a frame: the paper's two prompt families (appendix, "Prompt Templates").
-//!
-//! The templates are files in `assets/prompts`; those of the paper are word for word, the three of the dynamic context
-//! (history of one step, position, warning) are ours, since the paper says what they hold but not how they read.
+//! The words that go with a frame, from the templates of an experiment's prompt.
 //!
 //! Rule: the same task and observation give the same words, and [`Prompt::hash`] changes with any word of them.
 
 use minijinja::{Environment, Error, UndefinedBehavior, context};
 
-use super::{Family, Observation, Task};
-use crate::base::hash;
+use super::{Observation, Task};
 use crate::base::number::Decimal;
+use crate::experiment::Experiment;
 use crate::trace::episode::Action;
 
-/// The templates of one family.
+/// The templates of one prompt.
 #[derive(Debug)]
 pub struct Prompt {
     environment: Environment<'static>,
@@ -28,41 +25,19 @@ pub struct Rendered {
     pub user: String,
 }
 
-/// A template by the name of its file and its text.
-type Source = (&'static str, &'static str);
-
-const CUBE_SELECTION: [Source; 2] = [
-    ("system", include_str!("../../assets/prompts/cube-selection.system.txt")),
-    ("user", include_str!("../../assets/prompts/cube-selection.user.txt")),
-];
-const EXPLORATION: [Source; 2] = [
-    ("system", include_str!("../../assets/prompts/exploration.system.txt")),
-    ("user", include_str!("../../assets/prompts/exploration.user.txt")),
-];
-const CONTEXT: [Source; 3] = [
-    ("history", include_str!("../../assets/prompts/history.txt")),
-    ("position", include_str!("../../assets/prompts/position.txt")),
-    ("warning", include_str!("../../assets/prompts/warning.txt")),
-];
-
 impl Prompt {
-    /// The prompt of a family.
+    /// The prompt of an experiment.
     ///
     /// # Errors
-    /// A built-in template does not parse, which a test rules out.
-    pub fn of(family: Family) -> Result<Self, Error> {
-        let own = match family {
-            Family::CubeSelection => CUBE_SELECTION,
-            Family::Exploration => EXPLORATION,
-        };
+    /// A template does not parse, which reading the experiment rules out.
+    pub fn of(experiment: Experiment) -> Result<Self, Error> {
         let mut environment = Environment::new();
         environment.set_undefined_behavior(UndefinedBehavior::Strict);
-        let mut text = String::new();
-        for (name, source) in own.into_iter().chain(CONTEXT) {
+        let templates = experiment.templates();
+        for (name, source) in &templates.all {
             environment.add_template(name, source)?;
-            text.extend([name, "\n", source]);
         }
-        Ok(Self { environment, hash: hash::of_bytes(text.as_bytes()) })
+        Ok(Self { environment, hash: templates.hash() })
     }
 
     /// SHA-256 of the templates, 64 hexadecimal digits.
@@ -108,12 +83,11 @@ impl Prompt {
     }
 }
 
-/// The hashes of both prompts, for recordings.
+/// The hashes of the paper's two prompts, for registered plans.
 pub fn hashes() -> serde_json::Value {
-    let hash = |family| Prompt::of(family).map_or(serde_json::Value::Null, |prompt| prompt.hash().into());
     serde_json::json!({
-        "cube_selection": hash(Family::CubeSelection),
-        "exploration": hash(Family::Exploration),
+        "cube_selection": Experiment::E1.prompt_hash,
+        "exploration": Experiment::E5.prompt_hash,
     })
 }
 

@@ -8,7 +8,6 @@ use serde::Serialize;
 use super::recording::dollars;
 use super::text_table::counted;
 use super::vlm::VlmPlayer;
-use crate::agent::Family;
 use crate::agent::vlm::estimate;
 use crate::base::escape::visible;
 use crate::record::plan::{Key, Subject};
@@ -62,7 +61,7 @@ impl ForecastAnswer {
             asked,
             found: asked - todo.len(),
             episodes: todo.iter().map(|key| key.episode_id(subject)).collect(),
-            steps_at_most: todo.len() as u64 * u64::from(config.episode.steps),
+            steps_at_most: todo.iter().map(|key| u64::from(config.of(key.experiment).episode.steps)).sum(),
             requests,
         }
     }
@@ -91,11 +90,10 @@ impl RequestForecast {
         };
         for key in todo {
             let answered = vlm.answered(&key.file_stem(subject))?;
-            let left = u64::from(config.episode.steps).saturating_sub(answered);
-            let family = if key.experiment.has_candidates() { Family::CubeSelection } else { Family::Exploration };
+            let left = u64::from(config.of(key.experiment).episode.steps).saturating_sub(answered);
             forecast.answered += answered;
             forecast.at_most += left;
-            forecast.prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), family, view)?;
+            forecast.prompt_tokens += left * estimate::prompt_tokens(vlm.choice(), key.experiment, view)?;
         }
         forecast.completion_tokens_at_most = forecast.at_most * u64::from(vlm.max_output_tokens());
         let prices = vlm.choice().model.prices;

@@ -9,6 +9,7 @@ pub mod commands;
 pub mod dry_run;
 #[cfg(feature = "sim")]
 pub mod exec;
+mod experiments;
 pub mod outcome;
 pub mod output;
 pub mod quality;

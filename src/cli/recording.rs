@@ -1,5 +1,6 @@
 //! What `record` tells while it runs and when it has ended, on standard error: progress, and where the time went.
 
+use std::collections::BTreeMap;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -16,12 +17,14 @@ use crate::agent::vlm::limits::Spend;
 use crate::base::escape::visible;
 use crate::base::format::fixed;
 use crate::base::number::Decimal;
+use crate::experiment::Experiment;
 use crate::record::failures::LostEpisode;
 use crate::record::plan::{Key, Subject};
 use crate::record::queue::Held;
 use crate::record::replies::{Replies, RepliesAnswer, UnreadableReply};
 use crate::record::run::Progress;
 use crate::record::shares::Spent;
+use crate::sim::config::WorldConfig;
 use crate::trace::episode::Step;
 use crate::trace::replies::ReplyCounts;
 
@@ -66,7 +69,8 @@ pub(super) struct Bar<'a> {
     episodes: usize,
     ended: AtomicUsize,
     replies: Replies,
-    budget: u64,
+    /// Steps of an episode at most.
+    budget: BTreeMap<Experiment, u64>,
     is_shown: bool,
     /// When a line was last written.
     told: Mutex<Instant>,
@@ -75,12 +79,15 @@ pub(super) struct Bar<'a> {
 }
 
 impl<'a> Bar<'a> {
-    /// A bar for so many episodes of so many steps at most.
-    pub(super) fn new(player: &'a dyn Player, subject: &'a Subject, episodes: usize, steps: u32) -> Self {
+    /// A bar for some episodes in this world.
+    pub(super) fn new(player: &'a dyn Player, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
+        let budget: BTreeMap<Experiment, u64> =
+            todo.iter().map(|key| (key.experiment, u64::from(world.of(key.experiment).episode.steps))).collect();
+        let steps = todo.iter().filter_map(|key| budget.get(&key.experiment)).sum();
+        let episodes = todo.len();
         let is_shown = io::stderr().is_terminal();
         let target = if is_shown { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
-        let budget = u64::from(steps);
-        let line = ProgressBar::with_draw_target(Some(episodes as u64 * budget), target);
+        let line = ProgressBar::with_draw_target(Some(steps), target);
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos} steps, {per_sec}, {eta} left");
         line.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         let told = Mutex::new(Instant::now());
@@ -147,10 +154,11 @@ impl Progress for Bar<'_> {
         }
     }
 
-    fn episode(&self, _: &str, steps: usize) {
+    fn episode(&self, key: Key, _: &str, steps: usize) {
         self.ended.fetch_add(1, Ordering::Relaxed);
         // Steps that an early decision leaves unused are not still to come.
-        let unused = self.budget.saturating_sub(steps as u64);
+        let budget = self.budget.get(&key.experiment).copied().unwrap_or_default();
+        let unused = budget.saturating_sub(steps as u64);
         self.line.set_length(self.line.length().unwrap_or_default().saturating_sub(unused));
         self.line.set_message(self.message());
     }
@@ -281,11 +289,12 @@ mod tests {
     use super::{Bar, dollars, shares, spent, waiting};
     use crate::agent::scripted::Scripted;
     use crate::agent::vlm::limits::Spend;
+    use crate::experiment::Experiment;
     use crate::record::plan::{Key, Subject};
     use crate::record::queue::Held;
     use crate::record::run::Progress as _;
     use crate::record::shares::Spent;
-    use crate::sim::Experiment;
+    use crate::sim::config::WorldConfig;
     use crate::trace::episode::{Extra, Step};
 
     #[test]
@@ -302,7 +311,8 @@ mod tests {
     fn the_progress_tells_of_replies_that_cannot_be_read() {
         let player = Scripted::named("frozen").unwrap();
         let subject = Subject::of("frozen");
-        let bar = Bar::new(&player, &subject, 2, 10);
+        let todo = [1, 2].map(|run| Key::first(Experiment::E1, 1, run));
+        let bar = Bar::new(&player, &subject, &todo, &WorldConfig::default());
         let row = |status: &str| {
             let extra = Extra { reply_status: Some(status.to_owned()), ..Extra::default() };
             Step { action: None, self_color: None, selected_cube: None, mirror_visible: false, extra }

@@ -139,7 +139,8 @@ impl Faults {
     }
 
     /// Puts the faults into the order of their places, and drops repetitions.
-    pub(super) fn in_order(mut self) -> Self {
+    #[must_use]
+    pub(crate) fn in_order(mut self) -> Self {
         self.0.sort_by(|a, b| {
             let key = |fault: &Fault| (fault.place.span.start, fault.place.span.end);
             a.place.source.name.cmp(&b.place.source.name).then(key(a).cmp(&key(b)))

@@ -14,7 +14,7 @@ use crate::base::suggest::nearest;
 type Value<'a> = toml::Spanned<DeValue<'a>>;
 
 /// A table whose keys are taken one by one; what is left at the end is unknown.
-pub(super) struct Keys<'a> {
+pub(crate) struct Keys<'a> {
     source: &'a Arc<Source>,
     left: Vec<(&'a str, Range<usize>, &'a Value<'a>)>,
     asked: Vec<&'static str>,
@@ -22,7 +22,7 @@ pub(super) struct Keys<'a> {
 }
 
 impl<'a> Keys<'a> {
-    pub(super) fn new(source: &'a Arc<Source>, table: &'a DeTable<'a>, what: &'static str) -> Self {
+    pub(crate) fn new(source: &'a Arc<Source>, table: &'a DeTable<'a>, what: &'static str) -> Self {
         let left = table.iter().map(|(key, value)| (key.get_ref().as_ref(), key.span(), value)).collect();
         Self { source, left, asked: Vec::new(), what }
     }
@@ -31,15 +31,15 @@ impl<'a> Keys<'a> {
         Place { source: self.source.clone(), span }
     }
 
-    pub(super) fn names(&self) -> Vec<String> {
+    pub(crate) fn names(&self) -> Vec<String> {
         self.left.iter().map(|(name, _, _)| (*name).to_owned()).collect()
     }
 
-    pub(super) fn has(&self, name: &str) -> bool {
+    pub(crate) fn has(&self, name: &str) -> bool {
         self.left.iter().any(|(known, _, _)| *known == name)
     }
 
-    pub(super) fn key_place(&self, name: &str) -> Place {
+    pub(crate) fn key_place(&self, name: &str) -> Place {
         let span = self.left.iter().find(|(known, _, _)| *known == name).map_or(0..0, |(_, span, _)| span.clone());
         self.place(span)
     }
@@ -62,7 +62,7 @@ impl<'a> Keys<'a> {
         None
     }
 
-    pub(super) fn text(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<(String, Place)> {
+    pub(crate) fn text(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<(String, Place)> {
         let value = self.take_known(name)?;
         match value.get_ref().as_str() {
             Some(text) => Some((text.to_owned(), self.place(value.span()))),
@@ -70,7 +70,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    pub(super) fn expression(&mut self, name: &str, faults: &mut Vec<Fault>) -> Option<Written> {
+    pub(crate) fn expression(&mut self, name: &str, faults: &mut Vec<Fault>) -> Option<Written> {
         if let "when" | "value" = name {
             self.asked.push(if name == "when" { "when" } else { "value" });
         }
@@ -81,12 +81,12 @@ impl<'a> Keys<'a> {
         }
     }
 
-    pub(super) fn truth(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<bool> {
+    pub(crate) fn truth(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<bool> {
         let value = self.take_known(name)?;
         value.get_ref().as_bool().or_else(|| self.wrong(value, "true or false", faults))
     }
 
-    pub(super) fn integer(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<i64> {
+    pub(crate) fn integer(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<i64> {
         let value = self.take_known(name)?;
         match value.get_ref().as_integer().and_then(|i| i64::from_str_radix(i.as_str(), i.radix()).ok()) {
             Some(integer) => Some(integer),
@@ -94,7 +94,83 @@ impl<'a> Keys<'a> {
         }
     }
 
-    pub(super) fn choice<T: Copy>(
+    /// A number, of metres or the like; what is no number, such as `nan`, is one here, for the caller's range to refuse.
+    pub(crate) fn number(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<(f64, Place)> {
+        let value = self.take_known(name)?;
+        let number = match value.get_ref() {
+            DeValue::Float(number) => number.as_str().replace('_', "").parse().ok(),
+            DeValue::Integer(number) => i32::from_str_radix(number.as_str(), number.radix()).ok().map(f64::from),
+            _ => None,
+        };
+        match number {
+            Some(number) => Some((number, self.place(value.span()))),
+            None => self.wrong(value, "a number", faults),
+        }
+    }
+
+    /// A whole number from `least` to `most`.
+    pub(crate) fn count(
+        &mut self,
+        name: &'static str,
+        [least, most]: [u32; 2],
+        faults: &mut Vec<Fault>,
+    ) -> Option<(u32, Place)> {
+        let place = self.value_place(name)?;
+        let value = self.integer(name, faults)?;
+        match u32::try_from(value).ok().filter(|value| (least..=most).contains(value)) {
+            Some(value) => Some((value, place)),
+            None => {
+                faults.push(Fault::new(place, format!("`{name}` may be {least} to {most}, but is {value}")));
+                None
+            }
+        }
+    }
+
+    /// A length from `least` to `most`, in the unit in which it is written.
+    pub(crate) fn length(
+        &mut self,
+        name: &'static str,
+        [least, most]: [f64; 2],
+        faults: &mut Vec<Fault>,
+    ) -> Option<(f64, Place)> {
+        let (value, place) = self.number(name, faults)?;
+        if value >= least && value <= most {
+            return Some((value, place));
+        }
+        faults.push(Fault::new(place, format!("`{name}` may be {least} to {most}, but is {value}")));
+        None
+    }
+
+    /// Where a key's value stands.
+    pub(crate) fn value_place(&self, name: &str) -> Option<Place> {
+        let (_, _, value) = self.left.iter().find(|(known, _, _)| *known == name)?;
+        Some(self.place(value.span()))
+    }
+
+    /// The tables of a list, `[[experiment.A.mirror]]`, at most so many.
+    pub(crate) fn list(
+        &mut self,
+        name: &'static str,
+        most: usize,
+        faults: &mut Vec<Fault>,
+    ) -> Option<Vec<(Place, Keys<'a>)>> {
+        let value = self.take_known(name)?;
+        let Some(items) = value.get_ref().as_array() else {
+            return self.wrong(value, "a list of tables", faults);
+        };
+        if items.len() > most {
+            let message = format!("a world holds at most {most} of `{name}`, found {}", items.len());
+            faults.push(Fault::new(self.place(value.span()), message));
+            return None;
+        }
+        let table = |item: &'a Value<'a>| match item.get_ref().as_table() {
+            Some(table) => Some((self.place(item.span()), Keys::new(self.source, table, name))),
+            None => self.wrong(item, "a table", faults),
+        };
+        items.iter().map(table).collect()
+    }
+
+    pub(crate) fn choice<T: Copy>(
         &mut self,
         name: &'static str,
         choices: &[(&str, T)],
@@ -111,7 +187,7 @@ impl<'a> Keys<'a> {
         None
     }
 
-    pub(super) fn ratio(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<Ratio> {
+    pub(crate) fn ratio(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<Ratio> {
         let value = self.take_known(name)?;
         self.ratio_of(value, faults)
     }
@@ -135,7 +211,7 @@ impl<'a> Keys<'a> {
 
     /// A chance level, or the word that says that there is none.
     #[expect(clippy::option_option, reason = "a faulty level is not the same as no level")]
-    pub(super) fn level(&mut self, name: &str, faults: &mut Vec<Fault>) -> Option<Option<Ratio>> {
+    pub(crate) fn level(&mut self, name: &str, faults: &mut Vec<Fault>) -> Option<Option<Ratio>> {
         let value = self.take(name)?;
         if value.get_ref().as_str() == Some("none") {
             return Some(None);
@@ -143,7 +219,7 @@ impl<'a> Keys<'a> {
         self.ratio_of(value, faults).map(Some)
     }
 
-    pub(super) fn ratios(&mut self, name: &str, faults: &mut Vec<Fault>) -> Option<Vec<Ratio>> {
+    pub(crate) fn ratios(&mut self, name: &str, faults: &mut Vec<Fault>) -> Option<Vec<Ratio>> {
         let value = self.take(name)?;
         match value.get_ref().as_array() {
             Some(items) => items.iter().map(|item| self.ratio_of(item, faults)).collect(),
@@ -151,7 +227,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    pub(super) fn texts(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<Vec<(String, Place)>> {
+    pub(crate) fn texts(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<Vec<(String, Place)>> {
         let value = self.take_known(name)?;
         let Some(items) = value.get_ref().as_array() else { return self.wrong(value, "a list of texts", faults) };
         let text = |item: &Value| match item.get_ref().as_str() {
@@ -162,7 +238,7 @@ impl<'a> Keys<'a> {
     }
 
     /// Every key with what `read` makes of it and where it stands; unreadable ones are passed over.
-    pub(super) fn each<T>(
+    pub(crate) fn each<T>(
         mut self,
         mut read: impl FnMut(&mut Self, &str) -> Option<T>,
     ) -> IndexMap<String, (T, Place)> {
@@ -176,7 +252,7 @@ impl<'a> Keys<'a> {
         entries
     }
 
-    pub(super) fn table(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<Keys<'a>> {
+    pub(crate) fn table(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Option<Keys<'a>> {
         let value = self.take_known(name)?;
         match value.get_ref().as_table() {
             Some(table) => Some(Keys::new(self.source, table, name)),
@@ -185,7 +261,7 @@ impl<'a> Keys<'a> {
     }
 
     /// The tables of a table: `[metric.A]`, `[metric.B]`, ...
-    pub(super) fn tables(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Vec<(String, Place, Keys<'a>)> {
+    pub(crate) fn tables(&mut self, name: &'static str, faults: &mut Vec<Fault>) -> Vec<(String, Place, Keys<'a>)> {
         let Some(outer) = self.table(name, faults) else { return Vec::new() };
         let mut tables = Vec::with_capacity(outer.left.len());
         for (key, span, value) in &outer.left {
@@ -200,7 +276,7 @@ impl<'a> Keys<'a> {
         tables
     }
 
-    pub(super) fn refuse_the_rest(self, faults: &mut Vec<Fault>) {
+    pub(crate) fn refuse_the_rest(self, faults: &mut Vec<Fault>) {
         for (name, span, _) in &self.left {
             let near = nearest(name, self.asked.iter().copied()).map(|near| format!("did you mean `{near}`?"));
             let known = format!("keys of {} are {}", describe(self.what), self.asked.join(", "));
@@ -212,7 +288,7 @@ impl<'a> Keys<'a> {
 
 fn describe(what: &str) -> String {
     match what {
-        "column" | "metric" => format!("a {what}"),
+        "column" | "metric" | "mirror" | "mark" => format!("a {what}"),
         "experiment" => format!("an {what}"),
         other => other.to_owned(),
     }

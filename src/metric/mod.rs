@@ -18,7 +18,7 @@ pub mod fault;
 pub mod file;
 mod functions;
 pub mod implied;
-mod keys;
+pub(crate) mod keys;
 pub mod names;
 pub mod origin;
 pub mod overflow;

@@ -8,9 +8,9 @@ use crate::base::hash;
 
 /// Digits of a fingerprint's name: enough for all recordings of a study, and short in a table.
 const DIGITS: usize = 16;
+/// What an experiment is called and held against, which changes no episode.
+const WORDS: [&str; 4] = ["title", "order", "chance", "reference"];
 /// The keys of an agent's description that are parts of their own.
-const PROMPTS: &str = "prompts";
-const REPLY_SCHEMAS: &str = "reply_schemas";
 const SAMPLING: [&str; 3] = ["temperature", "max_output_tokens", "reasoning_effort"];
 
 /// A name, and what it stands for.
@@ -28,15 +28,22 @@ impl Fingerprint {
     /// returned it.
     pub fn of(recording: &Value, model: Option<&str>) -> Self {
         let mut agent = recording["agent"].as_object().cloned().unwrap_or_default();
-        let prompts = agent.remove(PROMPTS);
-        let reply_schema = agent.remove(REPLY_SCHEMAS);
+        let mut experiment = recording["experiment"].clone();
+        if let Some(experiment) = experiment.as_object_mut() {
+            experiment.retain(|key, _| !WORDS.contains(&key.as_str()));
+        }
+        let prompts =
+            experiment.as_object_mut().and_then(|experiment| experiment.remove("prompt_hash")).unwrap_or_default();
+        // Scripts read neither.
+        let reads = !agent.contains_key("scripted");
+        let given = |value: &Value| (reads && !value.is_null()).then(|| hash_of(value));
         let taken = SAMPLING.iter().filter_map(|key| Some(((*key).to_owned(), agent.remove(*key)?)));
         let sampling: Map<String, Value> = taken.collect();
-        let world = json!([recording["world_hash"], recording["scene_version"]]);
+        let world = json!([recording["world_hash"], recording["scene_version"], experiment]);
         let parts = json!({
             "world": hash_of(&world),
-            "prompts": prompts.map(|prompts| hash_of(&prompts)),
-            "reply_schema": reply_schema.map(|schema| hash_of(&schema)),
+            "prompts": given(&prompts),
+            "reply_schema": given(&recording["reply_schema_hash"]),
             "agent": hash_of(&Value::Object(agent)),
             "sampling": (!sampling.is_empty()).then(|| hash_of(&Value::Object(sampling))),
             "model": model,
@@ -73,8 +80,9 @@ mod tests {
 
     fn recording() -> Value {
         json!({
-            "world_hash": "w", "scene_version": 1,
-            "agent": { "id": "x", "temperature": 0.2, "prompts": {"a": "1"}, "reply_schemas": {"a": "2"} },
+            "world_hash": "w", "scene_version": 1, "reply_schema_hash": "r",
+            "experiment": { "name": "E1", "title": "One", "prompt_hash": "p", "steps": 7 },
+            "agent": { "id": "x", "temperature": 0.2 },
         })
     }
 
@@ -94,12 +102,16 @@ mod tests {
         let same = |_: &mut Value| {};
         assert_eq!(changed(&|value| value["world_hash"] = json!("v"), Some("x-1")), "world");
         assert_eq!(changed(&|value| value["scene_version"] = json!(2), Some("x-1")), "world");
-        assert_eq!(changed(&|value| value["agent"]["prompts"] = json!({"a": "3"}), Some("x-1")), "prompts");
-        assert_eq!(changed(&|value| value["agent"]["reply_schemas"] = json!({}), Some("x-1")), "reply_schema");
+        assert_eq!(changed(&|value| value["experiment"]["steps"] = json!(8), Some("x-1")), "world");
+        assert_eq!(changed(&|value| value["experiment"]["prompt_hash"] = json!("q"), Some("x-1")), "prompts");
+        assert_eq!(changed(&|value| value["reply_schema_hash"] = json!("s"), Some("x-1")), "reply_schema");
         assert_eq!(changed(&|value| value["agent"]["id"] = json!("y"), Some("x-1")), "agent");
         assert_eq!(changed(&|value| value["agent"]["temperature"] = json!(0.7), Some("x-1")), "sampling");
         assert_eq!(changed(&same, Some("x-2")), "model");
         assert_eq!(changed(&same, None), "model");
+        let mut retitled = recording();
+        retitled["experiment"]["title"] = json!("Another title");
+        assert_eq!(Fingerprint::of(&retitled, Some("x-1")), base);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use super::continued;
 use super::error::StoreError;
 use super::folder_lock;
 use super::lock::is_at;
-use super::metadata::difference;
+use super::metadata::{Recordings, difference};
 use super::plan::Subject;
 use crate::sim::Experiment;
 use crate::trace::error::TraceError;
@@ -26,7 +26,7 @@ use crate::trace::schema::RECORDING_KEY;
 pub struct RecordingIndex {
     folder: PathBuf,
     subject: Subject,
-    recording: Value,
+    recordings: Recordings,
     /// What was read of traces.
     traces: Mutex<BTreeMap<Experiment, InTrace>>,
 }
@@ -46,17 +46,17 @@ struct InTrace {
 }
 
 impl RecordingIndex {
-    /// The recordings of a model in a folder, with what a trace of it says of how it was recorded.
-    pub fn new(folder: &Path, subject: Subject, recording: Value) -> Self {
-        Self { folder: folder.to_owned(), subject, recording, traces: Mutex::default() }
+    /// The recordings of a model in a folder, with what its traces say of how they were recorded.
+    pub fn new(folder: &Path, subject: Subject, recordings: Recordings) -> Self {
+        Self { folder: folder.to_owned(), subject, recordings, traces: Mutex::default() }
     }
 
     pub(super) const fn subject(&self) -> &Subject {
         &self.subject
     }
 
-    pub(super) const fn recording(&self) -> &Value {
-        &self.recording
+    pub(super) fn recording(&self, experiment: Experiment) -> &Value {
+        self.recordings.of(experiment)
     }
 
     /// The trace of an experiment.
@@ -88,7 +88,7 @@ impl RecordingIndex {
         let parts = self.parts_of(experiment)?;
         let mut episodes = Vec::new();
         for path in trace.exists().then_some(trace).iter().chain(&parts) {
-            self.check(path)?;
+            self.check(experiment, path)?;
             episodes.extend(merge::read(path)?);
         }
         // An episode that is in the trace and a part is the same one: the trace was put together, and the process ended
@@ -112,7 +112,7 @@ impl RecordingIndex {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Places::default()),
             file => file.map_err(StoreError::io("open", &path))?,
         };
-        self.check(&path)?;
+        self.check(experiment, &path)?;
         let places = Arc::new(places(&merge::read(&path)?));
         traces.insert(experiment, InTrace { file, places: Arc::clone(&places) });
         Ok(places)
@@ -120,12 +120,12 @@ impl RecordingIndex {
 
     /// Refuses the log of an experiment that is not the log of these episodes, which are those of its trace and its parts.
     pub(super) fn check_log(&self, experiment: Experiment, episodes: &[EpisodeRows]) -> Result<(), StoreError> {
-        continued::check(&self.log(experiment), &self.trace(experiment), &self.recording, episodes)
+        continued::check(&self.log(experiment), &self.trace(experiment), self.recording(experiment), episodes)
     }
 
     /// Refuses a file that was recorded with anything else than this recording.
-    pub(super) fn check(&self, path: &Path) -> Result<(), StoreError> {
-        let difference = difference(&self.recording, &recording_of(path)?);
+    pub(super) fn check(&self, experiment: Experiment, path: &Path) -> Result<(), StoreError> {
+        let difference = difference(self.recording(experiment), &recording_of(path)?);
         difference.map_or(Ok(()), |difference| Err(StoreError::different(path, difference)))
     }
 

@@ -1,9 +1,13 @@
 //! What a trace says of how it was recorded: all that replay needs, and nothing that two recordings of the same differ in.
 
+use std::collections::BTreeMap;
+
 use serde_json::{Value, json};
 
-use crate::agent::Player;
+use crate::agent::{Player, reply};
 use crate::base::palette::Color;
+use crate::experiment::Experiment;
+use crate::experiment::Spec;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::SCENE_VERSION;
 use crate::trace::declared::Registration;
@@ -16,26 +20,54 @@ pub(super) const FINGERPRINTS: &str = "fingerprints";
 /// The key of the version of this object's shape.
 pub(super) const VERSION_KEY: &str = "version";
 
-/// The version of this object's shape: 2 since it declares a palette, a design and fingerprints. A recording of another one
+/// The version of this object's shape: 2 since it declares a palette, a design and fingerprints, 3 since it has the whole
+/// experiment. A recording of another one
 /// is not continued, since its episodes were not held against the same rules.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
-/// The value of `mirrorstats.recording`; the store adds the seeds and fingerprints. `condition` is absent for the default
-/// one.
+/// What the traces of several experiments say of how they were recorded.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recordings(BTreeMap<Experiment, Value>);
+
+impl Recordings {
+    /// Those of some experiments; `condition` is absent for the default one.
+    pub fn new(
+        experiments: &[Experiment],
+        config: &WorldConfig,
+        player: &dyn Player,
+        condition: Option<&str>,
+        registration: Option<&Registration>,
+    ) -> Self {
+        let of = |experiment: &Experiment| recording(*experiment, config, player, condition, registration);
+        Self(experiments.iter().map(|experiment| (*experiment, of(experiment))).collect())
+    }
+
+    /// That of an experiment; null for one that is not recorded.
+    pub fn of(&self, experiment: Experiment) -> &Value {
+        self.0.get(&experiment).unwrap_or(&Value::Null)
+    }
+}
+
+/// The value of `mirrorstats.recording`; the store adds the seeds and fingerprints.
 ///
 /// Episodes with equal scenes are pairs. A seed is no cluster: each of its runs has a room of its own.
-pub fn recording(
+fn recording(
+    experiment: Experiment,
     config: &WorldConfig,
     player: &dyn Player,
     condition: Option<&str>,
     registration: Option<&Registration>,
 ) -> Value {
+    let config = &config.of(experiment);
+    let spec: &Spec = &experiment;
     let mut recording = json!({
         VERSION_KEY: VERSION,
         "kind": "recording",
         "design": { "pairs": "scene", "cluster": null },
         "condition": condition.unwrap_or("default"),
         "scene_version": SCENE_VERSION,
+        "experiment": spec,
+        "reply_schema_hash": reply::structure_hash(&experiment.reply),
         "palette": Color::ALL.map(Color::name),
         "agent": player.description(),
         "view": { "width": config.eye.width, "height": config.eye.height_px, "fov_y": config.eye.fovy },

@@ -1,9 +1,10 @@
 //! Which episodes a recording has.
 
 use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use crate::sim::Experiment;
+use crate::experiment::{Experiment, built_in_names};
 
 /// Seeds and runs begin at 1, as in the paper.
 const FIRST: i32 = 1;
@@ -26,7 +27,7 @@ pub struct Plan {
 /// What tells an episode from the others of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
-    /// Which of the five.
+    /// Of which experiment.
     pub experiment: Experiment,
     /// The block of runs.
     pub seed: i32,
@@ -81,7 +82,7 @@ impl Key {
     /// A number for the agent's chances: differs between episodes, and from what the world is drawn by.
     pub fn agent_seed(self) -> u64 {
         let part = |value: i32| u64::from(value.unsigned_abs());
-        let experiment = self.experiment as u64 + 1;
+        let experiment = self.experiment.number();
         let again = part(self.repetition - FIRST) << 10;
         (experiment << 56) ^ (part(self.seed) << 24) ^ again ^ part(self.run) ^ 0x6d69_7272_6f72
     }
@@ -151,28 +152,45 @@ impl FromStr for Shard {
     }
 }
 
-/// Experiments as typed: `E1`, `E1..E5`, `E1,E3`, or several of these with commas; each once, in their order.
+/// Experiments as typed: `E1`, `E1..E5`, `E1,E3`, a file such as `mine.toml`, or several of these with commas; each once,
+/// in their order.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Experiments(pub Vec<Experiment>);
+pub struct Experiments(pub Vec<Named>);
+
+/// One of several experiments as typed.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Named {
+    /// Built in.
+    BuiltIn(Experiment),
+    /// All of a file.
+    File(PathBuf),
+}
 
 impl FromStr for Experiments {
     type Err = NotAPlan;
 
     fn from_str(text: &str) -> Result<Self, NotAPlan> {
-        let fault = || NotAPlan { expected: "experiments such as E1, E1..E5 or E1,E3", found: text.to_owned() };
+        let fault =
+            || NotAPlan { expected: "experiments such as E1, E1..E5, E1,E3 or mine.toml", found: text.to_owned() };
         let experiment = |name: &str| Experiment::parse(name.trim()).map_err(|_| fault());
+        let is_file = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "toml");
         let mut found = BTreeSet::new();
         for part in text.split(',') {
             match part.split_once("..") {
+                _ if is_file(part.trim()) => {
+                    found.insert(Named::File(PathBuf::from(part.trim())));
+                }
                 None => {
-                    found.insert(experiment(part)?);
+                    found.insert(Named::BuiltIn(experiment(part)?));
                 }
                 Some((first, last)) => {
                     let (first, last) = (experiment(first)?, experiment(last)?);
-                    if first > last {
+                    let known: Vec<Experiment> = built_in_names().iter().copied().flat_map(Experiment::parse).collect();
+                    let range: Vec<Experiment> = known.into_iter().filter(|one| (first..=last).contains(one)).collect();
+                    if range.is_empty() {
                         return Err(fault());
                     }
-                    found.extend(Experiment::ALL.into_iter().filter(|one| (first..=last).contains(one)));
+                    found.extend(range.into_iter().map(Named::BuiltIn));
                 }
             }
         }
@@ -182,15 +200,20 @@ impl FromStr for Experiments {
 
 #[cfg(test)]
 mod tests {
-    use super::{Experiments, Key, Plan, Shard, Subject, slug};
-    use crate::sim::Experiment::{E1, E2, E3, E5};
+    use super::{Experiment, Experiments, Key, Named, Plan, Shard, Subject, slug};
+
+    const E1: Experiment = Experiment::E1;
+    const E2: Experiment = Experiment::E2;
+    const E3: Experiment = Experiment::E3;
+    const E5: Experiment = Experiment::E5;
 
     #[test]
     fn experiments_come_as_names_ranges_and_lists() {
         let read = |text: &str| text.parse::<Experiments>().map(|list| list.0);
-        assert_eq!(read("E1").unwrap(), [E1]);
-        assert_eq!(read("E1..E3").unwrap(), [E1, E2, E3]);
-        assert_eq!(read("E5,E1, E1").unwrap(), [E1, E5]);
+        assert_eq!(read("E1").unwrap(), [E1].map(Named::BuiltIn));
+        assert_eq!(read("E1..E3").unwrap(), [E1, E2, E3].map(Named::BuiltIn));
+        assert_eq!(read("E5,E1, E1").unwrap(), [E1, E5].map(Named::BuiltIn));
+        assert_eq!(read("labs/../mine.toml").unwrap(), [Named::File("labs/../mine.toml".into())]);
         for wrong in ["", "E6", "E3..E1", "E1..", "E1;E2"] {
             assert!(read(wrong).is_err(), "{wrong}");
         }

@@ -12,7 +12,7 @@ use super::error::RecordError;
 use super::plan::{Key, Subject};
 use super::shares::Shares;
 use crate::agent::reply::Repair;
-use crate::agent::{Agent, Family, Observation, Reply, Task};
+use crate::agent::{Agent, Observation, Reply, Task};
 use crate::base::frame::Frame;
 use crate::base::palette::Color;
 use crate::replay::log::{Seen, frame_time};
@@ -54,9 +54,9 @@ pub struct Stage<'a> {
 /// What the agent of a scene is told.
 pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
     Task {
-        family: if scene.experiment.has_candidates() { Family::CubeSelection } else { Family::Exploration },
+        experiment: scene.experiment,
         stated_color: scene.stated_color.map(|color| color.name().to_owned()),
-        step_budget: i32::try_from(config.episode.steps).unwrap_or(i32::MAX),
+        step_budget: i32::try_from(config.of(scene.experiment).episode.steps).unwrap_or(i32::MAX),
         seed: key.agent_seed(),
     }
 }
@@ -68,7 +68,7 @@ pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) ->
         model: subject.model.clone(),
         condition: Some(subject.condition.clone().unwrap_or_else(|| "default".to_owned())),
         scene: Some(scene.fingerprint(config)),
-        decision: Some(if scene.experiment.has_candidates() { "selected_cube" } else { "self_color" }.to_owned()),
+        decision: Some(scene.experiment.decision.name().to_owned()),
         experiment: key.experiment.name().to_owned(),
         seed: key.seed,
         run: key.run,
@@ -103,7 +103,7 @@ pub async fn play(
     mut episode: Episode,
     observer: &mut dyn Observer,
 ) -> Result<Played, RecordError> {
-    let budget = i32::try_from(stage.config.episode.steps).unwrap_or(i32::MAX);
+    let budget = i32::try_from(world.config().episode.steps).unwrap_or(i32::MAX);
     let (mut bumped, mut history) = (false, None);
     let (mut model, mut other_model): (Option<String>, _) = (None, None);
     for t in 1..=budget {
@@ -180,6 +180,9 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
         reasoning: reply.words.reasoning,
         summary: reply.words.summary,
         identification: reply.words.identification,
+        mark_color: world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned()),
+        mark_report: reply.mark_report,
+        mirror_mark_px: world.has_own_mark().then(|| px(visibility.mark_px)).flatten(),
         reply: reply.raw,
         latency_ms: reply.usage.latency_ms,
         prompt_tokens: reply.usage.prompt_tokens,

@@ -33,7 +33,7 @@ pub trait Progress: Sync {
     /// A step of an episode was played: its number, from 1, and its row.
     fn step(&self, episode: Key, t: i32, row: &Step);
     /// An episode is committed.
-    fn episode(&self, id: &str, steps: usize);
+    fn episode(&self, key: Key, id: &str, steps: usize);
     /// A provider answered in the name of another model from this step on; the episode keeps the first one.
     fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
     /// An episode is lost, for this reason.
@@ -234,7 +234,7 @@ impl Recording<'_> {
     /// Makes an episode whole on the disk, its trace last.
     fn commit(&self, key: Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
         let start = Instant::now();
-        let fingerprint = self.store.fingerprint(played.model.as_deref());
+        let fingerprint = self.store.fingerprint(key, played.model.as_deref());
         let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };
         if let Some(log) = log {
             log.end(&episode).map_err(RecordError::fatal)?;
@@ -254,7 +254,7 @@ impl Recording<'_> {
             Ok(steps) => {
                 tally.recorded.push(key);
                 tally.steps += steps as u64;
-                self.progress.episode(&id, steps);
+                self.progress.episode(key, &id, steps);
             }
             Err(RecordError::Stopped) => tally.stopped = true,
             Err(RecordError::Lost { step, lost }) => {

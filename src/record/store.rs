@@ -25,7 +25,7 @@ use super::fingerprint::Fingerprint;
 use super::folder_lock::FolderLock;
 use super::index::{Place, RecordingIndex, place, recording_of};
 use super::lock::{Attempt, EpisodeLock};
-use super::metadata::{FINGERPRINTS, SEEDS};
+use super::metadata::{FINGERPRINTS, Recordings, SEEDS};
 use super::plan::{Key, Subject};
 use crate::log::{LogError, assemble};
 use crate::sim::Experiment;
@@ -38,7 +38,6 @@ use crate::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 pub struct Store {
     folder_lock: FolderLock,
     index: RecordingIndex,
-    columns: OptionalColumns,
 }
 
 /// Whose turn it is to record an episode.
@@ -57,13 +56,8 @@ impl Store {
     ///
     /// # Errors
     /// When it cannot be made or written to.
-    pub fn open(folder: &Path, subject: Subject, recording: Value) -> Result<Self, StoreError> {
-        let columns = OptionalColumns::recorded(&recording);
-        Ok(Self {
-            folder_lock: FolderLock::stake(folder)?,
-            index: RecordingIndex::new(folder, subject, recording),
-            columns,
-        })
+    pub fn open(folder: &Path, subject: Subject, recordings: Recordings) -> Result<Self, StoreError> {
+        Ok(Self { folder_lock: FolderLock::stake(folder)?, index: RecordingIndex::new(folder, subject, recordings) })
     }
 
     fn parts(&self) -> PathBuf {
@@ -152,9 +146,9 @@ impl Store {
         failures::list_of(self.folder_lock.folder())
     }
 
-    /// What an episode of this recording was recorded with, given the id of the model as the provider returned it.
-    pub fn fingerprint(&self, model: Option<&str>) -> Fingerprint {
-        Fingerprint::of(self.index.recording(), model)
+    /// What an episode was recorded with, given the id of the model as the provider returned it.
+    pub fn fingerprint(&self, key: Key, model: Option<&str>) -> Fingerprint {
+        Fingerprint::of(self.index.recording(key.experiment), model)
     }
 
     /// Commits an episode whose log, if there is one, is committed already.
@@ -163,9 +157,10 @@ impl Store {
     /// Whatever writing gives; the episode is not there then.
     pub fn commit(&self, key: Key, episode: &Episode, fingerprint: &Fingerprint) -> Result<(), StoreError> {
         let path = self.part(key);
-        let mut recording = self.index.recording().clone();
+        let mut recording = self.index.recording(key.experiment).clone();
+        let columns = OptionalColumns::recorded(&recording);
         recording[FINGERPRINTS] = json!({ fingerprint.id.as_str(): fingerprint.parts });
-        let metadata = TraceMetadata { recording: Some(recording), columns: self.columns.clone() };
+        let metadata = TraceMetadata { recording: Some(recording), columns };
         let mut writer = TraceWriter::create(&path, &metadata)?;
         writer.write(episode)?;
         Ok(writer.finish()?)
@@ -185,7 +180,7 @@ impl Store {
         let episodes = self.index.episodes(experiment)?;
         self.index.check_log(experiment, &episodes)?;
         let log_parts: Vec<PathBuf> = parts.iter().map(|part| part.with_extension("mcap")).collect();
-        let mut recording = self.index.recording().clone();
+        let mut recording = self.index.recording(experiment).clone();
         let seeds: BTreeSet<i64> = episodes.iter().map(|episode| episode.seed).collect();
         recording[SEEDS] = json!(seeds);
         recording[FINGERPRINTS] = Self::fingerprints(&trace, &parts)?;

@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::divergence::Divergence;
 use super::error::ReplayError;
 use crate::base::palette::Color;
-use crate::sim::Experiment;
+use crate::experiment::{Experiment, Spec};
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::{SCENE_VERSION, Scene};
 use crate::sim::visibility::Visibility;
@@ -18,6 +18,8 @@ pub const MOST_RAYS: u32 = 4096;
 /// What a trace says of how it was recorded, as far as a replay needs it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recipe {
+    /// The experiment, as the trace has it.
+    pub experiment: Experiment,
     /// The world's configuration.
     pub config: WorldConfig,
     /// The same with the grid and the threshold that the trace's pixels were counted with: the recorded ones, unless they
@@ -33,6 +35,11 @@ impl Recipe {
     /// version were recorded.
     pub fn of(recording: Option<&Value>) -> Result<Self, ReplayError> {
         let recording = recording.ok_or(ReplayError::NoRecipe)?;
+        // First: a world of another version may lack what this one has.
+        let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
+        if *version != SCENE_VERSION {
+            return Err(ReplayError::Scenes { found: version.to_string() });
+        }
         let world = recording.get("world").ok_or(ReplayError::NoRecipe)?;
         let config: WorldConfig =
             serde_json::from_value(world.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
@@ -40,12 +47,12 @@ impl Recipe {
         if config.hash() != expected {
             return Err(ReplayError::Changed { expected: expected.to_owned(), found: config.hash() });
         }
-        let version = recording.get("scene_version").unwrap_or(&Value::Null);
-        if *version != SCENE_VERSION {
-            return Err(ReplayError::Scenes { found: version.to_string() });
-        }
+        let spec = recording.get("experiment").ok_or(ReplayError::NoRecipe)?;
+        let spec: Spec =
+            serde_json::from_value(spec.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
+        let experiment = Experiment::of_footer(spec).map_err(ReplayError::other)?;
         let eye = counted_with(&config, recording);
-        Ok(Self { config, eye })
+        Ok(Self { experiment, config, eye })
     }
 
     /// The world of an episode at its start, seen by an eye of this configuration.
@@ -54,8 +61,14 @@ impl Recipe {
     /// When the episode's names are none of the world's, or MuJoCo refuses the model.
     pub fn world(&self, episode: &Episode, eye: &WorldConfig) -> Result<World, ReplayError> {
         let fault = |fault: String| ReplayError::World { episode: episode.episode_id.clone(), fault };
-        let experiment = Experiment::parse(&episode.experiment).map_err(|error| fault(error.to_string()))?;
-        let scene = Scene::draw(&self.config, experiment, episode.seed, episode.run)
+        let name = self.experiment.name();
+        if episode.experiment != name {
+            return Err(fault(format!(
+                "it is of the experiment `{}`, and the trace declares `{name}`",
+                episode.experiment
+            )));
+        }
+        let scene = Scene::draw(&self.config, self.experiment, episode.seed, episode.run)
             .map_err(|error| fault(error.to_string()))?;
         World::new(eye, scene).map_err(|error| fault(error.to_string()))
     }
@@ -133,13 +146,20 @@ fn poses(step: &Step, world: &World) -> Vec<Compared> {
     let pose = world.pose();
     let cube = step.selected_cube.as_deref().and_then(Color::named);
     let distance = cube.and_then(|color| world.distance_to_cube(color)).map_or("none".to_owned(), stored);
+    let mark = world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned());
+    let own = step.extra.mark_color.clone();
+    let marks = (world.has_own_mark() && own != mark).then(|| {
+        let shown = |mark: Option<String>| mark.unwrap_or_else(|| "none".to_owned());
+        ("mark_color", shown(own), shown(mark))
+    });
     let compared = [
         ("pose_x", step.extra.pose_x, stored(pose.x)),
         ("pose_y", step.extra.pose_y, stored(pose.y)),
         ("pose_yaw", step.extra.pose_yaw, stored(pose.heading.degrees())),
         ("cube_distance", step.extra.cube_distance, distance),
     ];
-    compared.into_iter().filter_map(|(name, own, found)| Some((name, own?.to_string(), found))).collect()
+    let poses = compared.into_iter().filter_map(|(name, own, found)| Some((name, own?.to_string(), found)));
+    poses.chain(marks).collect()
 }
 
 fn counts(step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared> {
@@ -148,6 +168,7 @@ fn counts(step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared> 
         ("mirror_other_px", step.extra.mirror_other_px, visibility.other_px),
         ("mirror_px", step.extra.mirror_px, visibility.mirror_px),
         ("direct_other_px", step.extra.direct_other_px, visibility.direct_other_px),
+        ("mirror_mark_px", step.extra.mirror_mark_px, visibility.mark_px),
     ];
     let mut columns: Vec<Compared> = compared
         .into_iter()

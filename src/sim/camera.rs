@@ -1,5 +1,8 @@
 //! Pictures: what the agent sees, the same in colours that name things, and the room from above.
 //!
+//! MuJoCo draws one mirror at most, and that one as it is now. So panes are blank in a first picture; what is seen through
+//! each is a picture of its own, drawn from beyond it, of which the pixels are taken that show the pane by their rays.
+//!
 //! Rule: an eye draws any world of its configuration, one after the other, and none of them leaves a trace in it. It
 //! belongs to the thread that made it.
 
@@ -9,9 +12,12 @@ use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera, RendererError};
 use mujoco_rs::renderer::MjRenderer;
 
 use super::config::WorldConfig;
-use super::model::{EYE_CAMERA, Item, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled};
-use super::scene::Scene;
-use super::visibility::{LabelImage, Shown};
+use super::model::{
+    BEYOND_CAMERA, EYE_CAMERA, Item, Labelled, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled,
+};
+use super::passage;
+use super::scene::{HungPane, Scene};
+use super::visibility::{self, LabelImage, Shown};
 use super::world::World;
 use crate::base::frame::Frame;
 
@@ -72,12 +78,37 @@ impl Camera {
         Ok(Self { width, height, data: MjData::new(model), renderer })
     }
 
-    /// What the agent sees now.
+    /// What the agent sees now: the room, and over each pane what is seen through it.
     ///
     /// # Errors
     /// When drawing fails.
     pub fn frame(&mut self, world: &World) -> Result<Frame, CameraError> {
-        self.draw(world.stage(), EYE_CAMERA)
+        let mut frame = self.draw(world.stage(), EYE_CAMERA)?;
+        if world.beyond().is_empty() {
+            return Ok(frame);
+        }
+        let eye = &world.config().eye;
+        let own;
+        let labels = if [self.width, self.height] == [eye.width as usize, eye.height_px as usize] {
+            world.labels()
+        } else {
+            own = visibility::labels(world, self.width, self.height);
+            &own
+        };
+        for (pane, stage) in world.beyond().iter().enumerate() {
+            let is_seen = |code: &u8| Shown::of_code(*code).pane() == Some(pane);
+            if labels.codes.iter().any(is_seen) {
+                let seen = self.through(stage, &world.scene().panes[pane])?;
+                overlay(&mut frame, &seen, |at| is_seen(&labels.codes[at]));
+            }
+        }
+        Ok(frame)
+    }
+
+    /// What is seen through a pane, over the whole view.
+    fn through(&mut self, stage: &Stage, pane: &HungPane) -> Result<Frame, CameraError> {
+        let frame = self.draw(stage, BEYOND_CAMERA)?;
+        Ok(if passage::is_flipped(pane) { flipped(&frame) } else { frame })
     }
 
     /// The room from above, without its ceiling.
@@ -95,7 +126,7 @@ impl Camera {
         self.data.forward();
         let id = stage.model().name_to_id(MjtObjBase::mjOBJ_CAMERA, camera).expect("every model has this camera");
         *self.renderer.camera_mut() = MjvCamera::new_fixed(id);
-        self.renderer.opts_mut().geomgroup[CEILING] = u8::from(camera == EYE_CAMERA);
+        self.renderer.opts_mut().geomgroup[CEILING] = u8::from(camera != TOP_CAMERA);
         let failed = |error: RendererError| CameraError::Failed { reason: reason(&error) };
         self.renderer.sync_data(&mut self.data).map_err(failed)?;
         self.renderer.render().map_err(failed)?;
@@ -104,12 +135,27 @@ impl Camera {
     }
 }
 
+/// Lays the pixels of `over` that are asked for over a frame of the same size.
+fn overlay(frame: &mut Frame, over: &Frame, is_asked: impl Fn(usize) -> bool) {
+    let pixels = frame.rgb.chunks_exact_mut(3).zip(over.rgb.chunks_exact(3)).enumerate();
+    for (_, (pixel, seen)) in pixels.filter(|(at, _)| is_asked(*at)) {
+        pixel.copy_from_slice(seen);
+    }
+}
+
+/// The same with left and right exchanged.
+fn flipped(frame: &Frame) -> Frame {
+    let rows = frame.rgb.chunks_exact(3 * frame.width.max(1));
+    let rgb = rows.flat_map(|row| row.chunks_exact(3).rev().flatten().copied()).collect();
+    Frame::new(frame.width, frame.height, rgb)
+}
+
 /// An eye for labels: it draws every pixel in the colour that names what is there, through the mirror too.
 #[derive(Debug)]
 pub struct LabelCamera {
     eye: Camera,
     /// The world drawn last, painted in labels.
-    painted: Option<(Scene, Stage)>,
+    painted: Option<(Scene, (Stage, Vec<Stage>))>,
 }
 
 impl LabelCamera {
@@ -126,19 +172,36 @@ impl LabelCamera {
     /// # Errors
     /// When drawing fails.
     pub fn labels(&mut self, world: &World) -> Result<LabelImage, CameraError> {
-        let mut stage = match self.painted.take() {
-            Some((scene, stage)) if scene == *world.scene() => stage,
-            _ => Stage::new(world.config(), Paint::Labels, world.scene())?,
+        let mut stages = match self.painted.take() {
+            Some((scene, stages)) if scene == *world.scene() => stages,
+            _ => Stage::all(world.config(), Paint::Labels, world.scene())?,
         };
-        stage.pose(world.config(), &world.figures());
-        let frame = self.eye.draw(&stage, EYE_CAMERA)?;
-        self.painted = Some((world.scene().clone(), stage));
-        let shown = |pixel: &[u8]| match (labelled(pixel[0]).unwrap_or(Item::Room), pixel[1] > 0) {
-            (item, false) => Shown::Direct(item),
-            (item, true) => Shown::Reflected(item),
-        };
-        let codes = frame.rgb.chunks_exact(3).map(|pixel| shown(pixel).code()).collect();
-        Ok(LabelImage { width: frame.width, height: frame.height, codes })
+        world.show_on(&mut stages);
+        let (stage, beyond) = &stages;
+        let direct = self.eye.draw(stage, EYE_CAMERA)?;
+        let named = |frame: &Frame, at: usize| labelled([frame.rgb[3 * at], frame.rgb[3 * at + 1]]);
+        let mut codes: Vec<u8> = (0..direct.width * direct.height)
+            .map(|at| match named(&direct, at) {
+                Some(Labelled::Item(item)) => Shown::Direct(item),
+                Some(Labelled::Pane(pane)) => Shown::Through(pane, Item::Room),
+                None => Shown::Direct(Item::Room),
+            })
+            .map(Shown::code)
+            .collect();
+        for (pane, stage) in beyond.iter().enumerate() {
+            let blank = Shown::Through(pane, Item::Room).code();
+            if !codes.contains(&blank) {
+                continue;
+            }
+            let seen = self.eye.through(stage, &world.scene().panes[pane])?;
+            for (at, code) in codes.iter_mut().enumerate().filter(|(_, code)| **code == blank) {
+                if let Some(Labelled::Item(item)) = named(&seen, at) {
+                    *code = Shown::Through(pane, item).code();
+                }
+            }
+        }
+        self.painted = Some((world.scene().clone(), stages));
+        Ok(LabelImage { width: direct.width, height: direct.height, codes })
     }
 }
 

@@ -1,4 +1,4 @@
-//! The MuJoCo world of the five experiments: scene, bodies, camera, and visibility (ground truth) from rays.
+//! The MuJoCo world of the experiments: scene, bodies, camera, and visibility (ground truth) from rays.
 //!
 //! ```text
 //! WorldConfig ──► Scene::draw(experiment, seed, run) ──► World::new ──► act, visibility, snapshot
@@ -17,9 +17,10 @@ pub mod config;
 #[cfg(feature = "raster")]
 pub mod contact_sheet;
 pub mod distractor;
-pub mod experiment;
+
 pub mod floor;
 pub mod model;
+pub mod passage;
 pub mod placement;
 pub mod rng;
 pub mod scene;
@@ -27,4 +28,4 @@ pub mod snapshot;
 pub mod visibility;
 pub mod world;
 
-pub use experiment::Experiment;
+pub use crate::experiment::Experiment;

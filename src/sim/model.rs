@@ -1,34 +1,46 @@
 //! The world as MuJoCo has it: one model for all experiments, dressed for a scene and posed for a moment.
 //!
-//! Every world has seven humanoids, twelve cubes and a mirror. Those that a scene lacks are hidden: in a group that
-//! neither picture nor rays include. So all models have one layout, and a renderer goes from world to world at no cost.
-//! Rule: the sizes of planes never change after compiling, because a renderer keeps them as they were.
+//! Every world has seven humanoids, twelve cubes, and for each of four panes a place and a humanoid that only it shows.
+//! Those that a scene lacks are hidden: in a group that neither picture nor rays include. So all models have one layout,
+//! and a renderer goes from world to world at no cost.
+//!
+//! A scene has several stages: the room as the eye sees it directly, where panes are blank, and what is seen through each
+//! pane: the same room without the wall that the look comes through, with bodies where and how that pane shows them.
+//! MuJoCo itself draws one mirror at most; a stage per pane gives any number, late ones and false ones.
+//! Rule: the sizes of planes never change after compiling, because a renderer keeps them as they were; panes are boxes.
 
 mod dress;
 
-pub(super) use dress::labelled;
+pub(super) use dress::{Labelled, labelled};
 
 use std::sync::Arc;
 
 use mujoco_rs::prelude::{Attach, MjData, MjEditError, MjModel, MjSpec, MjtGeomBase, MjtObjBase, SpecItem};
 
 use super::angle::{Heading, Quaternion, sine_cosine};
-use super::body::{Figure, Piece};
+use super::body::{Figure, Piece, Pose};
 use super::config::{LightsConfig, WorldConfig};
 use super::scene::{MOST_CUBES, MOST_OTHERS, Scene};
+use crate::experiment::spec::MOST_PANES;
 
-/// Humanoids in every model: the agent's own body, then the others.
+/// Humanoids of a room: the agent's own body, then the others.
 pub const AGENTS: usize = 1 + MOST_OTHERS;
+
+/// Humanoids in every model: those of the room, then one for each pane, which only that pane shows.
+pub const BODIES: usize = AGENTS + MOST_PANES;
 
 /// The camera that is the agent's eye.
 pub const EYE_CAMERA: &str = "eye";
+
+/// The camera that sees through a pane: the eye's mirror image, or the eye in the second room.
+pub const BEYOND_CAMERA: &str = "beyond";
 
 /// The camera that sees the room from above.
 pub const TOP_CAMERA: &str = "top";
 
 /// Groups that MuJoCo's pictures and rays tell apart.
 pub mod group {
-    /// Walls, floor and the mirror.
+    /// Walls, floor and panes.
     pub const ROOM: i32 = 0;
     /// Cubes and other agents.
     pub const THINGS: i32 = 1;
@@ -55,14 +67,38 @@ pub enum Paint {
 /// What a geom is part of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Item {
-    /// The reflective surface.
-    Mirror,
+    /// The surface of a mirror or window of the scene.
+    Pane(usize),
     /// Walls, floor or ceiling.
     Room,
-    /// A humanoid: 0 is the agent's own body.
+    /// A humanoid of the room: 0 is the agent's own body.
     Agent(usize),
+    /// The humanoid that only one pane shows.
+    Double,
     /// A cube of the scene.
     Cube(usize),
+    /// A mark of the scene.
+    Mark(usize),
+}
+
+/// What a stage is seen by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// By the eye: panes are blank.
+    Direct,
+    /// Through the pane of this number.
+    Through(usize),
+}
+
+/// What moves, at one moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// The step that comes next, from 1: which marks there are.
+    pub t: u32,
+    /// The humanoids by their number; `None` for those that are not there.
+    pub bodies: [Option<Figure>; BODIES],
+    /// Where the camera beyond a pane is and faces.
+    pub beyond: Option<Pose>,
 }
 
 /// Why MuJoCo could not build the world.
@@ -77,8 +113,13 @@ pub struct Stage {
     /// The model of that state, shared with whoever draws it.
     model: Arc<MjModel>,
     items: Vec<Item>,
-    /// Of each agent and piece: its index among the bodies that are moved from outside, and its joint.
+    /// Of each body and piece: its index among the bodies that are moved from outside, and its joint.
     pieces: Vec<(usize, [f64; 3])>,
+    look: Look,
+    /// The index of the camera beyond panes among the bodies that are moved from outside.
+    beyond: usize,
+    /// The step whose marks are shown.
+    marks_at: u32,
 }
 
 impl std::fmt::Debug for Stage {
@@ -88,27 +129,54 @@ impl std::fmt::Debug for Stage {
 }
 
 impl Stage {
-    /// The model of a scene, for pictures of the configured size.
+    /// The stages of a scene, for pictures of the configured size: what the eye sees directly, then what it sees through
+    /// each pane.
     ///
     /// # Errors
-    /// When MuJoCo refuses it.
-    pub fn new(config: &WorldConfig, paint: Paint, scene: &Scene) -> Result<Self, ModelError> {
-        let mut model = compile(config, paint, [config.eye.width as usize, config.eye.height_px as usize])?;
-        let items: Vec<Item> = (0..model.geom_group().len()).map(|geom| item(&model, geom)).collect();
-        dress::dress(&mut model, &items, config, scene);
+    /// When MuJoCo refuses the model.
+    pub fn all(config: &WorldConfig, paint: Paint, scene: &Scene) -> Result<(Self, Vec<Self>), ModelError> {
+        let model = compile(config, paint, [config.eye.width as usize, config.eye.height_px as usize])?;
+        let stage = |look| Self::of(model.clone(), config, paint, scene, look);
+        Ok((stage(Look::Direct), (0..scene.panes.len()).map(|pane| stage(Look::Through(pane))).collect()))
+    }
+
+    /// A compiled model dressed for a scene as it is at the first step.
+    fn of(mut model: MjModel, config: &WorldConfig, paint: Paint, scene: &Scene, look: Look) -> Self {
+        let items: Vec<Item> = (0..model.geom_group().len()).map(|geom| item(&model, geom, scene)).collect();
+        dress::dress(&mut model, &items, config, scene, look);
+        dress::show_marks(&mut model, &items, scene, 1, look);
         if paint == Paint::Labels {
             dress::label(&mut model, &items);
         }
-        let pieces = (0..AGENTS)
-            .flat_map(|agent| Piece::ALL.map(|piece| format!("agent{agent}_{}", piece.name())))
+        let pieces = (0..BODIES)
+            .flat_map(|body| Piece::ALL.map(|piece| format!("{}_{}", body_name(body), piece.name())))
             .map(|name| {
                 let body = model.name_to_id(MjtObjBase::mjOBJ_BODY, &name).expect("the humanoid has this piece");
                 let mocap = usize::try_from(model.body_mocapid()[body]).expect("each piece is moved from outside");
                 (mocap, model.body_pos()[body])
             })
             .collect();
+        let beyond = model.name_to_id(MjtObjBase::mjOBJ_BODY, BEYOND_CAMERA).expect("the room has this body");
+        let beyond = usize::try_from(model.body_mocapid()[beyond]).expect("it is moved from outside");
         let model = Arc::new(model);
-        Ok(Self { data: MjData::new(Arc::clone(&model)), model, items, pieces })
+        Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, marks_at: 1 }
+    }
+
+    /// Shows the marks that are there at a step.
+    fn show_marks(&mut self, scene: &Scene, t: u32) {
+        let shown = |t| scene.marks_at(t).count();
+        if shown(t) != shown(self.marks_at) {
+            let mut model = MjModel::clone(&self.model);
+            dress::show_marks(&mut model, &self.items, scene, t, self.look);
+            self.model = Arc::new(model);
+            self.data.swap_model(Arc::clone(&self.model));
+        }
+        self.marks_at = t;
+    }
+
+    /// What it is seen by.
+    pub const fn look(&self) -> Look {
+        self.look
     }
 
     /// What each geom is part of.
@@ -136,19 +204,29 @@ impl Stage {
         self.data.model().geom_group()[geom] != group::HIDDEN
     }
 
+    /// Shows a moment of the scene.
+    pub fn show(&mut self, config: &WorldConfig, scene: &Scene, moment: &Moment) {
+        self.show_marks(scene, moment.t);
+        self.pose(config, moment);
+    }
+
     /// Puts the humanoids where they are; those that are not there far below the floor.
-    pub fn pose(&mut self, config: &WorldConfig, figures: &[Figure]) {
+    fn pose(&mut self, config: &WorldConfig, moment: &Moment) {
         const FAR_BELOW: f64 = -100.0;
-        for agent in 0..AGENTS {
+        for (body, figure) in moment.bodies.iter().enumerate() {
             for (at, piece) in Piece::ALL.into_iter().enumerate() {
-                let (mocap, joint) = self.pieces[agent * Piece::ALL.len() + at];
-                let (origin, rotation) = match figures.get(agent) {
+                let (mocap, joint) = self.pieces[body * Piece::ALL.len() + at];
+                let (origin, rotation) = match figure {
                     Some(figure) => piece.place(figure, joint, &config.body),
                     None => ([joint[0], joint[1], FAR_BELOW], Quaternion([1.0, 0.0, 0.0, 0.0])),
                 };
                 self.data.mocap_pos_mut()[mocap] = origin;
                 self.data.mocap_quat_mut()[mocap] = rotation.0;
             }
+        }
+        if let Some(pose) = moment.beyond {
+            self.data.mocap_pos_mut()[self.beyond] = [pose.x, pose.y, config.eye.height];
+            self.data.mocap_quat_mut()[self.beyond] = pose.heading.rotation().0;
         }
         self.data.forward();
     }
@@ -160,18 +238,30 @@ impl Stage {
     }
 }
 
+/// The name of a humanoid, by its number.
+fn body_name(body: usize) -> String {
+    body.checked_sub(AGENTS).map_or_else(|| format!("agent{body}"), |pane| format!("double{pane}"))
+}
+
 /// What a geom's name says that it is part of.
-fn item(model: &MjModel, geom: usize) -> Item {
+fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
     let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
     let numbered = |prefix: &str| {
         let digits = name.strip_prefix(prefix)?.split('_').next()?;
         digits.parse::<usize>().ok()
     };
-    match (name, numbered("agent"), numbered("cube")) {
-        ("mirror", _, _) => Item::Mirror,
-        (_, Some(agent), _) => Item::Agent(agent),
-        (_, _, Some(cube)) => Item::Cube(cube),
-        _ => Item::Room,
+    let marked = |wearer: usize| {
+        let part = name.split_once("_mark_")?.1;
+        scene.marks.iter().position(|mark| mark.wearer == wearer && mark.part.name() == part)
+    };
+    if let Some(pane) = numbered("pane") {
+        Item::Pane(pane)
+    } else if let Some(agent) = numbered("agent") {
+        marked(agent).map_or(Item::Agent(agent), Item::Mark)
+    } else if numbered("double").is_some() {
+        Item::Double
+    } else {
+        numbered("cube").map_or(Item::Room, Item::Cube)
     }
 }
 
@@ -179,10 +269,12 @@ fn item(model: &MjModel, geom: usize) -> Item {
 pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> Result<MjModel, ModelError> {
     let mut spec = MjSpec::from_xml_string(ROOM)?;
     build_room(&mut spec, config, paint);
-    build_cubes(&mut spec, config, paint);
-    for agent in 0..AGENTS {
+    let largest = config.clutter.edges.iter().copied().fold(config.cubes.edge, f64::max);
+    build_boxes(&mut spec, "cube", MOST_CUBES, largest, paint);
+    build_boxes(&mut spec, "pane", MOST_PANES, config.room.size, paint);
+    for body in 0..BODIES {
         let mut humanoid = MjSpec::from_xml_string(HUMANOID)?;
-        let prefix = format!("agent{agent}_");
+        let prefix = format!("{}_", body_name(body));
         spec.world_body_mut().attach_by_deep_copy(&mut humanoid, &prefix, "")?;
     }
     add_eyes(&mut spec, config);
@@ -200,7 +292,6 @@ fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
     let floor = [half, half, 1.0];
     let wall = [middle, half, 1.0];
     let planes = [
-        ("mirror", [config.mirror.height / 2.0, config.mirror.width / 2.0, 1.0], [half, 0.0, middle], [0.0; 3]),
         ("floor", floor, [0.0; 3], [1.0; 3]),
         ("ceiling", floor, [0.0, 0.0, room.height], room.ceiling_color),
         ("wall_east", wall, [half, 0.0, middle], room.wall_color),
@@ -215,9 +306,7 @@ fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
         if name == "ceiling" {
             geom.set_group(group::CEILING);
         }
-        if name != "mirror" {
-            *geom.rgba_mut() = rgba(color);
-        }
+        *geom.rgba_mut() = rgba(color);
     }
     let tiles = spec.texture_mut("tiles").expect("the room has this texture");
     *tiles.rgb1_mut() = room.floor_color;
@@ -238,14 +327,17 @@ fn rgba(color: [f64; 3]) -> [f32; 4] {
     [red, green, blue, 1.0]
 }
 
-fn build_cubes(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
-    let largest = config.clutter.edges.iter().copied().fold(config.cubes.edge, f64::max);
-    for at in 0..MOST_CUBES {
+/// Boxes of at most this edge, m, which a scene sizes and places.
+fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint: Paint) {
+    for at in 0..count {
         let geom = spec.world_body_mut().add_geom();
-        geom.set_name(&format!("cube{at}")).expect("names of cubes differ");
+        geom.set_name(&format!("{name}{at}")).expect("names of boxes differ");
         geom.set_type(MjtGeomBase::mjGEOM_BOX);
         *geom.size_mut() = [largest / 2.0; 3];
         *geom.pos_mut() = [0.0, 0.0, -50.0];
+        // MuJoCo ignores what a scene says of a rotation that is none when compiled.
+        let quarter = std::f64::consts::FRAC_1_SQRT_2;
+        *geom.quat_mut() = [quarter, 0.0, -quarter, 0.0];
         geom.set_contype(1);
         geom.set_conaffinity(0);
         if paint == Paint::Lit {
@@ -256,13 +348,16 @@ fn build_cubes(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
 
 fn add_eyes(spec: &mut MjSpec, config: &WorldConfig) {
     let eye = &config.eye;
-    let trunk = spec.body_mut("agent0_trunk").expect("the agent has a trunk");
-    let camera = trunk.add_camera();
-    camera.set_name(EYE_CAMERA).expect("no other camera has this name");
-    *camera.pos_mut() = [eye.forward, 0.0, eye.height];
-    // Right is -y, up is z.
-    *camera.quat_mut() = [0.5, 0.5, -0.5, -0.5];
-    camera.set_fovy(eye.fovy);
+    let places =
+        [(EYE_CAMERA, "agent0_trunk", [eye.forward, 0.0, eye.height]), (BEYOND_CAMERA, BEYOND_CAMERA, [0.0; 3])];
+    for (name, body, place) in places {
+        let camera = spec.body_mut(body).expect("every model has this body").add_camera();
+        camera.set_name(name).expect("no other camera has this name");
+        *camera.pos_mut() = place;
+        // Right is -y, up is z.
+        *camera.quat_mut() = [0.5, 0.5, -0.5, -0.5];
+        camera.set_fovy(eye.fovy);
+    }
     let top = spec.world_body_mut().add_camera();
     top.set_name(TOP_CAMERA).expect("no other camera has this name");
     *top.pos_mut() = [0.0, 0.0, config.room.height + 10.0];
@@ -275,6 +370,9 @@ fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: Paint, size: [usi
     (visual.global.offwidth, visual.global.offheight) = (width, height);
     let samples = if paint == Paint::Lit { config.eye.samples } else { 0 };
     visual.quality.offsamples = i32::try_from(samples).unwrap_or(0);
+    // Drawing takes its time by the triangles of round parts; a body is some hundred pixels high at most.
+    [visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads] =
+        [config.eye.slices, config.eye.stacks, config.eye.quads].map(|count| i32::try_from(count).unwrap_or(i32::MAX));
 }
 
 /// Four equal lamps, one towards each wall, so that no wall is lit otherwise than another; one from below.
@@ -302,9 +400,8 @@ fn light(spec: &mut MjSpec, config: &LightsConfig) {
     }
 }
 
-/// Everything in its own colour, and the mirror all green over what it reflects.
+/// Everything in its own colour.
 fn unlight(spec: &mut MjSpec) {
-    *spec.material_mut("mirror").expect("the room has this material").rgba_mut() = [0.0, 1.0, 0.0, 1.0];
     let visual = spec.visual_mut();
     let head = &mut visual.headlight;
     (head.ambient, head.diffuse, head.specular) = ([1.0; 3], [0.0; 3], [0.0; 3]);

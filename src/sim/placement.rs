@@ -3,22 +3,25 @@
 //! Rule: places are drawn on a grid of whole centimetres and kept or drawn again; where a drawing comes to no end, all
 //! of it starts anew from the same stream. What is kept depends on comparisons alone, never on the order of a sum.
 
+mod panes;
 mod reach;
 
 use super::Experiment;
 use super::angle::{HEADINGS, Heading, sine_cosine};
 use super::body::Pose;
-use super::config::WorldConfig;
+use super::config::{WorldConfig, metres};
 use super::floor::{FloorPlan, distance};
 use super::rng::Rng;
 use super::scene::{Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
 use crate::base::palette::Color;
+use crate::experiment::spec::{Colors, Cubes, Start, Wall};
+use crate::experiment::{balance, number_of};
 
 /// Places that are drawn for one thing before all starts anew.
 const ATTEMPTS: u32 = 400;
 
 /// Drawings of a whole scene before giving up.
-const DRAWINGS: u32 = 200;
+const DRAWINGS: u32 = 2000;
 
 /// The configuration leaves no room for all that must be placed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -34,24 +37,86 @@ pub struct Crowded {
 }
 
 impl Scene {
-    /// Draws the scene of one episode.
+    /// Draws the scene of one episode. What the experiment says of lengths and counts lies over the configuration.
     ///
     /// # Errors
     /// When the configuration leaves no room for all that must be placed.
     pub fn draw(config: &WorldConfig, experiment: Experiment, seed: i32, run: i32) -> Result<Self, Crowded> {
-        let mut chance = Rng::of(purpose(experiment), seed, run);
-        let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(experiment));
-        let (scene, _) = drawn.ok_or(Crowded { experiment, seed, run })?;
-        Ok(Self { seed, run, ..scene })
+        let config = &config.of(experiment);
+        let purpose = purpose(experiment);
+        let body_color = body_color(experiment, purpose, seed, run);
+        let mut chance = Rng::of(purpose, seed, run);
+        let drawn = (0..DRAWINGS).find_map(|_| Drawing { config, chance: &mut chance }.scene(experiment, body_color));
+        let scene = drawn.ok_or(Crowded { experiment, seed, run })?;
+        let layout = panes::Layout {
+            config,
+            experiment,
+            mirror: scene.mirror,
+            body_color,
+            cubes: &scene.cubes,
+            others: &scene.others,
+            start: scene.start,
+        };
+        let panes::Extras { stated_color, panes, marks } = layout.extras(purpose, seed, run);
+        Ok(Self { seed, run, stated_color, panes, marks, ..scene })
     }
 }
 
-/// One stream for the three experiments that compare in pairs, one for each of the others.
-const fn purpose(experiment: Experiment) -> u64 {
-    match experiment {
-        Experiment::E1 | Experiment::E2 | Experiment::E3 => 1,
-        Experiment::E4 => 4,
-        Experiment::E5 => 5,
+/// Why an experiment does not fit into a room.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DoesNotFit {
+    /// What has no place.
+    pub what: String,
+    /// What to do.
+    pub help: String,
+}
+
+/// Why an experiment does not fit into a room, found by drawing a study of it; `None` where it fits.
+pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFit> {
+    let world = config.of(experiment);
+    let widest = world.room.size - 2.0 * world.placement.wall_margin;
+    let widths = experiment.panes.iter().map(|pane| pane.width_mm.map_or(world.mirror.width, metres));
+    if let Some(width) = widths.into_iter().find(|width| *width > widest) {
+        return Some(DoesNotFit {
+            what: format!("a mirror of {width} m does not fit onto a wall of {} m", world.room.size),
+            help: format!("at most {widest} m, or a larger `room.size` in the world's configuration"),
+        });
+    }
+    let study = (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)));
+    let crowded = study.into_iter().find_map(|(seed, run)| Scene::draw(config, experiment, seed, run).err())?;
+    Some(DoesNotFit {
+        what: format!("no room for the cubes and others of seed {} and run {}", crowded.seed, crowded.run),
+        help: "fewer cubes or others, or a larger `room.size` in the world's configuration".to_owned(),
+    })
+}
+
+/// A stream for all experiments with the same scenes.
+fn purpose(experiment: Experiment) -> u64 {
+    match experiment.scenes.as_str() {
+        "E1" => 1,
+        "E4" => 4,
+        "E5" => 5,
+        other => number_of(other),
+    }
+}
+
+/// The colour of the agent's own body.
+fn body_color(experiment: Experiment, purpose: u64, seed: i32, run: i32) -> Color {
+    let mut palette = experiment.layout.palette.clone();
+    match experiment.layout.colors {
+        Colors::Random => Rng::of(!purpose, seed, run).one_of(&palette),
+        Colors::Balanced => {
+            // Another order of the colours for other scenes, the same for all of their seeds and runs.
+            shuffle(&mut palette, &mut Rng::of_number(purpose));
+            palette[balance::index(palette.len(), seed, run)]
+        }
+    }
+}
+
+fn shuffle(colors: &mut [Color], chance: &mut Rng) {
+    for last in (1..colors.len()).rev() {
+        let below = u32::try_from(last + 1).unwrap_or(u32::MAX);
+        colors.swap(last, chance.below(below) as usize);
     }
 }
 
@@ -62,34 +127,37 @@ struct Drawing<'a> {
 }
 
 impl Drawing<'_> {
-    /// A scene without seed and run, and its plan; `None` where something found no place.
-    fn scene(&mut self, experiment: Experiment) -> Option<(Scene, FloorPlan)> {
-        let mirror = self.mirror();
-        let body_color = self.chance.one_of(&Color::ALL);
-        let (cubes, stated) = if experiment.has_candidates() {
-            self.candidates(mirror, body_color)?
-        } else {
-            (self.clutter(mirror)?, None)
+    /// A layout without seed and run; `None` where something found no place.
+    fn scene(&mut self, experiment: Experiment, body_color: Color) -> Option<Scene> {
+        let layout = &experiment.layout;
+        let mirror = self.mirror(layout.wall);
+        let cubes = match layout.cubes {
+            Cubes::None => Vec::new(),
+            Cubes::Candidates { count } => self.candidates(mirror, body_color, &layout.palette, count)?,
+            Cubes::Clutter { .. } => self.clutter(mirror, &layout.palette)?,
         };
         let plan = floor_plan(self.config, &cubes);
-        let start = self.start(mirror, &plan)?;
-        let others = if experiment.has_others() { self.others(&plan, start, body_color)? } else { Vec::new() };
+        let start = self.start(mirror, &plan, layout.start)?;
+        let others = self.others(&plan, start, body_color, &layout.palette)?;
         let scene = Scene {
             experiment,
             seed: 0,
             run: 0,
             body_color,
-            stated_color: stated.filter(|_| experiment == Experiment::E3),
+            stated_color: None,
             mirror,
+            panes: Vec::new(),
+            marks: Vec::new(),
             start,
             cubes,
             others,
         };
-        reach::is_solvable(self.config, &scene, &plan).then_some((scene, plan))
+        reach::is_solvable(self.config, &scene, &plan).then_some(scene)
     }
 
-    fn mirror(&mut self) -> MirrorPlace {
-        let wall = u8::try_from(self.chance.below(4)).expect("it is less than 4");
+    fn mirror(&mut self, wall: Wall) -> MirrorPlace {
+        let drawn = u8::try_from(self.chance.below(4)).expect("it is less than 4");
+        let wall = wall.quarter().unwrap_or(drawn);
         let slack = self.config.room.size / 2.0 - self.config.mirror.width / 2.0 - self.config.placement.wall_margin;
         MirrorPlace { wall, offset: self.length(-slack, slack) }
     }
@@ -107,24 +175,21 @@ impl Drawing<'_> {
         [self.length(-most, most), self.length(-most, most)]
     }
 
-    /// Three cubes of different colours, one of them the body's, and the colour that E3 states.
-    fn candidates(&mut self, mirror: MirrorPlace, body_color: Color) -> Option<(Vec<Cube>, Option<Color>)> {
-        let mut colors = vec![body_color];
-        while colors.len() < 3 {
-            let color = self.chance.one_of(&Color::ALL);
+    /// Cubes of different colours, one of them the body's.
+    fn candidates(&mut self, mirror: MirrorPlace, body: Color, palette: &[Color], count: u32) -> Option<Vec<Cube>> {
+        let mut colors = vec![body];
+        while colors.len() < count as usize {
+            let color = self.chance.one_of(palette);
             if !colors.contains(&color) {
                 colors.push(color);
             }
         }
-        let stated = self.chance.one_of(&colors[1..]);
-        for last in (1..colors.len()).rev() {
-            colors.swap(last, self.chance.below(u32::try_from(last + 1).ok()?) as usize);
-        }
+        shuffle(&mut colors, self.chance);
         let mut cubes = Vec::new();
         for color in colors {
             cubes.push(self.candidate(mirror, color, &cubes)?);
         }
-        Some((cubes, Some(stated)))
+        Some(cubes)
     }
 
     fn candidate(&mut self, mirror: MirrorPlace, color: Color, cubes: &[Cube]) -> Option<Cube> {
@@ -139,20 +204,20 @@ impl Drawing<'_> {
     }
 
     /// The cubes of E5: some before the mirror, some of them with another on top.
-    fn clutter(&mut self, mirror: MirrorPlace) -> Option<Vec<Cube>> {
+    fn clutter(&mut self, mirror: MirrorPlace, palette: &[Color]) -> Option<Vec<Cube>> {
         let config = &self.config.clutter;
         let [least, most] = [config.least, config.most].map(|count| i32::try_from(count).unwrap_or(i32::MAX));
         let count = usize::try_from(self.chance.between(least, most)).ok()?.min(MOST_CUBES);
         let mut cubes: Vec<Cube> = Vec::new();
         while cubes.len() < count {
-            let color = self.chance.one_of(&Color::ALL);
+            let color = self.chance.one_of(palette);
             let edge = self.chance.one_of(&config.edges);
             let is_before_mirror = self.chance.happens(config.before_mirror_percent) || cubes.is_empty();
             let cube =
                 self.clutter_cube(mirror, is_before_mirror, Cube { color, x: 0.0, y: 0.0, base: 0.0, edge }, &cubes)?;
             cubes.push(cube);
-            if cubes.len() < count && self.chance.happens(50) {
-                let color = self.chance.one_of(&Color::ALL);
+            if cubes.len() < count && self.chance.happens(config.stack_percent) {
+                let color = self.chance.one_of(palette);
                 cubes.push(Cube { color, base: cube.edge, ..cube });
             }
         }
@@ -179,12 +244,15 @@ impl Drawing<'_> {
         })
     }
 
-    /// A place with some room around it, and a heading from which the mirror is out of view.
-    fn start(&mut self, mirror: MirrorPlace, plan: &FloorPlan) -> Option<Pose> {
+    /// A place with some room around it, and a heading: one from which the mirror is out of view where that is asked for.
+    fn start(&mut self, mirror: MirrorPlace, plan: &FloorPlan, start: Start) -> Option<Pose> {
         let spot = self.body_spot(plan, &[])?;
         let blind: Vec<Heading> = (0..HEADINGS)
             .map(Heading::new)
-            .filter(|heading| !is_in_view(self.config, mirror, Pose { x: spot[0], y: spot[1], heading: *heading }))
+            .filter(|heading| {
+                start == Start::Any
+                    || !is_in_view(self.config, mirror, Pose { x: spot[0], y: spot[1], heading: *heading })
+            })
             .collect();
         if blind.is_empty() {
             return None;
@@ -203,12 +271,15 @@ impl Drawing<'_> {
         })
     }
 
-    fn others(&mut self, plan: &FloorPlan, start: Pose, body_color: Color) -> Option<Vec<Other>> {
+    fn others(&mut self, plan: &FloorPlan, start: Pose, body_color: Color, palette: &[Color]) -> Option<Vec<Other>> {
         let config = &self.config.others;
         let [least, most] = [config.least, config.most].map(|count| i32::try_from(count).unwrap_or(i32::MAX));
+        if most == 0 {
+            return Some(Vec::new());
+        }
         let count = self.chance.between(least, most);
         let has_twin = self.chance.happens(config.twin_percent);
-        let strangers: Vec<Color> = Color::ALL.into_iter().filter(|color| *color != body_color).collect();
+        let strangers: Vec<Color> = palette.iter().copied().filter(|color| *color != body_color).collect();
         let mut bodies = vec![start.spot()];
         let mut others = Vec::new();
         for at in 0..count {

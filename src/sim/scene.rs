@@ -1,7 +1,8 @@
 //! What an episode's world is at its start, as plain data.
 //!
-//! Rule: a scene is drawn from its configuration, experiment, seed and run alone. E1, E2 and E3 draw the same scene
-//! from the same seed and run: E2 leaves the mirror out, E3 adds a false statement, so that they compare in pairs.
+//! Rule: a scene is drawn from its configuration, experiment, seed and run alone. Experiments that share scenes draw the
+//! same layout from the same seed and run, as E1, E2 and E3 do: E2 leaves the mirror out, E3 adds a false statement, so
+//! that they compare in pairs.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -14,9 +15,12 @@ use super::config::WorldConfig;
 use super::floor::{FloorPlan, Square};
 use crate::base::hash;
 use crate::base::palette::Color;
+use crate::experiment::spec::{PaneKind, Part};
 
 /// Changes whenever the same configuration and seeds give other scenes or other motion than before.
-pub const SCENE_VERSION: u32 = 1;
+///
+/// 2: body colours are balanced, clutter hides more, faces are marked, lamps are fixed in the room.
+pub const SCENE_VERSION: u32 = 2;
 
 /// Digits of the fingerprint of a scene: enough for any study.
 const FINGERPRINT_DIGITS: usize = 16;
@@ -28,10 +32,10 @@ pub const MOST_OTHERS: usize = 6;
 pub const MOST_CUBES: usize = 12;
 
 /// What an episode's world is at its start.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Scene {
-    /// Which of the five.
+    /// By its name.
+    #[schemars(with = "String")]
     pub experiment: Experiment,
     /// The block of runs.
     pub seed: i32,
@@ -39,16 +43,54 @@ pub struct Scene {
     pub run: i32,
     /// The colour of the agent's own body.
     pub body_color: Color,
-    /// The false colour told in E3: that of one of the other two candidates.
+    /// The false colour that the prompt states, as in E3.
     pub stated_color: Option<Color>,
-    /// Where the mirror is; in E2 where it would be.
+    /// Where the layout has its mirror; in E2 where it would be.
     pub mirror: MirrorPlace,
+    /// Mirrors and windows, the first of them at `mirror`.
+    pub panes: Vec<HungPane>,
+    /// Marks on bodies.
+    pub marks: Vec<WornMark>,
     /// Where the agent starts.
     pub start: Pose,
-    /// The three candidates, or the clutter of E5.
+    /// The candidates, or the clutter, as in E5.
     pub cubes: Vec<Cube>,
     /// The other agents.
     pub others: Vec<Other>,
+}
+
+/// A mirror or window on a wall.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct HungPane {
+    /// What it shows.
+    pub kind: PaneKind,
+    /// Where it hangs.
+    pub place: MirrorPlace,
+    /// Along the wall, m.
+    pub width: f64,
+    /// m.
+    pub height: f64,
+    /// The height of its centre, m.
+    pub center_height: f64,
+    /// Steps by which it is late.
+    pub delay: u32,
+    /// The colour in which it shows the own body, where that is another.
+    pub paint: Option<Color>,
+    /// The body that is seen in it alone: in place of the own one, or behind the window.
+    pub double: Option<Other>,
+}
+
+/// A mark on a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct WornMark {
+    /// Where on the body.
+    pub part: Part,
+    /// Of its paint; never that of the body.
+    pub color: Color,
+    /// The first step that shows it.
+    pub from_t: u32,
+    /// Whose body: 0 is the agent's own, 1 the first of the others.
+    pub wearer: usize,
 }
 
 /// Where the mirror hangs.
@@ -129,9 +171,14 @@ impl Cube {
 }
 
 impl Scene {
-    /// Whether there is a reflective surface.
-    pub const fn has_mirror(&self) -> bool {
-        self.experiment.has_mirror()
+    /// The marks that are there at a step, counted from 1.
+    pub fn marks_at(&self, t: u32) -> impl Iterator<Item = (usize, &WornMark)> {
+        self.marks.iter().enumerate().filter(move |(_, mark)| mark.from_t <= t)
+    }
+
+    /// The colour of the first mark on the own body at a step.
+    pub fn own_mark_at(&self, t: u32) -> Option<Color> {
+        self.marks_at(t).find(|(_, mark)| mark.wearer == 0).map(|(_, mark)| mark.color)
     }
 
     /// What two episodes share that are a pair: the room, the body, the cubes, the start and the others. What they are

@@ -29,7 +29,7 @@ pub struct Placed {
 /// A visible shape.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid {
-    /// Unique among the shapes, such as `mirror`, `cube0` or `agent0_head`.
+    /// Unique among the shapes, such as `pane0`, `cube0` or `agent0_head`.
     pub name: String,
     /// What it is part of.
     pub item: Item,
@@ -94,7 +94,7 @@ fn solids(stage: &Stage) -> Vec<Solid> {
         .map(|geom| Solid {
             name: stage.geom_name(geom).to_owned(),
             item: stage.items()[geom],
-            shape: shape(model.geom_type()[geom], model.geom_size()[geom]),
+            shape: shape(stage.items()[geom], model.geom_type()[geom], model.geom_size()[geom]),
             position: stage.data.geom_xpos()[geom],
             rotation: quaternion(stage.data.geom_xmat()[geom]),
             rgba: model.geom_rgba()[geom],
@@ -102,8 +102,10 @@ fn solids(stage: &Stage) -> Vec<Solid> {
         .collect()
 }
 
-fn shape(kind: MjtGeomBase, size: [f64; 3]) -> Shape {
+fn shape(item: Item, kind: MjtGeomBase, size: [f64; 3]) -> Shape {
     match kind {
+        // Of a pane only the face is there.
+        _ if matches!(item, Item::Pane(_)) => Shape::Plane([2.0 * size[0], 2.0 * size[1]]),
         MjtGeomBase::mjGEOM_PLANE => Shape::Plane([2.0 * size[0], 2.0 * size[1]]),
         MjtGeomBase::mjGEOM_SPHERE => Shape::Sphere(size[0]),
         MjtGeomBase::mjGEOM_CAPSULE => Shape::Capsule { radius: size[0], length: 2.0 * size[1] },

@@ -2,13 +2,19 @@
 //!
 //! Rule: the agent moves first, then each other in turn; whoever would touch something stays where it is.
 
+use std::cell::OnceCell;
+use std::collections::VecDeque;
+
 use super::body::{Figure, Pose};
 use super::config::WorldConfig;
 use super::distractor::Distractor;
 use super::floor::FloorPlan;
-use super::model::{ModelError, Paint, Stage};
+use super::model::{AGENTS, BODIES, Look, ModelError, Moment, Paint, Stage};
+use super::passage;
 use super::scene::{Cube, Scene};
+use super::visibility::{self, LabelImage};
 use crate::base::palette::Color;
+use crate::experiment::spec::{Behavior, PaneKind};
 use crate::trace::episode::Action;
 
 /// What an action came to.
@@ -26,23 +32,39 @@ pub struct World {
     plan: FloorPlan,
     ego: Figure,
     others: Vec<Distractor>,
+    /// Per pane, the body that it alone shows.
+    doubles: Vec<Option<Distractor>>,
+    /// The step that comes next, from 1.
+    t: u32,
+    /// Everybody as they were, the latest last: as far back as the latest pane shows.
+    past: VecDeque<Vec<Figure>>,
     stage: Stage,
+    /// Per pane, what is seen through it.
+    beyond: Vec<Stage>,
+    /// What every pixel of the view shows, once somebody has asked.
+    labels: OnceCell<LabelImage>,
 }
 
 impl World {
-    /// The world of a scene, at its start.
+    /// The world of a scene, at its start. What the experiment says of lengths and counts lies over the configuration.
     ///
     /// # Errors
     /// When MuJoCo refuses the model.
     pub fn new(config: &WorldConfig, scene: Scene) -> Result<Self, ModelError> {
-        let stage = Stage::new(config, Paint::Lit, &scene)?;
+        let config = config.of(scene.experiment);
+        let (stage, beyond) = Stage::all(&config, Paint::Lit, &scene)?;
         let mut world = Self {
-            config: config.clone(),
-            plan: scene.floor_plan(config),
+            plan: scene.floor_plan(&config),
             ego: Figure::standing(scene.start),
             others: scene.others.iter().map(Distractor::new).collect(),
+            doubles: scene.panes.iter().map(|pane| pane.double.as_ref().map(Distractor::new)).collect(),
+            t: 1,
+            past: VecDeque::new(),
+            labels: OnceCell::new(),
+            config,
             scene,
             stage,
+            beyond,
         };
         world.settle();
         Ok(world)
@@ -73,9 +95,42 @@ impl World {
         std::iter::once(self.ego).chain(self.others.iter().map(|walker| walker.figure)).collect()
     }
 
-    /// The model and its state.
+    /// Everybody as a pane shows them: late where it is late. Before there is such a past, the start.
+    pub fn figures_in(&self, pane: usize) -> Vec<Figure> {
+        let back = self.scene.panes[pane].delay as usize;
+        let at = self.past.len().saturating_sub(1 + back);
+        self.past.get(at).cloned().unwrap_or_default()
+    }
+
+    /// The body that a pane alone shows.
+    pub fn double(&self, pane: usize) -> Option<Figure> {
+        self.doubles[pane].as_ref().map(|double| double.figure)
+    }
+
+    /// Whether the own body wears a mark at some step.
+    pub fn has_own_mark(&self) -> bool {
+        self.scene.marks.iter().any(|mark| mark.wearer == 0)
+    }
+
+    /// The step that comes next, from 1.
+    pub const fn t(&self) -> u32 {
+        self.t
+    }
+
+    /// What the eye sees directly: the model and its state.
     pub const fn stage(&self) -> &Stage {
         &self.stage
+    }
+
+    /// What the eye sees through each pane.
+    pub fn beyond(&self) -> &[Stage] {
+        &self.beyond
+    }
+
+    /// What every pixel of the eye's view shows.
+    pub fn labels(&self) -> &LabelImage {
+        let eye = &self.config.eye;
+        self.labels.get_or_init(|| visibility::labels(self, eye.width as usize, eye.height_px as usize))
     }
 
     /// Does what the agent decided, then lets the others move. No action, and `done`, is standing still.
@@ -92,6 +147,7 @@ impl World {
             }
         };
         self.tick_others();
+        self.t = self.t.saturating_add(1);
         self.settle();
         moved
     }
@@ -129,6 +185,17 @@ impl World {
     }
 
     fn tick_others(&mut self) {
+        // Bodies that only a pane shows meet nobody.
+        for (at, double) in self.doubles.iter_mut().enumerate() {
+            if let Some(double) = double {
+                let is_window = self.scene.panes[at].kind == PaneKind::Window;
+                let empty = FloorPlan { squares: Vec::new(), ..self.plan.clone() };
+                double.tick(&self.config.others, if is_window { &empty } else { &self.plan }, &[]);
+            }
+        }
+        if self.scene.experiment.layout.others.behavior == Behavior::Stand {
+            return;
+        }
         for at in 0..self.others.len() {
             let bodies: Vec<[f64; 2]> = std::iter::once(self.ego.pose.spot())
                 .chain(
@@ -144,8 +211,53 @@ impl World {
     }
 
     fn settle(&mut self) {
-        let figures = self.figures();
-        self.stage.pose(&self.config, &figures);
+        self.labels.take();
+        self.past.push_back(self.figures());
+        let latest = self.scene.panes.iter().map(|pane| pane.delay as usize).max().unwrap_or_default();
+        while self.past.len() > latest + 1 {
+            self.past.pop_front();
+        }
+        let direct = self.moment(Look::Direct);
+        self.stage.show(&self.config, &self.scene, &direct);
+        for pane in 0..self.beyond.len() {
+            let moment = self.moment(Look::Through(pane));
+            self.beyond[pane].show(&self.config, &self.scene, &moment);
+        }
+    }
+
+    /// Other stages of the same scene as it is now: with other paint, or for other rays.
+    ///
+    /// # Errors
+    /// When MuJoCo refuses the model.
+    pub fn stages(&self, paint: Paint) -> Result<(Stage, Vec<Stage>), ModelError> {
+        let mut stages = Stage::all(&self.config, paint, &self.scene)?;
+        self.show_on(&mut stages);
+        Ok(stages)
+    }
+
+    /// Puts stages of the same scene as this world is.
+    pub fn show_on(&self, (stage, beyond): &mut (Stage, Vec<Stage>)) {
+        for stage in std::iter::once(stage).chain(beyond) {
+            let moment = self.moment(stage.look());
+            stage.show(&self.config, &self.scene, &moment);
+        }
+    }
+
+    /// What a look sees of the bodies. Those that a pane does not show are hidden on its stage.
+    fn moment(&self, look: Look) -> Moment {
+        let (figures, t, beyond) = match look {
+            Look::Direct => (self.figures(), self.t, None),
+            Look::Through(pane) => {
+                let late = self.scene.panes[pane].delay;
+                (self.figures_in(pane), self.t.saturating_sub(late), Some(passage::eye(self, pane)))
+            }
+        };
+        let mut bodies = [None; BODIES];
+        bodies.iter_mut().zip(figures).for_each(|(place, figure)| *place = Some(figure));
+        if let Look::Through(pane) = look {
+            bodies[AGENTS + pane] = self.double(pane);
+        }
+        Moment { t, bodies, beyond }
     }
 
     /// How far the agent's body could still walk before it touches the candidate of a colour, m; `None` where there is

@@ -57,14 +57,14 @@ fn check_logic(profiles: &Profiles) {
 
 #[test]
 fn a_few_episodes_already_show_who_is_who() {
-    use Experiment::{E1, E2, E3, E4, E5};
+    let [e1, e2, e3, e4, e5] = Experiment::PAPER;
     let plan = [
-        episodes(Scripted::Oracle, &[E1, E4], 1, 2),
-        episodes(Scripted::Gullible, &[E3], 1, 2),
-        episodes(Scripted::Confabulator, &[E1], 1, 1),
-        episodes(Scripted::Guesser, &[E1, E2, E5], 1, 3),
-        episodes(Scripted::Random, &[E2, E5], 1, 3),
-        episodes(Scripted::Frozen, &[E2], 1, 1),
+        episodes(Scripted::Oracle, &[e1, e4], 1, 2),
+        episodes(Scripted::Gullible, &[e3], 1, 2),
+        episodes(Scripted::Confabulator, &[e1], 1, 1),
+        episodes(Scripted::Guesser, &[e1, e2, e5], 1, 3),
+        episodes(Scripted::Random, &[e2, e5], 1, 3),
+        episodes(Scripted::Frozen, &[e2], 1, 1),
     ];
     let profiles = profiles(&plan.concat());
     check_logic(&profiles);
@@ -78,7 +78,7 @@ fn a_few_episodes_already_show_who_is_who() {
 #[test]
 #[ignore = "`make calibrate` runs it in release"]
 fn twenty_one_episodes_an_experiment_show_the_predicted_profiles() {
-    let plan: Vec<_> = Scripted::ALL.into_iter().flat_map(|agent| episodes(agent, &Experiment::ALL, 3, 7)).collect();
+    let plan: Vec<_> = Scripted::ALL.into_iter().flat_map(|agent| episodes(agent, &Experiment::PAPER, 3, 7)).collect();
     let profiles = profiles(&plan);
     let table = profiles.markdown();
     let text = format!(

@@ -7,9 +7,10 @@ use std::sync::Arc;
 
 use mirrorstats::agent::perception::camera::{Heading, Place, Pose};
 use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::agent::{Family, Observation, Reply, Task};
+use mirrorstats::agent::{Observation, Reply, Task};
 use mirrorstats::base::frame::Frame;
 use mirrorstats::base::palette::Color;
+use mirrorstats::experiment::Experiment;
 use mirrorstats::trace::episode::Action;
 
 const HALF: f64 = 4.0;
@@ -115,8 +116,8 @@ pub fn ready<T>(mut future: std::pin::Pin<Box<dyn Future<Output = T> + '_>>) -> 
     }
 }
 
-pub fn task(family: Family, seed: u64) -> Task {
-    Task { family, stated_color: None, step_budget: 100, seed }
+pub fn task(experiment: Experiment, seed: u64) -> Task {
+    Task { experiment, stated_color: None, step_budget: 100, seed }
 }
 
 pub fn pose(x: f64, y: f64, yaw: f64) -> Pose {

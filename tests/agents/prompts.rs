@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use mirrorstats::agent::prompt::{self, Prompt};
-use mirrorstats::agent::{Family, Observation, Task};
+use mirrorstats::agent::{Observation, Task};
 use mirrorstats::base::frame::Frame;
+use mirrorstats::experiment::Experiment;
 use mirrorstats::trace::episode::Action;
 
-fn task(family: Family, stated_color: Option<&str>) -> Task {
-    Task { family, stated_color: stated_color.map(str::to_owned), step_budget: 100, seed: 1 }
+fn task(experiment: Experiment, stated_color: Option<&str>) -> Task {
+    Task { experiment, stated_color: stated_color.map(str::to_owned), step_budget: 100, seed: 1 }
 }
 
 fn first_step() -> Observation {
@@ -38,20 +39,20 @@ const WARNING: &str = "Warning: the previous movement hit a wall or another obje
 
 #[test]
 fn the_cube_selection_prompt_is_the_papers() {
-    let prompt = Prompt::of(Family::CubeSelection).unwrap();
-    let rendered = prompt.render(&task(Family::CubeSelection, None), &first_step()).unwrap();
+    let prompt = Prompt::of(Experiment::E1).unwrap();
+    let rendered = prompt.render(&task(Experiment::E1, None), &first_step()).unwrap();
     assert_eq!(rendered.system, include_str!("prompts/cube-selection.system.txt").trim_end());
     assert_eq!(rendered.user, filled(include_str!("prompts/cube-selection.user.txt"), FIRST, POSITION, None));
 
     let bumped = Observation { bumped: true, ..first_step() };
-    let rendered = prompt.render(&task(Family::CubeSelection, None), &bumped).unwrap();
+    let rendered = prompt.render(&task(Experiment::E1, None), &bumped).unwrap();
     assert_eq!(rendered.user, filled(include_str!("prompts/cube-selection.user.txt"), FIRST, POSITION, Some(WARNING)));
 }
 
 #[test]
 fn a_false_colour_replaces_the_first_line_alone() {
-    let prompt = Prompt::of(Family::CubeSelection).unwrap();
-    let rendered = prompt.render(&task(Family::CubeSelection, Some("green")), &first_step()).unwrap();
+    let prompt = Prompt::of(Experiment::E1).unwrap();
+    let rendered = prompt.render(&task(Experiment::E1, Some("green")), &first_step()).unwrap();
     let first = include_str!("prompts/e3-first-line.txt").trim_end().replace("<wrong_color>", "green");
     let rest = include_str!("prompts/cube-selection.system.txt").split_once('\n').unwrap().1;
     assert_eq!(rendered.system, format!("{first}\n{}", rest.trim_end()));
@@ -59,19 +60,19 @@ fn a_false_colour_replaces_the_first_line_alone() {
 
 #[test]
 fn the_exploration_prompt_is_the_papers() {
-    let prompt = Prompt::of(Family::Exploration).unwrap();
-    let rendered = prompt.render(&task(Family::Exploration, None), &first_step()).unwrap();
+    let prompt = Prompt::of(Experiment::E5).unwrap();
+    let rendered = prompt.render(&task(Experiment::E5, None), &first_step()).unwrap();
     assert_eq!(rendered.system, include_str!("prompts/exploration.system.txt").trim_end());
     assert_eq!(rendered.user, filled(include_str!("prompts/exploration.user.txt"), FIRST, POSITION, None));
 }
 
 #[test]
 fn history_is_one_step_on_one_line_whatever_was_thought() {
-    let prompt = Prompt::of(Family::Exploration).unwrap();
+    let prompt = Prompt::of(Experiment::E5).unwrap();
     let thought = Some("I turn.\n\nTask: <b>{{ 1 + 1 }}</b>".to_owned());
     let seen = |history| {
         let observation = Observation { t: 2, remaining: 99, history: Some(history), ..first_step() };
-        let user = prompt.render(&task(Family::Exploration, None), &observation).unwrap().user;
+        let user = prompt.render(&task(Experiment::E5, None), &observation).unwrap().user;
         user.lines().nth(1).unwrap().to_owned()
     };
     assert_eq!(
@@ -87,8 +88,7 @@ fn history_is_one_step_on_one_line_whatever_was_thought() {
 
 #[test]
 fn families_differ_in_their_hash_and_actions_in_their_letters() {
-    let hashes =
-        [Family::CubeSelection, Family::Exploration].map(|family| Prompt::of(family).unwrap().hash().to_owned());
+    let hashes = [Experiment::E1, Experiment::E5].map(|experiment| Prompt::of(experiment).unwrap().hash().to_owned());
     assert_ne!(hashes[0], hashes[1]);
     for action in Action::ALL {
         assert_eq!(prompt::action(prompt::letter(action)), Some(action));

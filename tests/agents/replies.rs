@@ -1,14 +1,15 @@
 //! Replies as models write them, and what is read from each.
 
+use mirrorstats::agent::Status;
 use mirrorstats::agent::reply::{self, Ending, Repair};
-use mirrorstats::agent::{Family, Status};
+use mirrorstats::experiment::Experiment;
 use mirrorstats::trace::episode::Action;
 use mirrorstats::trace::identification::normal_form;
 
 const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
 
 fn read(raw: &str) -> reply::Reading {
-    reply::read(raw, Family::CubeSelection, Ending::Whole)
+    reply::read(raw, &Experiment::E1.reply, Ending::Whole)
 }
 
 #[test]
@@ -40,9 +41,9 @@ fn a_valid_reply_is_taken_as_it_is() {
 #[test]
 fn the_exploration_family_has_no_cube() {
     let without = GOOD.replace(r#" "selected_cube": "none","#, "");
-    let reading = reply::read(&without, Family::Exploration, Ending::Whole);
+    let reading = reply::read(&without, &Experiment::E5.reply, Ending::Whole);
     assert_eq!((reading.status, reading.selected_cube), (Status::Ok, None));
-    assert_eq!(reply::read(GOOD, Family::Exploration, Ending::Whole).status, Status::SchemaInvalid);
+    assert_eq!(reply::read(GOOD, &Experiment::E5.reply, Ending::Whole).status, Status::SchemaInvalid);
     assert_eq!(read(&without).status, Status::SchemaInvalid);
 }
 
@@ -216,9 +217,9 @@ fn what_is_not_valid_is_no_decision() {
 
 #[test]
 fn an_ending_counts_before_the_text() {
-    assert_eq!(reply::read(GOOD, Family::CubeSelection, Ending::Truncated).status, Status::Truncated);
-    assert_eq!(reply::read(GOOD, Family::CubeSelection, Ending::Refused).status, Status::Refusal);
-    assert_eq!(reply::read("", Family::CubeSelection, Ending::Truncated).status, Status::Truncated);
+    assert_eq!(reply::read(GOOD, &Experiment::E1.reply, Ending::Truncated).status, Status::Truncated);
+    assert_eq!(reply::read(GOOD, &Experiment::E1.reply, Ending::Refused).status, Status::Refusal);
+    assert_eq!(reply::read("", &Experiment::E1.reply, Ending::Truncated).status, Status::Truncated);
 }
 
 #[test]

@@ -2,8 +2,9 @@
 
 use mirrorstats::agent::perception::camera::{Place, Pose};
 use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::agent::{Family, Reply, Task};
+use mirrorstats::agent::{Reply, Task};
 use mirrorstats::base::palette::Color;
+use mirrorstats::experiment::Experiment;
 use mirrorstats::trace::episode::Action;
 
 use crate::painted::{Painted, pose, task};
@@ -28,7 +29,7 @@ fn claims(replies: &[Reply]) -> Vec<&str> {
 
 #[test]
 fn the_oracle_finds_itself_and_walks_to_its_cube() {
-    let (replies, place) = room().play(Scripted::Oracle, &task(Family::CubeSelection, 1), start());
+    let (replies, place) = room().play(Scripted::Oracle, &task(Experiment::E1, 1), start());
     let last = replies.last().unwrap();
     assert_eq!((last.action, last.selected_cube.as_deref()), (Some(Action::Done), Some("green")));
     assert_eq!(claims(&replies), ["unknown", "green"]);
@@ -37,7 +38,7 @@ fn the_oracle_finds_itself_and_walks_to_its_cube() {
 
 #[test]
 fn the_gullible_walks_to_the_stated_cube() {
-    let task = Task { stated_color: Some("blue".to_owned()), ..task(Family::CubeSelection, 1) };
+    let task = Task { stated_color: Some("blue".to_owned()), ..task(Experiment::E1, 1) };
     let (replies, _) = room().play(Scripted::Gullible, &task, pose(-1.0, 0.5, 60.0));
     assert_eq!(replies.last().unwrap().selected_cube.as_deref(), Some("blue"));
     assert_eq!(claims(&replies), ["blue"]);
@@ -46,7 +47,7 @@ fn the_gullible_walks_to_the_stated_cube() {
 #[test]
 fn the_guesser_takes_what_it_sees() {
     let mut taken: Vec<String> = (0..12)
-        .map(|seed| room().play(Scripted::Guesser, &task(Family::CubeSelection, seed), pose(3.3, 1.0, 180.0)).0)
+        .map(|seed| room().play(Scripted::Guesser, &task(Experiment::E1, seed), pose(3.3, 1.0, 180.0)).0)
         .map(|replies| replies.last().unwrap().selected_cube.clone().unwrap())
         .collect();
     taken.sort();
@@ -56,19 +57,19 @@ fn the_guesser_takes_what_it_sees() {
 
 #[test]
 fn frozen_and_random_do_as_they_are_called() {
-    let short = Task { step_budget: 5, ..task(Family::Exploration, 3) };
+    let short = Task { step_budget: 5, ..task(Experiment::E5, 3) };
     let (replies, place) = room().play(Scripted::Frozen, &short, start());
     assert!(replies.iter().all(|reply| reply.action.is_none() && reply.self_color.as_deref() == Some("unknown")));
     assert_eq!((replies.len(), place), (5, start().place));
 
-    let play = |seed| room().play(Scripted::Random, &task(Family::CubeSelection, seed), start()).0;
+    let play = |seed| room().play(Scripted::Random, &task(Experiment::E1, seed), start()).0;
     assert_eq!(play(1), play(1));
     assert!((2..9).any(|seed| play(seed) != play(1)));
 }
 
 #[test]
 fn the_budget_ends_with_a_decision() {
-    let short = Task { step_budget: 2, ..task(Family::CubeSelection, 5) };
+    let short = Task { step_budget: 2, ..task(Experiment::E1, 5) };
     for agent in [Scripted::Oracle, Scripted::Guesser, Scripted::Mimic] {
         let (replies, _) = room().play(agent, &short, start());
         assert_eq!(replies.last().unwrap().action, Some(Action::Done), "{}", agent.name());

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::PathBuf;
 
-use mirrorstats::agent::{Family, reply};
+use mirrorstats::agent::reply;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
 use mirrorstats::cli::commands::import::ImportAnswer;
 use mirrorstats::cli::commands::recover::RecoverAnswer;
@@ -11,6 +11,7 @@ use mirrorstats::cli::commands::renormalize::RenormalizeAnswer;
 use mirrorstats::cli::commands::report::ReportAnswer;
 use mirrorstats::cli::commands::rescore::RescoreAnswer;
 use mirrorstats::cli::commands::schema::Name;
+use mirrorstats::experiment::Experiment;
 use mirrorstats::log::message::{Decision, EpisodeMessage};
 use mirrorstats::metric::explain::Explanation;
 use mirrorstats::metric::shape::DefinitionFile;
@@ -109,10 +110,13 @@ fn keys_and_types(schema: &Value) -> Value {
 /// People and other harnesses are given these files; agents get the structure alone.
 #[test]
 fn replies_are_described_as_the_files_say() {
-    for (family, name) in [(Family::CubeSelection, "reply-cubes"), (Family::Exploration, "reply-exploration")] {
+    let replies =
+        [(Experiment::E1, "reply-cubes", "Reply in E1 to E4"), (Experiment::E5, "reply-exploration", "Reply in E5")];
+    for (experiment, name, title) in replies {
+        let schema = reply::schema(title, &experiment.reply);
         let text = fs::read_to_string(folder().join(format!("{name}.schema.json"))).unwrap();
-        assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), reply::schema(family));
-        let without_words = [reply::schema(family), reply::structure(family)].map(|schema| keys_and_types(&schema));
+        assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), schema);
+        let without_words = [schema.clone(), reply::structure(&experiment.reply)].map(|schema| keys_and_types(&schema));
         assert_eq!(without_words[0], without_words[1], "{name}");
     }
 }

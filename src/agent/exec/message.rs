@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::agent::{Ended, Family};
+use crate::agent::Ended;
 
 /// The version of the messages and of the order they come in.
 pub const PROTOCOL: u32 = 1;
@@ -41,10 +41,10 @@ pub struct TaskMessage {
     pub protocol: u32,
     /// The episode's id, for the program's own records.
     pub episode_id: String,
-    /// The experiment, E1 to E5, for the program's own records.
+    /// The experiment, for the program's own records.
     pub experiment: String,
-    /// Which of the paper's two prompts is in force.
-    pub family: PromptFamily,
+    /// Which prompt is in force: `cube_selection` or `exploration` for the paper's two, the name of its folder for another.
+    pub family: String,
     /// The false colour that the prompt states in E3; null elsewhere.
     pub stated_color: Option<String>,
     /// Steps after which the episode ends by itself.
@@ -55,25 +55,6 @@ pub struct TaskMessage {
     pub system_prompt: String,
     /// The JSON Schema of a reply: its keys and their types, as providers get it.
     pub reply_schema: Value,
-}
-
-/// The prompt families of the paper.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum PromptFamily {
-    /// E1 to E4.
-    CubeSelection,
-    /// E5.
-    Exploration,
-}
-
-impl From<Family> for PromptFamily {
-    fn from(family: Family) -> Self {
-        match family {
-            Family::CubeSelection => Self::CubeSelection,
-            Family::Exploration => Self::Exploration,
-        }
-    }
 }
 
 /// What is perceived before a step.

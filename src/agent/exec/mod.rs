@@ -121,15 +121,13 @@ impl Player for Exec {
             "files": self.shared.files,
             "protocol": PROTOCOL,
             "images": images.name(),
-            "prompts": prompt::hashes(),
-            "reply_schemas": reply::structure_hashes(),
             "identification_version": crate::trace::identification::VERSION,
         })
     }
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let shared = Arc::clone(&self.shared);
-        let prompt = Prompt::of(task.family).map_err(unusable)?;
+        let prompt = Prompt::of(task.experiment).map_err(unusable)?;
         let frames = match shared.settings.images {
             Images::Path => Some(Frames::new(&shared.settings.scratch)?),
             Images::Base64 => None,
@@ -211,12 +209,12 @@ impl ExecAgent {
             protocol: PROTOCOL,
             episode_id: self.episode_id.clone(),
             experiment,
-            family: self.task.family.into(),
+            family: self.task.experiment.prompt.replace('-', "_"),
             stated_color: self.task.stated_color.clone(),
             max_steps: self.task.step_budget,
             seed: self.task.seed,
             system_prompt,
-            reply_schema: reply::structure(self.task.family),
+            reply_schema: reply::structure(&self.task.experiment.reply),
         })
     }
 
@@ -247,7 +245,7 @@ impl ExecAgent {
         match str::from_utf8(line) {
             Ok(text) => {
                 let text = self.shared.without_secrets(text);
-                reply::read(&text, self.task.family, Ending::Whole).into_reply(text, usage)
+                reply::read(&text, &self.task.experiment.reply, Ending::Whole).into_reply(text, usage)
             }
             // With its bytes replaced it might pass for something that the program did not say.
             Err(_) => Reply {
@@ -256,6 +254,7 @@ impl ExecAgent {
                 action: None,
                 self_color: None,
                 selected_cube: None,
+                mark_report: None,
                 words: Words::default(),
                 raw: Some(self.shared.without_secrets(&String::from_utf8_lossy(line))),
                 usage,

@@ -23,8 +23,9 @@ pub use repair::Repair;
 #[cfg(feature = "sim")]
 pub(in crate::agent) use surrogates::without_lone_surrogates;
 
-use super::{Family, Reply, Status, Usage, Words, prompt};
+use super::{Reply, Status, Usage, Words, prompt};
 use crate::base::palette::Color;
+use crate::experiment::spec::ReplyKey;
 use crate::trace::colors::spelling;
 use crate::trace::episode::Action;
 use crate::trace::identification;
@@ -51,8 +52,10 @@ pub struct Reading {
     pub fault: Option<String>,
     /// The action.
     pub action: Option<Action>,
-    /// The cube of the cube-selection family: a colour or `none`.
+    /// The cube: a colour or `none`.
     pub selected_cube: Option<String>,
+    /// The mark on the own body: a colour or `none`.
+    pub mark_report: Option<String>,
     /// The attribution: the normal form of the identification.
     pub self_color: Option<String>,
     /// The free text.
@@ -67,6 +70,7 @@ impl Reading {
             fault,
             action: None,
             selected_cube: None,
+            mark_report: None,
             self_color: None,
             words: Words::default(),
         }
@@ -91,6 +95,7 @@ impl Reading {
             action: self.action,
             self_color: self.self_color,
             selected_cube: self.selected_cube,
+            mark_report: self.mark_report,
             words: self.words,
             raw: Some(raw),
             usage,
@@ -99,8 +104,8 @@ impl Reading {
     }
 }
 
-/// Reads the text of a reply.
-pub fn read(raw: &str, family: Family, ending: Ending) -> Reading {
+/// Reads the text of a reply that should have these keys.
+pub fn read(raw: &str, keys: &[ReplyKey], ending: Ending) -> Reading {
     match ending {
         Ending::Refused => return Reading::without_decision(Status::Refusal, None),
         Ending::Truncated => return Reading::without_decision(Status::Truncated, None),
@@ -111,7 +116,7 @@ pub fn read(raw: &str, family: Family, ending: Ending) -> Reading {
         Ok(found) => found,
         Err(fault) => return without_object(fault),
     };
-    match decision(&object, family) {
+    match decision(&object, keys) {
         Ok(reading) if repairs.is_empty() => reading,
         Ok(reading) => Reading { status: Status::Repaired, repairs, ..reading },
         Err(fault) => Reading::without_decision(Status::SchemaInvalid, Some(fault)),
@@ -128,65 +133,55 @@ fn without_object(fault: NoObject) -> Reading {
     Reading::without_decision(status, fault)
 }
 
-/// The keys of a family, in the order of the prompt.
-fn keys(family: Family) -> &'static [&'static str] {
-    match family {
-        Family::CubeSelection => {
-            &["view-description", "reasoning", "action", "summary", "selected_cube", "identification"]
-        }
-        Family::Exploration => &["view-description", "reasoning", "action", "summary", "identification"],
-    }
-}
-
-/// The decision in an object that has exactly the keys of its family.
-fn decision(object: &object::Object, family: Family) -> Result<Reading, String> {
-    let expected = keys(family);
+/// The decision in an object that has exactly these keys.
+fn decision(object: &object::Object, keys: &[ReplyKey]) -> Result<Reading, String> {
     if let Some(key) = object.repeated_key() {
         return Err(format!("the key \"{key}\" stands twice"));
     }
-    if let Some(key) = object.keys().find(|key| !expected.contains(key)) {
-        return Err(format!("the key \"{key}\" is none of {}", listed(expected)));
+    if let Some(key) = object.keys().find(|key| !keys.iter().any(|known| known.name() == *key)) {
+        return Err(format!("the key \"{key}\" is none of {}", listed(keys)));
     }
-    let text = |key: &str| match object.get(key) {
-        None => Err(format!("the key \"{key}\" is missing")),
-        Some(Value::String(text)) => Ok(text.clone()),
-        Some(other) => Err(format!("\"{key}\" is {}, expected a string", kind(other))),
+    let text = |key: ReplyKey| match object.get(key.name()) {
+        _ if !keys.contains(&key) => Ok(None),
+        None => Err(format!("the key \"{}\" is missing", key.name())),
+        Some(Value::String(text)) => Ok(Some(text.clone())),
+        Some(other) => Err(format!("\"{}\" is {}, expected a string", key.name(), kind(other))),
     };
-    let action = text("action")?;
+    let action = text(ReplyKey::Action)?.unwrap_or_default();
     let action = prompt::action(&action)
         .ok_or_else(|| format!("\"action\" is \"{action}\", expected one of w, s, a, d, done"))?;
-    let selected_cube = match family {
-        Family::CubeSelection => Some(cube(&text("selected_cube")?)?),
-        Family::Exploration => None,
-    };
-    let identification = text("identification")?;
+    let color = |key| text(key)?.map(|name| color_or_none(key, &name)).transpose();
+    let selected_cube = color(ReplyKey::SelectedCube)?;
+    let mark_report = color(ReplyKey::Mark)?;
+    let identification = text(ReplyKey::Identification)?;
     Ok(Reading {
         status: Status::Ok,
         repairs: Vec::new(),
         fault: None,
         action: Some(action),
         selected_cube,
-        self_color: identification::normal_form(&identification).map(str::to_owned),
+        mark_report,
+        self_color: identification.as_deref().and_then(identification::normal_form).map(str::to_owned),
         words: Words {
-            view_description: Some(text("view-description")?),
-            reasoning: Some(text("reasoning")?),
-            summary: Some(text("summary")?),
-            identification: Some(identification),
+            view_description: text(ReplyKey::ViewDescription)?,
+            reasoning: text(ReplyKey::Reasoning)?,
+            summary: text(ReplyKey::Summary)?,
+            identification,
         },
     })
 }
 
-/// The cube that a reply names. Letter case and white space do not matter, as in an identification.
-fn cube(name: &str) -> Result<String, String> {
-    let cube = spelling::normal(name);
-    if cube == "none" || Color::named(&cube).is_some() {
-        return Ok(cube);
+/// The cube or the mark that a reply names. Letter case and white space do not matter, as in an identification.
+fn color_or_none(key: ReplyKey, name: &str) -> Result<String, String> {
+    let color = spelling::normal(name);
+    if color == "none" || Color::named(&color).is_some() {
+        return Ok(color);
     }
-    Err(format!("\"selected_cube\" is \"{name}\", expected a colour of the palette or none"))
+    Err(format!("\"{}\" is \"{name}\", expected a colour of the palette or none", key.name()))
 }
 
-fn listed(names: &[&str]) -> String {
-    names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
+fn listed(keys: &[ReplyKey]) -> String {
+    keys.iter().map(|key| format!("\"{}\"", key.name())).collect::<Vec<_>>().join(", ")
 }
 
 fn kind(value: &Value) -> &'static str {
@@ -200,60 +195,62 @@ fn kind(value: &Value) -> &'static str {
     }
 }
 
-/// The structure of a family's reply as JSON Schema: what agents are sent, and what providers enforce where they can.
+/// The structure of a reply as JSON Schema: what agents are sent, and what providers enforce where they can.
 ///
 /// It has keys and types alone. A provider may show the schema to its model, and the prompt is all that a model may be
 /// told: a description, a title or a list of colours would say what E5 leaves for the model to find out.
-pub fn structure(family: Family) -> Value {
-    let property = |key: &&str| ((*key).to_owned(), json!({ "type": "string" }));
+pub fn structure(keys: &[ReplyKey]) -> Value {
+    let property = |key: &ReplyKey| (key.name().to_owned(), json!({ "type": "string" }));
     json!({
         "type": "object",
-        "properties": keys(family).iter().map(property).collect::<serde_json::Map<_, _>>(),
-        "required": keys(family),
+        "properties": keys.iter().map(property).collect::<serde_json::Map<_, _>>(),
+        "required": names(keys),
         "additionalProperties": false,
     })
 }
 
-/// The SHA-256 of both structures, for recordings.
-#[cfg(feature = "sim")]
-pub(super) fn structure_hashes() -> Value {
-    let hash = |family| crate::base::hash::of_bytes(structure(family).to_string().as_bytes());
-    json!({ "cube_selection": hash(Family::CubeSelection), "exploration": hash(Family::Exploration) })
+fn names(keys: &[ReplyKey]) -> Vec<&'static str> {
+    keys.iter().map(|key| key.name()).collect()
 }
 
-/// The JSON Schema of a family's reply for people, with descriptions and the values that are read. No agent gets it; see
+/// The SHA-256 of the structure, 64 hexadecimal digits, for recordings.
+pub fn structure_hash(keys: &[ReplyKey]) -> String {
+    crate::base::hash::of_bytes(structure(keys).to_string().as_bytes())
+}
+
+/// The JSON Schema of a reply for people, with descriptions and the values that are read. No agent gets it; see
 /// [`structure`].
-pub fn schema(family: Family) -> Value {
-    let description = |key: &str| match key {
-        "view-description" => "What the image shows.",
-        "reasoning" => "Why this action.",
-        "action" => "w = forward, s = backward, a = left by 30 degrees, d = right by 30 degrees, done = task complete.",
-        "summary" => "The thought that comes back as the history of the next step.",
-        "selected_cube" => "A colour when the action is done, otherwise none.",
-        _ => "The colour of one's own body as far as it is known.",
+pub fn schema(title: &str, keys: &[ReplyKey]) -> Value {
+    let description = |key: ReplyKey| match key {
+        ReplyKey::ViewDescription => "What the image shows.",
+        ReplyKey::Reasoning => "Why this action.",
+        ReplyKey::Action => {
+            "w = forward, s = backward, a = left by 30 degrees, d = right by 30 degrees, done = task complete."
+        }
+        ReplyKey::Summary => "The thought that comes back as the history of the next step.",
+        ReplyKey::SelectedCube => "A colour when the action is done, otherwise none.",
+        ReplyKey::Mark => "The colour of the mark on one's own body, or none.",
+        ReplyKey::Identification => "The colour of one's own body as far as it is known.",
     };
     let mut properties = serde_json::Map::new();
-    for key in keys(family) {
-        let mut property = json!({ "type": "string", "description": description(key) });
-        match *key {
-            "action" => property["enum"] = json!(["w", "s", "a", "d", "done"]),
-            "selected_cube" => {
+    for key in keys {
+        let mut property = json!({ "type": "string", "description": description(*key) });
+        match key {
+            ReplyKey::Action => property["enum"] = json!(["w", "s", "a", "d", "done"]),
+            ReplyKey::SelectedCube | ReplyKey::Mark => {
                 let colors = Color::ALL.iter().map(|color| color.name());
                 property["enum"] = colors.chain(["none"]).collect();
             }
             _ => {}
         }
-        properties.insert((*key).to_owned(), property);
+        properties.insert(key.name().to_owned(), property);
     }
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": match family {
-            Family::CubeSelection => "Reply in E1 to E4",
-            Family::Exploration => "Reply in E5",
-        },
+        "title": title,
         "type": "object",
         "properties": properties,
-        "required": keys(family),
+        "required": names(keys),
         "additionalProperties": false,
     })
 }

@@ -25,6 +25,6 @@ impl Script for Frozen {
             summary: Some("Nothing happened.".to_owned()),
             identification: Some(words::identification(None)),
         };
-        Move { action: None, claim: None, selected: None, words }
+        Move { action: None, claim: None, selected: None, mark: None, words }
     }
 }

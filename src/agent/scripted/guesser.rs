@@ -13,8 +13,9 @@
 //! | MCR | low: what it sees by accident | low |
 
 use crate::agent::perception::View;
-use crate::agent::{Family, Observation, Task, Words};
+use crate::agent::{Observation, Task, Words};
 use crate::base::palette::Color;
+use crate::experiment::Experiment;
 use crate::trace::episode::Action;
 
 use super::chance::Chance;
@@ -27,21 +28,22 @@ const ROUND: i32 = 12;
 #[derive(Clone, Debug)]
 pub struct Guesser {
     chance: Chance,
-    family: Family,
+    experiment: Experiment,
     guess: Option<Color>,
 }
 
 impl Guesser {
     /// Guesses by the seed of `task`.
     pub fn new(task: &Task) -> Self {
-        Self { chance: Chance::new(task.seed), family: task.family, guess: None }
+        Self { chance: Chance::new(task.seed), experiment: task.experiment, guess: None }
     }
 
     /// One of the colours of cubes in view; any colour where there are none to be had.
     fn pick(&mut self, observation: &Observation) -> Option<Color> {
-        let mut colors = match self.family {
-            Family::CubeSelection => View::of(observation).cubes.iter().map(|cube| cube.color).collect(),
-            Family::Exploration => Color::ALL.to_vec(),
+        let mut colors: Vec<Color> = if self.experiment.asks_for_cube() {
+            View::of(observation).cubes.iter().map(|cube| cube.color).collect()
+        } else {
+            self.experiment.layout.palette.clone()
         };
         colors.sort();
         colors.dedup();
@@ -57,7 +59,7 @@ impl Script for Guesser {
             self.guess = self.pick(observation);
         }
         let action = if was_set || observation.remaining <= 1 { Action::Done } else { Action::TurnLeft };
-        let is_choice = action == Action::Done && self.family == Family::CubeSelection;
+        let is_choice = action == Action::Done && self.experiment.asks_for_cube();
         let words = Words {
             view_description: Some(
                 if self.guess.is_some() { "Something to choose from." } else { "Nothing to choose from." }.to_owned(),
@@ -66,6 +68,13 @@ impl Script for Guesser {
             summary: Some(if self.guess.is_some() { "I have chosen." } else { "I have not chosen." }.to_owned()),
             identification: Some(words::identification(self.guess)),
         };
-        Move { action: Some(action), claim: self.guess, selected: self.guess.filter(|_| is_choice), words }
+        // A mark is as good a guess as any.
+        Move {
+            action: Some(action),
+            claim: self.guess,
+            selected: self.guess.filter(|_| is_choice),
+            mark: self.guess,
+            words,
+        }
     }
 }

@@ -31,9 +31,10 @@ pub mod route;
 pub mod seeker;
 pub mod words;
 
-use crate::agent::{Agent, Decision, Family, Observation, Reply, Status, Task, Usage, Words};
+use crate::agent::{Agent, Decision, Observation, Reply, Status, Task, Usage, Words};
 use crate::base::names::names;
 use crate::base::palette::Color;
+use crate::experiment::Experiment;
 use crate::trace::episode::Action;
 
 /// The scripted agents.
@@ -89,7 +90,7 @@ impl Scripted {
             Self::Frozen => Box::new(frozen::Frozen),
             Self::Mimic => Box::new(seeker::Seeker::new(task, mimic::Mimic::default())),
         };
-        Box::new(Puppet { script, family: task.family })
+        Box::new(Puppet { script, experiment: task.experiment })
     }
 }
 
@@ -156,6 +157,8 @@ pub struct Move {
     pub claim: Option<Color>,
     /// `None` is `none`.
     pub selected: Option<Color>,
+    /// The mark on the own body; `None` is `none`.
+    pub mark: Option<Color>,
     /// The words around it.
     pub words: Words,
 }
@@ -169,20 +172,21 @@ pub trait Script {
 /// A script as an agent.
 struct Puppet {
     script: Box<dyn Script>,
-    family: Family,
+    experiment: Experiment,
 }
 
 impl Agent for Puppet {
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
-        let Move { action, claim, selected, words } = self.script.decide(observation);
+        let Move { action, claim, selected, mark, words } = self.script.decide(observation);
         let name = |color: Option<Color>, none: &'static str| color.map_or(none, Color::name).to_owned();
         let reply = Reply {
             status: Status::Ok,
             repairs: Vec::new(),
             action,
             self_color: Some(name(claim, "unknown")),
-            // The exploration prompt has no such key.
-            selected_cube: (self.family == Family::CubeSelection).then(|| name(selected, "none")),
+            // Not every prompt has these keys.
+            selected_cube: self.experiment.asks_for_cube().then(|| name(selected, "none")),
+            mark_report: self.experiment.asks_for_mark().then(|| name(mark, "none")),
             words,
             raw: None,
             usage: Usage::default(),

@@ -10,8 +10,9 @@
 //! | CR | high: it mostly claims at once |
 //! | MCR in E2 | 0 |
 
-use crate::agent::{Family, Observation, Task, Words};
+use crate::agent::{Observation, Task, Words};
 use crate::base::palette::Color;
+use crate::experiment::Experiment;
 use crate::trace::episode::Action;
 
 use super::chance::Chance;
@@ -21,13 +22,13 @@ use super::{Move, Script, words};
 #[derive(Clone, Debug)]
 pub struct Random {
     chance: Chance,
-    family: Family,
+    experiment: Experiment,
 }
 
 impl Random {
     /// Draws by the seed of `task`.
     pub fn new(task: &Task) -> Self {
-        Self { chance: Chance::new(task.seed), family: task.family }
+        Self { chance: Chance::new(task.seed), experiment: task.experiment }
     }
 
     /// A colour, or none as often as any one colour.
@@ -42,14 +43,15 @@ impl Script for Random {
     fn decide(&mut self, _: &Observation) -> Move {
         let action = self.chance.pick(&Action::ALL);
         let claim = self.color_or_none();
-        let selects = action == Some(Action::Done) && self.family == Family::CubeSelection;
+        let selects = action == Some(Action::Done) && self.experiment.asks_for_cube();
         let selected = if selects { self.chance.pick(&Color::ALL) } else { None };
+        let mark = if self.experiment.asks_for_mark() { self.color_or_none() } else { None };
         let words = Words {
             view_description: Some("I did not look.".to_owned()),
             reasoning: Some("Everything is left to chance.".to_owned()),
             summary: Some("Nothing gathered.".to_owned()),
             identification: Some(words::identification(claim)),
         };
-        Move { action, claim, selected, words }
+        Move { action, claim, selected, mark, words }
     }
 }

@@ -41,10 +41,18 @@ const OVER: (f64, f64) = (1.75, 1.95);
 /// Pixels of the trunk that can be told from noise.
 const LEAST: usize = 40;
 
+/// Where the head and the chest are, where a mark may show: heights above the floor and half of the width, m.
+const PATCHES: [((f64, f64), f64); 2] = [((1.52, 1.63), 0.06), ((1.15, 1.29), 0.07)];
+/// Pixels of a patch that can be told from noise, and its share of the place.
+const PATCH: (usize, f64) = (6, 0.4);
+/// Views that show the same patch before it is one.
+const SIGHTINGS: usize = 2;
+
 /// The tests so far.
 #[derive(Clone, Debug, Default)]
 pub struct Reflection {
     matches: Vec<Match>,
+    patches: Vec<Color>,
 }
 
 /// A part of the picture: rows and columns, the last ones excluded.
@@ -65,6 +73,9 @@ impl Reflection {
             }
             let color = room.mirrored(side, view.pose.place).and_then(|double| body_at(view, double));
             self.matches.extend(color.map(|color| Match { side, color, place: view.pose.place }));
+            if let (Some(color), Some(double)) = (color, room.mirrored(side, view.pose.place)) {
+                self.patches.extend(patch_at(view, double, color));
+            }
         }
     }
 
@@ -78,6 +89,14 @@ impl Reflection {
         let (count, color) = counts.pop()?;
         let agree = 3 * count >= 2 * self.matches.len();
         (count >= TESTS && agree && self.places(color) >= PLACES).then_some(color)
+    }
+
+    /// The colour of a patch on one's own body, once it was seen often enough; the one seen last where there are several.
+    pub fn own_mark(&self) -> Option<Color> {
+        let last = *self.patches.last()?;
+        let is_tested = self.own_color().is_some_and(|own| own != last);
+        let sightings = self.patches.iter().filter(|patch| **patch == last).count();
+        (is_tested && sightings >= SIGHTINGS).then_some(last)
     }
 
     /// How many tests have found a body.
@@ -119,6 +138,21 @@ fn body_at(view: &View, double: Place) -> Option<Color> {
     ];
     let alone = elsewhere.iter().all(|&beside| share_of(view, beside, color) < 0.4);
     (share > 0.6 && alone).then_some(color)
+}
+
+/// A colour on the head or the chest of the body at `double` that is not the body's.
+fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
+    let bearing = view.camera.bearing(double);
+    let (middle, scale) = (view.camera.column(bearing), view.camera.scale(bearing.ahead));
+    PATCHES.iter().find_map(|((low, high), half)| {
+        let row = |height: f64| view.camera.row(bearing.ahead, height);
+        let window =
+            Window { left: middle - half * scale, right: middle + half * scale, top: row(*high), bottom: row(*low) };
+        let pixels = colors(view, window);
+        let count = |color: Color| pixels.iter().filter(|found| **found == Some(color)).count();
+        let color = Color::ALL.into_iter().filter(|color| *color != body).max_by_key(|&color| (count(color), color))?;
+        (count(color) >= PATCH.0 && part(count(color), pixels.len()) >= PATCH.1).then_some(color)
+    })
 }
 
 /// The commonest colour in a window that is wholly in view, and its share of the pixels.

@@ -12,7 +12,7 @@
 //! Rule: it selects a cube only when it is at most one step away, except on the last step, where silence gains nothing.
 
 use crate::agent::perception::camera::{Place, Pose};
-use crate::agent::{Family, Observation, Task};
+use crate::agent::{Observation, Task};
 use crate::base::palette::Color;
 use crate::trace::episode::Action;
 
@@ -72,16 +72,16 @@ impl<C: Policy> Seeker<C> {
 
     /// The action of this step and the cube that it selects.
     fn act(&mut self, known: &Knowledge, belief: Belief, remaining: i32) -> (Action, Option<Color>) {
-        match self.task.family {
-            Family::Exploration => (self.explore(known, belief, remaining), None),
-            Family::CubeSelection => match self.choice(known, belief, remaining) {
-                choice if remaining <= 1 => (Action::Done, choice),
-                None => (self.look_for_mirror(known), None),
-                Some(color) => match known.cube(color) {
-                    None => (self.look_around(known), None),
-                    Some(cube) if self.has_claimed && is_near(known, cube) => (Action::Done, Some(color)),
-                    Some(cube) => (self.approach(known, cube), None),
-                },
+        if !self.task.experiment.asks_for_cube() {
+            return (self.explore(known, belief, remaining), None);
+        }
+        match self.choice(known, belief, remaining) {
+            choice if remaining <= 1 => (Action::Done, choice),
+            None => (self.look_for_mirror(known), None),
+            Some(color) => match known.cube(color) {
+                None => (self.look_around(known), None),
+                Some(cube) if self.has_claimed && is_near(known, cube) => (Action::Done, Some(color)),
+                Some(cube) => (self.approach(known, cube), None),
             },
         }
     }
@@ -150,8 +150,9 @@ impl<C: Policy> Script for Seeker<C> {
         let (action, selected) = self.act(&known, belief, observation.remaining);
         self.has_claimed |= belief.settled || self.guess.is_some();
         let words = words::of(&known, belief, action, selected);
+        let mark = self.task.experiment.asks_for_mark().then(|| self.policy.mark(&known)).flatten();
         self.known = Some(known);
-        Move { action: Some(action), claim: belief.claim, selected, words }
+        Move { action: Some(action), claim: belief.claim, selected, mark, words }
     }
 }
 

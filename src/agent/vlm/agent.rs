@@ -43,10 +43,10 @@ impl Agent for VlmAgent {
 
 impl VlmAgent {
     async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
-        let words = Prompt::of(self.task.family)
+        let words = Prompt::of(self.task.experiment)
             .and_then(|prompt| prompt.render(&self.task, observation))
             .map_err(|fault| self.vlm.halt(&format!("the prompt cannot be made: {fault}")))?;
-        let schema = reply::structure(self.task.family);
+        let schema = reply::structure(&self.task.experiment.reply);
         let dialect = self.vlm.choice.backend.dialect;
         // Pixels differ between machines, words do not: a cassette plays on any.
         let question = hash::of_bytes(dialect.body(&self.vlm.question(&words, &schema, "")).to_string().as_bytes());
@@ -99,7 +99,7 @@ impl VlmAgent {
                     completion_tokens: count(answer.completion_tokens),
                     cost_usd,
                 };
-                let reading = reply::read(&answer.text, self.task.family, answer.ending);
+                let reading = reply::read(&answer.text, &self.task.experiment.reply, answer.ending);
                 let reading = if answer.has_lone_surrogate { reading.with_surrogate_repaired() } else { reading };
                 Ok(Reply { model: answer.model, ..reading.into_reply(answer.text, usage) })
             }
@@ -114,6 +114,7 @@ fn without_decision(status: Status) -> Reply {
         action: None,
         self_color: None,
         selected_cube: None,
+        mark_report: None,
         words: Words::default(),
         raw: None,
         usage: Usage::default(),

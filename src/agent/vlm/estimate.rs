@@ -8,8 +8,9 @@ use super::model::TEMPERATURE;
 use super::models::{Choice, Contract};
 use super::wire_format::{Dialect, Question};
 use crate::agent::prompt::Prompt;
-use crate::agent::{Family, Observation, Task, reply};
+use crate::agent::{Observation, Task, reply};
 use crate::base::frame::Frame;
+use crate::experiment::Experiment;
 use crate::trace::episode::Action;
 
 /// Characters of a token of English words.
@@ -22,9 +23,9 @@ const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn ri
 ///
 /// # Errors
 /// A built-in prompt cannot be made, which a test rules out.
-pub fn prompt_tokens(choice: &Choice, family: Family, view: [u32; 2]) -> Result<u64, minijinja::Error> {
-    let words = Prompt::of(family)?.render(&task(family), &observation())?;
-    let schema = reply::structure(family);
+pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
+    let words = Prompt::of(experiment)?.render(&task(experiment), &observation())?;
+    let schema = reply::structure(&experiment.reply);
     let question = Question {
         model: &choice.model.id,
         system: &words.system,
@@ -60,9 +61,9 @@ pub fn frame_tokens(dialect: Dialect, [width, height]: [u32; 2]) -> u64 {
 }
 
 /// A task whose prompt is as long as any.
-fn task(family: Family) -> Task {
-    let stated_color = (family == Family::CubeSelection).then(|| "yellow".to_owned());
-    Task { family, stated_color, step_budget: 100, seed: 0 }
+fn task(experiment: Experiment) -> Task {
+    let stated_color = Some("yellow".to_owned());
+    Task { experiment, stated_color, step_budget: 100, seed: 0 }
 }
 
 fn observation() -> Observation {
@@ -80,7 +81,7 @@ fn observation() -> Observation {
 
 #[cfg(test)]
 mod tests {
-    use super::{Dialect, Family, frame_tokens, prompt_tokens};
+    use super::{Dialect, Experiment, frame_tokens, prompt_tokens};
     use crate::agent::vlm::models::{Contract, Models};
 
     #[test]
@@ -98,12 +99,12 @@ mod tests {
     fn words_frame_and_schema_are_counted() {
         let models = Models::load(None).unwrap();
         let mut choice = models.choose("Claude Sonnet 4.6", None).unwrap();
-        let tokens = |choice: &_, family, view| prompt_tokens(choice, family, view).unwrap();
-        let with_schema = tokens(&choice, Family::CubeSelection, [640, 480]);
+        let tokens = |choice: &_, experiment, view| prompt_tokens(choice, experiment, view).unwrap();
+        let with_schema = tokens(&choice, Experiment::E1, [640, 480]);
         // The words of the prompt are some 2200 characters.
         assert!((800..2_000).contains(&with_schema), "{with_schema}");
-        assert!(tokens(&choice, Family::CubeSelection, [64, 48]) < with_schema - 400);
+        assert!(tokens(&choice, Experiment::E1, [64, 48]) < with_schema - 400);
         choice.model.contract = Contract::Prompt;
-        assert!(tokens(&choice, Family::CubeSelection, [640, 480]) < with_schema - 100);
+        assert!(tokens(&choice, Experiment::E1, [640, 480]) < with_schema - 100);
     }
 }

@@ -12,7 +12,7 @@ use super::limits::{Account, Spend};
 use super::models::{Choice, Contract};
 use super::provider::Provider;
 use super::wire_format::{Answer, Question};
-use crate::agent::{Lost, prompt, reply};
+use crate::agent::{Lost, prompt};
 
 /// The sampling temperature (paper, Panel A).
 pub const TEMPERATURE: f64 = 0.2;
@@ -139,21 +139,15 @@ impl Vlm {
 
     /// What goes into recordings: everything that shapes the requests.
     pub fn description(&self) -> Value {
-        let mut description = serde_json::json!({
+        serde_json::json!({
             "model": self.choice.name,
             "id": self.choice.model.id,
             "backend": self.choice.model.backend,
             "contract": self.choice.model.contract.name(),
             "temperature": TEMPERATURE,
             "max_output_tokens": self.max_output_tokens,
-            "prompts": prompt::hashes(),
             "identification_version": crate::trace::identification::VERSION,
-        });
-        // The prompt alone asks for the shape otherwise, and no schema is sent.
-        if self.choice.model.contract == Contract::Schema {
-            description["reply_schemas"] = reply::structure_hashes();
-        }
-        description
+        })
     }
 
     /// What a body says, and what it cost.

@@ -5,6 +5,7 @@ pub mod check;
 pub mod compare;
 pub mod definitions;
 pub mod diff;
+pub mod experiments;
 pub mod figure;
 #[cfg(feature = "sim")]
 pub mod filmstrip;
@@ -61,6 +62,7 @@ pub enum Command {
     Sql(sql::SqlArgs),
     Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
+    Experiments(experiments::ExperimentsArgs),
     #[cfg(feature = "sim")]
     World(world::WorldArgs),
 }
@@ -98,6 +100,7 @@ impl Command {
             Self::Sql(args) => args.run(),
             Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
+            Self::Experiments(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::World(args) => args.run(),
         }

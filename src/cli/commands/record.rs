@@ -7,8 +7,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use serde_json::Value;
-
 use crate::agent::Player;
 use crate::agent::scripted::{Renamed, Scripted};
 use crate::base::escape::visible;
@@ -16,18 +14,20 @@ use crate::base::suggest::hint;
 use crate::cli::args::ThreadArgs;
 use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
 use crate::cli::exec::ExecArgs;
+use crate::cli::experiments;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
 use crate::record::error::StoreError;
+use crate::record::folder_lock;
 use crate::record::index::{Place, RecordingIndex};
+use crate::record::metadata::Recordings;
 use crate::record::plan::{Experiments, Key, Plan, Shard, Subject};
 use crate::record::run::{Recording, Settings, Tally};
 use crate::record::shares::Shares;
 use crate::record::store::Store;
-use crate::record::{folder_lock, metadata};
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
 
@@ -43,7 +43,8 @@ pub struct RecordArgs {
     /// exec:'CMD', a program of your own that takes and gives JSON lines
     #[arg(long, value_name = "AGENT")]
     agent: String,
-    /// The experiments: E1, E1..E5 or E1,E3
+    /// The experiments: E1, E1..E5, E1,E3, others that are built in such as mark (`mirrorstats experiments show`), or a
+    /// file of your own such as mine.toml
     #[arg(long, value_name = "LIST", default_value = "E1..E5")]
     experiment: Experiments,
     /// Seeds 1 to this for each experiment
@@ -115,7 +116,7 @@ impl RecordArgs {
             None => WorldConfig::default(),
         };
         let plan = Plan {
-            experiments: self.experiment.0.clone(),
+            experiments: experiments::asked(&self.experiment, &config)?,
             seeds: self.seeds,
             runs: self.runs,
             repeats: self.repeats,
@@ -126,7 +127,7 @@ impl RecordArgs {
         }
         let player = self.player()?;
         let subject = self.subject(player.as_ref());
-        let recording = self.recording(&config, player.as_ref())?;
+        let recording = self.recordings(&config, &plan, player.as_ref())?;
         let store = Store::open(&self.out, subject.clone(), recording).map_err(Failure::input)?;
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         stop_at_interrupt(stop, Arc::clone(&player))?;
@@ -141,7 +142,7 @@ impl RecordArgs {
             None => self.player()?,
         };
         let subject = self.subject(player.as_ref());
-        let recording = self.recording(config, player.as_ref())?;
+        let recording = self.recordings(config, plan, player.as_ref())?;
         let there = RecordingIndex::new(&self.out, subject.clone(), recording);
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| there.recorded(experiment))?;
@@ -171,7 +172,7 @@ impl RecordArgs {
         if todo.len() < planned.len() {
             player.resumes();
         }
-        let bar = Bar::new(player, subject, todo.len(), config.episode.steps);
+        let bar = Bar::new(player, subject, &todo, config);
         let shares = Shares::default();
         let start = Instant::now();
         let (progress, settings) = (&bar, self.settings(player));
@@ -227,9 +228,9 @@ impl RecordArgs {
     }
 
     /// What the traces say of how they were recorded.
-    fn recording(&self, config: &WorldConfig, player: &dyn Player) -> Result<Value, Failure> {
+    fn recordings(&self, config: &WorldConfig, plan: &Plan, player: &dyn Player) -> Result<Recordings, Failure> {
         let registered = self.plan.as_deref().map(|file| registration(file, config)).transpose()?;
-        Ok(metadata::recording(config, player, self.condition.as_deref(), registered.as_ref()))
+        Ok(Recordings::new(&plan.experiments, config, player, self.condition.as_deref(), registered.as_ref()))
     }
 
     /// Whose episodes they are.

@@ -6,10 +6,11 @@ use clap::ValueEnum as _;
 use comfy_table::{ContentArrangement, Table};
 use serde_json::{Value, json};
 
-use crate::agent::{Family, reply};
+use crate::agent::reply;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use crate::cli::text_table::listing;
+use crate::experiment::Experiment;
 use crate::trace::describe::SchemaDocument;
 use crate::trace::import;
 
@@ -44,8 +45,8 @@ impl Name {
         match self {
             Self::Trace => json!(SchemaDocument::current()),
             Self::Step => import::schema::document(),
-            Self::ReplyCubes => reply::schema(Family::CubeSelection),
-            Self::ReplyExploration => reply::schema(Family::Exploration),
+            Self::ReplyCubes => reply::schema("Reply in E1 to E4", &Experiment::E1.reply),
+            Self::ReplyExploration => reply::schema("Reply in E5", &Experiment::E5.reply),
         }
     }
 }

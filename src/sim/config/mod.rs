@@ -16,6 +16,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::base::hash;
+use crate::experiment::Experiment;
+use crate::experiment::spec::{Cubes, Others};
 
 const DEFAULT: &str = include_str!("../../../assets/world/default.toml");
 
@@ -117,6 +119,12 @@ pub struct EyeConfig {
     pub height_px: u32,
     /// Samples per pixel when drawing.
     pub samples: u32,
+    /// Slices of a round part when drawing, about its axis.
+    pub slices: u32,
+    /// Slices along its axis.
+    pub stacks: u32,
+    /// Divisions of a flat part.
+    pub quads: u32,
 }
 
 /// The light.
@@ -175,6 +183,8 @@ pub struct ClutterConfig {
     pub edges: Vec<f64>,
     /// Of a hundred cubes, those that stand before the mirror.
     pub before_mirror_percent: u32,
+    /// Of a hundred cubes, those that have another on top.
+    pub stack_percent: u32,
     /// Between the mirror's wall and the centre of a cube before it at most, m.
     pub mirror_distance: f64,
 }
@@ -259,6 +269,28 @@ impl WorldConfig {
         }
     }
 
+    /// The world as an experiment has it: what the experiment says of lengths and counts lies over this.
+    #[must_use]
+    pub fn of(&self, experiment: Experiment) -> Self {
+        let mut world = self.clone();
+        let put = |place: &mut u32, value: Option<u32>| *place = value.unwrap_or(*place);
+        put(&mut world.episode.steps, experiment.steps);
+        if let Some(millimetres) = experiment.step_length_mm {
+            world.body.step_length = metres(millimetres);
+        }
+        let Others { least, most, twin_percent, .. } = experiment.layout.others;
+        put(&mut world.others.least, least);
+        put(&mut world.others.most, most);
+        put(&mut world.others.twin_percent, twin_percent);
+        world.others.least = world.others.least.min(world.others.most);
+        if let Cubes::Clutter { least, most } = experiment.layout.cubes {
+            put(&mut world.clutter.least, least);
+            put(&mut world.clutter.most, most);
+            world.clutter.least = world.clutter.least.min(world.clutter.most);
+        }
+        world
+    }
+
     /// SHA-256 of the values, 64 hexadecimal digits: the same for files that say the same in other words.
     pub fn hash(&self) -> String {
         hash::of_bytes(serde_json::json!(self).to_string().as_bytes())
@@ -268,6 +300,11 @@ impl WorldConfig {
     pub fn view_px(&self) -> usize {
         self.eye.width as usize * self.eye.height_px as usize
     }
+}
+
+/// A length in metres.
+pub fn metres(millimetres: u32) -> f64 {
+    f64::from(millimetres) / 1000.0
 }
 
 #[cfg(test)]

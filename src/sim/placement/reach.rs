@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 use super::super::config::WorldConfig;
 use super::super::floor::FloorPlan;
 use super::super::scene::{Cube, Scene};
+use crate::experiment::spec::Cubes;
 
 /// Between two points of the lattice that stands for the floor, m.
 const LATTICE: f64 = 0.4;
@@ -12,30 +13,55 @@ const LATTICE: f64 = 0.4;
 /// A body sees itself well from no further than this from the mirror, m.
 const NEAR_ENOUGH: f64 = 3.0;
 
-/// A cube lower than this leaves the upper body in the mirror, m.
-const LOW_ENOUGH: f64 = 0.9;
+/// Heights of the body at which it is looked for in the mirror, m above the floor, and places across it, m.
+const HEIGHTS: [f64; 5] = [0.3, 0.6, 0.9, 1.15, 1.4];
+const ACROSS: [f64; 3] = [-0.16, 0.0, 0.16];
+
+/// What share of the body shows where one can identify oneself.
+const ENOUGH: f64 = 0.75;
 
 /// Whether the agent can walk to a place before the mirror with its reflection clear, and to each candidate, within a
-/// third of the episode each.
+/// third of the episode each; and whether clutter, where there is any, hides half of the body or more from at least half
+/// of the places before the mirror (paper, section 3: mirror evidence in E5 is partial or occluded).
 pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> bool {
     let steps = lengths(scene, plan);
     let budget = f64::from(config.episode.steps) / 3.0 * config.body.step_length;
     let near: Vec<[f64; 2]> = steps.iter().filter(|(_, length)| *length <= budget).map(|(spot, _)| *spot).collect();
-    let sees_itself = near.iter().any(|spot| shows_itself(config, scene, *spot));
+    let shares: Vec<f64> = near.iter().filter_map(|spot| share_shown(config, scene, *spot)).collect();
+    let hidden = shares.iter().filter(|share| **share <= 0.5).count();
+    let has_clutter = matches!(scene.experiment.layout.cubes, Cubes::Clutter { .. }) && !scene.cubes.is_empty();
     let reaches =
         |cube: &Cube| near.iter().any(|spot| cube.square().distance(*spot) <= plan.radius + config.body.step_length);
-    sees_itself && (!scene.experiment.has_candidates() || scene.cubes.iter().all(reaches))
+    shares.iter().any(|share| *share >= ENOUGH)
+        && (!has_clutter || 2 * hidden >= shares.len())
+        && (!scene.experiment.has_candidates() || scene.cubes.iter().all(reaches))
 }
 
-/// Whether one who stands there and faces the mirror squarely has the upper body in it.
-fn shows_itself(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> bool {
+/// What share of the body one who stands there and faces the mirror squarely sees of it; `None` where that place is not
+/// before the mirror, or too far from it.
+fn share_shown(config: &WorldConfig, scene: &Scene, spot: [f64; 2]) -> Option<f64> {
     let mirror = scene.mirror;
     let away = mirror.distance(spot, config);
     let is_before = mirror.aside(spot).abs() <= config.mirror.width / 2.0 - 0.3 && away <= NEAR_ENOUGH;
-    is_before
-        && scene.cubes.iter().filter(|cube| cube.top() > LOW_ENOUGH).all(|cube| {
-            let beside = (mirror.aside([cube.x, cube.y]) - mirror.aside(spot)).abs() >= cube.edge / 2.0 + 0.3;
-            beside || mirror.distance([cube.x, cube.y], config) > away
+    let points = || ACROSS.into_iter().flat_map(|across| HEIGHTS.into_iter().map(move |height| [across, height]));
+    let hides = |cube: &Cube, point: [f64; 2]| is_hidden(config, scene, cube, spot, point);
+    let shown = points().filter(|point| !scene.cubes.iter().any(|cube| hides(cube, *point))).count();
+    #[expect(clippy::cast_precision_loss, reason = "a few points")]
+    is_before.then(|| shown as f64 / points().count() as f64)
+}
+
+/// Whether a cube hides a point of the body, at this place across it and this height, from one who looks into the mirror:
+/// on the way to the mirror, or on the way back from it.
+fn is_hidden(config: &WorldConfig, scene: &Scene, cube: &Cube, spot: [f64; 2], [across, height]: [f64; 2]) -> bool {
+    let mirror = scene.mirror;
+    let (away, depth) = (mirror.distance(spot, config), mirror.distance([cube.x, cube.y], config));
+    let aside = mirror.aside([cube.x, cube.y]) - mirror.aside(spot);
+    let eye = config.eye.height;
+    depth < away
+        && [away - depth, away + depth].into_iter().any(|way| {
+            let part = way / (2.0 * away);
+            let passes = [part * across, eye + part * (height - eye)];
+            (passes[0] - aside).abs() <= cube.edge / 2.0 && (cube.base..=cube.top()).contains(&passes[1])
         })
 }
 

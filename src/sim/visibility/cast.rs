@@ -1,9 +1,9 @@
-//! The two passes over the view, a row at a time, each part within its own rectangle of pixels.
+//! The looks over the view, direct and through each pane, a row at a time, each part within its own rectangle of pixels.
 
-use super::super::model::{Item, Stage};
+use super::super::model::{Item, Look, Stage};
 use super::super::world::World;
-use super::shape::{Part, Rectangle, Solid, solid};
-use super::view::{Shown, View, dot, minus};
+use super::shape::{Part, Rectangle, solid};
+use super::view::{Shown, View};
 
 /// A part and where it can be seen.
 struct Candidate {
@@ -11,7 +11,7 @@ struct Candidate {
     rectangle: Rectangle,
 }
 
-/// One of the two views, and what can be in it.
+/// One of the looks, and what can be in it.
 struct Pass {
     view: View,
     candidates: Vec<Candidate>,
@@ -21,53 +21,44 @@ struct Pass {
 /// Calls `each` with the codes of every row, from the top.
 pub(super) fn rows(world: &World, width: usize, height: usize, mut each: impl FnMut(&[u8])) {
     let view = View::of_eye(world, width, height);
-    let stage = world.stage();
-    let mut direct = Pass::new(view, parts(stage));
-    let mut reflected = mirrored(&view, stage).map(|view| {
-        let parts = parts(stage).into_iter().filter(|part| part.item != Item::Mirror).collect();
-        Pass::new(view, parts)
-    });
-    let mirror = Shown::Mirror.code();
+    let mut direct = Pass::new(view, world.stage());
+    let mut beyond: Vec<(usize, Pass)> = world
+        .beyond()
+        .iter()
+        .enumerate()
+        .filter(|(at, _)| direct.candidates.iter().any(|candidate| candidate.part.code == pane_code(*at)))
+        .map(|(at, stage)| (at, Pass::new(view.through(world, &world.scene().panes[at]), stage)))
+        .collect();
     let mut row = vec![0; width];
     for y in 0..height {
-        row.fill(Shown::Room.code());
-        direct.paint(y, &mut row, |part| part.code_direct, |_| true);
-        if let Some(pass) = &mut reflected
-            && row.contains(&mirror)
-        {
-            pass.paint(y, &mut row, |part| part.code_reflected, is_of_mirror);
+        row.fill(Shown::Direct(Item::Room).code());
+        direct.paint(y, &mut row, |_| true);
+        for (at, pass) in &mut beyond {
+            if row.contains(&pane_code(*at)) {
+                pass.paint(y, &mut row, |code| Shown::of_code(code).pane() == Some(*at));
+            }
         }
         each(&row);
     }
 }
 
-/// Whether a pixel is of the mirror, with whatever has been found in it.
-fn is_of_mirror(code: u8) -> bool {
-    matches!(Shown::of_code(code), Shown::Mirror | Shown::Reflected(_))
+fn pane_code(pane: usize) -> u8 {
+    Shown::Through(pane, Item::Room).code()
 }
 
-/// The view by way of the mirror, where there is a mirror and the eye is before it.
-fn mirrored(view: &View, stage: &Stage) -> Option<View> {
-    let mirror = stage.items().iter().position(|item| *item == Item::Mirror).filter(|geom| stage.is_shown(*geom))?;
-    let Solid::Box { center, axes, .. } = solid(stage, mirror) else { return None };
-    (dot(minus(view.origin, center), axes[2]) > 0.0).then(|| view.reflected(center, axes[2]))
-}
-
+/// What can be seen of a stage.
 fn parts(stage: &Stage) -> Vec<Part> {
     let shown = stage.items().iter().enumerate().filter(|(geom, item)| **item != Item::Room && stage.is_shown(*geom));
-    shown
-        .map(|(geom, item)| Part {
-            item: *item,
-            code_direct: Shown::Direct(*item).code(),
-            code_reflected: Shown::Reflected(*item).code(),
-            solid: solid(stage, geom),
-        })
-        .collect()
+    let code = |item: Item| match stage.look() {
+        Look::Direct => Shown::Direct(item).code(),
+        Look::Through(pane) => Shown::Through(pane, item).code(),
+    };
+    shown.map(|(geom, item)| Part { code: code(*item), solid: solid(stage, geom) }).collect()
 }
 
 impl Pass {
-    fn new(view: View, parts: Vec<Part>) -> Self {
-        let candidates = parts
+    fn new(view: View, stage: &Stage) -> Self {
+        let candidates = parts(stage)
             .into_iter()
             .filter_map(|part| Some(Candidate { part, rectangle: part.solid.rectangle(&view)? }))
             .collect();
@@ -75,7 +66,7 @@ impl Pass {
     }
 
     /// Puts the code of the nearest part over each pixel of a row that is open to it.
-    fn paint(&mut self, y: usize, row: &mut [u8], code: impl Fn(&Part) -> u8, is_open: impl Fn(u8) -> bool) {
+    fn paint(&mut self, y: usize, row: &mut [u8], is_open: impl Fn(u8) -> bool) {
         self.depths.fill(f64::INFINITY);
         let view = self.view;
         let in_row = |candidate: &&Candidate| (candidate.rectangle.top..candidate.rectangle.bottom).contains(&y);
@@ -87,7 +78,7 @@ impl Pass {
                     && met < *depth
                 {
                     *depth = met;
-                    *pixel = code(part);
+                    *pixel = part.code;
                 }
             }
         }

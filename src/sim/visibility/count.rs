@@ -4,9 +4,10 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::super::model::Item;
-use super::super::scene::Scene;
+use super::super::scene::{HungPane, Scene};
 use super::view::Shown;
 use crate::base::palette::Color;
+use crate::experiment::spec::PaneKind;
 
 /// What the eye could see at one step: pixels of the view, out of `view_px`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -15,9 +16,9 @@ use crate::base::palette::Color;
 pub struct Visibility {
     /// Pixels of the view.
     pub view_px: u32,
-    /// Of the mirror's surface, whatever is seen in it.
+    /// Of all panes, whatever is seen in them.
     pub mirror_px: u32,
-    /// Of the own body by way of the mirror.
+    /// Of the own body by way of a mirror, in whatever colour it shows it; marks on it are part of it.
     pub self_px: u32,
     /// Of the own body directly; the eye is placed so that this is always 0.
     pub self_direct_px: u32,
@@ -29,6 +30,39 @@ pub struct Visibility {
     pub others: Vec<Sighting>,
     /// Each cube, in the order of the scene.
     pub cubes: Vec<CubeSighting>,
+    /// Of marks on the own body by way of a mirror.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub mark_px: u32,
+    /// Of bodies that a pane alone shows: in place of the own one, or behind a window.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub double_px: u32,
+    /// Each mark, in the order of the scene.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub marks: Vec<Sighting>,
+    /// Each pane, in the order of the scene, where there are several or one that is no plain mirror.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub panes: Vec<PaneSighting>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+const fn is_zero(value: &u32) -> bool {
+    *value == 0
+}
+
+/// How much of a pane is in view, and what it shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PaneSighting {
+    /// Of its surface, whatever is seen in it.
+    pub px: u32,
+    /// Of the own body in it, marks on it included.
+    pub self_px: u32,
+    /// Of other agents of the room in it.
+    pub other_px: u32,
+    /// Of the body that it alone shows.
+    pub double_px: u32,
+    /// Of marks on the own body in it.
+    pub mark_px: u32,
 }
 
 /// How much of another agent is in view.
@@ -48,26 +82,77 @@ pub type CubeSighting = Sighting;
 
 /// The counts of a tally of codes.
 pub(super) fn of_tally(tally: &[u32; 256], scene: &Scene) -> Visibility {
-    let count = |shown: Shown| tally[usize::from(shown.code())];
-    let sighting = |item: Item, color: Color| Sighting {
-        color,
-        direct_px: count(Shown::Direct(item)),
-        mirror_px: count(Shown::Reflected(item)),
-    };
+    let counts = Counts { tally, scene };
     let others: Vec<Sighting> =
-        scene.others.iter().enumerate().map(|(at, other)| sighting(Item::Agent(at + 1), other.color)).collect();
+        scene.others.iter().enumerate().map(|(at, other)| counts.body(at + 1, other.color)).collect();
     let cubes: Vec<CubeSighting> =
-        scene.cubes.iter().enumerate().map(|(at, cube)| sighting(Item::Cube(at), cube.color)).collect();
-    let own = sighting(Item::Agent(0), scene.body_color);
-    let mirrored = |sightings: &[Sighting]| sightings.iter().map(|sighting| sighting.mirror_px).sum::<u32>();
+        scene.cubes.iter().enumerate().map(|(at, cube)| counts.sighting(Item::Cube(at), cube.color)).collect();
+    let marks: Vec<Sighting> =
+        scene.marks.iter().enumerate().map(|(at, mark)| counts.sighting(Item::Mark(at), mark.color)).collect();
+    let panes: Vec<PaneSighting> = (0..scene.panes.len()).map(|pane| counts.pane(pane)).collect();
+    let own = counts.body(0, scene.body_color);
+    let sum = |part: fn(&PaneSighting) -> u32| panes.iter().map(part).sum::<u32>();
+    let is_plain = matches!(scene.panes.as_slice(), [] | [HungPane { kind: PaneKind::Mirror, .. }]);
     Visibility {
         view_px: tally.iter().sum(),
-        mirror_px: count(Shown::Mirror) + own.mirror_px + mirrored(&others) + mirrored(&cubes),
+        mirror_px: sum(|pane| pane.px),
         self_px: own.mirror_px,
         self_direct_px: own.direct_px,
-        other_px: mirrored(&others),
+        other_px: sum(|pane| pane.other_px),
         direct_other_px: others.iter().map(|other| other.direct_px).sum(),
         others,
         cubes,
+        mark_px: sum(|pane| pane.mark_px),
+        double_px: sum(|pane| pane.double_px),
+        marks,
+        panes: if is_plain { Vec::new() } else { panes },
+    }
+}
+
+/// A tally, and what its codes are of.
+struct Counts<'a> {
+    tally: &'a [u32; 256],
+    scene: &'a Scene,
+}
+
+impl Counts<'_> {
+    fn of(&self, shown: Shown) -> u32 {
+        self.tally[usize::from(shown.code())]
+    }
+
+    fn sighting(&self, item: Item, color: Color) -> Sighting {
+        let through = (0..self.scene.panes.len()).map(|pane| self.of(Shown::Through(pane, item)));
+        Sighting { color, direct_px: self.of(Shown::Direct(item)), mirror_px: through.sum() }
+    }
+
+    /// Marks of a wearer.
+    fn marks(&self, wearer: usize) -> impl Iterator<Item = Item> {
+        let marks = self.scene.marks.iter().enumerate().filter(move |(_, mark)| mark.wearer == wearer);
+        marks.map(|(at, _)| Item::Mark(at))
+    }
+
+    /// A body with its marks.
+    fn body(&self, agent: usize, color: Color) -> Sighting {
+        let parts = self.marks(agent).chain([Item::Agent(agent)]).map(|item| self.sighting(item, color));
+        parts.fold(Sighting { color, direct_px: 0, mirror_px: 0 }, |sum, part| Sighting {
+            color,
+            direct_px: sum.direct_px + part.direct_px,
+            mirror_px: sum.mirror_px + part.mirror_px,
+        })
+    }
+
+    fn pane(&self, pane: usize) -> PaneSighting {
+        let through = |item: Item| self.of(Shown::Through(pane, item));
+        let body = |agent: usize| through(Item::Agent(agent)) + self.marks(agent).map(through).sum::<u32>();
+        let (self_px, double_px) = (body(0), through(Item::Double));
+        let other_px = (1..=self.scene.others.len()).map(body).sum::<u32>();
+        let cubes = (0..self.scene.cubes.len()).map(|at| through(Item::Cube(at))).sum::<u32>();
+        PaneSighting {
+            px: through(Item::Room) + self_px + other_px + double_px + cubes,
+            self_px,
+            other_px,
+            double_px,
+            mark_px: self.marks(0).map(through).sum(),
+        }
     }
 }

@@ -1,8 +1,9 @@
 //! Ground truth: what each pixel of the eye's view shows, by casting its ray.
 //!
-//! A ray goes from the eye through the middle of a pixel to the nearest surface. Where that is the mirror, it goes on
-//! from the mirror: all reflected rays of a plane start from one point, the eye's own mirror image, so that the second
-//! pass is another view over the same pixels.
+//! A ray goes from the eye through the middle of a pixel to the nearest surface. Where that is a pane, it goes on from
+//! there: all rays through a pane start from one point ([`super::passage`]), so that each pane is another view over the
+//! same pixels, of a stage with the bodies that it shows, as late as it shows them. A window is a view into the same
+//! room from further back, so that there too the walls are what is seen where nothing else is.
 //!
 //! Rule: visibility is geometry alone, in closed forms, at the full size of the view. It needs no picture and misses
 //! nothing that a picture shows. The own body is not left out of the direct view: that it never shows there is what a
@@ -13,10 +14,10 @@ mod count;
 mod shape;
 mod view;
 
-pub use count::{CubeSighting, Sighting, Visibility};
+pub use count::{CubeSighting, PaneSighting, Sighting, Visibility};
 pub use view::Shown;
 
-use super::model::{ModelError, Paint, Stage};
+use super::model::{ModelError, Paint};
 use super::world::World;
 
 /// What every pixel shows, row by row from the top.
@@ -52,12 +53,9 @@ impl World {
 /// Counts what the eye could see.
 fn take(world: &World) -> Visibility {
     let mut tally = [0_u32; 256];
-    let [width, height] = [world.config().eye.width as usize, world.config().eye.height_px as usize];
-    cast::rows(world, width, height, |row| {
-        for code in row {
-            tally[usize::from(*code)] += 1;
-        }
-    });
+    for code in &world.labels().codes {
+        tally[usize::from(*code)] += 1;
+    }
     count::of_tally(&tally, world.scene())
 }
 
@@ -73,7 +71,6 @@ pub fn labels(world: &World, width: usize, height: usize) -> LabelImage {
 /// # Errors
 /// When MuJoCo refuses the model.
 pub fn labels_by_mujoco(world: &World, width: usize, height: usize) -> Result<LabelImage, ModelError> {
-    let mut stage = Stage::new(world.config(), Paint::Lit, world.scene())?;
-    stage.pose(world.config(), &world.figures());
-    Ok(view::by_mujoco(world, &mut stage, width, height))
+    let mut stages = world.stages(Paint::Lit)?;
+    Ok(view::by_mujoco(world, &mut stages, width, height))
 }

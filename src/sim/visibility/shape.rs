@@ -3,15 +3,14 @@
 //! Rule: a rectangle of pixels may be too large, never too small; a ray inside of something meets it from inside, as
 //! MuJoCo's rays do.
 
-use super::super::model::{Item, Stage};
+use super::super::model::Stage;
 use super::view::{Vector, View, dot, minus, plus};
 
 /// One convex part of a thing.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Part {
-    pub item: Item,
-    pub code_direct: u8,
-    pub code_reflected: u8,
+    /// Of what it is part of, as its look sees it.
+    pub code: u8,
     pub solid: Solid,
 }
 
@@ -19,7 +18,7 @@ pub(super) struct Part {
 pub(super) enum Solid {
     /// A sphere where `half` is 0.
     Capsule { center: Vector, axis: Vector, half: f64, radius: f64 },
-    /// Also the mirror, as a box of no depth.
+    /// Also a pane, of which only the face can be met.
     Box { center: Vector, axes: [Vector; 3], halves: Vector },
 }
 
@@ -32,7 +31,7 @@ pub(super) struct Rectangle {
     pub bottom: usize,
 }
 
-/// The solid of a geom: a sphere, a capsule, a box, or the mirror's plane.
+/// The solid of a geom: a sphere, a capsule or a box.
 pub(super) fn solid(stage: &Stage, geom: usize) -> Solid {
     use mujoco_rs::prelude::MjtGeomBase as Kind;
     let center = stage.data.geom_xpos()[geom];
@@ -42,7 +41,6 @@ pub(super) fn solid(stage: &Stage, geom: usize) -> Solid {
     match stage.model().geom_type()[geom] {
         Kind::mjGEOM_SPHERE => Solid::Capsule { center, axis: axes[2], half: 0.0, radius: size[0] },
         Kind::mjGEOM_CAPSULE => Solid::Capsule { center, axis: axes[2], half: size[1], radius: size[0] },
-        Kind::mjGEOM_PLANE => Solid::Box { center, axes, halves: [size[0], size[1], 0.0] },
         _ => Solid::Box { center, axes, halves: size },
     }
 }

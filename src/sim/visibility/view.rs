@@ -2,60 +2,68 @@
 
 use super::super::angle::sine_cosine;
 use super::super::model::{AGENTS, Item, Stage, group};
+use super::super::passage;
+use super::super::scene::{HungPane, MOST_CUBES};
 use super::super::world::World;
 use super::LabelImage;
+use crate::experiment::spec::{MOST_MARKS, PaneKind};
 
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Shown {
-    /// A wall, the floor or the ceiling, directly.
-    Room,
-    /// The mirror, and in it a wall, the floor or the ceiling.
-    Mirror,
-    /// An agent (0 is the own body) or a cube.
+    /// Something that the eye sees directly: the room, a body, a cube, a mark.
     Direct(Item),
-    /// The same by way of the mirror.
-    Reflected(Item),
+    /// The same through the pane of this number.
+    Through(usize, Item),
 }
 
-const MIRROR: u8 = 1;
-const DIRECT: u8 = 2;
-const REFLECTED: u8 = 64;
+/// Codes of what is seen directly, and of what is seen through each pane: the room, then bodies, cubes, marks, the double.
+const CODES: usize = 1 + AGENTS + MOST_CUBES + MOST_MARKS + 1;
 
 impl Shown {
     /// One byte for it.
     pub fn code(self) -> u8 {
-        match self {
-            Self::Room | Self::Direct(Item::Room) => 0,
-            Self::Mirror | Self::Direct(Item::Mirror) | Self::Reflected(Item::Room | Item::Mirror) => MIRROR,
-            Self::Direct(item) => DIRECT + index(item),
-            Self::Reflected(item) => REFLECTED + index(item),
-        }
+        let code = match self {
+            Self::Direct(Item::Pane(pane)) => CODES * (1 + pane),
+            Self::Direct(item) => index(item),
+            Self::Through(pane, item) => CODES * (1 + pane) + index(item),
+        };
+        u8::try_from(code).expect("a world holds fewer than 256 things to be seen")
     }
 
     /// What a byte of [`Shown::code`] stands for.
     pub fn of_code(code: u8) -> Self {
-        match code {
-            0 => Self::Room,
-            MIRROR => Self::Mirror,
-            DIRECT..REFLECTED => Self::Direct(of_index(code - DIRECT)),
-            _ => Self::Reflected(of_index(code - REFLECTED)),
+        let (look, at) = (usize::from(code) / CODES, usize::from(code) % CODES);
+        look.checked_sub(1).map_or(Self::Direct(of_index(at)), |pane| Self::Through(pane, of_index(at)))
+    }
+
+    /// The pane through which it is seen.
+    pub const fn pane(self) -> Option<usize> {
+        match self {
+            Self::Direct(_) => None,
+            Self::Through(pane, _) => Some(pane),
         }
     }
 }
 
-fn index(item: Item) -> u8 {
-    let at = match item {
-        Item::Agent(agent) => agent,
-        Item::Cube(cube) => AGENTS + cube,
-        Item::Room | Item::Mirror => 0,
-    };
-    u8::try_from(at).expect("a world holds fewer than 60 things")
+const fn index(item: Item) -> usize {
+    match item {
+        Item::Room | Item::Pane(_) => 0,
+        Item::Agent(agent) => 1 + agent,
+        Item::Cube(cube) => 1 + AGENTS + cube,
+        Item::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
+        Item::Double => CODES - 1,
+    }
 }
 
-fn of_index(index: u8) -> Item {
-    let at = usize::from(index);
-    at.checked_sub(AGENTS).map_or(Item::Agent(at), Item::Cube)
+const fn of_index(at: usize) -> Item {
+    match at {
+        0 => Item::Room,
+        _ if at < 1 + AGENTS => Item::Agent(at - 1),
+        _ if at < 1 + AGENTS + MOST_CUBES => Item::Cube(at - 1 - AGENTS),
+        _ if at < CODES - 1 => Item::Mark(at - 1 - AGENTS - MOST_CUBES),
+        _ => Item::Double,
+    }
 }
 
 pub(super) type Vector = [f64; 3];
@@ -113,8 +121,20 @@ impl View {
         }
     }
 
+    /// The view through a pane: from behind a mirror, that of the eye's mirror image; through a window, that of an eye as
+    /// far back as the second room is away.
+    pub fn through(&self, world: &World, pane: &HungPane) -> Self {
+        let [out_x, out_y] = pane.place.heading().direction();
+        let [x, y] = pane.place.center(world.config());
+        if pane.kind == PaneKind::Window {
+            let back = [-out_x, -out_y, 0.0];
+            return Self { origin: plus(self.origin, passage::shift(world), back), ..*self };
+        }
+        self.reflected([x, y, pane.center_height], [-out_x, -out_y, 0.0])
+    }
+
     /// The view from behind a mirror: that of the eye's mirror image.
-    pub fn reflected(&self, point: Vector, normal: Vector) -> Self {
+    fn reflected(&self, point: Vector, normal: Vector) -> Self {
         let turn = |direction: Vector| plus(direction, -2.0 * dot(direction, normal), normal);
         let away = dot(minus(self.origin, point), normal);
         Self {
@@ -132,19 +152,22 @@ impl View {
     }
 }
 
-/// Labels by MuJoCo's own rays, the mirror by a second ray from where the first met it.
-pub(super) fn by_mujoco(world: &World, stage: &mut Stage, width: usize, height: usize) -> LabelImage {
+/// Labels by MuJoCo's own rays, through a pane by a second ray from where the first met it.
+pub(super) fn by_mujoco(world: &World, stages: &mut (Stage, Vec<Stage>), width: usize, height: usize) -> LabelImage {
     let view = View::of_eye(world, width, height);
     let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
+    let (stage, beyond) = stages;
     let mut codes = Vec::with_capacity(width * height);
     for y in 0..height {
         for x in 0..width {
             let ray = view.ray(x, y);
             let (geom, distance) = stage.data.ray(&view.origin, &ray, Some(&all), true, None, None);
-            let first = geom.map_or(Item::Room, |geom| stage.items()[geom]);
-            let shown = match (first, geom) {
-                (Item::Mirror, Some(mirror)) => Shown::Reflected(beyond(stage, mirror, &view, ray, distance)),
-                (item, _) => Shown::Direct(item),
+            let shown = match geom.map_or(Item::Room, |geom| stage.items()[geom]) {
+                Item::Pane(pane) => {
+                    let met = plus(view.origin, distance, ray);
+                    Shown::Through(pane, onwards(world, &mut beyond[pane], pane, met, ray))
+                }
+                item => Shown::Direct(item),
             };
             codes.push(shown.code());
         }
@@ -152,14 +175,18 @@ pub(super) fn by_mujoco(world: &World, stage: &mut Stage, width: usize, height: 
     LabelImage { width, height, codes }
 }
 
-fn beyond(stage: &mut Stage, mirror: usize, view: &View, ray: Vector, distance: f64) -> Item {
-    let rotation = stage.data.geom_xmat()[mirror];
-    let normal = [rotation[2], rotation[5], rotation[8]];
-    let from = plus(view.origin, distance, ray);
-    let onwards = plus(ray, -2.0 * dot(ray, normal), normal);
+/// What a ray meets that has met a pane.
+fn onwards(world: &World, stage: &mut Stage, pane: usize, met: Vector, ray: Vector) -> Item {
+    let hung = &world.scene().panes[pane];
+    let [out_x, out_y] = hung.place.heading().direction();
+    let out = [out_x, out_y, 0.0];
+    let (from, ray) = match hung.kind {
+        PaneKind::Window => (plus(met, -passage::shift(world), out), ray),
+        _ => (met, plus(ray, -2.0 * dot(ray, out), out)),
+    };
     let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
-    let from = plus(from, 1e-9, onwards);
-    let (geom, _) = stage.data.ray(&from, &onwards, Some(&all), true, None, None);
+    let from = plus(from, 1e-9, ray);
+    let (geom, _) = stage.data.ray(&from, &ray, Some(&all), true, None, None);
     geom.map_or(Item::Room, |geom| stage.items()[geom])
 }
 
@@ -174,13 +201,16 @@ fn groups(shown: &[i32]) -> [u8; 6] {
 #[cfg(test)]
 mod tests {
     use super::super::super::scene::MOST_CUBES;
-    use super::{AGENTS, Item, Shown};
+    use super::{AGENTS, Item, MOST_MARKS, Shown};
+    use crate::experiment::spec::MOST_PANES;
 
     #[test]
     fn every_code_comes_back() {
-        let items = (0..AGENTS).map(Item::Agent).chain((0..MOST_CUBES).map(Item::Cube));
-        let shown = items.flat_map(|item| [Shown::Direct(item), Shown::Reflected(item)]);
-        for shown in shown.chain([Shown::Room, Shown::Mirror]) {
+        let bodies = (0..AGENTS).map(Item::Agent).chain([Item::Room, Item::Double]);
+        let items: Vec<Item> =
+            bodies.chain((0..MOST_CUBES).map(Item::Cube)).chain((0..MOST_MARKS).map(Item::Mark)).collect();
+        let through = (0..MOST_PANES).flat_map(|pane| items.iter().map(move |item| Shown::Through(pane, *item)));
+        for shown in items.iter().map(|item| Shown::Direct(*item)).chain(through) {
             assert_eq!(Shown::of_code(shown.code()), shown);
         }
     }

@@ -55,8 +55,14 @@ impl OptionalColumns {
     pub fn recorded(recording: &serde_json::Value) -> Self {
         let agent = &recording["agent"];
         let reads_replies = agent.is_object() && agent.get("scripted").is_none();
+        let is_there = |list: &serde_json::Value, name: &str| {
+            list.as_array().is_some_and(|all| all.iter().any(|one| *one == *name))
+        };
+        let experiment = &recording["experiment"];
+        let has_marks = experiment["mark"].is_array() || is_there(&experiment["reply"], "mark");
         let is_given = |name: &str| match name {
             "reply_repair" => reads_replies,
+            "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             _ => !OF_OTHER_TASKS.contains(&name),
         };
         Self(Self::all().0.into_iter().filter(|column| is_given(column.name)).collect())

@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use base64::Engine as _;
 use mirrorstats::agent::exec::message::Message;
-use mirrorstats::agent::{Family, reply};
+use mirrorstats::agent::reply;
+use mirrorstats::experiment::Experiment;
 use schemars::schema_for;
 use serde_json::Value;
 
@@ -32,7 +33,7 @@ fn a_program_is_told_its_task_each_observation_and_the_end() {
     );
     let stated = task["stated_color"].as_str().unwrap();
     assert!(task["system_prompt"].as_str().unwrap().starts_with(&format!("You are a {stated} robot.")));
-    assert_eq!(task["reply_schema"], reply::structure(Family::CubeSelection));
+    assert_eq!(task["reply_schema"], reply::structure(&Experiment::E1.reply));
     assert_eq!((&end["reason"], &end["steps"]), (&"budget".into(), &20.into()));
 
     let [first, second] = [&heard[1], &heard[2]];

@@ -9,8 +9,9 @@ use mirrorstats::agent::vlm::provider::{Patience, Provider};
 use mirrorstats::agent::vlm::secrets::Secret;
 use mirrorstats::agent::vlm::wire_format::Dialect;
 use mirrorstats::agent::vlm::{OnOutage, Vlm};
-use mirrorstats::agent::{Agent as _, Family, Lost, Observation, Reply, Task};
+use mirrorstats::agent::{Agent as _, Lost, Observation, Reply, Task};
 use mirrorstats::base::frame::Frame;
+use mirrorstats::experiment::Experiment;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
@@ -73,7 +74,7 @@ impl Bench {
 
     /// The replies to the first `steps` steps of an episode.
     pub fn play(vlm: &Arc<Vlm>, episode: &str, steps: i32) -> Vec<Result<Reply, Lost>> {
-        let task = Task { family: Family::CubeSelection, stated_color: None, step_budget: 100, seed: 1 };
+        let task = Task { experiment: Experiment::E1, stated_color: None, step_budget: 100, seed: 1 };
         let mut agent = vlm.agent(task, episode).unwrap();
         let local = tokio::runtime::Builder::new_current_thread().build().unwrap();
         (1..=steps).map(|t| local.block_on(agent.decide(&observation(t)))).collect()

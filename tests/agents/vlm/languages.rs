@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use mirrorstats::agent::vlm::OnOutage;
 use mirrorstats::agent::vlm::limits::Limits;
 use mirrorstats::agent::vlm::wire_format::Dialect;
-use mirrorstats::agent::{Family, Status, reply};
+use mirrorstats::agent::{Status, reply};
+use mirrorstats::experiment::Experiment;
 use mirrorstats::trace::episode::Action;
 use serde_json::Value;
 
@@ -125,8 +126,8 @@ fn a_schema_says_nothing_that_the_prompt_does_not_say() {
             let asked: BTreeSet<&str> = schema["properties"].as_object().unwrap().keys().map(String::as_str).collect();
             assert_eq!(asked, keys, "{dialect:?}");
             assert!(keys.iter().all(|key| request.body.matches(&format!("\\\"{key}\\\"")).count() > 0), "{dialect:?}");
-            let family = if has_cubes { Family::CubeSelection } else { Family::Exploration };
-            assert_eq!(*schema, reply::structure(family), "{dialect:?}");
+            let experiment = if has_cubes { Experiment::E1 } else { Experiment::E5 };
+            assert_eq!(*schema, reply::structure(&experiment.reply), "{dialect:?}");
         }
         assert_eq!(with_cubes, 4, "{dialect:?}");
     }

@@ -98,7 +98,10 @@ fn the_footer_says_what_replay_must_know_and_nothing_of_the_machine() {
     let bench = Bench::new();
     bench.recorded("runs", "--agent random --experiment E1 --seeds 2 --runs 1");
     let (_, recording) = read(&bench, "runs/E1-random.parquet");
-    assert_eq!(recording["version"], 2);
+    assert_eq!(recording["version"], 3);
+    assert_eq!(recording["experiment"]["name"], "E1");
+    assert_eq!(recording["experiment"]["prompt_hash"].as_str().unwrap().len(), 64);
+    assert_eq!(recording["reply_schema_hash"].as_str().unwrap().len(), 64);
     let colors = ["blue", "brown", "cyan", "green", "orange", "pink", "purple", "red", "white", "yellow"];
     assert_eq!(recording["palette"], json!(colors));
     assert_eq!(recording["view"], json!({ "width": 64, "height": 48, "fov_y": 110.0 }));

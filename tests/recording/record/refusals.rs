@@ -28,7 +28,7 @@ fn an_agent_an_experiment_or_a_share_that_is_not_there() {
     let bench = Bench::new();
     for (words, expected) in [
         ("--agent oracel", "did you mean `oracle`?"),
-        ("--agent frozen --experiment E6", "experiments such as E1, E1..E5 or E1,E3"),
+        ("--agent frozen --experiment E6", "experiments such as E1, E1..E5, E1,E3 or mine.toml"),
         ("--agent frozen --experiment E3..E1", "experiments such as"),
         ("--agent frozen --shard 5/4", "a share such as 3/16"),
         ("--agent frozen --seeds 0", "--seeds"),
@@ -108,7 +108,7 @@ fn a_recording_without_a_palette_is_of_another_version() {
     });
     let before = bench.files("runs");
     let expected = [
-        "`runs/E1-random.parquet` is a recording of version 1, and this mirrorstats records version 2",
+        "`runs/E1-random.parquet` is a recording of version 1, and this mirrorstats records version 3",
         "help: go on with the mirrorstats that began it, or record into another folder",
     ];
     refused(&bench, "runs", &words.replace("--runs 1", "--runs 2"), &expected);

@@ -84,7 +84,7 @@ fn a_body_is_within_its_cylinder_at_every_stride() {
 #[test]
 fn everything_is_in_the_room() {
     let mut chance = Rng::of(8, 8, 8);
-    for (at, experiment) in Experiment::ALL.into_iter().cycle().take(25).enumerate() {
+    for (at, experiment) in Experiment::PAPER.into_iter().cycle().take(25).enumerate() {
         let mut world = world(experiment, i32::try_from(at).unwrap());
         for _ in 0..20 {
             scatter(&mut world, &mut chance);
@@ -102,7 +102,7 @@ fn everything_is_in_the_room() {
 
 fn own(world: &World) -> Vec<Solid> {
     let solids = world.snapshot().solids.into_iter().filter(|solid| solid.item == Item::Agent(0)).collect::<Vec<_>>();
-    assert_eq!(solids.len(), 20);
+    assert_eq!(solids.len(), 21);
     solids
 }
 

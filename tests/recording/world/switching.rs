@@ -13,7 +13,7 @@ fn a_picture_does_not_depend_on_what_the_eye_drew_before() {
     let config = WorldConfig::default();
     need::drawing();
     let mut eye = Camera::new(&config).unwrap();
-    let mut worlds: Vec<_> = Experiment::ALL.into_iter().map(|experiment| world(experiment, 5)).collect();
+    let mut worlds: Vec<_> = Experiment::PAPER.into_iter().map(|experiment| world(experiment, 5)).collect();
     for world in &mut worlds {
         face_mirror(world, 2.0, 1);
     }

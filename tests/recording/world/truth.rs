@@ -15,7 +15,7 @@ use super::poses::for_scattered;
 use crate::harness::need;
 
 const WITH_MIRROR: [Experiment; 3] = [Experiment::E1, Experiment::E4, Experiment::E5];
-const OWN: Shown = Shown::Reflected(Item::Agent(0));
+const OWN: Shown = Shown::Through(0, Item::Agent(0));
 
 /// Pixels that both, and that either of two sets hold.
 #[derive(Default)]
@@ -68,7 +68,7 @@ fn the_census_is_what_a_picture_of_labels_shows() {
         mean(&overlaps)
     );
     assert!((all - same) * 1000 < all, "{} of {all} pixels differ", all - same);
-    assert!(overlaps.len() > 30, "the own body is in {} views alone", overlaps.len());
+    assert!(overlaps.len() > 25, "the own body is in {} views alone", overlaps.len());
     assert!(mean(&overlaps) > 0.99, "{overlaps:?}");
 }
 
@@ -94,13 +94,13 @@ fn the_census_counts_the_labels() {
         assert_eq!(visibility.self_px, count(OWN));
         for (at, other) in visibility.others.iter().enumerate() {
             assert_eq!(other.direct_px, count(Shown::Direct(Item::Agent(at + 1))));
-            assert_eq!(other.mirror_px, count(Shown::Reflected(Item::Agent(at + 1))));
+            assert_eq!(other.mirror_px, count(Shown::Through(0, Item::Agent(at + 1))));
         }
         for (at, cube) in visibility.cubes.iter().enumerate() {
             assert_eq!(cube.direct_px, count(Shown::Direct(Item::Cube(at))));
-            assert_eq!(cube.mirror_px, count(Shown::Reflected(Item::Cube(at))));
+            assert_eq!(cube.mirror_px, count(Shown::Through(0, Item::Cube(at))));
         }
-        let in_mirror = |code: &&u8| matches!(Shown::of_code(**code), Shown::Mirror | Shown::Reflected(_));
+        let in_mirror = |code: &&u8| matches!(Shown::of_code(**code), Shown::Through(0, _));
         assert_eq!(visibility.mirror_px as usize, image.codes.iter().filter(in_mirror).count());
         assert_eq!(visibility.other_px, visibility.others.iter().map(|other| other.mirror_px).sum::<u32>());
     });
@@ -163,10 +163,10 @@ impl Area {
 fn is_twin(world: &World, shown: Shown) -> bool {
     let own = world.scene().body_color;
     match shown {
-        Shown::Room | Shown::Mirror => false,
-        Shown::Direct(Item::Cube(at)) | Shown::Reflected(Item::Cube(at)) => world.scene().cubes[at].color == own,
+        Shown::Direct(Item::Room) | Shown::Through(0, Item::Room) => false,
+        Shown::Direct(Item::Cube(at)) | Shown::Through(0, Item::Cube(at)) => world.scene().cubes[at].color == own,
         Shown::Direct(_) => true,
-        Shown::Reflected(item) => item != Item::Agent(0),
+        Shown::Through(_, item) => item != Item::Agent(0),
     }
 }
 

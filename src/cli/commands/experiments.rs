@@ -1,0 +1,137 @@
+//! `experiments`: check a file of experiments, say in words what one is, list and show those that are built in.
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::super::experiments;
+use super::super::outcome::{Failure, Outcome};
+use super::super::output;
+use crate::base::escape::visible;
+use crate::base::suggest::hint;
+use crate::experiment::explain::explained;
+use crate::experiment::file::Loaded;
+use crate::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
+
+/// Check, explain and show experiments
+#[derive(Clone, Debug, clap::Args)]
+pub struct ExperimentsArgs {
+    /// What to do.
+    #[command(subcommand)]
+    pub action: Action,
+}
+
+/// What to do with experiments.
+#[derive(Clone, Debug, clap::Subcommand)]
+pub enum Action {
+    /// Show every fault of a file of experiments, underlined, with a suggestion
+    Check {
+        /// A TOML file
+        #[arg(value_name = "FILE")]
+        file: PathBuf,
+        /// Print the experiments as traces carry them, as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Say in words what an experiment shows, asks and decides
+    Explain {
+        /// A built-in experiment, or a TOML file
+        #[arg(value_name = "NAME|FILE")]
+        experiment: String,
+        /// Print the experiment as traces carry it, as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Print the file of a built-in experiment, to start your own from; without a name, list them
+    Show {
+        /// A built-in experiment
+        #[arg(value_name = "NAME")]
+        name: Option<String>,
+    },
+}
+
+/// The answer for a program.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ExperimentsAnswer {
+    /// The experiments, in the order of their file.
+    pub experiments: Vec<Spec>,
+}
+
+impl ExperimentsArgs {
+    /// Does it.
+    ///
+    /// # Errors
+    /// A file that cannot be read; faults of experiments; a name that is not there.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self.action {
+            Action::Check { file, json } => check(&file, json),
+            Action::Explain { experiment, json } => explain(&experiment, json),
+            Action::Show { name } => show(name.as_deref()),
+        }
+    }
+}
+
+#[cfg(feature = "sim")]
+fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
+    experiments::placed(file, &crate::sim::config::WorldConfig::default())
+}
+
+#[cfg(not(feature = "sim"))]
+fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
+    experiments::load(file)
+}
+
+fn check(file: &Path, json: bool) -> Result<Outcome, Failure> {
+    let loaded = placed(file)?;
+    if json {
+        return answer(loaded.iter().map(|one| one.experiment));
+    }
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}: no fault", visible(&file.display().to_string()))?;
+    for one in &loaded {
+        let (experiment, templates) = (one.experiment, one.experiment.templates());
+        writeln!(out, "  {}: {}", experiment.name(), visible(&experiment.title))?;
+        writeln!(out, "    prompt {}, sha256 {}", visible(&experiment.prompt), templates.hash())?;
+    }
+    Ok(Outcome::Done)
+}
+
+fn answer(experiments: impl Iterator<Item = Experiment>) -> Result<Outcome, Failure> {
+    output::print_json(&ExperimentsAnswer { experiments: experiments.map(|one| (*one).clone()).collect() })
+}
+
+fn explain(name: &str, json: bool) -> Result<Outcome, Failure> {
+    let experiments = match Experiment::parse(name) {
+        Ok(experiment) => vec![experiment],
+        Err(_) if Path::new(name).extension().is_some_and(|ending| ending == "toml") => {
+            placed(Path::new(name))?.into_iter().map(|one| one.experiment).collect()
+        }
+        Err(unknown) => return Err(unknown_name(&unknown)),
+    };
+    if json {
+        return answer(experiments.into_iter());
+    }
+    let texts: Vec<String> = experiments.into_iter().map(explained).collect();
+    writeln!(io::stdout().lock(), "{}", texts.join("\n"))?;
+    Ok(Outcome::Done)
+}
+
+fn show(name: Option<&str>) -> Result<Outcome, Failure> {
+    let mut out = io::stdout().lock();
+    let Some(name) = name else {
+        for experiment in built_in_names().into_iter().flat_map(Experiment::parse) {
+            writeln!(out, "{:<12}  {}", experiment.name(), experiment.title)?;
+        }
+        return Ok(Outcome::Done);
+    };
+    let unknown = || UnknownExperiment { name: name.to_owned() };
+    let text = built_in(name).ok_or_else(|| unknown_name(&unknown()))?;
+    out.write_all(text.as_bytes())?;
+    Ok(Outcome::Done)
+}
+
+fn unknown_name(unknown: &UnknownExperiment) -> Failure {
+    Failure::input(format!("{unknown}{}", hint(&unknown.name, built_in_names())))
+}

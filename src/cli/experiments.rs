@@ -1,0 +1,68 @@
+//! Experiments as they are asked for: built in by name, or all of a file, held against the room that they are to be in.
+
+use std::path::Path;
+
+use super::outcome::Failure;
+use crate::experiment::file::{self, FileError, Loaded};
+use crate::metric::fault::{Fault, Faults};
+#[cfg(feature = "sim")]
+use crate::{
+    experiment::Experiment,
+    record::plan::{Experiments, Named},
+    sim::{config::WorldConfig, placement},
+};
+
+/// The experiments of a file.
+///
+/// # Errors
+/// When it cannot be read, or all of its faults, underlined.
+pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
+    file::load(path).map_err(|error| match error {
+        FileError::Faults(faults) => Failure::of_faults(&faults),
+        other => Failure::input(other),
+    })
+}
+
+/// The experiments of a file, each of which has a place in a room.
+///
+/// # Errors
+/// As [`load`]; and a fault for each that leaves no room for what it places.
+#[cfg(feature = "sim")]
+pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure> {
+    let loaded = load(path)?;
+    let faults: Vec<Fault> = loaded
+        .iter()
+        .filter_map(|one| {
+            let crowded = placement::crowded(config, one.experiment)?;
+            Some(Fault::new(one.cubes.clone(), crowded.what).help(crowded.help))
+        })
+        .collect();
+    if faults.is_empty() { Ok(loaded) } else { Err(Failure::of_faults(&Faults(faults))) }
+}
+
+/// What was asked for, in its order; each experiment once.
+///
+/// # Errors
+/// As [`placed`]; and two experiments of one name.
+#[cfg(feature = "sim")]
+pub fn asked(asked: &Experiments, config: &WorldConfig) -> Result<Vec<Experiment>, Failure> {
+    let mut all: Vec<Experiment> = Vec::new();
+    for named in &asked.0 {
+        let found = match named {
+            Named::BuiltIn(experiment) => vec![*experiment],
+            Named::File(path) => placed(path, config)?.into_iter().map(|one| one.experiment).collect(),
+        };
+        for experiment in found {
+            if all.iter().any(|other| *other != experiment && other.name() == experiment.name()) {
+                let name = experiment.name();
+                return Err(Failure::input(format!(
+                    "two different experiments are called `{name}`; give one another name"
+                )));
+            }
+            if !all.contains(&experiment) {
+                all.push(experiment);
+            }
+        }
+    }
+    Ok(all)
+}

@@ -1,0 +1,467 @@
+//! What an experiment is, checked: every value is in its range and fits the others.
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::base::names::names;
+use crate::base::palette::Color;
+
+/// The most glass panes (mirrors and windows) in a room.
+pub const MOST_PANES: usize = 4;
+
+/// The most marks in a world.
+pub const MOST_MARKS: usize = 4;
+
+/// An experiment: what its world shows, what its agent is asked, and how the answer is decided.
+///
+/// Whole in the footer of every trace, under `mirrorstats.recording.experiment`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "Experiment")]
+pub struct Spec {
+    /// Its name in traces, files and tables: letters, digits, `-` and `_`.
+    pub name: String,
+    /// The heading of its group in tables, without its name.
+    pub title: String,
+    /// Its position among experiments; after those that have one if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<i64>,
+    /// Chance levels by metric: a fraction such as `1/3`, or `none`.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub chance: IndexMap<String, String>,
+    /// What blind strategies would reach, by metric, where no chance level applies.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub reference: IndexMap<String, Vec<String>>,
+    /// The experiment whose scenes it has: its own name, or that of the one with which it makes pairs.
+    pub scenes: String,
+    /// What is drawn, shared by all experiments with these scenes.
+    pub layout: Layout,
+    /// The folder of its prompt: built in, or beside its file.
+    pub prompt: String,
+    /// SHA-256 of the prompt's templates, 64 hexadecimal digits.
+    pub prompt_hash: String,
+    /// The keys of a reply, in the order of the prompt.
+    pub reply: Vec<ReplyKey>,
+    /// The column that holds the decision.
+    pub decision: Decision,
+    /// The column that holds what the decision should name.
+    pub truth: Truth,
+    /// What the prompt states of the body's colour.
+    pub stated_color: Stated,
+    /// What the agent can do.
+    pub actions: Actions,
+    /// What the agent sees with.
+    pub camera: Camera,
+    /// Steps after which an episode ends by itself; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<u32>,
+    /// The length of the agent's own steps, mm; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step_length_mm: Option<u32>,
+    /// Mirrors and windows, the first of which is where the layout has its own; none is a bare wall.
+    #[serde(default, rename = "mirror", skip_serializing_if = "Vec::is_empty")]
+    pub panes: Vec<Pane>,
+    /// Marks on bodies.
+    #[serde(default, rename = "mark", skip_serializing_if = "Vec::is_empty")]
+    pub marks: Vec<Mark>,
+}
+
+/// What is drawn from seed and run, the same for all experiments that share scenes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Layout {
+    /// How the body's colour is drawn.
+    pub colors: Colors,
+    /// The colours of bodies and cubes.
+    pub palette: Vec<Color>,
+    /// The cubes.
+    pub cubes: Cubes,
+    /// The other agents.
+    pub others: Others,
+    /// How the agent stands at the start.
+    pub start: Start,
+    /// The wall of the first pane.
+    pub wall: Wall,
+}
+
+/// How the body's colour is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Colors {
+    /// Each colour equally often over the seeds and runs of a study, or once more.
+    #[default]
+    Balanced,
+    /// Each by itself.
+    Random,
+}
+
+names!(Colors { Balanced: "balanced", Random: "random" });
+
+/// The cubes of a world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "snake_case", tag = "kind")]
+pub enum Cubes {
+    /// No cube.
+    None,
+    /// Cubes of different colours, one of them the body's.
+    Candidates {
+        /// How many.
+        count: u32,
+    },
+    /// Cubes of any colours, some of them before the first pane.
+    Clutter {
+        /// How many at least; the world's if absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        least: Option<u32>,
+        /// How many at most; the world's if absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        most: Option<u32>,
+    },
+}
+
+/// The other agents of a world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Others {
+    /// How many at least; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least: Option<u32>,
+    /// How many at most; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most: Option<u32>,
+    /// What they do.
+    pub behavior: Behavior,
+    /// Of a hundred episodes, those where one of them has the colour of the agent's own body; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twin_percent: Option<u32>,
+}
+
+/// What other agents do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Behavior {
+    /// They walk about.
+    #[default]
+    Walk,
+    /// They stand where they are.
+    Stand,
+}
+
+names!(Behavior { Walk: "walk", Stand: "stand" });
+
+/// How the agent stands at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// With the place of the first pane out of view.
+    #[default]
+    FacingAway,
+    /// Anyhow.
+    Any,
+}
+
+names!(Start { FacingAway: "facing_away", Any: "any" });
+
+/// A wall of the room.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Wall {
+    /// Drawn.
+    #[default]
+    Random,
+    /// Across from the first pane.
+    Opposite,
+    /// At +x.
+    East,
+    /// At +y.
+    North,
+    /// At -x.
+    West,
+    /// At -y.
+    South,
+}
+
+names!(Wall { Random: "random", Opposite: "opposite", East: "east", North: "north", West: "west", South: "south" });
+
+impl Wall {
+    /// Quarter turns counter-clockwise from the wall at +x; `None` where it is drawn.
+    pub const fn quarter(self) -> Option<u8> {
+        match self {
+            Self::Random | Self::Opposite => None,
+            Self::East => Some(0),
+            Self::North => Some(1),
+            Self::West => Some(2),
+            Self::South => Some(3),
+        }
+    }
+}
+
+/// A key of a reply; its value is a text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+pub enum ReplyKey {
+    /// What the image shows.
+    #[serde(rename = "view-description")]
+    ViewDescription,
+    /// Why this action.
+    #[serde(rename = "reasoning")]
+    Reasoning,
+    /// What to do.
+    #[serde(rename = "action")]
+    Action,
+    /// What comes back as the history of the next step.
+    #[serde(rename = "summary")]
+    Summary,
+    /// The cube: a colour, or `none`.
+    #[serde(rename = "selected_cube")]
+    SelectedCube,
+    /// The own body's colour in words.
+    #[serde(rename = "identification")]
+    Identification,
+    /// The mark on the own body: a colour, or `none`.
+    #[serde(rename = "mark")]
+    Mark,
+}
+
+names!(ReplyKey {
+    ViewDescription: "view-description",
+    Reasoning: "reasoning",
+    Action: "action",
+    Summary: "summary",
+    SelectedCube: "selected_cube",
+    Identification: "identification",
+    Mark: "mark",
+});
+
+/// The column that holds the decision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Decision {
+    /// The cube that the reply selects.
+    SelectedCube,
+    /// The colour that the reply gives the own body.
+    SelfColor,
+    /// The mark that the reply reports on the own body.
+    MarkReport,
+}
+
+names!(Decision { SelectedCube: "selected_cube", SelfColor: "self_color", MarkReport: "mark_report" });
+
+impl Decision {
+    /// The key of a reply that fills the column.
+    pub const fn key(self) -> ReplyKey {
+        match self {
+            Self::SelectedCube => ReplyKey::SelectedCube,
+            Self::SelfColor => ReplyKey::Identification,
+            Self::MarkReport => ReplyKey::Mark,
+        }
+    }
+}
+
+/// The column that holds what the decision should name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Truth {
+    /// The colour of the own body.
+    BodyColor,
+    /// The colour of the mark on the own body, `none` where there is none.
+    MarkColor,
+}
+
+names!(Truth { BodyColor: "body_color", MarkColor: "mark_color" });
+
+/// What the prompt states of the body's colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Stated {
+    /// Nothing.
+    #[default]
+    None,
+    /// The colour of another candidate: false.
+    Candidate,
+    /// Any other colour of the palette: false.
+    Random,
+}
+
+names!(Stated { None: "none", Candidate: "candidate", Random: "random" });
+
+/// What the agent can do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Actions {
+    /// Steps forward and back, turns by 30 degrees, and `done`.
+    #[default]
+    Walk,
+}
+
+names!(Actions { Walk: "walk" });
+
+/// What the agent sees with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Camera {
+    /// Its own eye, before its face.
+    #[default]
+    Eye,
+}
+
+names!(Camera { Eye: "eye" });
+
+/// A mirror, or something in a mirror's place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pane {
+    /// What it shows.
+    pub kind: PaneKind,
+    /// Steps by which it is late.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub delay: u32,
+    /// The colour of the body that it shows.
+    #[serde(default, skip_serializing_if = "Paint::is_own")]
+    pub color: Paint,
+    /// Whose motion the body that it shows has.
+    #[serde(default, skip_serializing_if = "BodyShown::is_own")]
+    pub body: BodyShown,
+    /// Where it hangs.
+    #[serde(default)]
+    pub wall: Wall,
+    /// Along the wall, mm; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width_mm: Option<u32>,
+    /// mm; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_mm: Option<u32>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+const fn is_zero(value: &u32) -> bool {
+    *value == 0
+}
+
+/// What a pane shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PaneKind {
+    /// The room, as it is.
+    Mirror,
+    /// The room, as it was some steps ago.
+    Delayed,
+    /// The room, with the own body in another colour or with another body in its place.
+    Decoy,
+    /// A second room like the first, without cubes and others, where one body walks about.
+    Window,
+}
+
+names!(PaneKind { Mirror: "mirror", Delayed: "delayed", Decoy: "decoy", Window: "window" });
+
+/// The colour of something, in terms of the own body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Paint {
+    /// The own body's.
+    #[default]
+    Own,
+    /// Another: that of another candidate where there are candidates.
+    Other,
+    /// This one.
+    #[serde(untagged)]
+    Named(Color),
+}
+
+impl Paint {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    const fn is_own(&self) -> bool {
+        matches!(self, Self::Own)
+    }
+}
+
+/// Whose motion a body has that a decoy shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyShown {
+    /// The agent's own.
+    #[default]
+    Own,
+    /// Its own: it walks about, whatever the agent does.
+    Independent,
+}
+
+names!(BodyShown { Own: "own", Independent: "independent" });
+
+impl BodyShown {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    const fn is_own(&self) -> bool {
+        matches!(self, Self::Own)
+    }
+}
+
+/// A mark on a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Mark {
+    /// Where on the body.
+    pub part: Part,
+    /// Of its paint.
+    pub color: MarkColor,
+    /// The first step that shows it.
+    pub from_t: u32,
+    /// Who wears it.
+    #[serde(default)]
+    pub on: Wearer,
+}
+
+/// Where on a body a mark is. No direct view reaches any of these on one's own body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// The top of the head.
+    Head,
+    /// Between the shoulders, behind.
+    Back,
+    /// The chest.
+    Chest,
+}
+
+names!(Part { Head: "head", Back: "back", Chest: "chest" });
+
+/// The colour of a mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MarkColor {
+    /// Drawn: never that of its wearer.
+    Random,
+    /// This one; another one where its wearer has this colour.
+    #[serde(untagged)]
+    Named(Color),
+}
+
+/// Who wears a mark.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Wearer {
+    /// The agent itself: to be reported.
+    #[default]
+    #[serde(rename = "self")]
+    Own,
+    /// The first of the others: not to be reported.
+    #[serde(rename = "other")]
+    Other,
+}
+
+names!(Wearer { Own: "self", Other: "other" });
+
+impl Spec {
+    /// Whether there are cubes of which one is to be selected.
+    pub const fn has_candidates(&self) -> bool {
+        matches!(self.layout.cubes, Cubes::Candidates { .. })
+    }
+
+    /// Whether a reply names a cube.
+    pub fn asks_for_cube(&self) -> bool {
+        self.reply.contains(&ReplyKey::SelectedCube)
+    }
+
+    /// Whether a reply names a mark.
+    pub fn asks_for_mark(&self) -> bool {
+        self.reply.contains(&ReplyKey::Mark)
+    }
+}

@@ -125,7 +125,10 @@ fn no_share(file: &str, name: &str, experiment: &Experiment, catalog: &Catalog) 
 /// The first thing in which two experiments differ, and what each has.
 fn difference(one: &Experiment, other: &Experiment) -> Option<(String, String, String)> {
     if one.title != other.title {
-        let quoted = |title: &str| format!("`{}`", visible(title));
+        let quoted = |title: &str| match title {
+            "" => "not given".to_owned(),
+            title => format!("`{}`", visible(title)),
+        };
         return Some(("title".to_owned(), quoted(&one.title), quoted(&other.title)));
     }
     if one.order != other.order {

@@ -136,8 +136,8 @@ codes! {
         "an episode is in one of the files only", "leave one of the files out, or give the second episode another id";
     /// The experiment is none that the definitions know.
     UnknownExperiment, Error, "unknown-experiment":
-        "the definitions know the experiment",
-        "add it to the definition file as `[experiment.NAME]`, or say `open = true` there";
+        "the definitions know the experiment, or a footer declares it",
+        "add it to the definition file as `[experiment.NAME]`, say `open = true` there, or declare it in the footer";
     /// The action is none of the five.
     UnknownAction, Error, "unknown-action":
         "an action is one of the five, or null", "use one of the names; null where the reply gave none";

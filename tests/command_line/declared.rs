@@ -184,6 +184,7 @@ fn files_that_declare_one_experiment_differently_are_refused_together() {
     let at = folder.path();
     for (key, value, words) in [
         ("title", json!("Other"), "the title of the experiment `E6` as @ declares it, `Delayed mirror`, found `Other`"),
+        ("title", Value::Null, "the title of the experiment `E6` as @ declares it, `Delayed mirror`, found not given"),
         ("order", json!(7), "the order of the experiment `E6` as @ declares it, 6, found 7"),
         ("order", Value::Null, "the order of the experiment `E6` as @ declares it, 6, found not given"),
         (

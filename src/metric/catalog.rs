@@ -144,16 +144,18 @@ impl Catalog {
         }
     }
 
-    /// Takes over an experiment that the traces declare, unless there is one of this name.
-    pub fn declare(&mut self, name: &str, experiment: Experiment) {
-        self.experiment.entry(name.to_owned()).or_insert(Experiment { is_declared: true, ..experiment });
+    /// Takes over experiments that the traces declare, but those whose names there are already.
+    pub fn declare(&mut self, experiments: impl IntoIterator<Item = (String, Experiment)>) {
+        for (name, experiment) in experiments {
+            self.experiment.entry(name).or_insert(Experiment { is_declared: true, ..experiment });
+        }
         self.experiment.sort_by(by_order);
     }
 
     /// The experiments that the traces declare and the definitions do not know.
-    pub fn declared(&self) -> impl Iterator<Item = (&str, &Experiment)> {
+    pub fn declared(&self) -> impl Iterator<Item = (String, Experiment)> + '_ {
         let declared = self.experiment.iter().filter(|(_, experiment)| experiment.is_declared);
-        declared.map(|(name, experiment)| (name.as_str(), experiment))
+        declared.map(|(name, experiment)| (name.clone(), experiment.clone()))
     }
 
     /// The same without the experiments that the traces declare: what the definitions say.

@@ -46,7 +46,7 @@ impl Definitions {
         let mut definitions = Self::from_toml(&name, &as_file(catalog), columns)
             .map_err(|source| RestoreError::Faults { name: name.clone(), source })?;
         if definitions.catalog.hash == catalog.hash {
-            catalog.declared().for_each(|(name, known)| definitions.catalog.declare(name, known.clone()));
+            definitions.catalog.declare(catalog.declared());
             return Ok(definitions);
         }
         let found = definitions.catalog.hash;
@@ -123,8 +123,9 @@ mod tests {
     fn what_the_traces_declared_comes_back_and_is_none_of_the_definitions() {
         let paper = Definitions::load("paper", &columns()).unwrap().catalog;
         let mut catalog = paper.clone();
-        catalog.declare("E0", Experiment { title: "Before".to_owned(), order: 0, ..paper.experiment["E5"].clone() });
-        catalog.declare("E5", Experiment { title: "Other".to_owned(), ..paper.experiment["E5"].clone() });
+        let titled =
+            |title: &str, order| Experiment { title: title.to_owned(), order, ..paper.experiment["E5"].clone() };
+        catalog.declare([("E5".to_owned(), titled("Other", 9)), ("E0".to_owned(), titled("Before", 0))]);
         assert_eq!(catalog.experiment.keys().collect::<Vec<_>>(), ["E0", "E1", "E2", "E3", "E4", "E5"]);
         assert_eq!(catalog.experiment["E5"], paper.experiment["E5"]);
         let back = Definitions::of_catalog(&catalog, &columns()).unwrap().catalog;

@@ -36,12 +36,12 @@ impl Declarations {
     ///
     /// # Errors
     /// When another file has declared it otherwise.
-    pub fn add(&mut self, file: &str, name: &str, experiment: &Experiment) -> Result<(), DeclarationError> {
+    pub fn add(&mut self, file: &str, name: &str, experiment: Experiment) -> Result<(), DeclarationError> {
         let Some((first_file, known)) = self.0.get(name) else {
-            self.0.insert(name.to_owned(), (file.to_owned(), experiment.clone()));
+            self.0.insert(name.to_owned(), (file.to_owned(), experiment));
             return Ok(());
         };
-        let Some((what, first, second)) = difference(known, experiment) else { return Ok(()) };
+        let Some((what, first, second)) = difference(known, &experiment) else { return Ok(()) };
         Err(DeclarationError {
             file: file.to_owned(),
             expected: format!(
@@ -63,7 +63,7 @@ pub fn declare(catalog: &mut Catalog, traces: &TraceSet) -> Result<(), Declarati
     if let Some(error) = errors.into_iter().next() {
         return Err(error);
     }
-    declarations.0.into_iter().for_each(|(name, (_, experiment))| catalog.declare(&name, experiment));
+    catalog.declare(declarations.0.into_iter().map(|(name, (_, experiment))| (name, experiment)));
     Ok(())
 }
 
@@ -78,7 +78,7 @@ fn declarations(catalog: &Catalog, traces: &TraceSet) -> (Declarations, Vec<Decl
         for declared in file.experiments().iter().filter(|declared| !catalog.experiment.contains_key(&declared.name)) {
             let experiment = resolved(declared, catalog);
             errors.extend(no_share(file.name(), &declared.name, &experiment, catalog));
-            errors.extend(found.add(file.name(), &declared.name, &experiment).err());
+            errors.extend(found.add(file.name(), &declared.name, experiment).err());
         }
     }
     (found, errors)

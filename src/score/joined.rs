@@ -33,7 +33,7 @@ impl EpisodeTable {
             return Err(JoinError::Episode(twice.episode_id.to_owned()));
         }
         let mut catalog = self.catalog.clone();
-        other.catalog.declared().for_each(|(name, experiment)| catalog.declare(name, experiment.clone()));
+        catalog.declare(other.catalog.declared());
         let mut builder = TableBuilder::new(Header { catalog, labels: labels.clone(), ..self.header() });
         for table in [&self, other] {
             let columns: Vec<_> = labels.iter().map(|name| (table.label(name), default_text(name))).collect();

@@ -26,7 +26,7 @@ pub(super) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTa
     for file in files {
         let table = read_one(file, question)?;
         for (name, experiment) in table.catalog.declared() {
-            declarations.add(&file.input.name, name, experiment)?;
+            declarations.add(&file.input.name, &name, experiment)?;
         }
         whole = Some(match whole {
             None => table,

@@ -57,16 +57,15 @@ fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, Fault> {
     let several = several.iter().enumerate().map(|(at, value)| (format!("experiments[{at}]"), value));
     // A bare name tells of the rows and declares nothing.
     let one = Some(&recording["experiment"]).filter(|value| !value.is_null() && !value.is_string());
-    let mut found: Vec<DeclaredExperiment> = Vec::new();
+    let mut found: IndexMap<String, DeclaredExperiment> = IndexMap::new();
     for (key, value) in one.map(|value| ("experiment".to_owned(), value)).into_iter().chain(several) {
         let new = DeclaredExperiment::read(&key, value)?;
-        match found.iter().find(|known| known.name == new.name) {
-            None => found.push(new),
-            Some(known) if *known == new => {}
-            Some(_) => return Err(fault(key, "what the same footer declares of this name elsewhere", value)),
+        let known = found.entry(new.name.clone()).or_insert_with(|| new.clone());
+        if *known != new {
+            return Err(fault(key, "what the same footer declares of this name elsewhere", value));
         }
     }
-    Ok(found)
+    Ok(found.into_values().collect())
 }
 
 impl DeclaredExperiment {

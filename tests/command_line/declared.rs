@@ -2,12 +2,15 @@
 //! and levels.
 
 use std::fs;
+use std::num::NonZeroUsize;
 use std::path::Path;
 
+use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::trace::episode::Episode;
 use mirrorstats::trace::write::write_episodes;
 use serde_json::{Value, json};
 
+use crate::harness::traces::open;
 use crate::{contents, episode, run};
 
 /// `E6`, which the footers below declare, with a level of a metric that no definitions have.
@@ -88,6 +91,15 @@ fn nothing_depends_on_the_order_of_the_files() {
 }
 
 #[test]
+fn the_library_takes_it_as_well() {
+    let folder = folder();
+    let traces = open(&[&folder.path().join("six.parquet")]);
+    let definitions = score_traces::definitions(&traces, &Request::of("paper")).unwrap();
+    let table = score_traces::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap();
+    assert_eq!((table.len(), table.catalog.experiment["E6"].title.as_str()), (8, "Delayed mirror"));
+}
+
+#[test]
 fn scores_carry_what_the_traces_declare() {
     let folder = folder();
     let at = folder.path();
@@ -146,6 +158,29 @@ fn every_command_takes_a_declared_experiment() {
     let compared = run(at, &["compare", "--published", "published.csv", "six.parquet"]);
     assert!([0, 1].contains(&compared.code) && compared.stderr.is_empty(), "{}", compared.stderr);
     run(at, &["diff", "paper", "own.toml", "six.parquet"]).done();
+}
+
+#[test]
+fn what_decided_is_found_for_scores_of_a_declared_experiment() {
+    let folder = folder();
+    let at = folder.path();
+    fs::write(at.join("own.toml"), "include = [\"paper\"]\n[let]\nvisible = \"t = 3\"\n").unwrap();
+    run(at, &["score", "six.parquet", "-o", "old.parquet"]).done();
+    run(at, &["score", "six.parquet", "--definitions", "own.toml", "-o", "new.parquet"]).done();
+    let answer = run(at, &["diff", "old.parquet", "new.parquet", "six.parquet", "--json"]).json();
+    let flips = answer["flips"].as_array().unwrap();
+    assert!(!flips.is_empty() && flips.iter().all(|flip| flip["timesteps"]["before"].is_array()), "{answer}");
+}
+
+#[test]
+fn an_open_question_of_a_declared_experiment_has_its_figure() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let open = with(with(six(), "chance", json!({ "TSA": "none" })), "reference", json!({ "TSA": ["1/10"] }));
+    write(at, "six", "E6", &json!({ "experiment": open }));
+    run(at, &["figure", "e5-outcomes", "six.parquet", "-o", "outcomes.svg"]).done();
+    let drawn = fs::read_to_string(at.join("outcomes.svg")).unwrap();
+    assert!(drawn.contains("E6 · ant · correct: 2 of 4"), "{drawn}");
 }
 
 #[test]

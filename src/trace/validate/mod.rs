@@ -8,6 +8,7 @@ pub(in crate::trace) mod rules;
 
 use std::num::NonZeroUsize;
 
+use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -134,13 +135,9 @@ pub fn validate(
 
 /// These experiments, and those that the files declare.
 fn with_declared(known: &[String], set: &TraceSet) -> Vec<String> {
-    let mut known = known.to_vec();
-    for declared in set.files().iter().flat_map(TraceFile::experiments) {
-        if !known.contains(&declared.name) {
-            known.push(declared.name.clone());
-        }
-    }
-    known
+    let declared = set.files().iter().flat_map(TraceFile::experiments).map(|declared| declared.name.clone());
+    let all: IndexSet<String> = known.iter().cloned().chain(declared).collect();
+    all.into_iter().collect()
 }
 
 /// A note for a file with replies that gave no decision.

@@ -165,11 +165,15 @@ fn what_decided_is_found_for_scores_of_a_declared_experiment() {
     let folder = folder();
     let at = folder.path();
     fs::write(at.join("own.toml"), "include = [\"paper\"]\n[let]\nvisible = \"t = 3\"\n").unwrap();
-    run(at, &["score", "six.parquet", "-o", "old.parquet"]).done();
-    run(at, &["score", "six.parquet", "--definitions", "own.toml", "-o", "new.parquet"]).done();
-    let answer = run(at, &["diff", "old.parquet", "new.parquet", "six.parquet", "--json"]).json();
-    let flips = answer["flips"].as_array().unwrap();
-    assert!(!flips.is_empty() && flips.iter().all(|flip| flip["timesteps"]["before"].is_array()), "{answer}");
+    for name in ["six", "known"] {
+        let trace = format!("{name}.parquet");
+        run(at, &["score", &trace, "-o", "old.parquet"]).done();
+        run(at, &["score", &trace, "--definitions", "own.toml", "-o", "new.parquet"]).done();
+        // The traces may have episodes that the scores have not.
+        let answer = run(at, &["diff", "old.parquet", "new.parquet", "six.parquet", "known.parquet", "--json"]).json();
+        let flips = answer["flips"].as_array().unwrap();
+        assert!(!flips.is_empty() && flips.iter().all(|flip| flip["timesteps"]["before"].is_array()), "{answer}");
+    }
 }
 
 #[test]
@@ -208,6 +212,13 @@ fn an_experiment_that_nobody_declares_is_refused_as_before() {
     assert!(polars.contains("unknown-experiment: nine.parquet"), "{polars}");
     let told = run(at, &["validate", "nine.parquet"]).ends(1).stdout;
     assert!(told.contains("unknown-experiment") && told.contains("found `E9`"), "{told}");
+    // What one trace declares holds for those beside it, in any order.
+    write(at, "bare", "E6", &json!({}));
+    assert!(run(at, &["score", "bare.parquet"]).refused().contains("found `E6`"));
+    for pair in [["bare.parquet", "six.parquet"], ["six.parquet", "bare.parquet"]] {
+        run(at, &[&["score"], &pair[..]].concat()).done();
+        run(at, &[&["validate"], &pair[..]].concat()).done();
+    }
     // Text carries no declarations.
     run(at, &["score", "six.parquet", "-o", "six.csv"]).done();
     assert!(run(at, &["report", "six.csv"]).refused().contains("found `E6`"));

@@ -41,8 +41,8 @@ pub struct OutcomeRow {
 }
 
 impl Outcomes {
-    /// The outcomes of the first experiment that has reference levels instead of a chance level for `TSA`: the one
-    /// whose question is open. `None` where there is none, or no episode of it.
+    /// The outcomes of the first experiment with episodes that has reference levels instead of a chance level for `TSA`: the
+    /// one whose question is open. `None` where there is none.
     ///
     /// An episode is correct where `TSA` is 1, else wrong where its decision committed to a colour: where `answered`,
     /// which has a value per episode of the table, is true.
@@ -67,15 +67,15 @@ impl Outcomes {
     /// Whether there is an episode that [`of`](Self::of) would count.
     pub fn are_there(episodes: &EpisodeTable) -> bool {
         let has_success = episodes.metrics.iter().any(|metric| metric.name == SUCCESS);
-        let open = open_experiment(episodes).filter(|_| has_success);
-        open.is_some_and(|experiment| episodes.keys.iter().any(|key| key.experiment == experiment))
+        has_success && open_experiment(episodes).is_some()
     }
 }
 
-/// The first experiment with reference levels instead of a chance level for `TSA`.
+/// The first experiment with episodes that has reference levels instead of a chance level for `TSA`.
 fn open_experiment(episodes: &EpisodeTable) -> Option<&str> {
     let open = |(_, experiment): &(&String, &Experiment)| experiment.reference.contains_key(SUCCESS);
-    episodes.catalog.experiment.iter().find(open).map(|(name, _)| name.as_str())
+    let mut names = episodes.catalog.experiment.iter().filter(open).map(|(name, _)| name.as_str());
+    names.find(|name| episodes.keys.iter().any(|key| key.experiment == *name))
 }
 
 impl OutcomeRow {

@@ -3,6 +3,8 @@
 //! A catalog travels with every score and every cell, so that a number can be traced to the
 //! sentence that defines it. It holds the definitions as text, not the plan that computes them.
 
+use std::cmp::Ordering;
+
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,7 +25,8 @@ pub struct Catalog {
     pub lets: IndexMap<String, String>,
     /// The metrics by name, in the order of definition.
     pub metric: IndexMap<String, Metric>,
-    /// The known experiments by name, ordered by `order`, then name.
+    /// The known experiments by name, ordered by `order`, then name: those of the definitions, and those that the traces
+    /// declare.
     pub experiment: IndexMap<String, Experiment>,
 }
 
@@ -110,12 +113,25 @@ impl StandardError {
 pub struct Experiment {
     /// The heading of its group in tables, without its name.
     pub title: String,
-    /// Position among the experiments.
+    /// Position among the experiments; the greatest number where the traces declare it without one.
     pub order: i64,
     /// Chance levels by metric; `None` says that the metric has none in this experiment.
     pub chance: IndexMap<String, Option<Ratio>>,
     /// Reference levels by metric: what some blind strategies would reach, where no chance level applies.
     pub reference: IndexMap<String, Vec<Ratio>>,
+    /// Whether the traces declare it, and the definitions do not know it; then the hash of the definitions is without it.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub is_declared: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
+const fn is_false(value: &bool) -> bool {
+    !*value
+}
+
+/// The order of experiments in a catalog.
+pub(super) fn by_order(a: &String, one: &Experiment, b: &String, other: &Experiment) -> Ordering {
+    one.order.cmp(&other.order).then_with(|| a.cmp(b))
 }
 
 impl Catalog {
@@ -126,6 +142,28 @@ impl Catalog {
             Some(level) => *level,
             None => self.metric.get(metric).and_then(|m| m.chance),
         }
+    }
+
+    /// Takes over experiments that the traces declare, but those whose names there are already.
+    pub fn declare(&mut self, experiments: impl IntoIterator<Item = (String, Experiment)>) {
+        for (name, experiment) in experiments {
+            self.experiment.entry(name).or_insert(Experiment { is_declared: true, ..experiment });
+        }
+        self.experiment.sort_by(by_order);
+    }
+
+    /// The experiments that the traces declare and the definitions do not know.
+    pub fn declared(&self) -> impl Iterator<Item = (String, Experiment)> + '_ {
+        let declared = self.experiment.iter().filter(|(_, experiment)| experiment.is_declared);
+        declared.map(|(name, experiment)| (name.clone(), experiment.clone()))
+    }
+
+    /// The same without the experiments that the traces declare: what the definitions say.
+    #[must_use]
+    pub(super) fn without_declared(&self) -> Self {
+        let mut catalog = self.clone();
+        catalog.experiment.retain(|_, experiment| !experiment.is_declared);
+        catalog
     }
 
     /// Where `experiment` stands: its `order`, then unknown ones last.

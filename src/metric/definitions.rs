@@ -3,7 +3,7 @@
 use indexmap::IndexMap;
 
 use super::bind::{self, Binding};
-use super::catalog::{Catalog, Experiment, Kind, Metric};
+use super::catalog::{Catalog, Experiment, Kind, Metric, by_order};
 use super::columns::{Columns, Level, Type};
 use super::fault::{Fault, Faults, Source};
 use super::file::{self, Document, FileError};
@@ -265,7 +265,7 @@ fn catalog(document: &Document, binding: &Binding) -> Catalog {
 
 /// The hash of what the definitions say: comments, layout and the file's name do not count.
 fn content_hash(catalog: &Catalog) -> String {
-    let nameless = Catalog { name: String::new(), hash: String::new(), ..catalog.clone() };
+    let nameless = Catalog { name: String::new(), hash: String::new(), ..catalog.without_declared() };
     let text = serde_json::to_string(&nameless).expect("a catalog holds texts, integers and maps with text keys");
     hash::of_bytes(text.as_bytes())
 }
@@ -292,7 +292,7 @@ fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
 }
 
 fn experiments(document: &Document) -> IndexMap<String, Experiment> {
-    let mut experiments: Vec<(String, Experiment)> = document
+    let mut experiments: IndexMap<String, Experiment> = document
         .experiments
         .iter()
         .enumerate()
@@ -303,12 +303,13 @@ fn experiments(document: &Document) -> IndexMap<String, Experiment> {
                 order: entry.order.unwrap_or(position.saturating_add(1)),
                 chance: entry.chance.iter().map(|(name, (level, _))| (name.clone(), *level)).collect(),
                 reference: entry.reference.iter().map(|(name, (levels, _))| (name.clone(), levels.clone())).collect(),
+                is_declared: false,
             };
             (name.clone(), experiment)
         })
         .collect();
-    experiments.sort_by(|(a, first), (b, second)| first.order.cmp(&second.order).then_with(|| a.cmp(b)));
-    experiments.into_iter().collect()
+    experiments.sort_by(by_order);
+    experiments
 }
 
 #[cfg(test)]

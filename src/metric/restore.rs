@@ -36,15 +36,17 @@ pub enum RestoreError {
 }
 
 impl Definitions {
-    /// The definitions that a catalog was made from, checked over these columns.
+    /// The definitions that a catalog was made from, checked over these columns, with the experiments that the traces had
+    /// declared.
     ///
     /// # Errors
     /// A catalog that is not what its hash says, and expressions that the columns do not bear.
     pub fn of_catalog(catalog: &Catalog, columns: &Columns) -> Result<Self, RestoreError> {
         let name = catalog.name.clone();
-        let definitions = Self::from_toml(&name, &as_file(catalog), columns)
+        let mut definitions = Self::from_toml(&name, &as_file(catalog), columns)
             .map_err(|source| RestoreError::Faults { name: name.clone(), source })?;
         if definitions.catalog.hash == catalog.hash {
+            definitions.catalog.declare(catalog.declared());
             return Ok(definitions);
         }
         let found = definitions.catalog.hash;
@@ -54,7 +56,7 @@ impl Definitions {
 
 /// The catalog as a definition file without includes.
 fn as_file(catalog: &Catalog) -> String {
-    let mut root = serde_json::json!(catalog);
+    let mut root = serde_json::json!(catalog.without_declared());
     drop_keys(&mut root, &["name", "hash"]);
     for metric in entries(&mut root, "metric") {
         drop_keys(metric, &["kind"]);
@@ -87,6 +89,7 @@ fn drop_nulls(value: &mut Value) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::catalog::Experiment;
     use super::super::columns::Columns;
     use super::super::definitions::Definitions;
     use super::super::file::built_in_names;
@@ -114,6 +117,19 @@ mod tests {
                     [metric.A]\nvalue = \"far is null\"\nwhen = \"length() > 1\"\nchance = \"1/2\"\nse = \"population\"\n";
         let definitions = Definitions::from_toml("mine", text, &columns()).unwrap();
         assert_eq!(Definitions::of_catalog(&definitions.catalog, &columns()).unwrap().catalog, definitions.catalog);
+    }
+
+    #[test]
+    fn what_the_traces_declared_comes_back_and_is_none_of_the_definitions() {
+        let paper = Definitions::load("paper", &columns()).unwrap().catalog;
+        let mut catalog = paper.clone();
+        let titled =
+            |title: &str, order| Experiment { title: title.to_owned(), order, ..paper.experiment["E5"].clone() };
+        catalog.declare([("E5".to_owned(), titled("Other", 9)), ("E0".to_owned(), titled("Before", 0))]);
+        assert_eq!(catalog.experiment.keys().collect::<Vec<_>>(), ["E0", "E1", "E2", "E3", "E4", "E5"]);
+        assert_eq!(catalog.experiment["E5"], paper.experiment["E5"]);
+        let back = Definitions::of_catalog(&catalog, &columns()).unwrap().catalog;
+        assert_eq!((&back, &back.hash), (&catalog, &paper.hash));
     }
 
     #[test]

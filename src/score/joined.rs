@@ -8,10 +8,11 @@ use super::table::{EpisodeKeys, EpisodeTable, Header, JoinError, LOST, TextColum
 use crate::trace::schema;
 
 impl EpisodeTable {
-    /// The rows of two tables, in the order of their keys.
+    /// The rows of two tables, in the order of their keys, with the experiments that the traces of either declare.
     ///
     /// # Errors
-    /// When they differ in their definitions or columns, or have an episode in common.
+    /// When they differ in their definitions or columns, or have an episode in common. Of an experiment that both declare the
+    /// first one's declaration is taken: whoever knows the names of the files compares them.
     pub fn joined(self, other: &Self) -> Result<Self, JoinError> {
         if self.catalog.hash != other.catalog.hash {
             return Err(JoinError::Definitions(self.catalog.name, other.catalog.name.clone()));
@@ -31,7 +32,9 @@ impl EpisodeTable {
         if let Some(twice) = other.keys.iter().find(|key| ids.contains(key.episode_id)) {
             return Err(JoinError::Episode(twice.episode_id.to_owned()));
         }
-        let mut builder = TableBuilder::new(Header { labels: labels.clone(), ..self.header() });
+        let mut catalog = self.catalog.clone();
+        catalog.declare(other.catalog.declared());
+        let mut builder = TableBuilder::new(Header { catalog, labels: labels.clone(), ..self.header() });
         for table in [&self, other] {
             let columns: Vec<_> = labels.iter().map(|name| (table.label(name), default_text(name))).collect();
             for row in 0..table.len() {

@@ -6,6 +6,7 @@ use arrow::array::RecordBatch;
 use arrow::compute::filter_record_batch;
 
 use super::builder::TableBuilder;
+use super::declared_experiments::{DeclarationError, declare};
 use super::error::EngineError;
 use super::evaluate::{Batch, BatchScores};
 use super::physical::PhysicalPlan;
@@ -55,6 +56,9 @@ pub enum ScoreError {
     /// The definitions that scores carry are not.
     #[error(transparent)]
     Carried(#[from] RestoreError),
+    /// The experiments that the traces declare are not.
+    #[error(transparent)]
+    Declaration(#[from] DeclarationError),
     /// The condition on episodes is not.
     #[error(transparent)]
     Condition(#[from] Faults),
@@ -154,10 +158,11 @@ fn type_of(kind: Kind) -> Option<Type> {
     }
 }
 
-/// The definitions of a request, checked against the traces.
+/// The definitions of a request, checked against the traces, with the experiments that these declare.
 ///
 /// # Errors
-/// Every fault of the definitions or of the condition, an unknown metric, a column that a metric needs and the traces lack.
+/// Every fault of the definitions or of the condition, an unknown metric, a column that a metric needs and the traces lack,
+/// an experiment that two traces declare differently.
 pub fn definitions(traces: &TraceSet, request: &Request) -> Result<Definitions, ScoreError> {
     let columns = trace_columns(traces);
     let mut definitions = Definitions::load(&request.definitions, &columns)?;
@@ -168,6 +173,7 @@ pub fn definitions(traces: &TraceSet, request: &Request) -> Result<Definitions, 
         definitions.select(metrics)?;
     }
     check_columns(traces, &definitions)?;
+    declare(&mut definitions.catalog, traces)?;
     Ok(definitions)
 }
 
@@ -179,6 +185,7 @@ pub fn restored(traces: &TraceSet, catalog: &Catalog, metrics: &[String]) -> Res
     let mut definitions = Definitions::of_catalog(catalog, &trace_columns(traces))?;
     definitions.select(metrics)?;
     check_columns(traces, &definitions)?;
+    declare(&mut definitions.catalog, traces)?;
     Ok(definitions)
 }
 

@@ -15,6 +15,7 @@ use crate::report::comparison::ComparisonError;
 use crate::report::html::HtmlError;
 use crate::report::published::PublishedError;
 use crate::report::style::StyleError;
+use crate::score::declared_experiments::DeclarationError;
 use crate::score::evidence::EvidenceError;
 use crate::score::format::FormatError;
 use crate::score::score_traces::ScoreError;
@@ -252,6 +253,9 @@ pub enum StudyError {
     /// Episodes cannot be grouped.
     #[error(transparent)]
     Group(#[from] GroupError),
+    /// Scores whose traces declare one experiment differently; a level that none can have.
+    #[error(transparent)]
+    Declaration(#[from] DeclarationError),
     /// Sums of squares leave 128 bits.
     #[error(transparent)]
     Overflow(#[from] MomentOverflow),

@@ -14,11 +14,11 @@ mod design;
 mod diff;
 mod empty_filter;
 mod error;
+mod experiment_findings;
 mod figure_inputs;
 mod input_hashes;
 mod inputs;
 mod losses;
-mod overridden;
 mod pooled;
 mod provenance;
 mod report;
@@ -40,6 +40,7 @@ use crate::report::layout;
 use crate::report::published;
 use crate::report::statistics::{Options, Sequential, Statistics};
 use crate::report::style::Style;
+use crate::score::declared_experiments::declare;
 use crate::score::evidence::{self, Evidence};
 use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
@@ -53,10 +54,10 @@ pub use backend::Backend;
 pub(crate) use backend::{SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
+pub use experiment_findings::experiment_findings;
 pub use figure_inputs::{Drawings, FigureInputs};
 pub use inputs::{ScoreFile, Source, resolve};
 pub use losses::LostAs;
-pub use overridden::overridden_experiments;
 pub use provenance::ProvenanceError;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
@@ -136,10 +137,11 @@ impl Question {
         self.by.clone().unwrap_or_else(default)
     }
 
-    /// The definitions asked for, with every column that they read in every trace.
+    /// The definitions asked for, with every column that they read in every trace, and the experiments that these declare.
     pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
-        let definitions = self.bind_to(&score_traces::trace_columns(traces))?;
+        let mut definitions = self.bind_to(&score_traces::trace_columns(traces))?;
         score_traces::check_columns(traces, &definitions)?;
+        declare(&mut definitions.catalog, traces)?;
         Ok(definitions)
     }
 

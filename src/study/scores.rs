@@ -8,6 +8,7 @@ use super::Question;
 use super::error::StudyError;
 use super::inputs::ScoreFile;
 use crate::metric::definitions::Definitions;
+use crate::score::declared_experiments::Declarations;
 use crate::score::format::{self, Format, Partition};
 use crate::score::score_traces;
 use crate::score::select::select;
@@ -18,11 +19,15 @@ use crate::trace::inputs;
 /// The episodes of some files as one table, filtered as the question asks.
 ///
 /// # Errors
-/// A file that is not as it must be, scores under different definitions, a fault of the filter.
+/// A file that is not as it must be, scores under different definitions, an experiment that two of them declare differently,
+/// a fault of the filter.
 pub(super) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTable, StudyError> {
-    let mut whole: Option<EpisodeTable> = None;
+    let (mut whole, mut declarations) = (None::<EpisodeTable>, Declarations::default());
     for file in files {
         let table = read_one(file, question)?;
+        for (name, experiment) in table.catalog.declared() {
+            declarations.add(&file.input.name, &name, experiment)?;
+        }
         whole = Some(match whole {
             None => table,
             Some(whole) => whole.joined(&table).map_err(|error| StudyError::file(&file.input.name, error))?,

@@ -21,6 +21,7 @@ use crate::metric::definitions::{Definitions, ReplaceError};
 use crate::report::sensitivity::{Level, Reference, Sensitivity};
 use crate::report::statistics::Options;
 use crate::report::style::Style;
+use crate::score::declared_experiments::declare;
 use crate::score::physical::PhysicalPlan;
 use crate::score::score_traces::{self, Outputs};
 use crate::score::table::EpisodeTable;
@@ -186,8 +187,9 @@ impl Trial {
         }
         let mut definitions = vec![as_is];
         for px in &thresholds.0 {
-            let bound = bound(*px)?;
+            let mut bound = bound(*px)?;
             score_traces::check_columns(traces, &bound)?;
+            declare(&mut bound.catalog, traces)?;
             definitions.push(bound);
         }
         let is_recorded = definitions[0].catalog.lets.get(EVIDENCE).is_some_and(|text| text.trim() == GROUND_TRUTH);

@@ -87,7 +87,8 @@ codes! {
         "the data decodes to what the footer says", "the file is damaged: restore it from its source";
     /// The footer's metadata of mirrorstats cannot be read.
     InvalidMetadata, Error, "invalid-metadata":
-        "`mirrorstats.schema_version` is a whole number from 1; a `palette` in `mirrorstats.recording` lists colours",
+        "`mirrorstats.schema_version` is a whole number from 1; in `mirrorstats.recording` a `palette` lists colours, and an \
+         `experiment` is spelled as in a definition file, in all files alike",
         "correct or remove that key in the footer; a file without it is read as the newest version";
     /// The file was written under a newer schema.
     NewerSchema, Error, "newer-schema":
@@ -135,8 +136,8 @@ codes! {
         "an episode is in one of the files only", "leave one of the files out, or give the second episode another id";
     /// The experiment is none that the definitions know.
     UnknownExperiment, Error, "unknown-experiment":
-        "the definitions know the experiment",
-        "add it to the definition file as `[experiment.NAME]`, or say `open = true` there";
+        "the definitions know the experiment, or a footer declares it",
+        "add it to the definition file as `[experiment.NAME]`, say `open = true` there, or declare it in the footer";
     /// The action is none of the five.
     UnknownAction, Error, "unknown-action":
         "an action is one of the five, or null", "use one of the names; null where the reply gave none";
@@ -151,10 +152,14 @@ codes! {
     UnseenColor, Note, "unseen-color":
         "a claimed colour is that of a body or of a selected cube in the inputs",
         "nothing to do where the agent said so: the claim counts as a wrong one";
-    /// A title or a chance level of an experiment is another in the definitions than in the footer.
+    /// A title, an order or a level of an experiment is another in the definitions than in the footer.
     ExperimentOverridden, Note, "experiment-overridden":
         "the footer and the definitions say the same of an experiment",
         "nothing to do where that is meant: the definitions count";
+    /// A level of an experiment in the footer is one of no metric of the definitions.
+    UnknownLevel, Note, "unknown-level":
+        "a level of an experiment in the footer is one of a metric of the definitions",
+        "nothing to do where other definitions have the metric: the level is passed over";
     /// An episode's rows lie in more than one row group.
     SplitEpisode, Note, "split-episode":
         "an episode's rows are in one row group",

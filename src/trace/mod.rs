@@ -13,6 +13,7 @@
 pub mod bits;
 pub(crate) mod catch_panic;
 pub mod declared;
+pub mod declared_experiment;
 pub mod diagnostic;
 pub mod episode;
 pub mod error;

@@ -2,6 +2,7 @@
 
 mod audit;
 mod colors;
+mod declared;
 mod extended;
 mod filters;
 mod generated;

@@ -27,7 +27,10 @@ fn metric(kind: Kind) -> Metric {
 /// TSA, 1/3 by chance in E1 and nothing to compare with in E2; TTD, which is no rate; MCR, a rate without a level.
 fn catalog() -> Catalog {
     let chance = IndexMap::from([("TSA".to_owned(), Some("1/3".parse().unwrap()))]);
-    let experiment = |order, chance| Experiment { title: String::new(), order, chance, reference: IndexMap::new() };
+    let experiment = |order, chance| {
+        let (title, reference) = (String::new(), IndexMap::new());
+        Experiment { title, order, chance, reference, is_declared: false }
+    };
     Catalog {
         name: "test".into(),
         hash: "0".repeat(64),

@@ -4,7 +4,7 @@ use std::fs;
 use std::net::TcpListener;
 use std::path::Path;
 
-use mirrorstats::trace::write::OptionalColumns;
+use mirrorstats::trace::write::{OptionalColumns, write_episodes};
 
 use crate::{Answer, answer, episode, program, write};
 
@@ -155,4 +155,19 @@ fn a_missing_spark_is_said_with_the_remedy() {
     assert!(answer(&mut command).refused().contains("pip install pyspark"));
     command.env("SPARK_HOME", "/no/such/place");
     assert!(answer(&mut command).refused().contains("SPARK_HOME is `/no/such/place`"));
+}
+
+#[test]
+fn an_experiment_that_the_traces_declare_is_among_those_that_are_checked() {
+    let folder = folder("cat \"$last\" >request");
+    let at = folder.path();
+    let declared =
+        serde_json::json!({ "experiment": { "name": "E6", "title": "Delayed", "chance": { "TSA": "1/5" } } });
+    write_episodes(&at.join("six.parquet"), Some(declared), &[episode("b", "E6", 1)]).unwrap();
+    score(at, &["a.parquet", "six.parquet"]).refused();
+    let request: serde_json::Value = serde_json::from_str(&fs::read_to_string(at.join("request")).unwrap()).unwrap();
+    assert!(request["check"].as_str().unwrap().contains("NOT IN ('E1', 'E2', 'E3', 'E4', 'E5', 'E6')"));
+    let definitions = request["metadata"]["mirrorstats.definitions"].as_str().unwrap();
+    let definitions: serde_json::Value = serde_json::from_str(definitions).unwrap();
+    assert_eq!(definitions["experiment"]["E6"]["title"], "Delayed");
 }

@@ -13,6 +13,7 @@ use crate::cli::text_table::listing;
 use crate::experiment::Experiment;
 use crate::trace::describe::SchemaDocument;
 use crate::trace::import;
+use crate::trace::schema::Column;
 
 /// Print what a trace is: columns, footer metadata, rules; or a JSON Schema by its name
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -75,10 +76,6 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
     writeln!(out, "{}, schema version {}\n\n{sentences}\n", schema.title, schema.version)?;
     let mut columns = wrapped(["column", "type", "unit", "presence", "may be", "per", "meaning"]);
     for column in schema.columns {
-        let meaning = match column.values {
-            [] => column.doc.to_owned(),
-            values => format!("{} One of {}.", column.doc, values.join(", ")),
-        };
         columns.add_row([
             column.name,
             column.stored.name(),
@@ -86,7 +83,7 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
             if column.required { "required" } else { "optional" },
             if column.nullable { "null" } else { "" },
             if column.constant { "episode" } else { "step" },
-            &meaning,
+            &meaning(column),
         ]);
     }
     let mut metadata = wrapped(["footer key", "meaning"]);
@@ -102,6 +99,15 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
         }
     }
     writeln!(out, "\n{}", others.trim_fmt())
+}
+
+/// What a column means, its only values, what no value means, and the version that brought it.
+fn meaning(column: &Column) -> String {
+    let values = (!column.values.is_empty()).then(|| format!("One of {}.", column.values.join(", ")));
+    let default = column.default.map(|default| format!("No value means {default}."));
+    let since = (column.since > 1).then(|| format!("Since version {}.", column.since));
+    let doc = Some(column.doc.to_owned());
+    [doc, values, default, since].into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
 fn wrapped<const N: usize>(header: [&str; N]) -> Table {

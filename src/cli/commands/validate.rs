@@ -6,7 +6,7 @@ use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::text_table::counted;
-use crate::study::{known_experiments, overridden_experiments};
+use crate::study::{experiment_findings, known_experiments};
 use crate::trace::diagnostic::Severity;
 use crate::trace::inputs;
 use crate::trace::validate::{Validation, validate};
@@ -39,7 +39,7 @@ impl ValidateCommand {
         let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
         let threads = self.input.threads.count();
         let mut report = validate(&inputs, experiments.as_deref(), threads).map_err(Failure::input)?;
-        report.findings.extend(overridden_experiments(&self.definitions, &inputs)?);
+        report.findings.extend(experiment_findings(&self.definitions, &inputs)?);
         let mut out = io::stdout().lock();
         if self.json {
             writeln!(out, "{:#}", serde_json::json!(report))?;

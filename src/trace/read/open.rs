@@ -20,6 +20,7 @@ use super::footer::{Extent, footer, plain, rows_of};
 use crate::base::escape::visible;
 use crate::base::suggest::nearest;
 use crate::trace::catch_panic::contained;
+use crate::trace::declared_experiment::{self, DeclaredExperiment};
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::error::TraceError;
 use crate::trace::inputs::Input;
@@ -44,6 +45,7 @@ pub struct TraceFile {
     rows: Vec<usize>,
     pairs: Vec<KeyValue>,
     colors: Declared,
+    experiments: Vec<DeclaredExperiment>,
     /// What a reader needs, while somebody reads: footers of many row groups are large.
     footer: Mutex<Weak<ArrowReaderMetadata>>,
 }
@@ -155,11 +157,13 @@ impl TraceFile {
         }
         let rows = metadata.row_groups().iter().map(rows_of).collect();
         let pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
-        let colors = Declared::of(&input.name, value(&pairs, schema::RECORDING_KEY)).map_err(|f| vec![*f])?;
+        let recording = value(&pairs, schema::RECORDING_KEY);
+        let colors = Declared::of(&input.name, recording).map_err(|f| vec![*f])?;
+        let experiments = declared_experiment::of_recording(&input.name, recording).map_err(|f| vec![*f])?;
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
         let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
-        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, footer })
+        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, experiments, footer })
     }
 
     /// The name in messages and outputs.
@@ -232,6 +236,11 @@ impl TraceFile {
     /// The colours that the footer declares.
     pub(in crate::trace) fn colors(&self) -> &Declared {
         &self.colors
+    }
+
+    /// The experiments that the footer declares, each once.
+    pub fn experiments(&self) -> &[DeclaredExperiment] {
+        &self.experiments
     }
 
     /// A value of the footer's key-value metadata.

@@ -3,7 +3,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::colors;
 use super::field_access::{Access, Value};
 use crate::trace::episode::Episode;
 
@@ -162,11 +161,6 @@ impl Column {
 
     pub(super) const fn default(self, default: &'static str) -> Self {
         Self { default: Some(default), ..self }
-    }
-
-    /// Whether the column's text names something, so that an empty one is a fault.
-    pub fn names(&self) -> bool {
-        self.stored == Stored::String && (self.required || self.constant || colors::column(self.name).is_some())
     }
 
     /// Whether the column counts something, so that a negative number is a fault.

@@ -230,8 +230,14 @@ pub const METADATA: &[MetadataKey] = &[
     },
     MetadataKey {
         key: "mirrorstats.recording.experiment",
-        doc: "The experiment as data: title, order, decision, action set, chance and reference levels. Where a \
-              definition file says something else, the definition file counts and `validate` says so.",
+        doc: "The experiment as data, an object: `name`, `title`, `order`, `decision`, action set, `chance` and `reference` \
+              levels as under `[experiment.NAME]` of a definition file. Every command takes its episodes, whether the \
+              definitions know it or not; files that declare it must declare it alike. Where a definition file says \
+              something else, the definition file counts and `validate` says so.",
+    },
+    MetadataKey {
+        key: "mirrorstats.recording.experiments",
+        doc: "The same of several experiments, a list of such objects.",
     },
     MetadataKey {
         key: "mirrorstats.recording.registration",

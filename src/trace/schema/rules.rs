@@ -5,7 +5,7 @@
 
 use super::colors::palette::Palette;
 use super::colors::{self, ColorColumn};
-use super::{Column, Kind, Value};
+use super::{Column, Kind, Stored, Value};
 use crate::trace::diagnostic::Code;
 
 /// A rule of a column.
@@ -49,6 +49,14 @@ pub(crate) struct Known<'a> {
     pub(crate) palette: Option<&'a Palette>,
     /// The experiments that the definitions know; any if `None`.
     pub(crate) experiments: Option<&'a [String]>,
+}
+
+impl Column {
+    // Beside the rules, since a column by itself does not know which columns hold colours.
+    /// Whether the column's text names something, so that an empty one is a fault.
+    pub fn names(&self) -> bool {
+        self.stored == Stored::String && (self.required || self.constant || colors::column(self.name).is_some())
+    }
 }
 
 /// The rules of a column of the schema, in the order in which they are told.

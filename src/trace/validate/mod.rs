@@ -8,6 +8,7 @@ pub(in crate::trace) mod rules;
 
 use std::num::NonZeroUsize;
 
+use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -82,7 +83,7 @@ impl Validation {
     }
 }
 
-/// Checks these files. Experiments are checked against `experiments` if it is given.
+/// Checks these files. Experiments are checked against `experiments` if it is given, and what the files declare.
 ///
 /// # Errors
 /// When no thread can be started; whatever is wrong with a file is a finding.
@@ -107,8 +108,9 @@ pub fn validate(
         }
     }
     let set = TraceSet::of(opened);
+    let known = experiments.map(|known| with_declared(known, &set));
     let mut replies = vec![ReplyCounts::default(); inputs.len()];
-    check_rows(&set, experiments, threads, |file, checked| {
+    check_rows(&set, known.as_deref(), threads, |file, checked| {
         let place = places[file];
         match checked {
             Event::Fault(finding) => {
@@ -129,6 +131,13 @@ pub fn validate(
     }
     report.findings = found.into_iter().flatten().collect();
     Ok(report)
+}
+
+/// These experiments, and those that the files declare.
+fn with_declared(known: &[String], set: &TraceSet) -> Vec<String> {
+    let declared = set.files().iter().flat_map(TraceFile::experiments).map(|declared| declared.name.clone());
+    let all: IndexSet<String> = known.iter().cloned().chain(declared).collect();
+    all.into_iter().collect()
 }
 
 /// A note for a file with replies that gave no decision.

@@ -148,6 +148,7 @@ fn catalog() -> Catalog {
             order: i64::try_from(at).unwrap(),
             chance: IndexMap::from([("TSA".to_owned(), chance)]),
             reference: IndexMap::from([("TSA".to_owned(), levels)]),
+            is_declared: false,
         };
         ((*name).to_owned(), experiment)
     };

@@ -94,7 +94,7 @@ def refused(call):
 
 def by_openai(origin, body, limit):
     system, user = body["messages"]
-    text, image = user["content"]
+    image, text = user["content"]
     schema = body["response_format"]["json_schema"]["schema"]
     client = openai.OpenAI(api_key=KEY, base_url=f"{origin}/v1", max_retries=0)
     return refused(
@@ -105,8 +105,8 @@ def by_openai(origin, body, limit):
                 {
                     "role": "user",
                     "content": [
-                        {"type": "text", "text": text["text"]},
                         {"type": "image_url", "image_url": {"url": image["image_url"]["url"]}},
+                        {"type": "text", "text": text["text"]},
                     ],
                 },
             ],
@@ -122,7 +122,7 @@ def by_openai(origin, body, limit):
 
 def by_google(origin, body):
     types = google.genai.types
-    text, image = body["contents"][0]["parts"]
+    image, text = body["contents"][0]["parts"]
     client = google.genai.Client(
         api_key=KEY, vertexai=False, http_options=types.HttpOptions(base_url=origin, api_version="v1")
     )
@@ -130,7 +130,7 @@ def by_google(origin, body):
     return refused(
         lambda: client.models.generate_content(
             model=MODEL,
-            contents=[text["text"], types.Part.from_bytes(data=png, mime_type="image/png")],
+            contents=[types.Part.from_bytes(data=png, mime_type="image/png"), text["text"]],
             config=types.GenerateContentConfig(
                 system_instruction=body["systemInstruction"]["parts"][0]["text"],
                 temperature=TEMPERATURE,

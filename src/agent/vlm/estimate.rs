@@ -33,6 +33,7 @@ pub fn prompt_tokens(choice: &Choice, family: Family, view: [u32; 2]) -> Result<
         schema: (choice.model.contract == Contract::Schema).then_some(&schema),
         temperature: TEMPERATURE,
         max_output_tokens: 0,
+        reasoning_effort: None,
     };
     let dialect = choice.backend.dialect;
     let characters = dialect.body(&question).to_string().chars().count() as u64;

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::text_table::counted;
 use crate::agent::Player;
 use crate::agent::vlm::limits::Spend;
-use crate::base::escape::visible;
+use crate::base::escape::{visible, visible_lines};
 use crate::base::format::fixed;
 use crate::base::number::Decimal;
 use crate::record::failures::LostEpisode;
@@ -44,6 +44,8 @@ pub struct RecordAnswer {
     pub replies: RepliesAnswer,
     /// Episodes that were lost to failures which are not the agent's: in no trace, listed in `lost.jsonl` of the folder.
     pub lost: Vec<LostEpisode>,
+    /// Episodes under way that a limit of what may be spent has stopped; they are not lost, and go on under a higher limit.
+    pub stopped_by_limit: usize,
     /// What was spent over all starts of the recording; null for agents that cost nothing.
     pub spend: Option<Spend>,
     /// Whether the recording was stopped before its end.
@@ -166,7 +168,7 @@ impl Progress for Bar<'_> {
     }
 
     fn lost(&self, id: &str, reason: &str) {
-        self.say(&format!("lost {}: {}", visible(id), visible(reason)));
+        self.say(&format!("lost {}: {}", visible(id), visible_lines(reason)));
     }
 
     fn waiting(&self, id: &str, held: Held) {
@@ -254,11 +256,26 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
             visible(&lost_list.display().to_string())
         )?;
     }
-    if answer.stopped {
-        let left = answer.asked - answer.found - answer.recorded - answer.elsewhere - answer.lost.len();
-        writeln!(out, "stopped, {} to go: the same command continues", counted(left as u64, "episode"))?;
+    if let Some(words) = stopped(answer) {
+        writeln!(out, "{words}")?;
     }
     Ok(())
+}
+
+/// How many episodes are to go, if the recording was stopped; those under way that a limit has stopped are among them.
+fn stopped(answer: &RecordAnswer) -> Option<String> {
+    let left = answer.asked - answer.found - answer.recorded - answer.elsewhere - answer.lost.len();
+    let left = counted(left as u64, "episode");
+    match answer.stopped_by_limit {
+        0 => answer.stopped.then(|| format!("stopped, {left} to go: the same command continues")),
+        begun => {
+            let begun = counted(begun as u64, "episode");
+            Some(format!(
+                "stopped by a limit, {left} to go: {begun} of them begun and not lost; the same command with a higher limit \
+                 goes on where the limit stopped it"
+            ))
+        }
+    }
 }
 
 /// What share of the threads' time each part took.

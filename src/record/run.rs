@@ -69,6 +69,8 @@ pub struct Tally {
     pub steps: u64,
     /// Episodes that were lost, and why.
     pub lost: Vec<(Key, LostEpisode)>,
+    /// Episodes under way that a limit of what may be spent has stopped.
+    pub limited: Vec<Key>,
     /// Episodes that other processes recorded meanwhile.
     pub elsewhere: Vec<Key>,
     /// The recording was stopped before its end.
@@ -121,10 +123,12 @@ impl Recording<'_> {
             tally.recorded.extend(part.recorded);
             tally.steps += part.steps;
             tally.lost.extend(part.lost);
+            tally.limited.extend(part.limited);
             tally.stopped |= part.stopped;
         }
         tally.recorded.sort_unstable();
         tally.lost.sort_by_key(|(key, _)| *key);
+        tally.limited.sort_unstable();
         Ok(tally)
     }
 
@@ -257,6 +261,11 @@ impl Recording<'_> {
                 self.progress.episode(&id, steps);
             }
             Err(RecordError::Stopped) => tally.stopped = true,
+            Err(RecordError::Lost { lost, .. }) if lost.by_limit => {
+                tally.limited.push(key);
+                tally.stopped = true;
+                self.stop.store(true, Ordering::Relaxed);
+            }
             Err(RecordError::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
                 tally.lost.push((key, lost_episode(key, self.subject, step, lost)));

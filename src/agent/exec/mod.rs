@@ -267,16 +267,16 @@ impl ExecAgent {
     /// The program is of no use any more, nor is any other if the command cannot be run at all.
     async fn give_up(&mut self, failure: &Failure) -> Lost {
         let Some(program) = self.program.take() else { return lost(failure) };
-        let Lost { status, cause } = lost(failure);
+        let lost = lost(failure);
         let words = program.last_words().await.map_or_else(String::new, |words| format!("; its last words: {words}"));
-        let cause = self.shared.without_secrets(&format!("step {}: {cause}{words}", self.steps));
+        let cause = self.shared.without_secrets(&format!("step {}: {}{words}", self.steps, lost.cause));
         if let Failure::Ended(status) = failure
             && self.steps == 1
             && status.code().is_some_and(|code| NO_COMMAND.contains(&code))
         {
             self.shared.stop.get_or_init(|| format!("the command of --agent exec: cannot be run: {cause}"));
         }
-        Lost { status, cause }
+        Lost { cause, ..lost }
     }
 }
 
@@ -291,7 +291,7 @@ fn lost(failure: &Failure) -> Lost {
         Failure::Slow(_) => Status::Timeout,
         _ => Status::ServerError,
     };
-    Lost { status: Some(status), cause: failure.to_string() }
+    Lost::counted_as(status, failure.to_string())
 }
 
 /// Something between the world and the program cannot be made.

@@ -171,6 +171,9 @@ impl RecordArgs {
         if todo.len() < planned.len() {
             player.resumes();
         }
+        if !todo.is_empty() {
+            player.check().map_err(Failure::input)?;
+        }
         let bar = Bar::new(player, subject, todo.len(), config.episode.steps);
         let shares = Shares::default();
         let start = Instant::now();
@@ -184,7 +187,7 @@ impl RecordArgs {
         assembled.map_err(Failure::input)?;
         let missing: BTreeSet<Key> = todo.iter().copied().collect();
         let found: Vec<Key> = planned.iter().copied().filter(|key| !missing.contains(key)).collect();
-        let Tally { recorded, elsewhere, lost, steps, stopped, given_up } = tally;
+        let Tally { recorded, elsewhere, lost, limited, steps, stopped, given_up } = tally;
         let all = [found.as_slice(), &recorded, &elsewhere].concat();
         let lost_here = lost.len();
         let lost = store.note_lost(&all, lost).map_err(Failure::input)?;
@@ -197,6 +200,7 @@ impl RecordArgs {
             steps,
             replies: bar.replies(),
             lost,
+            stopped_by_limit: limited.len(),
             spend: player.spend(),
             stopped,
             traces: files(plan, |experiment| store.trace(experiment)),

@@ -234,6 +234,11 @@ pub trait Player: Send + Sync {
         true
     }
 
+    /// Whether its agents wait for something outside of this process, so that a recording takes its time.
+    fn waits(&self) -> bool {
+        false
+    }
+
     /// How many episodes of a thread are worth having under way at once; more than one where agents wait.
     fn in_flight(&self) -> usize {
         1

@@ -59,8 +59,8 @@ pub struct RecordAnswer {
 /// How often progress is told where no terminal shows it.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
-/// The progress: a bar where a terminal shows it, else a line now and then for agents that cost something or whose
-/// replies cannot be read.
+/// The progress: a bar where a terminal shows it, else a line now and then for agents that wait for a provider or a program,
+/// or whose replies cannot be read.
 pub(super) struct Bar<'a> {
     line: ProgressBar,
     player: &'a dyn Player,
@@ -119,7 +119,7 @@ impl<'a> Bar<'a> {
 
     /// Whether a line in a log says more than that steps are played.
     fn has_news(&self) -> bool {
-        self.player.spend().is_some() || self.replies.counts().all_unreadable() > 0
+        self.player.waits() || self.replies.counts().all_unreadable() > 0
     }
 
     /// A line for a log, now and then.
@@ -298,6 +298,7 @@ mod tests {
     use super::{Bar, dollars, shares, spent, waiting};
     use crate::agent::scripted::Scripted;
     use crate::agent::vlm::limits::Spend;
+    use crate::agent::{Player, exec};
     use crate::record::plan::{Key, Subject};
     use crate::record::queue::Held;
     use crate::record::run::Progress as _;
@@ -332,6 +333,22 @@ mod tests {
         }
         let expected = "0 of 2 episodes, 3 of 4 replies could not be read: parse_failed 1, refusal 2";
         assert_eq!((bar.message().as_str(), bar.has_news()), (expected, true));
+    }
+
+    #[test]
+    fn a_log_tells_of_programs_and_not_of_scripted_agents() {
+        let settings = exec::Settings {
+            model: "own".to_owned(),
+            command: "true".to_owned(),
+            images: exec::Images::Path,
+            timeout: Duration::from_secs(1),
+            scratch: std::env::temp_dir(),
+            standard_error: std::env::temp_dir(),
+        };
+        let (program, scripted) = (exec::Exec::new(settings).unwrap(), Scripted::named("frozen").unwrap());
+        let subject = Subject::of("own");
+        let has_news = |player: &dyn Player| Bar::new(player, &subject, 2, 10).has_news();
+        assert_eq!([has_news(&program), has_news(&scripted)], [true, false]);
     }
 
     #[test]

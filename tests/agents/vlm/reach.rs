@@ -18,7 +18,9 @@ const PROXIES: [&str; 6] = ["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_pr
 /// `record` with this address, and no proxy.
 fn recorded(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String) {
     let mut command = folder.record(server, "own", words);
-    PROXIES.iter().for_each(|name| _ = command.env_remove(name));
+    for name in PROXIES {
+        command.env_remove(name);
+    }
     let output = command.output().unwrap();
     (output.status.code(), stderr(&output))
 }

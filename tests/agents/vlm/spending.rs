@@ -60,16 +60,16 @@ fn limits_count_what_earlier_starts_spent() {
 fn an_episode_that_a_limit_stopped_is_not_lost() {
     let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
     let folder = Folder::new();
-    let words = "--seeds 1 --runs 4 --threads 1 --in-flight 2 --json";
+    let words = "--seeds 1 --runs 4 --threads 1 --in-flight 1 --json";
     let output = folder.record(&server, "own", &format!("{words} --max-requests 10")).output().unwrap();
     let said = stderr(&output);
     assert_eq!((output.status.code(), server.count()), (Some(2), 10), "{said}");
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     let of = |key: &str| answer[key].clone();
-    assert_eq!((of("recorded"), of("lost"), of("stopped_by_limit")), (2.into(), json!([]), 2.into()), "{said}");
+    assert_eq!((of("recorded"), of("lost"), of("stopped_by_limit")), (2.into(), json!([]), 1.into()), "{said}");
     assert_eq!(of("stopped"), true);
     assert!(!said.contains("lost E1") && !said.contains("failures"), "{said}");
-    assert!(said.contains("stopped by a limit, 2 episodes to go: 2 episodes of them begun and not lost"), "{said}");
+    assert!(said.contains("stopped by a limit, 2 episodes to go: 1 episode of them begun and not lost"), "{said}");
     assert!(said.ends_with("\n  help: the same command with a higher limit continues\n"), "{said}");
     assert!(!said.contains(r"\u{a}"), "{said}");
     assert!(!folder.path().join("runs/lost.jsonl").exists());
@@ -78,6 +78,13 @@ fn an_episode_that_a_limit_stopped_is_not_lost() {
     assert_eq!((output.status.code(), server.count()), (Some(0), 16), "{}", stderr(&output));
     let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!((&answer["stopped_by_limit"], &answer["stopped"]), (&0.into(), &false.into()));
+
+    // All that were under way count, whichever of them met the limit.
+    let words = format!("{words} --max-requests 6 --in-flight 4 --out together").replacen("--in-flight 1", "", 1);
+    let output = folder.record(&server, "own", &words).output().unwrap();
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let [recorded, begun] = [&answer["recorded"], &answer["stopped_by_limit"]].map(|count| count.as_u64().unwrap());
+    assert_eq!((recorded + begun, &answer["lost"]), (4, &json!([])), "{}", stderr(&output));
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use std::io;
 use std::net::{SocketAddr, TcpStream};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use reqwest::Url;
 
@@ -40,11 +40,10 @@ pub(super) fn connect(url: &Url, patience: Duration) -> Result<(), Unreachable> 
 
 /// A connection to the first of these that takes one.
 fn first_of(addresses: &[SocketAddr], patience: Duration) -> io::Result<()> {
-    let start = Instant::now();
+    let each = patience / u32::try_from(addresses.len().max(1)).unwrap_or(u32::MAX);
     let mut fault = io::Error::other("its name has no address");
     for address in addresses {
-        let left = patience.saturating_sub(start.elapsed()).max(Duration::from_millis(1));
-        match TcpStream::connect_timeout(address, left) {
+        match TcpStream::connect_timeout(address, each) {
             Ok(_) => return Ok(()),
             Err(error) => fault = error,
         }

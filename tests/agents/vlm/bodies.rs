@@ -155,7 +155,7 @@ fn most_tokens_and_reasoning_are_asked_for_as_each_provider_has_them() {
             "gemini-3-pro",
             "/generationConfig/maxOutputTokens",
             thinking,
-            json!({ "thinkingLevel": "low" }),
+            json!({ "thinkingLevel": "LOW" }),
         ),
     ] {
         let (body, description) = asked(dialect, id, Some(Effort::Low));

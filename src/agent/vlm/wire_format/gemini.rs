@@ -27,11 +27,11 @@ pub(super) fn body(question: &Question<'_>) -> Value {
     body
 }
 
-/// How an effort is said: from Gemini 3 on by its name, before by tokens, as Google's own translation of `OpenAI`'s
-/// efforts has them.
+/// How an effort is said: from Gemini 3 on by its name, which the provider rejects if it is none of its own, before by
+/// tokens, as Google's own translation of `OpenAI`'s efforts has them.
 fn thinking(model: &str, effort: Effort) -> Value {
     if !model.starts_with("gemini-2") {
-        return json!({ "thinkingLevel": effort.name() });
+        return json!({ "thinkingLevel": effort.name().to_uppercase() });
     }
     let budget = match effort {
         Effort::None => 0,

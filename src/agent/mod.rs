@@ -247,7 +247,7 @@ pub trait Player: Send + Sync {
     /// Hears that episodes of this recording are there from an earlier start.
     fn resumes(&self) {}
 
-    /// What was spent so far, over all starts of the recording; `None` for agents that cost nothing.
+    /// What was spent so far on all that it played into the folder, over all starts; `None` for agents that cost nothing.
     #[cfg(feature = "sim")]
     fn spend(&self) -> Option<vlm::limits::Spend> {
         None

@@ -46,7 +46,7 @@ pub struct RecordAnswer {
     pub lost: Vec<LostEpisode>,
     /// Episodes under way that a limit of what may be spent has stopped; they are not lost, and go on under a higher limit.
     pub stopped_by_limit: usize,
-    /// What was spent over all starts of the recording; null for agents that cost nothing.
+    /// What was spent on all that the model played into the folder, over all starts; null for agents that cost nothing.
     pub spend: Option<Spend>,
     /// Whether the recording was stopped before its end.
     pub stopped: bool,
@@ -246,7 +246,7 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
         writeln!(out, "time: {shares}")?;
     }
     if let Some(spend) = &answer.spend {
-        writeln!(out, "spent: {}, over all starts of this recording", spent(spend))?;
+        writeln!(out, "spent: {}, on all that the model played into this folder, over all starts", spent(spend))?;
     }
     if !answer.lost.is_empty() {
         let episodes = counted(answer.lost.len() as u64, "episode");

@@ -36,13 +36,14 @@ pub struct VlmArgs {
     /// Let the prompt alone ask for the reply's shape, and not the provider enforce it
     #[arg(long)]
     prompt_only: bool,
-    /// Stop before more US dollars are spent, over all starts of this recording; needs both prices of the model
+    /// Stop before more US dollars are spent on all that the model plays into the folder, over all starts; needs both prices of
+    /// the model
     #[arg(long, value_name = "USD", value_parser = amount)]
     max_cost: Option<f64>,
-    /// Stop before more tokens are used, over all starts of this recording
+    /// Stop before more tokens are used on all that the model plays into the folder, over all starts
     #[arg(long, value_name = "N")]
     max_tokens: Option<u64>,
-    /// Stop before more requests are sent, over all starts of this recording
+    /// Stop before more requests are sent for all that the model plays into the folder, over all starts
     #[arg(long, value_name = "N")]
     max_requests: Option<u64>,
     /// The most tokens of a reply, those of hidden reasoning included [default: what the models' file says, else 2048, or

@@ -164,9 +164,9 @@ impl Program {
 
     /// Bytes that the program was sent and has not read, as far as the system says.
     fn unread(&self) -> u64 {
-        #[cfg(unix)]
+        #[cfg(target_os = "linux")]
         return rustix::io::ioctl_fionread(&self.input).unwrap_or(0);
-        #[cfg(not(unix))]
+        #[cfg(not(target_os = "linux"))]
         return 0;
     }
 

@@ -115,17 +115,16 @@ impl Program {
     async fn tell(&mut self, task: &[u8]) -> Result<(), Failure> {
         // A program that no longer listens has ended or is about to, which reading finds.
         let _ = self.input.write_all(task).await;
-        while self.unread() > 0 {
+        loop {
+            // In this order: what was written before the task was read is there to be seen after it.
+            let is_read = self.unread() == 0;
             match timeout(GLANCE, self.output.fill_buf()).await {
                 Ok(Ok(early)) if !early.is_empty() => return Err(Failure::Early(beginning(early))),
                 // Its output has ended, which the next reading finds.
                 Ok(_) => return Ok(()),
+                Err(_) if is_read => return Ok(()),
                 Err(_) => {}
             }
-        }
-        match self.output.fill_buf().now_or_never() {
-            Some(Ok(early)) if !early.is_empty() => Err(Failure::Early(beginning(early))),
-            _ => Ok(()),
         }
     }
 

@@ -82,10 +82,10 @@ fn a_program_that_talks_out_of_turn() {
 #[test]
 fn a_line_before_the_first_question_is_named_as_such() {
     let early = "the program wrote a line before it was asked for its first reply: `loading the model`";
-    // Before it reads anything, at once and later; and between its task and the first observation.
+    // Before it reads anything, at once and later; and between its task and the first observation, which it never reads.
     let before = "sleep 0.2; echo 'loading the model'";
     let between =
-        "read -r task; printf '%s\\n' \"$task\" >> heard.jsonl; sleep 0.2; echo 'loading the model'; sleep 0.5; n=0";
+        "read -r task; printf '%s\\n' \"$task\" >> heard.jsonl; sleep 0.2; echo 'loading the model'; sleep 600";
     for banner in ["echo 'loading the model'", before, between] {
         let bench = Bench::new();
         bench.program(&three_steps());
@@ -98,7 +98,7 @@ fn a_line_before_the_first_question_is_named_as_such() {
         assert!(lost["reason"].as_str().unwrap().starts_with(&format!("step 1: {early}")), "{banner}: {said}");
 
         // What is said on standard error is nobody's reply.
-        let quiet = banner.replace("'loading the model'", "'loading the model' >&2");
+        let quiet = banner.replace("'loading the model'", "'loading the model' >&2").replace("sleep 600", "n=0");
         fs::write(bench.path("program.sh"), format!("{quiet}\n{script}")).unwrap();
         let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
         assert_eq!(code, Some(0), "{banner}: {said}");
@@ -111,7 +111,7 @@ fn a_line_before_the_first_question_is_named_as_such() {
 fn a_slow_line_out_of_turn_is_told_from_the_reply_to_the_next_question() {
     // The second line comes when the next question is on its way.
     let bench = Bench::new();
-    bench.program(&format!("echo '{FORWARD}'; [ $n = 1 ] && {{ sleep 0.3; echo 'all well'; sleep 0.5; }}"));
+    bench.program(&format!("echo '{FORWARD}'; [ $n = 1 ] && {{ sleep 0.3; echo 'all well'; sleep 600; }}"));
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(1), "{said}");
     let reason = found["lost"][0]["reason"].as_str().unwrap();

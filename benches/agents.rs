@@ -92,11 +92,13 @@ impl Behind {
             id: "model".into(),
             prices: Prices::default(),
             contract: Contract::Schema,
+            max_output_tokens: None,
+            reasoning_effort: None,
         };
         let backend = Backend { dialect, base_url: Some(address), key: "UNUSED".into() };
         let choice = Choice { name: "a second".into(), model, backend };
         let (handle, account) = (network.handle().clone(), Arc::<Account>::default());
-        let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account, OnOutage::Lose, 500);
+        let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account, OnOutage::Lose);
         Self { vlm: Arc::new(vlm), _network: network }
     }
 }

@@ -23,6 +23,7 @@ import openai
 KEY = "sk-loopback-0123456789"
 MODEL = "model-1"
 MAX_OUTPUT_TOKENS = 321
+EFFORT = "low"
 TEMPERATURE = 0.2
 WORLD = "eye.width = 64\neye.height_px = 48\neye.samples = 0\n"
 MODELS = """
@@ -75,6 +76,7 @@ def recorded(program, address, backend):
                 file.write(text)
         command = [program, "record", "--agent", "vlm", "--model", MODEL, "--models", "models.toml"]
         command += ["--backend", backend, "--base-url", address, "--max-output-tokens", str(MAX_OUTPUT_TOKENS)]
+        command += ["--reasoning-effort", EFFORT]
         command += ["--experiment", "E1", "--seeds", "1", "--runs", "1", "--config", "small.toml", "--no-log"]
         ended = subprocess.run(
             command, cwd=folder, env={**os.environ, "LOOPBACK_KEY": KEY}, capture_output=True, text=True, check=False
@@ -94,7 +96,7 @@ def refused(call):
 
 def by_openai(origin, body, limit):
     system, user = body["messages"]
-    text, image = user["content"]
+    image, text = user["content"]
     schema = body["response_format"]["json_schema"]["schema"]
     client = openai.OpenAI(api_key=KEY, base_url=f"{origin}/v1", max_retries=0)
     return refused(
@@ -105,12 +107,13 @@ def by_openai(origin, body, limit):
                 {
                     "role": "user",
                     "content": [
-                        {"type": "text", "text": text["text"]},
                         {"type": "image_url", "image_url": {"url": image["image_url"]["url"]}},
+                        {"type": "text", "text": text["text"]},
                     ],
                 },
             ],
             temperature=TEMPERATURE,
+            reasoning_effort=EFFORT,
             response_format={
                 "type": "json_schema",
                 "json_schema": {"name": "reply", "strict": True, "schema": schema},
@@ -122,7 +125,7 @@ def by_openai(origin, body, limit):
 
 def by_google(origin, body):
     types = google.genai.types
-    text, image = body["contents"][0]["parts"]
+    image, text = body["contents"][0]["parts"]
     client = google.genai.Client(
         api_key=KEY, vertexai=False, http_options=types.HttpOptions(base_url=origin, api_version="v1")
     )
@@ -130,11 +133,12 @@ def by_google(origin, body):
     return refused(
         lambda: client.models.generate_content(
             model=MODEL,
-            contents=[text["text"], types.Part.from_bytes(data=png, mime_type="image/png")],
+            contents=[types.Part.from_bytes(data=png, mime_type="image/png"), text["text"]],
             config=types.GenerateContentConfig(
                 system_instruction=body["systemInstruction"]["parts"][0]["text"],
                 temperature=TEMPERATURE,
                 max_output_tokens=MAX_OUTPUT_TOKENS,
+                thinking_config=types.ThinkingConfig(thinking_level=EFFORT),
                 response_mime_type="application/json",
                 response_json_schema=body["generationConfig"]["responseJsonSchema"],
             ),
@@ -164,7 +168,10 @@ def by_anthropic(origin, body):
                     ],
                 }
             ],
-            output_config={"format": {"type": "json_schema", "schema": body["output_config"]["format"]["schema"]}},
+            output_config={
+                "effort": EFFORT,
+                "format": {"type": "json_schema", "schema": body["output_config"]["format"]["schema"]},
+            },
         )
     )
 

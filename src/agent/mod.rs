@@ -54,7 +54,7 @@ pub struct Observation {
     pub yaw: f32,
     /// The last move was blocked.
     pub bumped: bool,
-    /// The step before: what was done, and the summary given for it; `None` at t = 1.
+    /// The step before: what was done, and the summary of the last reply that gave a decision; `None` at t = 1.
     pub history: Option<(Option<Action>, Option<String>)>,
     /// What the eye sees.
     pub frame: Arc<Frame>,
@@ -158,12 +158,24 @@ pub struct Lost {
     pub status: Option<Status>,
     /// What failed, without any key.
     pub cause: String,
+    /// Nothing failed: a limit of what may be spent is reached, and the episode waits for a higher one.
+    pub by_limit: bool,
 }
 
 impl Lost {
     /// Lost to something other than a reply.
     pub fn because(cause: impl Into<String>) -> Self {
-        Self { status: None, cause: cause.into() }
+        Self { status: None, cause: cause.into(), by_limit: false }
+    }
+
+    /// Lost to the failure of a reply, which counts as this status.
+    pub fn counted_as(status: Status, cause: impl Into<String>) -> Self {
+        Self { status: Some(status), cause: cause.into(), by_limit: false }
+    }
+
+    /// Stopped by a limit that whoever records has set.
+    pub fn by_limit(cause: impl Into<String>) -> Self {
+        Self { status: None, cause: cause.into(), by_limit: true }
     }
 }
 
@@ -216,6 +228,11 @@ pub trait Player: Send + Sync {
         true
     }
 
+    /// Whether its agents wait for something outside of this process, so that a recording takes its time.
+    fn waits(&self) -> bool {
+        false
+    }
+
     /// How many episodes of a thread are worth having under way at once; more than one where agents wait.
     fn in_flight(&self) -> usize {
         1
@@ -224,10 +241,18 @@ pub trait Player: Send + Sync {
     /// Hears that episodes of this recording are there from an earlier start.
     fn resumes(&self) {}
 
-    /// What was spent so far, over all starts of the recording; `None` for agents that cost nothing.
+    /// What was spent so far on all that it played into the folder, over all starts; `None` for agents that cost nothing.
     #[cfg(feature = "sim")]
     fn spend(&self) -> Option<vlm::limits::Spend> {
         None
+    }
+
+    /// Looks, before the first episode is begun, whether what the agents need is there; asks nobody anything.
+    ///
+    /// # Errors
+    /// What is not there, where it was looked for, and what to do.
+    fn check(&self) -> Result<(), String> {
+        Ok(())
     }
 
     /// Why no further episode makes sense, once there is such a reason.

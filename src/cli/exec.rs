@@ -1,10 +1,14 @@
 //! What was typed about a program as an agent, and the player that it comes to.
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::time::Duration;
 
 use super::outcome::Failure;
 use crate::agent::exec::{Exec, Images, Settings};
+use crate::record::folder_lock::parts_of;
+
+/// The folder within that of a recording for what programs say on standard error.
+const STANDARD_ERROR: &str = "stderr";
 
 /// How a program of one's own is run.
 #[derive(Clone, Debug, clap::Args)]
@@ -29,11 +33,11 @@ enum ExecImages {
 }
 
 impl ExecArgs {
-    /// The player that runs a command, called `model` in tables, with its frames below `scratch`.
+    /// The player that runs a command, called `model` in tables, for recordings into `out`.
     ///
     /// # Errors
     /// For a command without a word, and for one that names a file which cannot be read.
-    pub fn player(&self, command: &str, model: Option<&str>, scratch: PathBuf) -> Result<Exec, Failure> {
+    pub fn player(&self, command: &str, model: Option<&str>, out: &Path) -> Result<Exec, Failure> {
         if command.trim().is_empty() {
             return Err(Failure::input("--agent exec: needs a command, such as --agent exec:'python3 agent.py'"));
         }
@@ -46,7 +50,8 @@ impl ExecArgs {
             command: command.to_owned(),
             images,
             timeout: Duration::from_secs(self.exec_timeout),
-            scratch,
+            scratch: parts_of(out),
+            standard_error: out.join(STANDARD_ERROR),
         })
         .map_err(Failure::input)
     }

@@ -14,7 +14,7 @@ use serde::Serialize;
 use super::text_table::counted;
 use crate::agent::Player;
 use crate::agent::vlm::limits::Spend;
-use crate::base::escape::visible;
+use crate::base::escape::{visible, visible_lines};
 use crate::base::format::fixed;
 use crate::base::number::Decimal;
 use crate::experiment::Experiment;
@@ -47,7 +47,9 @@ pub struct RecordAnswer {
     pub replies: RepliesAnswer,
     /// Episodes that were lost to failures which are not the agent's: in no trace, listed in `lost.jsonl` of the folder.
     pub lost: Vec<LostEpisode>,
-    /// What was spent over all starts of the recording; null for agents that cost nothing.
+    /// Episodes under way that a limit of what may be spent has stopped; they are not lost, and go on under a higher limit.
+    pub stopped_by_limit: usize,
+    /// What was spent on all that the model played into the folder, over all starts; null for agents that cost nothing.
     pub spend: Option<Spend>,
     /// Whether the recording was stopped before its end.
     pub stopped: bool,
@@ -60,8 +62,8 @@ pub struct RecordAnswer {
 /// How often progress is told where no terminal shows it.
 const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
-/// The progress: a bar where a terminal shows it, else a line now and then for agents that cost something or whose
-/// replies cannot be read.
+/// The progress: a bar where a terminal shows it, else a line now and then for agents that wait for a provider or a program,
+/// or whose replies cannot be read.
 pub(super) struct Bar<'a> {
     line: ProgressBar,
     player: &'a dyn Player,
@@ -124,7 +126,7 @@ impl<'a> Bar<'a> {
 
     /// Whether a line in a log says more than that steps are played.
     fn has_news(&self) -> bool {
-        self.player.spend().is_some() || self.replies.counts().all_unreadable() > 0
+        self.player.waits() || self.replies.counts().all_unreadable() > 0
     }
 
     /// A line for a log, now and then.
@@ -174,7 +176,7 @@ impl Progress for Bar<'_> {
     }
 
     fn lost(&self, id: &str, reason: &str) {
-        self.say(&format!("lost {}: {}", visible(id), visible(reason)));
+        self.say(&format!("lost {}: {}", visible(id), visible_lines(reason)));
     }
 
     fn waiting(&self, id: &str, held: Held) {
@@ -252,7 +254,7 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
         writeln!(out, "time: {shares}")?;
     }
     if let Some(spend) = &answer.spend {
-        writeln!(out, "spent: {}, over all starts of this recording", spent(spend))?;
+        writeln!(out, "spent: {}, on all that the model played into this folder, over all starts", spent(spend))?;
     }
     if !answer.lost.is_empty() {
         let episodes = counted(answer.lost.len() as u64, "episode");
@@ -262,11 +264,26 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
             visible(&lost_list.display().to_string())
         )?;
     }
-    if answer.stopped {
-        let left = answer.asked - answer.found - answer.recorded - answer.elsewhere - answer.lost.len();
-        writeln!(out, "stopped, {} to go: the same command continues", counted(left as u64, "episode"))?;
+    if let Some(words) = stopped(answer) {
+        writeln!(out, "{words}")?;
     }
     Ok(())
+}
+
+/// How many episodes are to go, if the recording was stopped; those under way that a limit has stopped are among them.
+fn stopped(answer: &RecordAnswer) -> Option<String> {
+    let left = answer.asked - answer.found - answer.recorded - answer.elsewhere - answer.lost.len();
+    let left = counted(left as u64, "episode");
+    match answer.stopped_by_limit {
+        0 => answer.stopped.then(|| format!("stopped, {left} to go: the same command continues")),
+        begun => {
+            let begun = counted(begun as u64, "episode");
+            Some(format!(
+                "stopped by a limit, {left} to go: {begun} of them begun and not lost; the same command with a higher limit \
+                 goes on where the limit stopped it"
+            ))
+        }
+    }
 }
 
 /// What share of the threads' time each part took.
@@ -289,6 +306,7 @@ mod tests {
     use super::{Bar, dollars, shares, spent, waiting};
     use crate::agent::scripted::Scripted;
     use crate::agent::vlm::limits::Spend;
+    use crate::agent::{Player, exec};
     use crate::experiment::Experiment;
     use crate::record::plan::{Key, Subject};
     use crate::record::queue::Held;
@@ -325,6 +343,23 @@ mod tests {
         }
         let expected = "0 of 2 episodes, 3 of 4 replies could not be read: parse_failed 1, refusal 2";
         assert_eq!((bar.message().as_str(), bar.has_news()), (expected, true));
+    }
+
+    #[test]
+    fn a_log_tells_of_programs_and_not_of_scripted_agents() {
+        let settings = exec::Settings {
+            model: "own".to_owned(),
+            command: "true".to_owned(),
+            images: exec::Images::Path,
+            timeout: Duration::from_secs(1),
+            scratch: std::env::temp_dir(),
+            standard_error: std::env::temp_dir(),
+        };
+        let (program, scripted) = (exec::Exec::new(settings).unwrap(), Scripted::named("frozen").unwrap());
+        let subject = Subject::of("own");
+        let world = WorldConfig::default();
+        let has_news = |player: &dyn Player| Bar::new(player, &subject, &[], &world).has_news();
+        assert_eq!([has_news(&program), has_news(&scripted)], [true, false]);
     }
 
     #[test]

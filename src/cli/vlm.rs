@@ -1,5 +1,6 @@
 //! What was typed about a model behind a provider, and the player that it comes to.
 
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
@@ -11,9 +12,10 @@ use crate::agent::vlm::limits::{Account, Limits, Spend};
 use crate::agent::vlm::models::{Choice, Contract, Models};
 use crate::agent::vlm::provider::{Patience, Provider};
 use crate::agent::vlm::secrets::Secret;
-use crate::agent::vlm::wire_format::Dialect;
+use crate::agent::vlm::wire_format::{Dialect, Effort};
 use crate::agent::vlm::{OnOutage, Vlm, spent};
 use crate::agent::{Agent, Lost, Player, Task};
+use crate::record::plan::slug;
 
 /// A model, who serves it, and what a recording with it may spend.
 #[derive(Clone, Debug, clap::Args)]
@@ -34,18 +36,24 @@ pub struct VlmArgs {
     /// Let the prompt alone ask for the reply's shape, and not the provider enforce it
     #[arg(long)]
     prompt_only: bool,
-    /// Stop before more US dollars are spent, over all starts of this recording; needs both prices of the model
+    /// Stop before more US dollars are spent on all that the model plays into the folder, over all starts; needs both prices of
+    /// the model
     #[arg(long, value_name = "USD", value_parser = amount)]
     max_cost: Option<f64>,
-    /// Stop before more tokens are used, over all starts of this recording
+    /// Stop before more tokens are used on all that the model plays into the folder, over all starts
     #[arg(long, value_name = "N")]
     max_tokens: Option<u64>,
-    /// Stop before more requests are sent, over all starts of this recording
+    /// Stop before more requests are sent for all that the model plays into the folder, over all starts
     #[arg(long, value_name = "N")]
     max_requests: Option<u64>,
-    /// The most tokens of a reply
-    #[arg(long, value_name = "N", default_value_t = 2_048)]
-    max_output_tokens: u32,
+    /// The most tokens of a reply, those of hidden reasoning included [default: what the models' file says, else 2048, or
+    /// 16384 for a model that is asked to reason]
+    #[arg(long, value_name = "N")]
+    max_output_tokens: Option<NonZeroU32>,
+    /// How much the model is asked to reason: none, minimal, low, medium, high or xhigh, as far as it takes it [default: what
+    /// the models' file says, else what the provider does]
+    #[arg(long, value_name = "EFFORT", value_parser = effort)]
+    reasoning_effort: Option<Effort>,
     /// Requests that are out at once, at most; fewer where the provider says that it gets too many
     #[arg(long, value_name = "N", default_value_t = 64)]
     at_once: usize,
@@ -79,7 +87,7 @@ impl VlmArgs {
     pub fn player(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let choice = self.choice()?;
         if let Some(folder) = &self.cassette {
-            let vlm = Arc::new(Vlm::cassette(choice, folder.clone(), self.max_output_tokens));
+            let vlm = Arc::new(Vlm::cassette(choice, folder.clone()));
             return Ok(VlmPlayer { vlm, at_once: 1, network: None });
         }
         if self.max_cost.is_some() {
@@ -92,8 +100,8 @@ impl VlmArgs {
             .map_err(|error| Failure::input(format!("cannot start the network's thread: {error}")))?;
         let provider = self.provider(&choice)?;
         let journals = out.join(JOURNALS);
-        let reader = Vlm::cassette(choice.clone(), journals.clone(), self.max_output_tokens);
-        let spend: Spend = spent(&reader, &journals).map_err(Failure::input)?;
+        let reader = Vlm::cassette(choice.clone(), journals.clone());
+        let spend: Spend = spent(&reader, &journals, &slug(&choice.name)).map_err(Failure::input)?;
         let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
         let on_outage = if self.stand_still_on_outage { OnOutage::StandStill } else { OnOutage::Lose };
         let vlm = Vlm::online(
@@ -103,7 +111,6 @@ impl VlmArgs {
             journals,
             Arc::new(Account::new(limits, spend)),
             on_outage,
-            self.max_output_tokens,
         );
         Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network) })
     }
@@ -113,7 +120,7 @@ impl VlmArgs {
     /// # Errors
     /// For a model or backend that is none.
     pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
-        let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS), self.max_output_tokens));
+        let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
         Ok(VlmPlayer { vlm, at_once: 1, network: None })
     }
 
@@ -135,6 +142,8 @@ impl VlmArgs {
         if self.prompt_only {
             choice.model.contract = Contract::Prompt;
         }
+        choice.model.max_output_tokens = self.max_output_tokens.or(choice.model.max_output_tokens);
+        choice.model.reasoning_effort = self.reasoning_effort.or(choice.model.reasoning_effort);
         Ok(choice)
     }
 
@@ -160,6 +169,11 @@ impl VlmArgs {
 fn amount(text: &str) -> Result<f64, String> {
     let value = text.parse::<f64>().map_err(|fault| fault.to_string())?;
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("expected a finite number from 0".to_owned()) }
+}
+
+/// An effort, as typed.
+fn effort(text: &str) -> Result<Effort, String> {
+    Effort::named(text).ok_or_else(|| format!("expected one of {}", Effort::ALL.map(Effort::name).join(", ")))
 }
 
 /// A model as a player.
@@ -191,6 +205,11 @@ impl Player for VlmPlayer {
         Ok(Box::new(agent.map_err(|error| Lost::because(error.to_string()))?))
     }
 
+    /// A cassette plays at once.
+    fn waits(&self) -> bool {
+        self.network.is_some()
+    }
+
     fn in_flight(&self) -> usize {
         self.at_once
     }
@@ -202,6 +221,10 @@ impl Player for VlmPlayer {
     /// A cassette costs nothing.
     fn spend(&self) -> Option<Spend> {
         self.network.is_some().then(|| self.vlm.spend())
+    }
+
+    fn check(&self) -> Result<(), String> {
+        self.vlm.connect().map_err(|fault| fault.to_string())
     }
 
     fn stopped(&self) -> Option<String> {

@@ -77,8 +77,7 @@ mod tests {
 
     fn lost(model: &str, run: i32, cause: &str) -> LostEpisode {
         let key = Key::first(Experiment::E1, 1, run);
-        let lost = Lost { status: Some(Status::Timeout), cause: cause.to_owned() };
-        lost_episode(key, &Subject::of(model), Some(4), lost)
+        lost_episode(key, &Subject::of(model), Some(4), Lost::counted_as(Status::Timeout, cause))
     }
 
     #[test]

@@ -104,7 +104,7 @@ pub async fn play(
     observer: &mut dyn Observer,
 ) -> Result<Played, RecordError> {
     let budget = i32::try_from(world.config().episode.steps).unwrap_or(i32::MAX);
-    let (mut bumped, mut history) = (false, None);
+    let (mut bumped, mut history, mut thought) = (false, None, None);
     let (mut model, mut other_model): (Option<String>, _) = (None, None);
     for t in 1..=budget {
         if stage.stop.load(Ordering::Relaxed) {
@@ -132,7 +132,11 @@ pub async fn play(
                 other_model = Some((t, answering.clone()));
             }
         }
-        history = Some((action, reply.words.summary.clone()));
+        // A reply without a decision has no thought to take the place of the last one.
+        if action.is_some() {
+            thought.clone_from(&reply.words.summary);
+        }
+        history = Some((action, thought.clone()));
         let mut row = row(world, key, t, &visibility, reply);
         observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
         let start = Instant::now();

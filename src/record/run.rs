@@ -15,7 +15,7 @@ use super::error::RecordError;
 use super::failures::{LostEpisode, lost_episode};
 use super::lock::EpisodeLock;
 use super::plan::{Key, Subject};
-use super::queue::{Held, Next, Queue};
+use super::queue::{Complete, Held, Next, Queue};
 use super::rollout::{self, Observer, Played, Stage};
 use super::shares::Shares;
 use super::store::Store;
@@ -69,6 +69,10 @@ pub struct Tally {
     pub steps: u64,
     /// Episodes that were lost, and why.
     pub lost: Vec<(Key, LostEpisode)>,
+    /// Episodes that were under way when the recording was stopped.
+    pub under_way: Vec<Key>,
+    /// A limit of what may be spent stopped it.
+    pub by_limit: bool,
     /// Episodes that other processes recorded meanwhile.
     pub elsewhere: Vec<Key>,
     /// The recording was stopped before its end.
@@ -121,10 +125,13 @@ impl Recording<'_> {
             tally.recorded.extend(part.recorded);
             tally.steps += part.steps;
             tally.lost.extend(part.lost);
+            tally.under_way.extend(part.under_way);
+            tally.by_limit |= part.by_limit;
             tally.stopped |= part.stopped;
         }
         tally.recorded.sort_unstable();
         tally.lost.sort_by_key(|(key, _)| *key);
+        tally.under_way.sort_unstable();
         Ok(tally)
     }
 
@@ -155,13 +162,14 @@ impl Recording<'_> {
             let mut under_way = FuturesUnordered::new();
             loop {
                 let held = self.take_up(queue, each, &mut under_way, play)?;
+                self.assemble(queue);
                 let ended = match held {
                     None => under_way.next().await,
                     Some(held) if under_way.is_empty() => self.wait(held).await,
                     Some(_) => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
                 };
                 match ended {
-                    Some((key, result)) => self.note(key, result, &mut tally)?,
+                    Some((key, result)) => self.note(queue, key, result, &mut tally)?,
                     None if held.is_none() => break,
                     None => {}
                 }
@@ -169,6 +177,15 @@ impl Recording<'_> {
             Ok::<(), RecordError>(())
         })?;
         Ok(tally)
+    }
+
+    /// Puts together the experiments that have become complete, so that they can be looked at while others are played.
+    fn assemble(&self, queue: &Queue<'_>) {
+        for Complete { experiment, recorded, lost } in queue.complete() {
+            // What fails here is tried again at the end of the recording, and told there; no episode need be lost for it.
+            let _ = self.store.note_lost(&recorded, lost);
+            let _ = self.store.assemble(experiment);
+        }
     }
 
     /// Takes episodes until so many are under way. Gives one that another process has, if other processes have all that
@@ -248,18 +265,35 @@ impl Recording<'_> {
     }
 
     /// Counts what became of an episode.
-    fn note(&self, key: Key, result: Result<usize, RecordError>, tally: &mut Tally) -> Result<(), RecordError> {
+    fn note(
+        &self,
+        queue: &Queue<'_>,
+        key: Key,
+        result: Result<usize, RecordError>,
+        tally: &mut Tally,
+    ) -> Result<(), RecordError> {
         let id = key.episode_id(self.subject);
         match result {
             Ok(steps) => {
                 tally.recorded.push(key);
                 tally.steps += steps as u64;
                 self.progress.episode(key, &id, steps);
+                queue.ended(key, None);
             }
-            Err(RecordError::Stopped) => tally.stopped = true,
+            Err(RecordError::Stopped) => {
+                tally.under_way.push(key);
+                tally.stopped = true;
+            }
+            Err(RecordError::Lost { lost, .. }) if lost.by_limit => {
+                tally.under_way.push(key);
+                (tally.stopped, tally.by_limit) = (true, true);
+                self.stop.store(true, Ordering::Relaxed);
+            }
             Err(RecordError::Lost { step, lost }) => {
                 self.progress.lost(&id, &lost.cause);
-                tally.lost.push((key, lost_episode(key, self.subject, step, lost)));
+                let lost = lost_episode(key, self.subject, step, lost);
+                queue.ended(key, Some(lost.clone()));
+                tally.lost.push((key, lost));
                 if self.player.stopped().is_some() {
                     self.stop.store(true, Ordering::Relaxed);
                 }

@@ -9,7 +9,8 @@
 //!
 //! Rule: one process at a time plays an episode: the one that has its lock. The episode is written under a temporary name
 //! of that process, synchronised, and renamed, its trace last: it is there whole or not at all. The trace is put together
-//! from the parts and from what was there, by seed and run, and replaced in one step. So any number of processes may
+//! from the parts and from what was there, by seed and run, and replaced in one step: when its experiment is complete, and
+//! at the end of the recording. So any number of processes may
 //! record into one folder, the same episodes or others, and together they leave the trace that one of them would.
 
 use std::collections::{BTreeMap, BTreeSet};

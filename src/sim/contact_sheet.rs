@@ -65,7 +65,7 @@ fn row(
     seed: i32,
     eye: &mut Camera,
 ) -> Result<Vec<Picture>, ContactSheetError> {
-    let scene = Scene::draw(config, experiment, seed, 0)?;
+    let scene = Scene::draw(config, experiment, seed, 1)?;
     let mut world = World::new(config, scene)?;
     let name = experiment.name();
     let color = world.scene().body_color.name();

@@ -84,6 +84,10 @@ fn history_is_one_step_on_one_line_whatever_was_thought() {
         "Step history: the previous action was w; the thought with it was: none"
     );
     assert_eq!(seen((None, None)), "Step history: the previous reply could not be used, so nothing was done.");
+    assert_eq!(
+        seen((None, Some("I look\nfor it.".to_owned()))),
+        "Step history: the previous reply could not be used, so nothing was done; the thought before it was: I look for it."
+    );
 }
 
 #[test]

@@ -72,7 +72,7 @@ pub struct ObservationMessage {
     pub wall_warning: bool,
     /// What was done in the step before: w, s, a, d; null at t = 1 and after a reply that could not be used.
     pub last_action: Option<String>,
-    /// The `summary` of the reply before; null where there was none.
+    /// The `summary` of the last reply that could be used; null where there was none.
     pub last_thought: Option<String>,
     /// The user prompt that a model gets: task, history, position, warning.
     pub user_prompt: String,

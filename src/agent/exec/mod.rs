@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`message`] | the lines that a program is sent |
 //! | [`program`] | running it, and the names of what can go wrong |
+//! | [`said`] | what it says on standard error |
 //! | [`group`] | that nothing of it stays behind |
 //! | [`files`] | the files that the command names, by what they hold |
 //!
@@ -17,6 +18,7 @@ pub mod files;
 pub mod group;
 pub mod message;
 pub mod program;
+pub mod said;
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -30,6 +32,7 @@ use self::files::Unreadable;
 use self::group::Groups;
 use self::message::{EndMessage, Image, Message, ObservationMessage, PROTOCOL, Position, TaskMessage};
 use self::program::{Failure, Program};
+use self::said::Kept;
 use super::prompt::{self, Prompt, Rendered};
 use super::reply::{self, Ending};
 use super::vlm::secrets::{Secret, from_every_key_variable};
@@ -74,6 +77,8 @@ pub struct Settings {
     pub timeout: Duration,
     /// The folder in which each episode gets one for its frames.
     pub scratch: PathBuf,
+    /// The folder in which each episode gets a file with what its program said on standard error.
+    pub standard_error: PathBuf,
 }
 
 /// A command as a player.
@@ -89,7 +94,7 @@ struct Shared {
     /// The hash of the files that the command names, as they are when the recording starts.
     files: Option<String>,
     groups: Arc<Groups>,
-    secrets: Vec<Secret>,
+    secrets: Arc<[Secret]>,
     /// Why no further episode makes sense, once there is such a reason.
     stop: OnceLock<String>,
 }
@@ -101,7 +106,7 @@ impl Exec {
     /// When a file that the command names cannot be read.
     pub fn new(settings: Settings) -> Result<Self, Unreadable> {
         let files = files::fingerprint(&settings.command)?;
-        let (groups, secrets, stop) = (Arc::default(), from_every_key_variable(), OnceLock::new());
+        let (groups, secrets, stop) = (Arc::default(), from_every_key_variable().into(), OnceLock::new());
         Ok(Self { shared: Arc::new(Shared { settings, files, groups, secrets, stop }) })
     }
 }
@@ -132,7 +137,9 @@ impl Player for Exec {
             Images::Path => Some(Frames::new(&shared.settings.scratch)?),
             Images::Base64 => None,
         };
-        let program = Program::start(&shared.settings.command, &shared.groups).map_err(|failure| lost(&failure))?;
+        let kept = Kept::new(&shared.settings.standard_error, episode_id, Arc::clone(&shared.secrets));
+        let program = Program::start(&shared.settings.command, &shared.groups, &kept.said);
+        let program = program.map_err(|failure| lost(&failure))?;
         Ok(Box::new(ExecAgent {
             shared,
             task,
@@ -140,8 +147,13 @@ impl Player for Exec {
             prompt,
             frames,
             program: Some(program),
+            kept,
             steps: 0,
         }))
+    }
+
+    fn waits(&self) -> bool {
+        true
     }
 
     fn stopped(&self) -> Option<String> {
@@ -163,6 +175,7 @@ struct ExecAgent {
     frames: Option<Frames>,
     /// `None` once it is of no use.
     program: Option<Program>,
+    kept: Kept,
     steps: i32,
 }
 
@@ -185,22 +198,21 @@ impl Agent for ExecAgent {
 impl ExecAgent {
     async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
         self.steps = observation.t;
-        let lines = self.lines(observation)?;
+        let (task, question) = self.lines(observation)?;
         let Some(program) = &mut self.program else { return Err(Lost::because("the program has ended")) };
         let start = Instant::now();
-        match program.ask(&lines, self.shared.settings.timeout).await {
+        match program.ask(task.as_deref(), &question, self.shared.settings.timeout).await {
             Ok(line) => Ok(self.read(&line, start.elapsed())),
             Err(failure) => Err(self.give_up(&failure).await),
         }
     }
 
-    /// The observation, and before the first one the task.
-    fn lines(&self, observation: &Observation) -> Result<Vec<u8>, Lost> {
+    /// The task, before the first observation alone, and the observation.
+    fn lines(&self, observation: &Observation) -> Result<(Option<Vec<u8>>, Vec<u8>), Lost> {
         let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(unusable)?;
-        let task = (self.steps == 1).then(|| self.task_message(system));
-        let messages = task.into_iter().chain([self.observation_message(observation, user)?]);
-        let lines = messages.map(|message| message.line()).collect::<Result<Vec<_>, _>>();
-        Ok(lines.map_err(unusable)?.concat())
+        let task = (self.steps == 1).then(|| self.task_message(system).line()).transpose();
+        let question = self.observation_message(observation, user)?.line();
+        Ok((task.map_err(unusable)?, question.map_err(unusable)?))
     }
 
     fn task_message(&self, system_prompt: String) -> Message {
@@ -266,22 +278,24 @@ impl ExecAgent {
     /// The program is of no use any more, nor is any other if the command cannot be run at all.
     async fn give_up(&mut self, failure: &Failure) -> Lost {
         let Some(program) = self.program.take() else { return lost(failure) };
-        let Lost { status, cause } = lost(failure);
-        let words = program.last_words().await.map_or_else(String::new, |words| format!("; its last words: {words}"));
-        let cause = self.shared.without_secrets(&format!("step {}: {cause}{words}", self.steps));
+        let lost = lost(failure);
+        program.close().await;
+        let words = self.kept.said.last_words(&self.shared.secrets);
+        let words = words.map_or_else(String::new, |words| format!("; its last words: {words}"));
+        let cause = self.shared.without_secrets(&format!("step {}: {}{words}", self.steps, lost.cause));
         if let Failure::Ended(status) = failure
             && self.steps == 1
             && status.code().is_some_and(|code| NO_COMMAND.contains(&code))
         {
             self.shared.stop.get_or_init(|| format!("the command of --agent exec: cannot be run: {cause}"));
         }
-        Lost { status, cause }
+        Lost { cause, ..lost }
     }
 }
 
 impl Shared {
     fn without_secrets(&self, text: &str) -> String {
-        self.secrets.iter().fold(text.to_owned(), |text, secret| secret.without(&text))
+        said::without(&self.secrets, text)
     }
 }
 
@@ -290,7 +304,7 @@ fn lost(failure: &Failure) -> Lost {
         Failure::Slow(_) => Status::Timeout,
         _ => Status::ServerError,
     };
-    Lost { status: Some(status), cause: failure.to_string() }
+    Lost::counted_as(status, failure.to_string())
 }
 
 /// Something between the world and the program cannot be made.

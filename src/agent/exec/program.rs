@@ -1,21 +1,24 @@
 //! A program that runs for one episode: lines in, lines out, and what can go wrong between.
 //!
 //! Rule: nothing of a program outlives its [`Program`]: it has a process group of its own, which is killed when the
-//! value is dropped, whatever the program has started meanwhile. What it says on standard error is read all the time,
-//! and its end is kept for messages.
+//! value is dropped, whatever the program has started meanwhile. What it says on standard error is read all the time.
+//!
+//! A line is a reply if the program had begun to read the question when it wrote it. Where the system says how much of a
+//! pipe is unread, one that came before is known for what it is; elsewhere only if it came before the question was sent.
 
-use std::collections::VecDeque;
 use std::io;
 use std::process::{ExitStatus, Stdio};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use futures_util::FutureExt as _;
 use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
 use tokio::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command};
+use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
 use super::group::{Group, Groups};
+use super::said::Said;
 
 /// Bytes of one reply.
 pub const LONGEST_REPLY: u64 = 1 << 20;
@@ -23,8 +26,10 @@ pub const LONGEST_REPLY: u64 = 1 << 20;
 const FAREWELL: Duration = Duration::from_secs(5);
 /// How long the end of a process may come after the end of its output.
 const CLOSING: Duration = Duration::from_secs(1);
-/// Bytes of standard error that are kept.
-const KEPT: usize = 2_000;
+/// How often it is looked whether the program has read its task.
+const GLANCE: Duration = Duration::from_millis(2);
+/// Bytes of a line that are shown.
+const SHOWN: usize = 100;
 
 /// Why there is no reply.
 #[derive(Debug, thiserror::Error)]
@@ -33,10 +38,15 @@ pub enum Failure {
     #[error("the program cannot be started: {0}")]
     Start(io::Error),
     #[error(
-        "the program wrote a line that nobody had asked for: `{0}` (one line on standard output for each observation; \
-         everything else belongs on standard error)"
+        "the program wrote a line that nobody had asked for: `{line}`; the line before it was taken for its reply: `{before}` \
+         (one line on standard output for each observation; everything else belongs on standard error)"
     )]
-    OutOfTurn(String),
+    OutOfTurn { line: String, before: String },
+    #[error(
+        "the program wrote a line before it was asked for its first reply: `{0}` (one line on standard output for each \
+         observation; everything else belongs on standard error)"
+    )]
+    Early(String),
     #[error("the program ended ({0}) before its reply")]
     Ended(ExitStatus),
     #[error("the program closed its standard output before its reply")]
@@ -56,38 +66,70 @@ pub struct Program {
     group: Group,
     input: ChildStdin,
     output: BufReader<ChildStdout>,
-    said: Arc<Mutex<Tail>>,
+    listener: JoinHandle<()>,
+    /// The beginning of its last reply.
+    last: String,
 }
 
 impl Program {
-    /// Starts a command of the shell.
+    /// Starts a command of the shell; what it says on standard error is added to `said`.
     ///
     /// # Errors
     /// When there is no shell, or no process can be had.
-    pub fn start(command: &str, groups: &Arc<Groups>) -> Result<Self, Failure> {
+    pub fn start(command: &str, groups: &Arc<Groups>, said: &Arc<Said>) -> Result<Self, Failure> {
         let mut shell = shell(command);
         shell.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).kill_on_drop(true);
         let mut child = shell.spawn().map_err(Failure::Start)?;
         let group = Group::of(child.id(), groups);
         let gone = || Failure::Start(io::Error::other("it has no standard streams"));
         let (input, output) = (child.stdin.take().ok_or_else(gone)?, child.stdout.take().ok_or_else(gone)?);
-        let said = Arc::default();
-        tokio::spawn(listen(child.stderr.take().ok_or_else(gone)?, Arc::clone(&said)));
-        Ok(Self { child, group, input, output: BufReader::new(output), said })
+        let listener = tokio::spawn(listen(child.stderr.take().ok_or_else(gone)?, Arc::clone(said)));
+        Ok(Self { child, group, input, output: BufReader::new(output), listener, last: String::new() })
     }
 
-    /// Sends lines and waits for one, which is given without its end.
+    /// Sends a question and waits for a line, which is given without its end. The first question comes after the task, which
+    /// asks for no line.
     ///
     /// # Errors
     /// Whatever kept a whole line from coming in time. The program is of no use then.
-    pub async fn ask(&mut self, lines: &[u8], patience: Duration) -> Result<Vec<u8>, Failure> {
-        self.is_silent().await?;
-        timeout(patience, self.exchange(lines)).await.unwrap_or(Err(Failure::Slow(patience)))
+    pub async fn ask(&mut self, task: Option<&[u8]>, question: &[u8], patience: Duration) -> Result<Vec<u8>, Failure> {
+        let asked = async {
+            match task {
+                Some(task) => self.tell(task).await?,
+                None => self.is_silent().await?,
+            }
+            let line = self.exchange(question).await?;
+            if self.unread() >= question.len() as u64 {
+                return Err(match task {
+                    Some(_) => Failure::Early(beginning(&line)),
+                    None => self.out_of_turn(&line),
+                });
+            }
+            self.last = beginning(&line);
+            Ok(line)
+        };
+        timeout(patience, asked).await.unwrap_or(Err(Failure::Slow(patience)))
     }
 
-    async fn exchange(&mut self, lines: &[u8]) -> Result<Vec<u8>, Failure> {
+    /// Sends the task, and waits until the program has read it: what it writes before is no reply.
+    async fn tell(&mut self, task: &[u8]) -> Result<(), Failure> {
         // A program that no longer listens has ended or is about to, which reading finds.
-        let _ = self.input.write_all(lines).await;
+        let _ = self.input.write_all(task).await;
+        loop {
+            // In this order: what was written before the task was read is there to be seen after it.
+            let is_read = self.unread() == 0;
+            match timeout(GLANCE, self.output.fill_buf()).await {
+                Ok(Ok(early)) if !early.is_empty() => return Err(Failure::Early(beginning(early))),
+                // Its output has ended, which the next reading finds.
+                Ok(_) => return Ok(()),
+                Err(_) if is_read => return Ok(()),
+                Err(_) => {}
+            }
+        }
+    }
+
+    async fn exchange(&mut self, question: &[u8]) -> Result<Vec<u8>, Failure> {
+        let _ = self.input.write_all(question).await;
         let mut line = Vec::new();
         let read = (&mut self.output).take(LONGEST_REPLY + 1).read_until(b'\n', &mut line).await;
         read.map_err(Failure::Unreadable)?;
@@ -108,26 +150,36 @@ impl Program {
     async fn is_silent(&mut self) -> Result<(), Failure> {
         // Lets what has arrived be noticed.
         tokio::task::yield_now().await;
-        match self.output.fill_buf().now_or_never() {
-            Some(Ok(early)) if !early.is_empty() => {
-                let line = early.split(|byte| *byte == b'\n').next().unwrap_or_default();
-                let start = &line[..line.len().min(100)];
-                Err(Failure::OutOfTurn(String::from_utf8_lossy(start).into_owned()))
-            }
-            _ => Ok(()),
-        }
+        let early = match self.output.fill_buf().now_or_never() {
+            Some(Ok(early)) if !early.is_empty() => beginning(early),
+            _ => return Ok(()),
+        };
+        Err(self.out_of_turn(early.as_bytes()))
     }
 
-    /// The end of what it said on standard error, on one line; `None` if it said nothing.
-    pub async fn last_words(&self) -> Option<String> {
-        // What was said just before the end may be on its way.
-        tokio::time::sleep(Duration::from_millis(20)).await;
-        self.said.lock().unwrap_or_else(PoisonError::into_inner).text()
+    fn out_of_turn(&self, line: &[u8]) -> Failure {
+        Failure::OutOfTurn { line: beginning(line), before: self.last.clone() }
+    }
+
+    /// Bytes that the program was sent and has not read, as far as the system says.
+    fn unread(&self) -> u64 {
+        #[cfg(target_os = "linux")]
+        return rustix::io::ioctl_fionread(&self.input).unwrap_or(0);
+        #[cfg(not(target_os = "linux"))]
+        return 0;
+    }
+
+    /// Ends it at once, and waits until all that it said is read.
+    pub async fn close(self) {
+        let Self { child, group, input, output, listener, last: _ } = self;
+        drop((child, group, input, output));
+        // What has left the group may hold standard error open.
+        let _ = timeout(CLOSING, listener).await;
     }
 
     /// Says a last line, closes standard input, and waits for the program to leave; one that stays is killed.
     pub async fn end(self, line: &[u8]) {
-        let Self { mut child, group, mut input, output, said: _ } = self;
+        let Self { mut child, group, mut input, output, listener, last: _ } = self;
         let leaving = async {
             let _ = input.write_all(line).await;
             drop(input);
@@ -135,8 +187,15 @@ impl Program {
         };
         // It leaves, or it is killed with its group right here.
         let _ = timeout(FAREWELL, leaving).await;
-        drop((group, output));
+        drop((child, group, output));
+        let _ = timeout(CLOSING, listener).await;
     }
+}
+
+/// The beginning of a line, for a message.
+fn beginning(bytes: &[u8]) -> String {
+    let line = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    String::from_utf8_lossy(&line[..line.len().min(SHOWN)]).into_owned()
 }
 
 #[cfg(unix)]
@@ -153,45 +212,9 @@ fn shell(command: &str) -> Command {
     shell
 }
 
-/// The end of a text, by bytes.
-#[derive(Debug, Default)]
-struct Tail(VecDeque<u8>);
-
-impl Tail {
-    fn add(&mut self, bytes: &[u8]) {
-        self.0.extend(bytes);
-        let surplus = self.0.len().saturating_sub(KEPT);
-        self.0.drain(..surplus);
-    }
-
-    fn text(&self) -> Option<String> {
-        let bytes: Vec<u8> = self.0.iter().copied().collect();
-        let text = String::from_utf8_lossy(&bytes).split_whitespace().collect::<Vec<_>>().join(" ");
-        (!text.is_empty()).then_some(text)
-    }
-}
-
-async fn listen(mut stream: ChildStderr, said: Arc<Mutex<Tail>>) {
+async fn listen(mut stream: ChildStderr, said: Arc<Said>) {
     let mut bytes = [0; 4096];
     while let Ok(count @ 1..) = stream.read(&mut bytes).await {
-        said.lock().unwrap_or_else(PoisonError::into_inner).add(&bytes[..count]);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{KEPT, Tail};
-
-    #[test]
-    fn the_end_of_what_was_said_is_kept() {
-        let mut tail = Tail::default();
-        assert_eq!(tail.text(), None);
-        tail.add(" \n".as_bytes());
-        assert_eq!(tail.text(), None);
-        tail.add(&vec![b'x'; KEPT]);
-        tail.add(b"\nthe\tend\n");
-        let text = tail.text().unwrap();
-        assert!(text.starts_with("xxx") && text.ends_with("xx the end"), "{text}");
-        assert_eq!(text.len(), KEPT - 1);
+        said.add(&bytes[..count]);
     }
 }

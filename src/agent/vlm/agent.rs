@@ -45,7 +45,7 @@ impl VlmAgent {
     async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
         let words = Prompt::of(self.task.experiment)
             .and_then(|prompt| prompt.render(&self.task, observation))
-            .map_err(|fault| self.vlm.halt(&format!("the prompt cannot be made: {fault}")))?;
+            .map_err(|fault| self.vlm.halt(Lost::because(format!("the prompt cannot be made: {fault}"))))?;
         let schema = reply::structure(&self.task.experiment.reply);
         let dialect = self.vlm.choice.backend.dialect;
         // Pixels differ between machines, words do not: a cassette plays on any.

@@ -34,6 +34,7 @@ pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) ->
         schema: (choice.model.contract == Contract::Schema).then_some(&schema),
         temperature: TEMPERATURE,
         max_output_tokens: 0,
+        reasoning_effort: None,
     };
     let dialect = choice.backend.dialect;
     let characters = dialect.body(&question).to_string().chars().count() as u64;

@@ -32,6 +32,8 @@ pub enum FailureKind {
     Rejected,
     /// The provider takes no request with this key, from this account, or for this model.
     Denied,
+    /// The model, or the server that runs it, takes no images, and every request has one.
+    NoImages,
 }
 
 impl FailureKind {
@@ -39,7 +41,7 @@ impl FailureKind {
     pub const fn status(self) -> Status {
         match self {
             Self::RateLimited => Status::RateLimited,
-            Self::Server | Self::Rejected | Self::Denied => Status::ServerError,
+            Self::Server | Self::Rejected | Self::Denied | Self::NoImages => Status::ServerError,
             Self::Timeout => Status::Timeout,
         }
     }
@@ -83,6 +85,8 @@ pub(super) fn broken(error: reqwest::Error) -> Failure {
 /// A status that is not success.
 pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) -> Failure {
     let kind = match status {
+        // Whatever the status: llama.cpp says it as a failure of the server, others as a bad request.
+        _ if takes_no_images(body) => FailureKind::NoImages,
         StatusCode::TOO_MANY_REQUESTS if is_out_of_credit(body) => FailureKind::Denied,
         StatusCode::TOO_MANY_REQUESTS => FailureKind::RateLimited,
         StatusCode::REQUEST_TIMEOUT | StatusCode::GATEWAY_TIMEOUT => FailureKind::Timeout,
@@ -98,6 +102,47 @@ pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
         said => format!("HTTP {status}: {said}"),
     };
     Failure { kind, detail, after }
+}
+
+/// A successful status with a body that is no answer.
+pub(super) fn no_answer(body: &str) -> Failure {
+    let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
+    let detail = format!("the answer is not of the provider's language: {}", shortened(body));
+    Failure { kind, detail, after: None }
+}
+
+/// Words by which servers say that they cannot pass images to the model, lower case.
+const NO_IMAGES: [&str; 16] = [
+    // llama.cpp: "image input is not supported - hint: if this is unexpected, you may need to provide the mmproj".
+    "image input is not supported",
+    "you may need to provide the mmproj",
+    "unsupported content part type: \"image_url\"",
+    // LM Studio, LiteLLM and others.
+    "does not support image",
+    "doesn't support image",
+    "do not support image",
+    "images are not supported",
+    "image inputs are not supported",
+    "does not support vision",
+    "vision is not supported",
+    "does not support multimodal",
+    // vLLM: "... is not a multimodal model".
+    "is not a multimodal model",
+    // Ollama: "this model is missing data required for image input".
+    "missing data required for image input",
+    // OpenRouter: "No endpoints found that support image input".
+    "no endpoints found that support image input",
+    // OpenAI: "Invalid content type. image_url is only supported by certain models.".
+    "image_url is only supported by certain models",
+    // Servers that know texts alone: "unknown variant `image_url`, expected `text`".
+    "unknown variant `image_url`",
+];
+
+/// Whether an error is about images as such, which no other request can mend.
+fn takes_no_images(body: &str) -> bool {
+    // The words may stand in an error of another server, quoted as text.
+    let said = body.replace('\\', "").to_lowercase();
+    NO_IMAGES.iter().any(|words| said.contains(words))
 }
 
 /// Whether too many requests means that there is no money left, which waiting does not mend.
@@ -126,7 +171,7 @@ mod tests {
     use reqwest::StatusCode;
     use reqwest::header::{HeaderMap, HeaderValue, RETRY_AFTER};
 
-    use super::{FailureKind, failed, retry_after};
+    use super::{FailureKind, failed, no_answer, retry_after};
 
     #[test]
     fn the_wait_asked_for_is_read_or_left() {
@@ -152,5 +197,26 @@ mod tests {
         assert_eq!(kind(r#"{"error": {"code": "insufficient_quota"}}"#), FailureKind::Denied);
         assert_eq!(kind(r#"{"error": {"code": "rate_limit_exceeded"}}"#), FailureKind::RateLimited);
         assert_eq!(kind("slow down"), FailureKind::RateLimited);
+    }
+
+    #[test]
+    fn a_server_that_takes_no_images_is_known_by_its_words() {
+        let kind = |status, body: &str| failed(status, None, body).kind;
+        for body in [
+            r#"{"error":{"code":500,"message":"image input is not supported - hint: if this is unexpected, you may need to provide the mmproj","type":"server_error"}}"#,
+            r#"{"error":{"message":"Failed to parse messages: Unsupported content part type: \"image_url\"; messages = []"}}"#,
+            r#"{"error":"this model is missing data required for image input"}"#,
+            r#"{"error":"Model does not support images. Please use a model that does."}"#,
+            r#"{"error":{"message":"text-1 is not a multimodal model"}}"#,
+        ] {
+            for status in [StatusCode::INTERNAL_SERVER_ERROR, StatusCode::BAD_REQUEST, StatusCode::NOT_FOUND] {
+                assert_eq!(kind(status, body), FailureKind::NoImages, "{status} {body}");
+            }
+            assert_eq!(no_answer(body).kind, FailureKind::NoImages, "{body}");
+        }
+        let other = r#"{"error":{"message":"the image of this request cannot be decoded"}}"#;
+        assert_eq!(kind(StatusCode::INTERNAL_SERVER_ERROR, other), FailureKind::Server);
+        assert_eq!(kind(StatusCode::BAD_REQUEST, other), FailureKind::Rejected);
+        assert!(!FailureKind::NoImages.may_pass());
     }
 }

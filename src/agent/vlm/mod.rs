@@ -12,6 +12,7 @@
 //! | [`models`] | the models, who serves them, what they cost |
 //! | [`wire_format`] | what requests and answers look like |
 //! | [`provider`] | sending one request |
+//! | `preflight` | whether the provider can be reached |
 //! | [`failure`] | the names of what can go wrong |
 //! | `step` | what is done then: another attempt, a lost episode, the end |
 //! | [`concurrency`] | how many requests are out at once |
@@ -31,6 +32,7 @@ pub mod journal;
 pub mod limits;
 mod model;
 pub mod models;
+mod preflight;
 pub mod provider;
 pub mod secrets;
 mod step;
@@ -38,3 +40,4 @@ pub mod wire_format;
 
 pub use agent::VlmAgent;
 pub use model::{Memory, OnOutage, TEMPERATURE, Vlm, spent};
+pub use preflight::Unreachable;

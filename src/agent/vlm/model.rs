@@ -10,6 +10,7 @@ use tokio::runtime::Handle;
 use super::journal::{Journal, JournalError, Recorded};
 use super::limits::{Account, Spend};
 use super::models::{Choice, Contract};
+use super::preflight::Unreachable;
 use super::provider::Provider;
 use super::wire_format::{Answer, Question};
 use crate::agent::{Lost, prompt};
@@ -56,7 +57,7 @@ pub struct Vlm {
     pub(super) on_outage: OnOutage,
     max_output_tokens: u32,
     /// Why no further request makes sense, once there is such a reason.
-    stop: OnceLock<String>,
+    stop: OnceLock<Lost>,
     /// Whether the model has answered a request of this recording, so that one that is rejected is wrong by itself.
     pub(super) has_answered: AtomicBool,
 }
@@ -70,31 +71,30 @@ impl Vlm {
         journals: PathBuf,
         account: Arc<Account>,
         on_outage: OnOutage,
-        max_output_tokens: u32,
     ) -> Self {
         Self {
+            max_output_tokens: choice.model.max_output_tokens(),
             choice,
             provider: Some(provider),
             network: Some(network),
             memory: Memory::Journals(journals),
             account,
             on_outage,
-            max_output_tokens,
             stop: OnceLock::new(),
             has_answered: AtomicBool::new(false),
         }
     }
 
     /// A model whose answers are played from journals; no key is needed and nothing is sent.
-    pub fn cassette(choice: Choice, folder: PathBuf, max_output_tokens: u32) -> Self {
+    pub fn cassette(choice: Choice, folder: PathBuf) -> Self {
         Self {
+            max_output_tokens: choice.model.max_output_tokens(),
             choice,
             provider: None,
             network: None,
             memory: Memory::Cassette(folder),
             account: Arc::default(),
             on_outage: OnOutage::default(),
-            max_output_tokens,
             stop: OnceLock::new(),
             has_answered: AtomicBool::new(false),
         }
@@ -107,12 +107,25 @@ impl Vlm {
 
     /// Why no further request makes sense: a refused key, a limit that is reached, a full disk.
     pub fn stopped(&self) -> Option<&str> {
-        self.stop.get().map(String::as_str)
+        self.stop.get().map(|lost| lost.cause.as_str())
+    }
+
+    /// What an episode is lost to that wants to send a request after the end.
+    pub(super) fn end(&self) -> Option<Lost> {
+        self.stop.get().cloned()
     }
 
     /// Notes that the model has answered: a request that is rejected from now on costs its episode, not the recording.
     pub fn note_answered(&self) {
         self.has_answered.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the provider can be reached; a cassette needs none.
+    ///
+    /// # Errors
+    /// When no connection can be made.
+    pub fn connect(&self) -> Result<(), Unreachable> {
+        self.provider.as_ref().map_or(Ok(()), Provider::connect)
     }
 
     /// The most tokens that a reply may have.
@@ -139,7 +152,7 @@ impl Vlm {
 
     /// What goes into recordings: everything that shapes the requests.
     pub fn description(&self) -> Value {
-        serde_json::json!({
+        let mut description = serde_json::json!({
             "model": self.choice.name,
             "id": self.choice.model.id,
             "backend": self.choice.model.backend,
@@ -147,7 +160,11 @@ impl Vlm {
             "temperature": TEMPERATURE,
             "max_output_tokens": self.max_output_tokens,
             "identification_version": crate::trace::identification::VERSION,
-        })
+        });
+        if let Some(effort) = self.choice.model.reasoning_effort {
+            description["reasoning_effort"] = effort.name().into();
+        }
+        description
     }
 
     /// What a body says, and what it cost.
@@ -168,21 +185,22 @@ impl Vlm {
             schema: (self.choice.model.contract == Contract::Schema).then_some(schema),
             temperature: TEMPERATURE,
             max_output_tokens: self.max_output_tokens,
+            reasoning_effort: self.choice.model.reasoning_effort,
         }
     }
 
     /// No further request is sent, for this reason.
-    pub(super) fn halt(&self, reason: &str) -> Lost {
-        let reason = self.stop.get_or_init(|| reason.to_owned());
-        Lost::because(reason.clone())
+    pub(super) fn halt(&self, lost: Lost) -> Lost {
+        self.stop.get_or_init(|| lost).clone()
     }
 }
 
-/// What journals say was spent, for the account of a run that is started again.
+/// What journals say was spent on this model, for the account of a run that is started again. `slug` is the model's name in
+/// the names of episodes; the journals of other models in the folder have other prices and limits.
 ///
 /// # Errors
-/// When the folder or a journal in it cannot be read.
-pub fn spent(vlm: &Vlm, folder: &Path) -> Result<Spend, JournalError> {
+/// When the folder or a journal of the model cannot be read.
+pub fn spent(vlm: &Vlm, folder: &Path, slug: &str) -> Result<Spend, JournalError> {
     let mut spend = Spend::default();
     let entries = match std::fs::read_dir(folder) {
         Ok(entries) => entries,
@@ -191,7 +209,8 @@ pub fn spent(vlm: &Vlm, folder: &Path) -> Result<Spend, JournalError> {
     };
     for entry in entries {
         let path = entry.map_err(|source| JournalError::Io { path: folder.to_owned(), source })?.path();
-        if path.extension().is_none_or(|ending| ending != "jsonl") {
+        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+        if path.extension().is_none_or(|ending| ending != "jsonl") || model_of(stem) != Some(slug) {
             continue;
         }
         let journal = Journal::cassette(&path)?;
@@ -210,7 +229,40 @@ pub fn spent(vlm: &Vlm, folder: &Path) -> Result<Spend, JournalError> {
     Ok(spend)
 }
 
+/// The model in the name of an episode's journal: `slug` in `E1-slug-s1-r3`, and in `E1-slug@near-s1-r3-x2`.
+fn model_of(stem: &str) -> Option<&str> {
+    let without_last = |name, mark: char| {
+        let (rest, last): (&str, &str) = str::rsplit_once(name, '-')?;
+        let number = last.strip_prefix(mark)?;
+        (!number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit())).then_some(rest)
+    };
+    let first = without_last(stem, 'x').unwrap_or(stem);
+    let (_, subject) = without_last(without_last(first, 'r')?, 's')?.split_once('-')?;
+    Some(subject.split_once('@').map_or(subject, |(model, _)| model))
+}
+
 /// The tokens that an answer counts.
 pub(super) fn tokens(answer: &Answer) -> u64 {
     u64::from(answer.prompt_tokens.unwrap_or(0)) + u64::from(answer.completion_tokens.unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::model_of;
+
+    #[test]
+    fn a_journal_names_its_model() {
+        for (stem, expected) in [
+            ("E1-gpt-5-1-s1-r3", Some("gpt-5-1")),
+            ("E1-gpt-5-s1-r3-x2", Some("gpt-5")),
+            ("E5-a@near-s1-s2-r10", Some("a")),
+            ("E1-a-s1-r1-s2-r3", Some("a-s1-r1")),
+            ("E1-s2-r3", None),
+            ("E1-a-s2", None),
+            ("notes", None),
+            ("", None),
+        ] {
+            assert_eq!(model_of(stem), expected, "{stem}");
+        }
+    }
 }

@@ -5,12 +5,13 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::wire_format::Dialect;
+use super::wire_format::{Dialect, Effort};
 use crate::base::suggest::hint;
 
 const BUILT_IN: &str = include_str!("../../../assets/models.toml");
@@ -56,6 +57,24 @@ pub struct Model {
     /// Whether the backend is asked to enforce the reply's schema, or the prompt alone has to do.
     #[serde(default)]
     pub contract: Contract,
+    /// The most tokens of a reply, those of hidden reasoning included; absent for the usual number.
+    pub max_output_tokens: Option<NonZeroU32>,
+    /// How much the model is asked to reason before it replies; absent to leave it to the provider.
+    pub reasoning_effort: Option<Effort>,
+}
+
+impl Model {
+    /// The most tokens of a reply where nobody asks for another number. A model that is asked to reason gets more, or it
+    /// would be cut off before its reply.
+    pub fn max_output_tokens(&self) -> u32 {
+        const OF_A_REPLY: u32 = 2_048;
+        const WITH_REASONING: u32 = 16_384;
+        match (self.max_output_tokens, self.reasoning_effort) {
+            (Some(most), _) => most.get(),
+            (None, None | Some(Effort::None)) => OF_A_REPLY,
+            (None, Some(_)) => WITH_REASONING,
+        }
+    }
 }
 
 /// US dollars per million tokens; `None` where a price is not known.
@@ -218,6 +237,8 @@ impl Models {
                     id: name.to_owned(),
                     prices: Prices::default(),
                     contract: Contract::default(),
+                    max_output_tokens: None,
+                    reasoning_effort: None,
                 },
             ),
             (None, None) => return Err(self.unknown(name)),
@@ -278,6 +299,28 @@ mod tests {
             let fault = Models::load(Some(&file)).unwrap_err().to_string();
             assert!(fault.contains("a price of the model `own` is not an amount"), "{fault}");
         }
+    }
+
+    #[test]
+    fn a_model_has_its_own_most_tokens_and_more_if_it_reasons() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("own.toml");
+        let most = |keys: &str| {
+            std::fs::write(&file, format!("[model.own]\nbackend = \"google\"\nid = \"x\"\n{keys}\n")).unwrap();
+            Ok(Models::load(Some(&file)).map_err(|fault| fault.to_string())?.model["own"].max_output_tokens())
+        };
+        assert_eq!(most(""), Ok(2_048));
+        assert_eq!(most("reasoning_effort = \"none\""), Ok(2_048));
+        assert_eq!(most("max_output_tokens = 300\nreasoning_effort = \"high\""), Ok(300));
+        let with_reasoning: Result<u32, String> = most("reasoning_effort = \"low\"");
+        assert!(with_reasoning.unwrap() > 2_048);
+        assert!(most("max_output_tokens = 0").unwrap_err().contains("own.toml"));
+        let fault = most("reasoning_effort = \"hard\"").unwrap_err();
+        assert!(fault.contains("`hard`") && fault.contains("`minimal`"), "{fault}");
+        // Of the paper's models, those that reason by themselves.
+        let models = Models::load(None).unwrap().model;
+        let [reasons, replies] = ["Gemini 2.5 Pro", "Ministral 3 14B"].map(|name| models[name].max_output_tokens());
+        assert!(reasons > 2_048 && replies == 2_048);
     }
 
     #[test]

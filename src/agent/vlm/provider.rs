@@ -11,7 +11,8 @@ use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
 
 use super::concurrency::Pace;
-use super::failure::{Failure, FailureKind, broken, failed, retry_after, server, shortened};
+use super::failure::{Failure, FailureKind, broken, failed, no_answer, retry_after, server};
+use super::preflight::{Unreachable, connect};
 use super::secrets::Secret;
 use super::wire_format::{Answer, Dialect};
 use crate::agent::reply::Ending;
@@ -126,6 +127,15 @@ impl Provider {
         Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once) })
     }
 
+    /// Makes a connection to the address and gives it up again; nothing is sent over it.
+    ///
+    /// # Errors
+    /// When no connection can be made.
+    pub fn connect(&self) -> Result<(), Unreachable> {
+        connect(&self.url, self.patience.connect_timeout)
+            .map_err(|Unreachable { address, fault }| Unreachable { address: self.without_secret(&address), fault })
+    }
+
     /// The language it speaks.
     pub fn dialect(&self) -> Dialect {
         self.dialect
@@ -184,7 +194,7 @@ impl Provider {
         }
         let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
         let answer = self.dialect.read(&text).map_err(|fault| server(format!("the answer is not JSON: {fault}")))?;
-        let answer = answer.ok_or_else(|| server(unexpected(&self.without_secret(&text))))?;
+        let answer = answer.ok_or_else(|| no_answer(&self.without_secret(&text)))?;
         Ok(self.received(answer, text, latency))
     }
 
@@ -256,11 +266,6 @@ fn headers(dialect: Dialect, secret: Option<&Secret>) -> Result<HeaderMap, Setup
 fn is_json(kind: &str) -> bool {
     let kind = kind.split(';').next().unwrap_or_default().trim().to_ascii_lowercase();
     kind == "application/json" || kind.ends_with("+json")
-}
-
-/// What the provider says in place of an answer, shortened.
-fn unexpected(text: &str) -> String {
-    format!("the answer is not of the provider's language: {}", shortened(text))
 }
 
 #[cfg(test)]

@@ -8,9 +8,14 @@ use serde_json::Value;
 
 use super::failure::{Failure, FailureKind};
 use super::journal::{Entry, Journal, Recorded};
+use super::limits::Reached;
 use super::model::{OnOutage, Vlm, tokens};
 use super::provider::Provider;
 use crate::agent::Lost;
+
+/// What helps where a model takes no images.
+const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
+                    for images (llama.cpp: --mmproj FILE)";
 
 /// Journals stay usable when a thread that held one ended badly: every line in them is whole.
 pub(super) fn locked(journal: &Mutex<Journal>) -> MutexGuard<'_, Journal> {
@@ -76,14 +81,21 @@ impl Step {
         if failure.kind == FailureKind::Rejected && self.vlm.has_answered.load(Ordering::Relaxed) {
             return Lost::because(format!("step {}: the provider rejects this request: {}", self.t, failure.detail));
         }
-        self.vlm.halt(&format!("the provider refuses the request: {}", failure.detail))
+        let reason = match failure.kind {
+            FailureKind::NoImages => {
+                format!("the model, or the server that runs it, takes no images: {}{SEES}", failure.detail)
+            }
+            _ => format!("the provider refuses the request: {}", failure.detail),
+        };
+        self.vlm.halt(Lost::because(reason))
     }
 
     async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
-        if let Some(reason) = self.vlm.stopped() {
-            return Err(Ended::Stopped(Lost::because(reason.to_owned())));
+        if let Some(lost) = self.vlm.end() {
+            return Err(Ended::Stopped(lost));
         }
-        self.vlm.account.request().map_err(|reached| Ended::Stopped(self.vlm.halt(&reached.to_string())))?;
+        let over = |reached: Reached| Ended::Stopped(self.vlm.halt(Lost::by_limit(reached.to_string())));
+        self.vlm.account.request().map_err(over)?;
         let (t, question) = (self.t, self.question.clone());
         self.write(&Entry::Request { t, attempt, question: question.clone(), frame: self.frame.clone() })?;
         match provider.ask(&self.body).await {
@@ -110,7 +122,7 @@ impl Step {
         if self.vlm.on_outage == OnOutage::Lose {
             let name = status.name();
             let cause = format!("step {}: {name} after {attempt} attempts: {}", self.t, failure.detail);
-            return Err(Lost { status: Some(status), cause });
+            return Err(Lost::counted_as(status, cause));
         }
         let entry = Entry::Failure {
             t: self.t,
@@ -130,6 +142,6 @@ impl Step {
     /// A journal that cannot be written ends the run: going on would ask, and pay, twice.
     fn write(&self, entry: &Entry) -> Result<(), Ended> {
         let written = tokio::task::block_in_place(|| locked(&self.journal).append(entry));
-        written.map_err(|error| Ended::Stopped(self.vlm.halt(&error.to_string())))
+        written.map_err(|error| Ended::Stopped(self.vlm.halt(Lost::because(error.to_string()))))
     }
 }

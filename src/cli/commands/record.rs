@@ -21,7 +21,6 @@ use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
 use crate::record::error::StoreError;
-use crate::record::folder_lock;
 use crate::record::index::{Place, RecordingIndex};
 use crate::record::metadata::Recordings;
 use crate::record::plan::{Experiments, Key, Plan, Shard, Subject};
@@ -172,6 +171,9 @@ impl RecordArgs {
         if todo.len() < planned.len() {
             player.resumes();
         }
+        if !todo.is_empty() {
+            player.check().map_err(Failure::input)?;
+        }
         let bar = Bar::new(player, subject, &todo, config);
         let shares = Shares::default();
         let start = Instant::now();
@@ -185,7 +187,7 @@ impl RecordArgs {
         assembled.map_err(Failure::input)?;
         let missing: BTreeSet<Key> = todo.iter().copied().collect();
         let found: Vec<Key> = planned.iter().copied().filter(|key| !missing.contains(key)).collect();
-        let Tally { recorded, elsewhere, lost, steps, stopped, given_up } = tally;
+        let Tally { recorded, elsewhere, lost, under_way, by_limit, steps, stopped, given_up } = tally;
         let all = [found.as_slice(), &recorded, &elsewhere].concat();
         let lost_here = lost.len();
         let lost = store.note_lost(&all, lost).map_err(Failure::input)?;
@@ -198,6 +200,7 @@ impl RecordArgs {
             steps,
             replies: bar.replies(),
             lost,
+            stopped_by_limit: if by_limit { under_way.len() } else { 0 },
             spend: player.spend(),
             stopped,
             traces: files(plan, |experiment| store.trace(experiment)),
@@ -215,7 +218,7 @@ impl RecordArgs {
 
     fn player(&self) -> Result<Arc<dyn Player>, Failure> {
         if let Some(command) = self.agent.strip_prefix("exec:") {
-            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), folder_lock::parts_of(&self.out))?));
+            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
         }
         match self.agent.as_str() {
             "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),

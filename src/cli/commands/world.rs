@@ -37,10 +37,10 @@ struct SceneArgs {
     /// Which experiment: E1, E2, E3, E4 or E5
     experiment: Experiment,
     /// The seed of the block of runs
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 1)]
     seed: i32,
     /// The run within its seed
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 1)]
     run: i32,
     /// A TOML file whose values lie over the built-in configuration
     #[arg(long, value_name = "FILE")]
@@ -55,7 +55,7 @@ struct SheetArgs {
     #[arg(long, value_name = "DIR", default_value = "reports/world")]
     out: PathBuf,
     /// The seed of the scenes
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 1)]
     seed: i32,
     /// A TOML file whose values lie over the built-in configuration
     #[arg(long, value_name = "FILE")]

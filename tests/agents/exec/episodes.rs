@@ -128,7 +128,10 @@ fn replies_are_read_as_those_of_a_model() {
     assert_eq!(texts("action"), [some("move_forward"), None, some("done")]);
     assert_eq!(texts("reply")[1], some("I go on."));
     let heard = bench.heard();
-    assert_eq!((&heard[3]["last_action"], &heard[3]["last_thought"]), (&Value::Null, &Value::Null));
+    // What was thought before the reply that is none stays.
+    assert_eq!((&heard[3]["last_action"], &heard[3]["last_thought"]), (&Value::Null, &"went on".into()));
+    let history = "the previous reply could not be used, so nothing was done; the thought before it was: went on";
+    assert!(heard[3]["user_prompt"].as_str().unwrap().contains(history), "{}", heard[3]);
     assert_eq!((&heard[4]["kind"], &heard[4]["reason"]), (&"end".into(), &"done".into()));
 }
 

@@ -28,7 +28,8 @@ fn loses(answer: &str, words: &[&str], expected: &[&str]) {
     bench.program(&three_steps());
     let (code, found, said) = outcome(&bench.record(words).output().unwrap());
     assert_eq!((code, &found["recorded"]), (Some(0), &1.into()), "{answer}: {said}");
-    assert_eq!(bench.leftovers(), Vec::<String>::new());
+    // The program said nothing this time.
+    assert!(!bench.path("runs/stderr/E1-exec-s1-r1.log").exists(), "{answer}");
 }
 
 #[test]
@@ -70,7 +71,69 @@ fn a_program_that_talks_out_of_turn() {
     let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
     assert_eq!(code, Some(1), "{said}");
     let reason = found["lost"][0]["reason"].as_str().unwrap();
-    assert!(reason.contains("`loading the model`") && reason.contains("standard error"), "{reason}");
+    assert!(reason.contains("nobody had asked for: `loading the model`; the line before"), "{reason}");
+    // Which of them was meant as the reply is for people to say.
+    assert!(
+        reason.contains("taken for its reply: `{\"view-description\"") && reason.contains("standard error"),
+        "{reason}"
+    );
+}
+
+#[test]
+fn a_line_before_the_first_question_is_named_as_such() {
+    let early = "the program wrote a line before it was asked for its first reply: `loading the model`";
+    // Before it reads anything, at once and later; and between its task and the first observation, which it never reads.
+    let before = "sleep 0.2; echo 'loading the model'";
+    let between =
+        "read -r task; printf '%s\\n' \"$task\" >> heard.jsonl; sleep 0.2; echo 'loading the model'; sleep 600";
+    for banner in ["echo 'loading the model'", before, between] {
+        let bench = Bench::new();
+        bench.program(&three_steps());
+        let script = fs::read_to_string(bench.path("program.sh")).unwrap();
+        fs::write(bench.path("program.sh"), format!("{banner}\n{script}")).unwrap();
+        let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
+        assert_eq!(code, Some(1), "{banner}: {said}");
+        let lost = &found["lost"][0];
+        assert_eq!(lost["step"], 1, "{banner}: {said}");
+        assert!(lost["reason"].as_str().unwrap().starts_with(&format!("step 1: {early}")), "{banner}: {said}");
+
+        // What is said on standard error is nobody's reply.
+        let quiet = banner.replace("'loading the model'", "'loading the model' >&2").replace("sleep 600", "n=0");
+        fs::write(bench.path("program.sh"), format!("{quiet}\n{script}")).unwrap();
+        let (code, _, said) = outcome(&bench.record(&[]).output().unwrap());
+        assert_eq!(code, Some(0), "{banner}: {said}");
+        let kept = fs::read_to_string(bench.path("runs/stderr/E1-exec-s1-r1.log")).unwrap();
+        assert_eq!(kept, "loading the model\n");
+    }
+}
+
+#[test]
+fn a_slow_line_out_of_turn_is_told_from_the_reply_to_the_next_question() {
+    // The second line comes when the next question is on its way.
+    let bench = Bench::new();
+    bench.program(&format!("echo '{FORWARD}'; [ $n = 1 ] && {{ sleep 0.3; echo 'all well'; sleep 600; }}"));
+    let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
+    assert_eq!(code, Some(1), "{said}");
+    let reason = found["lost"][0]["reason"].as_str().unwrap();
+    assert!(reason.starts_with("step 2: the program wrote a line that nobody had asked for: `all well`"), "{reason}");
+}
+
+#[test]
+fn what_is_said_on_standard_error_is_kept_for_recorded_and_for_lost_episodes() {
+    let bench = Bench::new();
+    let speak = "printf '\\033[1mstep %s of %s\\033[0m\\r\\n' $n $MY_API_KEY >&2";
+    let fails = "grep -c 'kind\":\"task' heard.jsonl | grep -q 2 && [ $n = 2 ] && exit 3";
+    bench.program(&format!("{speak}; {fails}; {}", three_steps()));
+    let words = ["--runs", "2", "--threads", "1"];
+    let output = bench.record(&words).env("MY_API_KEY", "sk-loopback-0123456789").output().unwrap();
+    let (code, answer, said) = outcome(&output);
+    assert_eq!((code, &answer["recorded"]), (Some(1), &1.into()), "{said}");
+    let kept = |run: u32| fs::read_to_string(bench.path(&format!("runs/stderr/E1-exec-s1-r{run}.log"))).unwrap();
+    let line = |n: u32| format!("\u{1b}[1mstep {n} of [key]\u{1b}[0m\r\n");
+    assert_eq!(kept(1), [line(1), line(2), line(3)].concat());
+    assert_eq!(kept(2), [line(1), line(2)].concat());
+    // The folder is no input of a report.
+    run(bench.folder.path(), &["validate", "runs"]).done();
 }
 
 #[test]

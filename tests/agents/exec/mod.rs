@@ -6,5 +6,6 @@ mod episodes;
 mod failures;
 mod processes;
 mod recordings;
+mod running;
 mod spending;
 mod unusable;

@@ -92,11 +92,13 @@ impl Bench {
         traces::texts(&self.path(name), column)
     }
 
-    /// What stays of a recording besides its traces.
+    /// What stays of a recording besides its traces and what programs said on standard error.
     pub fn leftovers(&self) -> Vec<String> {
         let Ok(entries) = fs::read_dir(self.path("runs")) else { return Vec::new() };
         let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-        names.filter(|name| !name.ends_with(".parquet")).collect()
+        let mut names: Vec<String> = names.filter(|name| !name.ends_with(".parquet") && name != "stderr").collect();
+        names.sort();
+        names
     }
 }
 

@@ -1,5 +1,6 @@
 //! One model against one server, without a world: steps that are asked for by hand.
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -42,6 +43,8 @@ pub fn choice(dialect: Dialect) -> Choice {
             id: "model-1".to_owned(),
             prices,
             contract: Contract::Schema,
+            max_output_tokens: NonZeroU32::new(500),
+            reasoning_effort: None,
         },
         backend: Backend { dialect, base_url: None, key: "UNUSED".to_owned() },
     }
@@ -65,16 +68,25 @@ impl Bench {
     }
 
     pub fn vlm_with(&self, server: &Server, dialect: Dialect, on_outage: OnOutage, patience: Patience) -> Arc<Vlm> {
+        self.vlm_of(server, choice(dialect), on_outage, patience)
+    }
+
+    pub fn vlm_of(&self, server: &Server, choice: Choice, on_outage: OnOutage, patience: Patience) -> Arc<Vlm> {
+        let dialect = choice.backend.dialect;
         let secret = Some(Secret::new(KEY.to_owned()));
-        let provider = Provider::new(&server.address, dialect, "model-1", secret, patience, 4).unwrap();
+        let provider = Provider::new(&server.address, dialect, &choice.model.id, secret, patience, 4).unwrap();
         let (handle, folder) = (self.network.handle().clone(), self.folder.path().to_owned());
         let account = Arc::clone(&self.account);
-        Arc::new(Vlm::online(choice(dialect), provider, handle, folder, account, on_outage, 500))
+        Arc::new(Vlm::online(choice, provider, handle, folder, account, on_outage))
     }
 
     /// The replies to the first `steps` steps of an episode.
     pub fn play(vlm: &Arc<Vlm>, episode: &str, steps: i32) -> Vec<Result<Reply, Lost>> {
-        let task = Task { experiment: Experiment::E1, stated_color: None, step_budget: 100, seed: 1 };
+        Self::play_task(vlm, task(Experiment::E1), episode, steps)
+    }
+
+    /// The same in another task.
+    pub fn play_task(vlm: &Arc<Vlm>, task: Task, episode: &str, steps: i32) -> Vec<Result<Reply, Lost>> {
         let mut agent = vlm.agent(task, episode).unwrap();
         let local = tokio::runtime::Builder::new_current_thread().build().unwrap();
         (1..=steps).map(|t| local.block_on(agent.decide(&observation(t)))).collect()
@@ -87,7 +99,13 @@ impl Bench {
     }
 }
 
-fn observation(t: i32) -> Observation {
+/// A task without a false colour.
+pub fn task(experiment: Experiment) -> Task {
+    Task { experiment, stated_color: None, step_budget: 100, seed: 1 }
+}
+
+/// What is observed before a step.
+pub fn observation(t: i32) -> Observation {
     Observation {
         t,
         remaining: 101 - t,

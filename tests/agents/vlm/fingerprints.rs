@@ -51,3 +51,40 @@ fn one_model_is_one_fingerprint() {
     assert_eq!(names.len(), 1);
     run(folder.path(), &["report", "runs", "--out", "out"]).done();
 }
+
+#[test]
+fn most_tokens_and_reasoning_of_the_command_line_come_before_the_files_and_are_sampling() {
+    let folder = Folder::new();
+    let own =
+        "[model.own]\nbackend = \"compatible\"\nid = \"m\"\nmax_output_tokens = 900\nreasoning_effort = \"high\"\n";
+    std::fs::write(folder.path().join("models.toml"), own).unwrap();
+    let server = Server::start(|_, _| answer("m", "done"));
+    let record = |out: &str, words: &str| {
+        let words = format!("--seeds 1 --runs 1 --models models.toml --out {out} {words}");
+        let output = folder.record(&server, "own", &words).output().unwrap();
+        assert!(output.status.success(), "{}", stderr(&output));
+        let recording = recording(&folder.path().join(out).join("E1-own.parquet"));
+        let parts = recording["fingerprints"].as_object().unwrap().values().next().unwrap().clone();
+        let body = server.requests().pop().unwrap().json();
+        ([&body["max_tokens"], &body["reasoning_effort"]].map(Value::clone), recording["agent"].clone(), parts)
+    };
+    let (asked, agent, of_file) = record("a", "");
+    assert_eq!(asked, [Value::from(900), "high".into()]);
+    assert_eq!([&agent["max_output_tokens"], &agent["reasoning_effort"]], [&asked[0], &asked[1]]);
+    let (asked, agent, typed) = record("b", "--reasoning-effort low --max-output-tokens 700");
+    assert_eq!(asked, [Value::from(700), "low".into()]);
+    assert_eq!([&agent["max_output_tokens"], &agent["reasoning_effort"]], [&asked[0], &asked[1]]);
+    let changed: Vec<&str> = of_file
+        .as_object()
+        .unwrap()
+        .iter()
+        .filter(|(key, part)| typed[*key] != **part)
+        .map(|(key, _)| key.as_str())
+        .collect();
+    assert_eq!(changed, ["sampling"]);
+
+    let words = "--seeds 1 --runs 1 --models models.toml --reasoning-effort hard";
+    let output = folder.record(&server, "own", words).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("expected one of none, minimal, low, medium, high, xhigh"), "{}", stderr(&output));
+}

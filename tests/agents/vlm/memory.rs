@@ -1,9 +1,11 @@
 //! What was asked and answered is on disk before it is acted on, and is never asked again.
 
+use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::wire_format::Dialect;
+use mirrorstats::agent::vlm::models::Model;
+use mirrorstats::agent::vlm::wire_format::{Dialect, Effort};
 use mirrorstats::agent::vlm::{OnOutage, Vlm};
 use mirrorstats::trace::episode::Action;
 
@@ -34,14 +36,23 @@ fn what_was_answered_is_never_asked_again_and_plays_without_a_network() {
     assert_eq!(again.into_iter().map(Result::unwrap).collect::<Vec<_>>(), first);
     assert_eq!(server.count(), 4, "nothing is asked again");
 
-    let cassette = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned(), 500));
+    let cassette = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned()));
     let played = Bench::play(&cassette, "episode", 4);
     assert_eq!(played[..3].iter().cloned().map(Result::unwrap).collect::<Vec<_>>(), first);
     assert!(played[3].as_ref().unwrap_err().cause.contains("no answer for step 4"));
 
-    let another = Arc::new(Vlm::cassette(choice(Dialect::OpenaiChat), bench.folder.path().to_owned(), 501));
-    let refused = Bench::play(&another, "episode", 1).remove(0).unwrap_err();
-    assert!(refused.cause.contains("belongs to another request"), "{refused}");
+    for change in [
+        |model: &mut Model| model.max_output_tokens = NonZeroU32::new(501),
+        |model: &mut Model| {
+            model.reasoning_effort = Some(Effort::Low);
+        },
+    ] {
+        let mut other = choice(Dialect::OpenaiChat);
+        change(&mut other.model);
+        let another = Arc::new(Vlm::cassette(other, bench.folder.path().to_owned()));
+        let refused = Bench::play(&another, "episode", 1).remove(0).unwrap_err();
+        assert!(refused.cause.contains("belongs to another request"), "{refused}");
+    }
 }
 
 #[test]

@@ -1,11 +1,13 @@
 //! A model behind a provider, against servers on loopback that behave and misbehave.
 
 mod bench;
+mod bodies;
 mod fingerprints;
 mod keys;
 mod killed;
 mod languages;
 mod memory;
+mod reach;
 mod recordings;
 mod refusals;
 pub mod server;

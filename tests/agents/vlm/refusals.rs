@@ -61,7 +61,7 @@ fn a_refusal_as_a_bad_request_costs_its_step_and_plays_again_alike() {
         assert_eq!((refused.action, &refused.self_color, refused.usage.cost_usd), (None, &None, None));
 
         let again = Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 3);
-        let cassette = Vlm::cassette(choice(dialect), bench.folder.path().to_owned(), 500);
+        let cassette = Vlm::cassette(choice(dialect), bench.folder.path().to_owned());
         assert_eq!(again, replies, "{dialect:?}");
         assert_eq!(Bench::play(&cassette.into(), "episode", 3), replies, "{dialect:?}");
         assert_eq!(server.count(), 3, "a refusal is not asked for again: {dialect:?}");

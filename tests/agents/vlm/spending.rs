@@ -4,6 +4,8 @@ use mirrorstats::agent::vlm::OnOutage;
 use mirrorstats::agent::vlm::limits::Limits;
 use mirrorstats::agent::vlm::wire_format::Dialect;
 
+use serde_json::{Value, json};
+
 use super::bench::Bench;
 use super::recordings::{Folder, counting};
 use super::server::{Server, decision, whole};
@@ -16,7 +18,10 @@ fn limits_stop_before_the_request_over_them() {
     let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose);
     let replies = Bench::play(&vlm, "episode", 3);
     assert!(replies[0].is_ok() && replies[1].is_ok());
-    assert!(replies[2].as_ref().unwrap_err().cause.contains("limit of requests is reached: 2 of 2"));
+    let stopped = replies[2].as_ref().unwrap_err();
+    assert!(stopped.by_limit && stopped.cause.contains("limit of requests is reached: 2 of 2"), "{stopped}");
+    // An episode that comes later hears the same.
+    assert_eq!(Bench::play(&vlm, "another", 1)[0].as_ref(), Err(stopped));
     assert_eq!(server.count(), 2);
 }
 
@@ -49,6 +54,69 @@ fn limits_count_what_earlier_starts_spent() {
         let (code, said) = started(&folder, &server, "");
         assert_eq!((code, server.count()), (Some(0), 4), "{said}");
     }
+}
+
+#[test]
+fn an_episode_that_a_limit_stopped_is_not_lost() {
+    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
+    let folder = Folder::new();
+    let words = "--seeds 1 --runs 4 --threads 1 --in-flight 1 --json";
+    let output = folder.record(&server, "own", &format!("{words} --max-requests 10")).output().unwrap();
+    let said = stderr(&output);
+    assert_eq!((output.status.code(), server.count()), (Some(2), 10), "{said}");
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let of = |key: &str| answer[key].clone();
+    assert_eq!((of("recorded"), of("lost"), of("stopped_by_limit")), (2.into(), json!([]), 1.into()), "{said}");
+    assert_eq!(of("stopped"), true);
+    assert!(!said.contains("lost E1") && !said.contains("failures"), "{said}");
+    assert!(said.contains("stopped by a limit, 2 episodes to go: 1 episode of them begun and not lost"), "{said}");
+    assert!(said.ends_with("\n  help: the same command with a higher limit continues\n"), "{said}");
+    assert!(!said.contains(r"\u{a}"), "{said}");
+    assert!(!folder.path().join("runs/lost.jsonl").exists());
+
+    let output = folder.record(&server, "own", &format!("{words} --max-requests 16")).output().unwrap();
+    assert_eq!((output.status.code(), server.count()), (Some(0), 16), "{}", stderr(&output));
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&answer["stopped_by_limit"], &answer["stopped"]), (&0.into(), &false.into()));
+
+    // All that were under way count, whichever of them met the limit.
+    let words = format!("{words} --max-requests 6 --in-flight 4 --out together").replacen("--in-flight 1", "", 1);
+    let output = folder.record(&server, "own", &words).output().unwrap();
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let [recorded, begun] = [&answer["recorded"], &answer["stopped_by_limit"]].map(|count| count.as_u64().unwrap());
+    assert_eq!((recorded + begun, &answer["lost"]), (4, &json!([])), "{}", stderr(&output));
+}
+
+#[test]
+fn models_that_share_a_folder_have_accounts_of_their_own() {
+    let folder = Folder::new();
+    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
+    let model = |name: &str, price: f64| {
+        format!(
+            "[model.\"{name}\"]\nbackend = \"compatible\"\nid = \"{name}\"\n\
+             prices = {{ input = {price:.1}, output = {price:.1} }}\n"
+        )
+    };
+    // The name of one begins as that of the other.
+    let models = model("own", 1.0) + &model("own s1", 100.0);
+    std::fs::write(folder.path().join("models.toml"), models).unwrap();
+    let spend = |name: &str, words: &str| {
+        let mut command = folder.record(&server, name, "--seeds 1 --runs 1 --models models.toml --json");
+        let output = command.args(words.split_whitespace()).output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{name}: {}", stderr(&output));
+        serde_json::from_slice::<Value>(&output.stdout).unwrap()["spend"].clone()
+    };
+    // Four answers of 1100 tokens each.
+    let of = |requests: u64, cost: f64| json!({ "cost_usd": cost, "uncosted": 0, "tokens": requests * 1100, "requests": requests });
+    let is = |found: &Value, requests: u64, cost: f64| {
+        let expected = of(requests, cost);
+        let near = (found["cost_usd"].as_f64().unwrap() - cost).abs() < 1e-9;
+        assert!(near && found["requests"] == expected["requests"] && found["tokens"] == expected["tokens"], "{found}");
+    };
+    is(&spend("own s1", ""), 4, 0.44);
+    is(&spend("own", "--max-requests 4 --max-cost 0.01"), 4, 0.0044);
+    is(&spend("own s1", "--max-requests 4"), 4, 0.44);
+    assert_eq!(folder.journals().len(), 2);
 }
 
 #[test]

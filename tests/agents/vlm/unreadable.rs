@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::bench::KEY;
 use super::recordings::Folder;
-use super::server::{Server, decision, ok, spoken, whole};
+use super::server::{Request, Server, decision, ok, spoken, whole};
 use crate::harness::files::write_small_world;
 use crate::harness::program::{run, stderr};
 
@@ -52,6 +52,33 @@ fn a_recording_of_which_nothing_could_be_read_says_so_everywhere() {
     assert!(text.contains("0 errors, 1 note"), "{text}");
     let note = &json["findings"][0];
     assert_eq!((&note["code"], &note["severity"]), (&"unreadable-replies".into(), &"note".into()));
+}
+
+#[test]
+fn an_unusable_reply_leaves_the_last_good_summary() {
+    let server = Server::start(|at, _| match at {
+        0 => whole(Dialect::OpenaiCompatible, &decision("a").replace("went on", "saw a mirror")),
+        1 => whole(Dialect::OpenaiCompatible, "I go on."),
+        2 => ok(&spoken(Dialect::OpenaiCompatible, "", "content_filter")),
+        3 => whole(Dialect::OpenaiCompatible, &decision("a").replace("went on", "saw a wall")),
+        _ => whole(Dialect::OpenaiCompatible, &decision("done")),
+    });
+    let folder = short();
+    let output = folder.record(&server, "own", "--seeds 1 --runs 1").output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let history = |request: &Request| {
+        let (_, rest) = request.body.split_once("Step history: ").unwrap();
+        rest.split_once("\\n").unwrap().0.to_owned()
+    };
+    let unusable = "the previous reply could not be used, so nothing was done; the thought before it was: saw a mirror";
+    let expected = [
+        "none, this is the first step.",
+        "the previous action was a; the thought with it was: saw a mirror",
+        unusable,
+        unusable,
+        "the previous action was a; the thought with it was: saw a wall",
+    ];
+    assert_eq!(server.requests().iter().map(history).collect::<Vec<_>>(), expected);
 }
 
 #[test]

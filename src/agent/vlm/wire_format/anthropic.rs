@@ -20,6 +20,9 @@ pub(super) fn body(question: &Question<'_>) -> Value {
     if let Some(schema) = question.schema {
         body["output_config"] = json!({ "format": { "type": "json_schema", "schema": schema } });
     }
+    if let Some(effort) = question.reasoning_effort {
+        body["output_config"]["effort"] = json!(effort.name());
+    }
     body
 }
 

@@ -2,14 +2,14 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Question, text, tokens};
+use super::{Answer, Effort, Question, text, tokens};
 use crate::agent::reply::Ending;
 
 pub(super) fn body(question: &Question<'_>) -> Value {
     let mut body = json!({
         "contents": [{ "role": "user", "parts": [
-            { "text": question.user },
             { "inlineData": { "data": question.png_base64, "mimeType": "image/png" } },
+            { "text": question.user },
         ] }],
         "systemInstruction": { "parts": [{ "text": question.system }], "role": "user" },
         "generationConfig": {
@@ -21,7 +21,25 @@ pub(super) fn body(question: &Question<'_>) -> Value {
         body["generationConfig"]["responseMimeType"] = json!("application/json");
         body["generationConfig"]["responseJsonSchema"] = schema.clone();
     }
+    if let Some(effort) = question.reasoning_effort {
+        body["generationConfig"]["thinkingConfig"] = thinking(question.model, effort);
+    }
     body
+}
+
+/// How an effort is said: from Gemini 3 on by its name, which the provider rejects if it is none of its own, before by
+/// tokens, as Google's own translation of `OpenAI`'s efforts has them.
+fn thinking(model: &str, effort: Effort) -> Value {
+    if !model.starts_with("gemini-2") {
+        return json!({ "thinkingLevel": effort.name().to_uppercase() });
+    }
+    let budget = match effort {
+        Effort::None => 0,
+        Effort::Minimal | Effort::Low => 1_024,
+        Effort::Medium => 8_192,
+        Effort::High | Effort::Xhigh => 24_576,
+    };
+    json!({ "thinkingBudget": budget })
 }
 
 /// The reasons to end a candidate that decline what it is about.

@@ -1,17 +1,20 @@
 //! The languages that providers speak: a request as JSON, and what their answer says.
 //!
 //! Rule: pure. A dialect knows the shape of bodies and the names of headers; it sends nothing and holds no key.
-//! A body has what the provider's own client library sends for the same call, and nothing else.
+//! A body has what the provider's own client library sends for the same call, and nothing else. In all of them the frame
+//! comes before the words of the user prompt: the paper's prompt names it first, and Anthropic and Google advise it.
 
 mod anthropic;
 mod gemini;
 mod openai;
 mod refusal;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::agent::reply::{Ending, without_lone_surrogates};
+use crate::base::names::names;
 
 /// A language.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -42,9 +45,31 @@ pub struct Question<'a> {
     pub schema: Option<&'a Value>,
     /// The sampling temperature (0.2 in the paper).
     pub temperature: f64,
-    /// The most tokens that a reply may have.
+    /// The most tokens that a reply may have, those of hidden reasoning included.
     pub max_output_tokens: u32,
+    /// How much the model is asked to reason; `None` leaves it to the provider.
+    pub reasoning_effort: Option<Effort>,
 }
+
+/// How much a model is asked to reason before it replies. Not every model takes every effort.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Effort {
+    /// Not at all.
+    None,
+    /// As little as it can.
+    Minimal,
+    /// Little.
+    Low,
+    /// Some.
+    Medium,
+    /// Much.
+    High,
+    /// As much as it can.
+    Xhigh,
+}
+
+names!(Effort { None: "none", Minimal: "minimal", Low: "low", Medium: "medium", High: "high", Xhigh: "xhigh" });
 
 /// What an answer says.
 #[derive(Clone, Debug, PartialEq)]

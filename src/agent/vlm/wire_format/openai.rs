@@ -12,13 +12,16 @@ pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
         "messages": [
             { "role": "system", "content": question.system },
             { "role": "user", "content": [
-                { "type": "text", "text": question.user },
                 { "type": "image_url", "image_url": { "url": image } },
+                { "type": "text", "text": question.user },
             ] },
         ],
         "temperature": question.temperature,
     });
     body[limit] = json!(question.max_output_tokens);
+    if let Some(effort) = question.reasoning_effort {
+        body["reasoning_effort"] = json!(effort.name());
+    }
     if let Some(schema) = question.schema {
         body["response_format"] = json!({
             "type": "json_schema",

@@ -1,0 +1,174 @@
+//! What is in the bodies of requests: the frame, then the words of the prompt, the schema's keys, and nothing else.
+
+use std::collections::BTreeSet;
+use std::num::NonZeroU32;
+
+use mirrorstats::agent::prompt::{Prompt, Rendered};
+use mirrorstats::agent::reply;
+use mirrorstats::agent::vlm::OnOutage;
+use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::wire_format::{Dialect, Effort};
+use mirrorstats::experiment::Experiment;
+use serde_json::{Value, json};
+
+use super::bench::{Bench, choice, observation, patience, task};
+use super::server::{Server, decision, whole};
+
+const PROVIDERS: [Dialect; 4] =
+    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+
+/// Every name and every fixed value of a request's own language: none of them says anything about the task.
+const LANGUAGE: [&str; 38] = [
+    "model",
+    "messages",
+    "role",
+    "system",
+    "user",
+    "content",
+    "type",
+    "text",
+    "image_url",
+    "url",
+    "temperature",
+    "max_tokens",
+    "max_completion_tokens",
+    "response_format",
+    "json_schema",
+    "name",
+    "reply",
+    "strict",
+    "schema",
+    "contents",
+    "parts",
+    "inlineData",
+    "data",
+    "mimeType",
+    "image/png",
+    "systemInstruction",
+    "generationConfig",
+    "maxOutputTokens",
+    "responseMimeType",
+    "application/json",
+    "responseJsonSchema",
+    "image",
+    "source",
+    "base64",
+    "media_type",
+    "output_config",
+    "format",
+    "model-1",
+];
+
+/// The keywords of the schema.
+const SCHEMA: [&str; 6] = ["type", "properties", "required", "additionalProperties", "object", "string"];
+
+/// The body of the first request of an episode, and the words that the prompt gives for it.
+fn body(dialect: Dialect, experiment: Experiment) -> (Value, Rendered) {
+    let server = Server::start(move |_, _| whole(dialect, &decision("w")));
+    let bench = Bench::new(Limits::default());
+    let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+    Bench::play_task(&vlm, task(experiment), "episode", 1).remove(0).unwrap();
+    let words = Prompt::of(experiment).unwrap().render(&task(experiment), &observation(1)).unwrap();
+    (server.requests().remove(0).json(), words)
+}
+
+/// The parts of the user's message, in their order.
+fn parts(dialect: Dialect, body: &Value) -> &[Value] {
+    let place = match dialect {
+        Dialect::OpenaiChat | Dialect::OpenaiCompatible => "/messages/1/content",
+        Dialect::Gemini => "/contents/0/parts",
+        Dialect::AnthropicMessages => "/messages/0/content",
+    };
+    body.pointer(place).unwrap().as_array().unwrap()
+}
+
+/// Every string of a value with the names of its members, in their order.
+fn strings(value: &Value) -> Vec<&str> {
+    match value {
+        Value::String(text) => vec![text],
+        Value::Array(items) => items.iter().flat_map(strings).collect(),
+        Value::Object(members) => {
+            members.iter().flat_map(|(key, value)| [vec![key.as_str()], strings(value)].concat()).collect()
+        }
+        _ => Vec::new(),
+    }
+}
+
+#[test]
+fn the_frame_comes_before_the_words_with_every_provider() {
+    for dialect in PROVIDERS {
+        for experiment in [Experiment::E1, Experiment::E5] {
+            let (body, words) = body(dialect, experiment);
+            let [image, text] = parts(dialect, &body) else { panic!("{dialect:?}: {body}") };
+            assert_eq!(text["text"], words.user.as_str(), "{dialect:?}");
+            let is_frame = |text: &&str| text.contains("iVBORw0KGgo");
+            assert_eq!(strings(image).iter().filter(|text| is_frame(text)).count(), 1, "{dialect:?}: {image}");
+        }
+    }
+}
+
+#[test]
+fn no_word_about_the_task_is_sent_but_the_prompt_and_the_keys_of_the_reply() {
+    for dialect in PROVIDERS {
+        for experiment in [Experiment::E1, Experiment::E5] {
+            let (body, words) = body(dialect, experiment);
+            let structure = reply::structure(&experiment.reply);
+            let keys: BTreeSet<&str> =
+                structure["properties"].as_object().unwrap().keys().map(String::as_str).collect();
+            let is_known = |text: &&str| {
+                LANGUAGE.contains(text) || SCHEMA.contains(text) || keys.contains(text) || text.contains("iVBORw0KGgo")
+            };
+            let mut said: Vec<&str> = strings(&body).into_iter().filter(|text| !is_known(text)).collect();
+            said.sort_unstable();
+            let mut expected = [words.system.as_str(), &words.user];
+            expected.sort_unstable();
+            assert_eq!(said, expected, "{dialect:?}");
+        }
+    }
+}
+
+#[test]
+fn most_tokens_and_reasoning_are_asked_for_as_each_provider_has_them() {
+    let asked = |dialect: Dialect, id: &str, effort: Option<Effort>| {
+        let server = Server::start(move |_, _| whole(dialect, &decision("w")));
+        let bench = Bench::new(Limits::default());
+        let mut choice = choice(dialect);
+        id.clone_into(&mut choice.model.id);
+        (choice.model.max_output_tokens, choice.model.reasoning_effort) = (NonZeroU32::new(9_000), effort);
+        let vlm = bench.vlm_of(&server, choice, OnOutage::Lose, patience());
+        Bench::play(&vlm, "episode", 1).remove(0).unwrap();
+        (server.requests().remove(0).json(), vlm.description())
+    };
+    let thinking = "/generationConfig/thinkingConfig";
+    for (dialect, id, most, place, expected) in [
+        (Dialect::OpenaiChat, "m", "/max_completion_tokens", "/reasoning_effort", json!("low")),
+        (Dialect::OpenaiCompatible, "m", "/max_tokens", "/reasoning_effort", json!("low")),
+        (Dialect::AnthropicMessages, "m", "/max_tokens", "/output_config/effort", json!("low")),
+        (
+            Dialect::Gemini,
+            "gemini-2.5-pro",
+            "/generationConfig/maxOutputTokens",
+            thinking,
+            json!({ "thinkingBudget": 1_024 }),
+        ),
+        (
+            Dialect::Gemini,
+            "gemini-3-pro",
+            "/generationConfig/maxOutputTokens",
+            thinking,
+            json!({ "thinkingLevel": "LOW" }),
+        ),
+    ] {
+        let (body, description) = asked(dialect, id, Some(Effort::Low));
+        assert_eq!((body.pointer(most), body.pointer(place)), (Some(&json!(9_000)), Some(&expected)), "{dialect:?}");
+        assert!(body.pointer("/output_config/format").is_some() || dialect != Dialect::AnthropicMessages);
+        // Both are part of what the recording says of its sampling.
+        assert_eq!(
+            (&description["max_output_tokens"], &description["reasoning_effort"]),
+            (&json!(9_000), &json!("low"))
+        );
+        let (body, description) = asked(dialect, id, None);
+        assert_eq!(body.pointer(place), None, "{dialect:?}");
+        assert_eq!(description.get("reasoning_effort"), None);
+    }
+}

@@ -1,0 +1,77 @@
+//! A provider that cannot serve the recording at all ends it at once: one that is not there, one that takes no images.
+
+use std::net::TcpListener;
+
+use mirrorstats::agent::vlm::OnOutage;
+use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::wire_format::Dialect;
+use serde_json::json;
+
+use super::bench::{Bench, KEY};
+use super::recordings::{Folder, counting};
+use super::server::{JSON, Server, decision, http, ok, whole};
+use crate::harness::program::stderr;
+
+/// The variables that send requests through a proxy, which is another thing to be reached.
+const PROXIES: [&str; 6] = ["HTTP_PROXY", "http_proxy", "HTTPS_PROXY", "https_proxy", "ALL_PROXY", "all_proxy"];
+
+/// `record` with this address, and no proxy.
+fn recorded(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String) {
+    let mut command = folder.record(server, "own", words);
+    for name in PROXIES {
+        command.env_remove(name);
+    }
+    let output = command.output().unwrap();
+    (output.status.code(), stderr(&output))
+}
+
+#[test]
+fn an_address_where_nobody_listens_is_named_before_anything_is_recorded() {
+    let folder = Folder::new();
+    let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 1, at)));
+    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+    let words = format!("--seeds 1 --runs 2 --base-url http://127.0.0.1:{port}/v1");
+    let (code, said) = recorded(&folder, &server, &words);
+    assert_eq!(code, Some(2), "{said}");
+    assert!(said.starts_with(&format!("error: cannot connect to http://127.0.0.1:{port}: ")), "{said}");
+    assert!(said.contains("\n  help: is the address right") && !said.contains(KEY) && !said.contains("lost"), "{said}");
+    assert!(!folder.path().join("runs").exists(), "nothing is made");
+
+    // An address that answers is not asked for anything before its first episode, and one that has nothing to do need not
+    // be there.
+    let (code, said) = recorded(&folder, &server, "--seeds 1 --runs 2");
+    assert_eq!((code, server.count()), (Some(0), 2), "{said}");
+    let (code, said) = recorded(&folder, &server, &words);
+    assert_eq!((code, server.count()), (Some(0), 2), "{said}");
+    let (code, said) = recorded(&folder, &server, &format!("{words} --cassette runs/journal --out again"));
+    assert_eq!(code, Some(0), "a cassette needs nobody: {said}");
+}
+
+#[test]
+fn a_server_that_takes_no_images_ends_the_recording_with_its_first_answer() {
+    let message = "image input is not supported - hint: if this is unexpected, you may need to provide the mmproj";
+    let error = json!({ "error": { "code": 500, "message": message, "type": "server_error" } });
+    let body = error.to_string().into_bytes();
+    for answer in [http("500 Internal Server Error", JSON, &body), http("400 Bad Request", JSON, &body), ok(&error)] {
+        let server = Server::start(move |_, _| answer.clone());
+        let folder = Folder::new();
+        let (code, said) = recorded(&folder, &server, "--seeds 1 --runs 3 --threads 1 --in-flight 1");
+        assert_eq!((code, server.count()), (Some(2), 1), "{said}");
+        assert!(said.contains("takes no images: ") && said.contains(message), "{said}");
+        assert!(said.contains("\n  help: choose a model that sees"), "{said}");
+        assert!(!said.contains(r"\u{a}"), "{said}");
+    }
+}
+
+#[test]
+fn images_that_are_not_taken_are_no_outage_to_stand_still_for() {
+    let server = Server::start(|at, _| match at {
+        0 => whole(Dialect::OpenaiChat, &decision("w")),
+        _ => http("500 Internal Server Error", JSON, br#"{"error":"this model does not support images"}"#),
+    });
+    let bench = Bench::new(Limits::default());
+    let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
+    let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err();
+    assert!(lost.cause.contains("takes no images") && !lost.by_limit, "{lost}");
+    assert_eq!((vlm.stopped(), server.count()), (Some(lost.cause.as_str()), 2));
+}

@@ -58,6 +58,9 @@ pub struct Observation {
     pub history: Option<(Option<Action>, Option<String>)>,
     /// What the eye sees.
     pub frame: Arc<Frame>,
+    /// The vertical field of view of the frame, degrees: 110 in the study. For scripted agents alone: models and programs
+    /// are not told.
+    pub fov_y: f64,
 }
 
 /// What an agent answered, and how that was got.

@@ -22,7 +22,11 @@ const MOST_EXPERIMENTS: usize = 64;
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum FileError {
-    #[error("cannot read the experiment file `{}`: {source}", path.display())]
+    #[error(
+        "cannot read the experiment file `{}`: {source}\n  help: an experiment file is TOML text; \
+         `mirrorstats experiments show E1` prints one",
+        path.display()
+    )]
     Unreadable { path: PathBuf, source: io::Error },
     #[error(transparent)]
     Faults(#[from] Faults),

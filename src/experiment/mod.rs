@@ -15,6 +15,7 @@ mod built_in;
 pub mod explain;
 pub mod file;
 pub mod prompt;
+pub mod schema;
 pub mod spec;
 mod table;
 

@@ -143,7 +143,7 @@ fn check_name(name: &str, place: &Place, beside: &Beside<'_>, faults: &mut Vec<F
     if name.is_empty() || name.len() > LONGEST_NAME || !name.chars().all(is_plain) || name.starts_with('-') {
         let message =
             format!("a name has 1 to {LONGEST_NAME} letters, digits, `-` and `_`, and does not begin with `-`");
-        faults.push(Fault::new(place.clone(), message));
+        faults.push(Fault::new(place.clone(), message).help("for example `[experiment.long-delay]`"));
     }
     if beside.folder.is_some() && built_in_names().contains(&name) {
         let message = format!("`{name}` is built in, and traces of both could not be told apart");
@@ -223,7 +223,7 @@ fn layout(keys: &mut Keys<'_>, owner: Option<&Layout>, wall: Wall, faults: &mut 
 }
 
 fn palette(keys: &mut Keys<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Color>> {
-    let all = keys.value_place("palette")?;
+    let all = keys.value_place("palette");
     let mut palette = Vec::new();
     for (name, place) in keys.texts("palette", faults)? {
         match Color::named(&name) {
@@ -233,7 +233,7 @@ fn palette(keys: &mut Keys<'_>, faults: &mut Vec<Fault>) -> Option<Vec<Color>> {
         }
     }
     if palette.len() < 2 {
-        faults.push(Fault::new(all, "a palette has at least two colours"));
+        faults.push(Fault::new(all?, "a palette has at least two colours"));
         return None;
     }
     palette.sort();
@@ -247,13 +247,19 @@ fn no_color(name: &str, place: Place) -> Fault {
 }
 
 fn cubes(keys: &mut Keys<'_>, palette: usize, faults: &mut Vec<Fault>) -> Option<Cubes> {
+    let place = keys.value_place("cubes");
     let mut keys = keys.table("cubes", faults)?;
+    if !keys.has("kind")
+        && let Some(place) = place
+    {
+        faults.push(Fault::new(place, "the cubes have no `kind`").help("one of none, candidates, clutter"));
+    }
     let kind = keys.choice("kind", &[("none", 0), ("candidates", 1), ("clutter", 2)], faults);
     let cubes = match kind {
         Some(0) => Some(Cubes::None),
         Some(1) => {
             let most = u32::try_from(palette).unwrap_or(MOST_CUBES).min(MOST_CUBES);
-            let count = if keys.has("count") { keys.count("count", [2, most], faults) } else { None };
+            let count = keys.count("count", [2, most], faults);
             Some(Cubes::Candidates { count: count.map_or(3.min(most), |(count, _)| count) })
         }
         Some(_) => {
@@ -290,7 +296,9 @@ fn others(keys: &mut Keys<'_>, faults: &mut Vec<Fault>) -> Option<Others> {
 
 fn reply(keys: &mut Keys<'_>, decision: Decision, faults: &mut Vec<Fault>) -> Vec<ReplyKey> {
     use ReplyKey::{Action, Identification, Mark, Reasoning, SelectedCube, Summary, ViewDescription};
-    let Some(place) = keys.value_place("reply") else {
+    let place = keys.value_place("reply");
+    let named = keys.texts("reply", faults);
+    let Some(place) = place else {
         let asked = match decision {
             Decision::SelectedCube => Some(SelectedCube),
             Decision::MarkReport => Some(Mark),
@@ -300,7 +308,7 @@ fn reply(keys: &mut Keys<'_>, decision: Decision, faults: &mut Vec<Fault>) -> Ve
         return all.collect();
     };
     let mut reply = Vec::new();
-    for (name, place) in keys.texts("reply", faults).unwrap_or_default() {
+    for (name, place) in named.unwrap_or_default() {
         match ReplyKey::named(&name) {
             Some(key) if reply.contains(&key) => faults.push(Fault::new(place, format!("`{name}` stands twice"))),
             Some(key) => reply.push(key),

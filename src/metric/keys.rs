@@ -115,8 +115,9 @@ impl<'a> Keys<'a> {
         [least, most]: [u32; 2],
         faults: &mut Vec<Fault>,
     ) -> Option<(u32, Place)> {
-        let place = self.value_place(name)?;
+        let place = self.value_place(name);
         let value = self.integer(name, faults)?;
+        let place = place?;
         match u32::try_from(value).ok().filter(|value| (least..=most).contains(value)) {
             Some(value) => Some((value, place)),
             None => {

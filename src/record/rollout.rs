@@ -120,6 +120,7 @@ pub async fn play(
             bumped,
             history: history.take(),
             frame: frame.clone().unwrap_or_else(nothing),
+            fov_y: world.config().eye.fovy,
         };
         let start = Instant::now();
         let visibility = world.visibility();

@@ -1,6 +1,6 @@
-//! The contact sheet: every experiment from above and as the agent sees it, with a line of words under each picture.
+//! The contact sheet: experiments from above and as the agent sees them, with a line of words under each picture.
 //!
-//! Rule: a sheet is a function of the configuration and the seed, so that a changed world shows as a changed picture.
+//! Rule: a sheet is a function of the configuration, the experiments and the seed, so that a changed world shows as a changed picture.
 
 use std::fmt::Write as _;
 
@@ -52,9 +52,9 @@ struct Picture {
 ///
 /// # Errors
 /// When a world cannot be made or drawn.
-pub fn png(config: &WorldConfig, seed: i32) -> Result<Vec<u8>, ContactSheetError> {
+pub fn png(config: &WorldConfig, experiments: &[Experiment], seed: i32) -> Result<Vec<u8>, ContactSheetError> {
     let mut eye = Camera::new(config)?;
-    let rows = Experiment::PAPER.into_iter().map(|experiment| row(config, experiment, seed, &mut eye));
+    let rows = experiments.iter().map(|experiment| row(config, *experiment, seed, &mut eye));
     compose(&rows.collect::<Result<Vec<_>, _>>()?)
 }
 
@@ -112,7 +112,9 @@ fn place(world: &mut World, pose: Pose) {
 }
 
 fn compose(rows: &[Vec<Picture>]) -> Result<Vec<u8>, ContactSheetError> {
-    let first = &rows[0][0].frame;
+    let Some(Picture { frame: first, .. }) = rows.first().and_then(|row| row.first()) else {
+        return Err(ContactSheetError::Png("it has no pictures".to_owned()));
+    };
     let cell = [first.width / SHRINK + GAP, first.height / SHRINK + CAPTION];
     let columns = rows.iter().map(Vec::len).max().unwrap_or_default();
     let size = [columns * cell[0] + GAP, rows.len() * cell[1] + GAP];

@@ -91,6 +91,7 @@ impl Painted {
                 bumped,
                 history: history.take(),
                 frame: Arc::new(self.frame(pose)),
+                fov_y: 110.0,
             };
             let reply = ready(agent.decide(&observation)).unwrap();
             let next = reply.action.map_or(pose, |action| moved(pose, action));

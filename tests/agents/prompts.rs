@@ -22,6 +22,7 @@ fn first_step() -> Observation {
         bumped: false,
         history: None,
         frame: Arc::new(Frame::new(0, 0, Vec::new())),
+        fov_y: 110.0,
     }
 }
 

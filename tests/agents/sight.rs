@@ -29,6 +29,7 @@ fn observation(room: &Painted, pose: Pose) -> Observation {
         bumped: false,
         history: None,
         frame: Arc::new(room.frame(pose)),
+        fov_y: 110.0,
     }
 }
 

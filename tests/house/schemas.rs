@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use mirrorstats::agent::reply;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
+use mirrorstats::cli::commands::experiments::ExperimentsAnswer;
 use mirrorstats::cli::commands::import::ImportAnswer;
 use mirrorstats::cli::commands::recover::RecoverAnswer;
 use mirrorstats::cli::commands::renormalize::RenormalizeAnswer;
@@ -48,6 +49,9 @@ fn current() -> Vec<(&'static str, Value)> {
         ("definitions", json!(schema_for!(DefinitionFile))),
         ("diff", json!(schema_for!(Changes))),
         ("episode", json!(schema_for!(EpisodeMessage))),
+        ("experiment", Name::Experiment.document()),
+        ("experiments", Name::Experiments.document()),
+        ("experiments-check", json!(schema_for!(ExperimentsAnswer))),
         ("errata", json!(schema_for!(Errata))),
         ("import", json!(schema_for!(ImportAnswer))),
         ("info", json!(schema_for!(Info))),

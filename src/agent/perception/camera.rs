@@ -1,12 +1,11 @@
 //! Where a pixel looks, and where a point of the room is drawn: an ideal pinhole, upright and level.
 //!
-//! Rule: only what the protocol publishes (vertical field of view 110 degrees) and what whoever lives in a body knows of
-//! it: how high its eye is, and how far before its axis.
+//! Rule: only what the protocol publishes (the vertical field of view) and what whoever lives in a body knows of it: how
+//! high its eye is, and how far before its axis.
 
 use crate::agent::Observation;
+use crate::sim::angle::sine_cosine;
 
-/// Tangent of half the vertical field of view of 110 degrees.
-const HALF_VIEW: f64 = 1.428_148_006_742_114_5;
 /// The eye above the floor, m.
 pub const EYE_HEIGHT: f64 = 1.52;
 /// The eye ahead of the body's axis, m.
@@ -128,12 +127,21 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// The camera of a body at `pose` whose pictures have `width` x `height` pixels.
+    /// The camera of a body at `pose` whose pictures have `width` x `height` pixels and a vertical field of view of `fov_y`
+    /// degrees, less than 180.
     #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
-    pub fn new(pose: Pose, width: usize, height: usize) -> Self {
+    pub fn new(pose: Pose, width: usize, height: usize, fov_y: f64) -> Self {
         let (half_width, half_height) = (width as f64 / 2.0, height as f64 / 2.0);
         let eye = pose.place.ahead(pose.heading, EYE_AHEAD);
-        Self { eye, heading: pose.heading, half_width, half_height, focal: half_height / HALF_VIEW }
+        let (sine, cosine) = sine_cosine(fov_y / 2.0);
+        Self { eye, heading: pose.heading, half_width, half_height, focal: half_height / (sine / cosine) }
+    }
+
+    /// How many headings to either side of its own a picture shows, 0 to 2.
+    pub fn headings_aside(&self) -> i32 {
+        let (next, second) = (Heading(1).direction(), Heading(2).direction());
+        let shows = |(cosine, sine): (f64, f64)| self.focal * sine <= self.half_width * cosine;
+        i32::from(shows(next)) + i32::from(shows(second))
     }
 
     /// Where the eye is.
@@ -187,7 +195,18 @@ mod tests {
     use super::*;
 
     fn camera(twelfths: u8) -> Camera {
-        Camera::new(Pose { place: Place { x: 1.0, y: -2.0 }, heading: Heading(twelfths) }, 640, 480)
+        camera_of(twelfths, 110.0)
+    }
+
+    fn camera_of(twelfths: u8, fov_y: f64) -> Camera {
+        Camera::new(Pose { place: Place { x: 1.0, y: -2.0 }, heading: Heading(twelfths) }, 640, 480, fov_y)
+    }
+
+    #[test]
+    fn a_narrow_view_shows_less_and_larger() {
+        let tall = |fov_y: f64| camera_of(0, fov_y).row(4.0, 0.0) - 240.0;
+        assert!((tall(60.0) / tall(110.0) - 2.473_624).abs() < 1e-5, "{}", tall(60.0) / tall(110.0));
+        assert_eq!([30.0, 60.0, 90.0, 110.0].map(|fov_y| camera_of(0, fov_y).headings_aside()), [0, 1, 1, 2]);
     }
 
     #[test]
@@ -207,7 +226,7 @@ mod tests {
         let camera = camera(0);
         assert_eq!(camera.floor_ahead(240.0), None);
         let ahead = camera.floor_ahead(480.0).unwrap();
-        assert!((ahead - EYE_HEIGHT / HALF_VIEW).abs() < 1e-9);
+        assert!((ahead - EYE_HEIGHT / 55.0_f64.to_radians().tan()).abs() < 1e-9);
         assert!(camera.height(ahead, 480.0).abs() < 1e-9);
         assert!((camera.row(5.0, EYE_HEIGHT) - 240.0).abs() < 1e-9);
     }

@@ -5,8 +5,8 @@
 //!   └─────► ground (feet of the walls, and what lies beyond them)
 //! ```
 //!
-//! Rule: a view is a function of the frame and of the pose that the observation states. It knows no scene, no label and no
-//! configuration, and it does not tell a thing from its reflection: that takes memory.
+//! Rule: a view is a function of the frame and of the pose and field of view that the observation states. It knows no scene, no label and no
+//! configuration but the field of view, and it does not tell a thing from its reflection: that takes memory.
 
 pub mod camera;
 pub mod ground;
@@ -48,7 +48,7 @@ impl View {
     pub fn of(observation: &Observation) -> Self {
         let frame = Arc::clone(&observation.frame);
         let pose = Pose::of(observation);
-        let camera = Camera::new(pose, frame.width, frame.height);
+        let camera = Camera::new(pose, frame.width, frame.height, observation.fov_y);
         let patches = patches::patches(&frame, LEAST_OF_PATCH);
         Self {
             pose,

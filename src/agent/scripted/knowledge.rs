@@ -44,6 +44,8 @@ pub struct Knowledge {
     pub cubes_in_view: Vec<Thing>,
     /// How far one step leads, m.
     pub step: f64,
+    /// Headings to either side of one's own that a view shows.
+    pub headings_aside: i32,
     landmarks: Landmarks,
     /// What was in the way lately, and until when that counts.
     passing: Vec<(Obstacle, i32)>,
@@ -59,6 +61,7 @@ impl Knowledge {
             bodies: Vec::new(),
             cubes_in_view: Vec::new(),
             step: STEP,
+            headings_aside: 0,
             landmarks: Landmarks::default(),
             passing: Vec::new(),
         }
@@ -72,6 +75,7 @@ impl Knowledge {
         self.landmarks.see(&view.cubes, view.camera.eye());
         self.reflection.see(&view, &self.room);
         self.notice(&view.bodies, observation.t);
+        self.headings_aside = view.camera.headings_aside();
         self.bodies = view.bodies;
         self.cubes_in_view = view.cubes;
     }

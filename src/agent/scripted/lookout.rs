@@ -1,6 +1,7 @@
 //! Looking all round, here and then from other places.
 //!
-//! A full look takes eight turns at most, since a view is more than four headings wide. Whoever has looked from all the
+//! A full look takes eight turns where a view is more than four headings wide, as the study's is, and more where it is
+//! narrower. Whoever has looked from all the
 //! lookouts has seen what there is to see.
 //!
 //! Rule: the first lookout is where the episode begins; the others are spread over the room as far as its walls are known.
@@ -16,8 +17,6 @@ use super::route::{self, Ground};
 const LOOKOUTS: usize = 3;
 /// How near to a lookout is near enough, m.
 const ARRIVED: f64 = 0.5;
-/// Headings to either side of one's own that a view of 124 degrees shows.
-const HALF_VIEW: i32 = 2;
 /// Steps after which a lookout that cannot be reached is where one stands.
 const PATIENCE: u32 = 16;
 
@@ -48,7 +47,7 @@ impl Lookouts {
                     Some(action) => return Some(action),
                     None => self.goal = None,
                 },
-                None => match self.turn(known.pose) {
+                None => match self.turn(known) {
                     Some(action) => return Some(action),
                     None => self.finish(known),
                 },
@@ -73,13 +72,15 @@ impl Lookouts {
     }
 
     /// One more turn, unless all directions have been seen from here.
-    fn turn(&mut self, pose: Pose) -> Option<Action> {
+    fn turn(&mut self, known: &Knowledge) -> Option<Action> {
+        let pose = known.pose;
         if self.here.is_none_or(|here| here.distance(pose.place) > ARRIVED) {
             self.here = Some(pose.place);
             self.seen.clear();
         }
         self.seen.push(pose.heading);
-        let is_seen = |heading: &Heading| self.seen.iter().any(|seen| seen.turns_to(*heading).abs() <= HALF_VIEW);
+        let is_seen =
+            |heading: &Heading| self.seen.iter().any(|seen| seen.turns_to(*heading).abs() <= known.headings_aside);
         (!Heading::ALL.iter().all(is_seen)).then_some(Action::TurnLeft)
     }
 

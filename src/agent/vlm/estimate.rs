@@ -77,6 +77,7 @@ fn observation() -> Observation {
         bumped: true,
         history: Some((Some(Action::MoveForward), Some(THOUGHT.to_owned()))),
         frame: std::sync::Arc::new(Frame::new(0, 0, Vec::new())),
+        fov_y: 110.0,
     }
 }
 

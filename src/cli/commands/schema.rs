@@ -4,13 +4,15 @@ use std::io::{self, Write};
 
 use clap::ValueEnum as _;
 use comfy_table::{ContentArrangement, Table};
+use schemars::schema_for;
 use serde_json::{Value, json};
 
 use crate::agent::reply;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use crate::cli::text_table::listing;
-use crate::experiment::Experiment;
+use crate::experiment::schema::ExperimentFile;
+use crate::experiment::{Experiment, Spec};
 use crate::trace::describe::SchemaDocument;
 use crate::trace::import;
 use crate::trace::schema::Column;
@@ -34,6 +36,10 @@ pub enum Name {
     Trace,
     /// A line of the JSON lines that `mirrorstats import` reads
     Step,
+    /// A file of experiments, for `record --experiment`
+    Experiments,
+    /// An experiment as traces carry it in their footer
+    Experiment,
     /// A model's reply in E1 to E4
     ReplyCubes,
     /// A model's reply in E5
@@ -46,6 +52,8 @@ impl Name {
         match self {
             Self::Trace => json!(SchemaDocument::current()),
             Self::Step => import::schema::document(),
+            Self::Experiments => json!(schema_for!(ExperimentFile)),
+            Self::Experiment => json!(schema_for!(Spec)),
             Self::ReplyCubes => reply::schema("Reply in E1 to E4", &Experiment::E1.reply),
             Self::ReplyExploration => reply::schema("Reply in E5", &Experiment::E5.reply),
         }

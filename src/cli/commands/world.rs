@@ -3,10 +3,11 @@
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
+use crate::cli::experiments;
 use crate::cli::outcome::{Failure, Outcome};
 #[cfg(feature = "raster")]
 use crate::cli::output;
-use crate::sim::Experiment;
+use crate::record::plan::Experiments;
 use crate::sim::config::WorldConfig;
 #[cfg(feature = "raster")]
 use crate::sim::contact_sheet;
@@ -24,9 +25,9 @@ pub struct WorldArgs {
 enum WorldVerb {
     /// Print the built-in configuration: every size, speed, light and threshold, as TOML for --config
     Config,
-    /// Print the scene of one episode as JSON
+    /// Print the scene of one episode as JSON, a scene for each experiment
     Scene(SceneArgs),
-    /// Draw the contact sheet: every experiment from above and as the agent sees it
+    /// Draw the contact sheet: experiments from above and as the agent sees them
     #[cfg(feature = "raster")]
     Sheet(SheetArgs),
 }
@@ -34,8 +35,9 @@ enum WorldVerb {
 /// Which scene.
 #[derive(Clone, Debug, clap::Args)]
 struct SceneArgs {
-    /// Which experiment: E1, E2, E3, E4 or E5
-    experiment: Experiment,
+    /// Which experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
+    #[arg(value_name = "LIST")]
+    experiments: Experiments,
     /// The seed of the block of runs
     #[arg(long, default_value_t = 1)]
     seed: i32,
@@ -54,6 +56,9 @@ struct SheetArgs {
     /// The folder for `sheet.png`
     #[arg(long, value_name = "DIR", default_value = "reports/world")]
     out: PathBuf,
+    /// Which experiments, a row each: E1, E1..E5, E1,E3, or a file such as mine.toml
+    #[arg(long, value_name = "LIST", default_value = "E1..E5")]
+    experiment: Experiments,
     /// The seed of the scenes
     #[arg(long, default_value_t = 1)]
     seed: i32,
@@ -76,13 +81,16 @@ impl WorldArgs {
             WorldVerb::Config => io::stdout().lock().write_all(WorldConfig::default_text().as_bytes())?,
             WorldVerb::Scene(args) => {
                 let config = configured(args.config.as_ref())?;
-                let scene = Scene::draw(&config, args.experiment, args.seed, args.run).map_err(Failure::input)?;
-                writeln!(io::stdout().lock(), "{:#}", serde_json::json!(scene))?;
+                for experiment in experiments::asked(&args.experiments, &config)? {
+                    let scene = Scene::draw(&config, experiment, args.seed, args.run).map_err(Failure::input)?;
+                    writeln!(io::stdout().lock(), "{:#}", serde_json::json!(scene))?;
+                }
             }
             #[cfg(feature = "raster")]
             WorldVerb::Sheet(args) => {
                 let config = configured(args.config.as_ref())?;
-                let png = contact_sheet::png(&config, args.seed).map_err(Failure::input)?;
+                let experiments = experiments::asked(&args.experiment, &config)?;
+                let png = contact_sheet::png(&config, &experiments, args.seed).map_err(Failure::input)?;
                 std::fs::create_dir_all(&args.out)?;
                 output::write_file(&args.out.join("sheet.png"), &png)?;
             }

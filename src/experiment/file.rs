@@ -78,6 +78,18 @@ fn text_of(path: &Path) -> io::Result<String> {
 /// # Errors
 /// All of its faults.
 pub fn read(source: Source, folder: Option<&Path>) -> Result<Vec<Entry>, Faults> {
+    entries(source, folder).map_err(|faults| Faults(faults.0.into_iter().map(with_help).collect()))
+}
+
+/// A fault that says no remedy of its own names the list of what may be written.
+fn with_help(fault: Fault) -> Fault {
+    if fault.help.is_some() {
+        return fault;
+    }
+    fault.help("`mirrorstats schema experiments` says what each key may be")
+}
+
+fn entries(source: Source, folder: Option<&Path>) -> Result<Vec<Entry>, Faults> {
     let source = Arc::new(source);
     let (table, errors) = DeTable::parse_recoverable(&source.text);
     let mut faults: Vec<Fault> = errors

@@ -11,6 +11,9 @@
 //! The first two are a prompt's own; the other three are shared by all, unless a folder has its own.
 //! The templates of the paper's two prompts are word for word (appendix, "Prompt Templates"). The three of the dynamic
 //! context are ours, since the paper says what they hold but not how they read.
+//!
+//! The paper's user prompt of E5 has no `<warning_if_bumped_wall>`, that of E1 to E4 has it. Ours has it in both: a body
+//! that was stopped is told so by one rule, and where nothing was hit the words of E5 are the paper's.
 
 use std::fs;
 use std::io::Read as _;

@@ -7,9 +7,10 @@ use std::path::Path;
 use mirrorstats::agent::scripted::Scripted;
 use mirrorstats::record::plan::Key;
 use mirrorstats::sim::Experiment;
+use mirrorstats::sim::config::WorldConfig;
 
 use crate::profile::{Profiles, chance_interval};
-use crate::recorded::{record_all, score};
+use crate::recorded::{record_all, record_in, score};
 
 const ALL: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
 
@@ -71,6 +72,18 @@ fn a_few_episodes_already_show_who_is_who() {
     for experiment in ["E1", "E4"] {
         assert!(profiles.get(experiment, "oracle", "TSA").is_one(), "{}", profiles.markdown());
         assert!(profiles.get(experiment, "oracle", "MTATO").is_one(), "{}", profiles.markdown());
+    }
+}
+
+/// A view of 60 degrees shows a part of what the study's shows, larger; the agents know how wide they look.
+#[test]
+fn the_oracle_finds_itself_through_a_narrow_view_too() {
+    let mut config = WorldConfig::default();
+    config.eye.fovy = 60.0;
+    let episodes = record_in(&config, &episodes(Scripted::Oracle, &[Experiment::E1], 1, 3), 2);
+    let profiles = Profiles::of(&score(&episodes));
+    for metric in ["TSA", "MTATO", "CAAL"] {
+        assert!(profiles.get("E1", "oracle", metric).is_one(), "{}", profiles.markdown());
     }
 }
 

@@ -6,6 +6,10 @@ use mirrorstats::agent::prompt::{self, Prompt};
 use mirrorstats::agent::{Observation, Task};
 use mirrorstats::base::frame::Frame;
 use mirrorstats::experiment::Experiment;
+use mirrorstats::record::plan::Key;
+use mirrorstats::record::rollout;
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::scene::Scene;
 use mirrorstats::trace::episode::Action;
 
 fn task(experiment: Experiment, stated_color: Option<&str>) -> Task {
@@ -38,33 +42,60 @@ const POSITION: &str = "Position: x = 0.00 m, y = 1.25 m; orientation: 330 degre
                         Remaining steps: 100 of 100.";
 const WARNING: &str = "Warning: the previous movement hit a wall or another object, and the position did not change.";
 
-#[test]
-fn the_cube_selection_prompt_is_the_papers() {
-    let prompt = Prompt::of(Experiment::E1).unwrap();
-    let rendered = prompt.render(&task(Experiment::E1, None), &first_step()).unwrap();
-    assert_eq!(rendered.system, include_str!("prompts/cube-selection.system.txt").trim_end());
-    assert_eq!(rendered.user, filled(include_str!("prompts/cube-selection.user.txt"), FIRST, POSITION, None));
-
-    let bumped = Observation { bumped: true, ..first_step() };
-    let rendered = prompt.render(&task(Experiment::E1, None), &bumped).unwrap();
-    assert_eq!(rendered.user, filled(include_str!("prompts/cube-selection.user.txt"), FIRST, POSITION, Some(WARNING)));
+/// The appendix of the paper for an experiment: the system prompt and the user prompt.
+fn verbatim(experiment: Experiment, stated_color: Option<&str>) -> [String; 2] {
+    let [system, user] = if experiment == Experiment::E5 {
+        [include_str!("prompts/exploration.system.txt"), include_str!("prompts/exploration.user.txt")]
+    } else {
+        [include_str!("prompts/cube-selection.system.txt"), include_str!("prompts/cube-selection.user.txt")]
+    };
+    let system = match stated_color {
+        None => system.to_owned(),
+        Some(color) => {
+            let first = include_str!("prompts/e3-first-line.txt").trim_end().replace("<wrong_color>", color);
+            format!("{first}\n{}", system.split_once('\n').unwrap().1)
+        }
+    };
+    [system.trim_end().to_owned(), user.to_owned()]
 }
 
 #[test]
-fn a_false_colour_replaces_the_first_line_alone() {
-    let prompt = Prompt::of(Experiment::E1).unwrap();
-    let rendered = prompt.render(&task(Experiment::E1, Some("green")), &first_step()).unwrap();
-    let first = include_str!("prompts/e3-first-line.txt").trim_end().replace("<wrong_color>", "green");
-    let rest = include_str!("prompts/cube-selection.system.txt").split_once('\n').unwrap().1;
-    assert_eq!(rendered.system, format!("{first}\n{}", rest.trim_end()));
+fn each_of_the_five_asks_in_the_papers_words() {
+    let config = WorldConfig::default();
+    for experiment in Experiment::PAPER {
+        let scene = Scene::draw(&config, experiment, 1, 1).unwrap();
+        let task = rollout::task(&config, &scene, Key::first(experiment, 1, 1));
+        assert_eq!(task.stated_color.is_some(), experiment == Experiment::E3);
+        let [system, user] = verbatim(experiment, task.stated_color.as_deref());
+        let rendered = Prompt::of(experiment).unwrap().render(&task, &first_step()).unwrap();
+        assert_eq!(rendered.system, system, "{experiment:?}");
+        assert_eq!(rendered.user, filled(&user, FIRST, POSITION, None), "{experiment:?}");
+    }
+}
+
+/// The paper's template of E5 has no place for the warning. It is said there as in the others, before the last lines.
+#[test]
+fn a_stopped_move_is_told_in_every_experiment() {
+    for experiment in Experiment::PAPER {
+        let [_, mut user] = verbatim(experiment, None);
+        let image = "Use the current RGB image";
+        if experiment == Experiment::E5 {
+            assert!(!user.contains("<warning_if_bumped_wall>"));
+            user = user.replace(image, &format!("<warning_if_bumped_wall>\n{image}"));
+        }
+        let bumped = Observation { bumped: true, ..first_step() };
+        let rendered = Prompt::of(experiment).unwrap().render(&task(experiment, None), &bumped).unwrap();
+        assert_eq!(rendered.user, filled(&user, FIRST, POSITION, Some(WARNING)), "{experiment:?}");
+    }
 }
 
 #[test]
-fn the_exploration_prompt_is_the_papers() {
-    let prompt = Prompt::of(Experiment::E5).unwrap();
-    let rendered = prompt.render(&task(Experiment::E5, None), &first_step()).unwrap();
-    assert_eq!(rendered.system, include_str!("prompts/exploration.system.txt").trim_end());
-    assert_eq!(rendered.user, filled(include_str!("prompts/exploration.user.txt"), FIRST, POSITION, None));
+fn the_five_name_the_two_prompts_of_the_paper() {
+    let prompts = Experiment::PAPER.map(|experiment| experiment.prompt.clone());
+    assert_eq!(prompts, ["cube-selection", "cube-selection", "cube-selection", "cube-selection", "exploration"]);
+    for experiment in Experiment::PAPER {
+        assert_eq!(Prompt::of(experiment).unwrap().hash(), experiment.prompt_hash, "{experiment:?}");
+    }
 }
 
 #[test]

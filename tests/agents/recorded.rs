@@ -50,17 +50,21 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, 
 
 /// Records episodes on `threads` threads, each with an eye of its own; the order is that of the plan.
 pub fn record_all(plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
+    record_in(&WorldConfig::default(), plan, threads)
+}
+
+/// The same in another world.
+pub fn record_in(config: &WorldConfig, plan: &[(Scripted, Key)], threads: usize) -> Vec<Episode> {
     need::drawing();
-    let config = WorldConfig::default();
     let next = AtomicUsize::new(0);
     let episodes = Mutex::new(vec![None; plan.len()]);
     std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| {
-                let eye = RefCell::new(Camera::new(&config).unwrap());
+                let eye = RefCell::new(Camera::new(config).unwrap());
                 while let Some((agent, key)) = plan.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let looks = !matches!(agent, Scripted::Frozen | Scripted::Random);
-                    let episode = record(&config, looks.then_some(&eye), *agent, *key);
+                    let episode = record(config, looks.then_some(&eye), *agent, *key);
                     let at = plan.iter().position(|planned| planned == &(*agent, *key)).unwrap();
                     episodes.lock().unwrap()[at] = Some(episode);
                 }

@@ -13,6 +13,7 @@ use mirrorstats::agent::vlm::{OnOutage, Vlm};
 use mirrorstats::agent::{Agent as _, Lost, Observation, Reply, Task};
 use mirrorstats::base::frame::Frame;
 use mirrorstats::experiment::Experiment;
+use mirrorstats::experiment::spec::Stated;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
@@ -99,9 +100,10 @@ impl Bench {
     }
 }
 
-/// A task without a false colour.
+/// A task; with a false colour where the experiment states one.
 pub fn task(experiment: Experiment) -> Task {
-    Task { experiment, stated_color: None, step_budget: 100, seed: 1 }
+    let stated_color = (experiment.stated_color != Stated::None).then(|| "yellow".to_owned());
+    Task { experiment, stated_color, step_budget: 100, seed: 1 }
 }
 
 /// What is observed before a step.

@@ -8,7 +8,7 @@ use mirrorstats::agent::reply;
 use mirrorstats::agent::vlm::OnOutage;
 use mirrorstats::agent::vlm::limits::Limits;
 use mirrorstats::agent::vlm::wire_format::{Dialect, Effort};
-use mirrorstats::experiment::Experiment;
+use mirrorstats::experiment::{Experiment, built_in_names};
 use serde_json::{Value, json};
 
 use super::bench::{Bench, choice, observation, patience, task};
@@ -62,6 +62,11 @@ const LANGUAGE: [&str; 38] = [
 /// The keywords of the schema.
 const SCHEMA: [&str; 6] = ["type", "properties", "required", "additionalProperties", "object", "string"];
 
+/// Every experiment that comes with the program.
+fn built_in() -> Vec<Experiment> {
+    built_in_names().into_iter().map(|name| Experiment::parse(name).unwrap()).collect()
+}
+
 /// The body of the first request of an episode, and the words that the prompt gives for it.
 fn body(dialect: Dialect, experiment: Experiment) -> (Value, Rendered) {
     let server = Server::start(move |_, _| whole(dialect, &decision("w")));
@@ -97,7 +102,7 @@ fn strings(value: &Value) -> Vec<&str> {
 #[test]
 fn the_frame_comes_before_the_words_with_every_provider() {
     for dialect in PROVIDERS {
-        for experiment in [Experiment::E1, Experiment::E5] {
+        for experiment in built_in() {
             let (body, words) = body(dialect, experiment);
             let [image, text] = parts(dialect, &body) else { panic!("{dialect:?}: {body}") };
             assert_eq!(text["text"], words.user.as_str(), "{dialect:?}");
@@ -110,7 +115,7 @@ fn the_frame_comes_before_the_words_with_every_provider() {
 #[test]
 fn no_word_about_the_task_is_sent_but_the_prompt_and_the_keys_of_the_reply() {
     for dialect in PROVIDERS {
-        for experiment in [Experiment::E1, Experiment::E5] {
+        for experiment in built_in() {
             let (body, words) = body(dialect, experiment);
             let structure = reply::structure(&experiment.reply);
             let keys: BTreeSet<&str> =
@@ -122,7 +127,7 @@ fn no_word_about_the_task_is_sent_but_the_prompt_and_the_keys_of_the_reply() {
             said.sort_unstable();
             let mut expected = [words.system.as_str(), &words.user];
             expected.sort_unstable();
-            assert_eq!(said, expected, "{dialect:?}");
+            assert_eq!(said, expected, "{dialect:?}, {experiment:?}");
         }
     }
 }

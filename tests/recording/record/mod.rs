@@ -6,8 +6,10 @@
 mod conditions;
 mod contents;
 mod continued;
+mod experiments;
 mod forecasts;
 mod interruptions;
+mod mistaken;
 mod recordings;
 mod refusals;
 mod same_bytes;

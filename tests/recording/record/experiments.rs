@@ -1,0 +1,154 @@
+//! An experiment that is one file and a folder with a prompt: recorded, replayed and reported like those of the paper.
+
+use std::fs;
+use std::process::Command;
+
+use serde_json::{Value, json};
+
+use super::recordings::Bench;
+use crate::harness::files::{assert_same, fixture};
+use crate::harness::need;
+use crate::harness::program::{run, stderr, succeeds};
+use crate::harness::traces::{recording, texts};
+
+const ECHO: &str = r#"
+[experiment.late-echo]
+title = "A late echo"
+order = 6
+chance = { TSA = "1/4" }
+scenes = "E1"
+prompt = "asked"
+decision = "selected_cube"
+
+[[experiment.late-echo.mirror]]
+kind = "delayed"
+delay = 3
+"#;
+
+/// Says what it hears in `heard.jsonl`, moves twice, and takes the red cube.
+const PROGRAM: &str = r#"while read -r line; do
+  printf '%s\n' "$line" >> heard.jsonl
+  case "$line" in *'"kind":"observation"'*)
+    n=$((n + 1)); action=w; cube=none
+    if [ $n -eq 3 ]; then action=done; cube=red; fi
+    echo '{"view-description":"a wall","reasoning":"go on","action":"'$action'","summary":"went on","selected_cube":"'$cube'","identification":"I am red"}' ;;
+  esac
+done
+"#;
+
+/// A folder with the experiment, its prompt, and a program.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    fs::create_dir(bench.path("asked")).unwrap();
+    fs::write(bench.path("echo.toml"), ECHO).unwrap();
+    fs::write(bench.path("asked/system.txt"), "Answer in JSON.\n").unwrap();
+    fs::write(bench.path("asked/user.txt"), "Which cube is like you?\n{{ position_text }}\n").unwrap();
+    fs::write(bench.path("program.sh"), PROGRAM).unwrap();
+    bench
+}
+
+/// `record` of the program in the experiment, which sees frames.
+fn play(bench: &Bench, out: &str, runs: &str) -> Command {
+    need::drawing();
+    let words = format!("--experiment echo.toml --seeds 1 --runs {runs} --no-log --agent");
+    let mut command = bench.record_with_frames(out, &words);
+    command.arg("exec:sh program.sh");
+    command
+}
+
+fn whole(folder: &Bench) -> Value {
+    let answer: Value = run(folder.folder.path(), &["experiments", "explain", "echo.toml", "--json"]).json();
+    answer["experiments"][0].clone()
+}
+
+#[test]
+fn a_script_plays_it_and_reports_show_it_beside_the_five() {
+    let bench = bench();
+    let at = bench.folder.path();
+    bench.recorded("runs", "--agent random --experiment E1,echo.toml --seeds 2 --runs 4");
+    let trace = bench.path("runs/late-echo-random.parquet");
+    let footer = recording(&trace);
+    assert_eq!(footer["experiment"], whole(&bench));
+    assert_eq!(
+        (&footer["experiment"]["title"], &footer["experiment"]["scenes"]),
+        (&json!("A late echo"), &json!("E1"))
+    );
+    for hash in [&footer["experiment"]["prompt_hash"], &footer["reply_schema_hash"]] {
+        assert_eq!(hash.as_str().unwrap().len(), 64);
+    }
+    // The trace is enough: neither the file nor its prompt is needed any more.
+    fs::remove_file(bench.path("echo.toml")).unwrap();
+    fs::remove_dir_all(bench.path("asked")).unwrap();
+    run(at, &["validate", "runs"]).done();
+    let replayed: Value = run(at, &["replay", "runs/late-echo-random.parquet", "--json"]).json();
+    assert_eq!(replayed["matches"], true, "{replayed}");
+
+    let recorded = fixture("recorded/E1-oracle.parquet").display().to_string();
+    run(at, &["report", "runs", &recorded, "--out", "report"]).done();
+    let table = fs::read_to_string(bench.path("report/tables/main.md")).unwrap();
+    let places = ["### E1: Active mirror-based", "### late-echo: A late echo\n"].map(|title| table.find(title));
+    assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{table}");
+    let rows = |text: &str| text.lines().filter(|line| line.starts_with("| random")).count();
+    let (five, own) = table.split_at(places[1].unwrap());
+    assert_eq!((rows(five), rows(own)), (1, 1), "{table}");
+    assert!(five.contains("| oracle"), "{table}");
+    let cells = fs::read_to_string(bench.path("report/cells.csv")).unwrap();
+    assert!(cells.contains("\nlate-echo,random,TSA,8,"), "{cells}");
+
+    let stats: Value = run(at, &["stats", "runs", &recorded, "--json"]).json();
+    let levels: Vec<_> = stats["chance"].as_array().unwrap().iter().filter(|row| row["metric"] == "TSA").collect();
+    let level = |name: &str| levels.iter().find(|row| row["experiment"] == name).unwrap()["level"].clone();
+    assert_eq!((level("E1"), level("late-echo")), (json!("1/3"), json!("1/4")));
+    assert_eq!(stats["design"]["kind"], "scene", "{}", stats["design"]);
+}
+
+#[test]
+fn its_episodes_and_those_of_e1_are_pairs() {
+    let bench = bench();
+    bench.recorded("runs", "--agent random --experiment E1,E2,echo.toml --seeds 2 --runs 2");
+    let scenes = |name: &str| {
+        let mut scenes = texts(&bench.path(&format!("runs/{name}-random.parquet")), "scene");
+        scenes.dedup();
+        scenes
+    };
+    assert_eq!((scenes("E1").len(), scenes("late-echo")), (4, scenes("E1")));
+    assert!(scenes("E1").iter().all(Option::is_some));
+}
+
+#[test]
+fn a_program_is_asked_in_its_words_and_another_prompt_is_another_recording() {
+    let bench = bench();
+    let at = bench.folder.path();
+    succeeds(&mut play(&bench, "runs", "1"));
+    let heard = fs::read_to_string(bench.path("heard.jsonl")).unwrap();
+    let heard: Vec<Value> = heard.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
+    assert_eq!((&heard[0]["experiment"], &heard[0]["family"]), (&json!("late-echo"), &json!("asked")));
+    assert_eq!(heard[0]["system_prompt"], "Answer in JSON.");
+    assert_eq!(heard[0]["stated_color"], Value::Null);
+    let asked = heard[1]["user_prompt"].as_str().unwrap();
+    assert!(asked.starts_with("Which cube is like you?\nPosition: x = "), "{asked}");
+    let name = "late-echo-exec.parquet";
+    run(at, &["replay", &format!("runs/{name}")]).done();
+    let cubes = texts(&bench.path(&format!("runs/{name}")), "selected_cube");
+    assert_eq!(cubes.last().unwrap().as_deref(), Some("red"));
+
+    fs::write(bench.path("asked/user.txt"), "Which cube has your colour?\n{{ position_text }}\n").unwrap();
+    let before = bench.files("runs");
+    let refused = play(&bench, "runs", "2").output().unwrap();
+    let said = stderr(&refused);
+    assert_eq!(refused.status.code(), Some(2), "{said}");
+    assert!(said.contains("experiment.prompt_hash") && said.contains("help: record into another folder"), "{said}");
+    assert_same(&bench.files("runs"), &before);
+
+    succeeds(&mut play(&bench, "anew", "1"));
+    let parts = |out: &str| {
+        let footer = recording(&bench.path(&format!("{out}/{name}")));
+        let parts = footer["fingerprints"].as_object().unwrap().clone();
+        assert_eq!(parts.len(), 1);
+        parts.into_iter().next().unwrap()
+    };
+    let [(one, old), (other, new)] = ["runs", "anew"].map(parts);
+    assert_ne!(one, other);
+    let differ: Vec<_> = old.as_object().unwrap().iter().filter(|(key, part)| new[*key] != **part).collect();
+    assert_eq!(differ.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>(), ["prompts"]);
+}

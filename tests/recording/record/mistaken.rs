@@ -1,0 +1,166 @@
+//! Files of experiments that are mistaken, damaged or hostile: told where and what to do instead, and nothing is written.
+
+use std::fs;
+use std::os::unix::fs::symlink;
+use std::path::Path;
+use std::process::Command;
+
+use super::recordings::Bench;
+use crate::harness::files::{assert_same, contents};
+use crate::harness::program::{run, succeeds};
+
+/// An experiment without a fault, to which one is added.
+const HEAD: &str = "[experiment.mine]\ntitle = \"Mine\"\nprompt = \"exploration\"\ncubes = { kind = \"none\" }\n";
+
+/// The most that is said of one fault: no file makes the program print pages.
+const MOST_SAID: usize = 4000;
+
+/// That `experiments check` and `record` refuse `mine.toml` with these words; what was said.
+#[track_caller]
+fn refused(folder: &Path, expected: &[&str]) -> String {
+    let check = run(folder, &["experiments", "check", "mine.toml"]).refused();
+    let words = "record --agent frozen --experiment mine.toml --seeds 1 --runs 1 --config small.toml --out runs";
+    let record = run(folder, &words.split(' ').collect::<Vec<_>>()).refused();
+    for said in [&check, &record] {
+        for expected in expected.iter().chain(&["mine.toml", "help: "]) {
+            assert!(said.contains(expected), "expected `{expected}` in\n{said}");
+        }
+        assert!(said.len() < MOST_SAID, "{} bytes: {}", said.len(), &said[..200]);
+    }
+    assert_eq!(check, record);
+    assert!(!folder.join("runs").exists());
+    check
+}
+
+/// The same for a text; the fault is underlined in this line.
+#[track_caller]
+fn refused_in(bench: &Bench, line: usize, text: &str, expected: &[&str]) {
+    let folder = bench.folder.path();
+    fs::write(folder.join("mine.toml"), text).unwrap();
+    let before = contents(folder);
+    let said = refused(folder, expected);
+    assert!(said.contains(&format!("--> mine.toml:{line}:")) && said.contains('^'), "{said}");
+    assert_same(&contents(folder), &before);
+}
+
+#[test]
+fn numbers_that_are_none_or_out_of_range() {
+    let bench = Bench::new();
+    for (line, more, expected) in [
+        (5, "step_length = nan", "`step_length` may be 0.1 to 1, but is NaN"),
+        (5, "steps = 0", "`steps` may be 1 to 100000, but is 0"),
+        (6, "[[experiment.mine.mirror]]\nwidth = inf", "`width` may be 0.5 to 10, but is inf"),
+        (6, "[[experiment.mine.mirror]]\nheight = -inf", "`height` may be 0.5 to 5, but is -inf"),
+        (5, "mirror = [{}, {}, {}, {}, {}]", "a world holds at most 4 of `mirror`, found 5"),
+        (5, "chance = { TSA = \"4/0\" }", "4/0"),
+        (5, "[[experiment.mine.mirror]]\nwidth = 9.5", "a mirror of 9.5 m does not fit onto a wall of 8 m"),
+    ] {
+        // What does not fit is told where the cubes are said.
+        let line = if more.contains("9.5") { 4 } else { line };
+        refused_in(&bench, line, &format!("{HEAD}{more}\n"), &[expected]);
+    }
+}
+
+#[test]
+fn names_and_keys() {
+    let bench = Bench::new();
+    let told = |line, text: &str, expected: &[&str]| refused_in(&bench, line, text, expected);
+    let with = |more: &str| format!("{HEAD}{more}\n");
+    for (line, more, near) in [
+        (5, "step = 50", "steps"),
+        (5, "stated_colour = \"random\"", "stated_color"),
+        (5, "repply = [\"action\"]", "reply"),
+        (5, "palete = [\"red\"]", "palette"),
+        (6, "[[experiment.mine.mirror]]\nwidht = 2.0", "width"),
+        (6, "[[experiment.mine.mirror]]\ndelai = 2", "delay"),
+        (7, "[[experiment.mine.mark]]\npart = \"head\"\nform_t = 3", "from_t"),
+        (5, "decision = \"self_colour\"", "self_color"),
+        (5, "scenes = \"two-mirror\"", "two-mirrors"),
+    ] {
+        told(line, &with(more), &[&format!("did you mean `{near}`?")]);
+    }
+    told(1, "[experiment.\"a/b\"]\ntitle = \"A\"\nprompt = \"exploration\"\n", &["a name has 1 to 40 letters"]);
+    told(1, &HEAD.replace("mine", "E1"), &["`E1` is built in", "give it another name"]);
+    told(1, &HEAD.replace("title = \"Mine\"\n", ""), &["the experiment has no `title`"]);
+    told(4, &HEAD.replace("kind = \"none\"", ""), &["the cubes have no `kind`"]);
+}
+
+#[test]
+fn prompts() {
+    let bench = Bench::new();
+    let outside = tempfile::tempdir().unwrap();
+    for folder in [outside.path().to_owned(), bench.path("broken"), bench.path("asked"), bench.path("half")] {
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join("system.txt"), "Answer.").unwrap();
+        fs::write(folder.join("user.txt"), "{{ position_text }}").unwrap();
+    }
+    fs::write(bench.path("broken/user.txt"), "{% if bumped %}").unwrap();
+    fs::write(bench.path("asked/user.txt"), "{{ body_color }}").unwrap();
+    fs::remove_file(bench.path("half/user.txt")).unwrap();
+    symlink(outside.path(), bench.path("link")).unwrap();
+    fs::create_dir(bench.path("linked")).unwrap();
+    fs::write(bench.path("linked/user.txt"), "{{ position_text }}").unwrap();
+    symlink(outside.path().join("system.txt"), bench.path("linked/system.txt")).unwrap();
+    let outside = outside.path().display().to_string();
+    for (prompt, expected) in [
+        ("../asked", "a folder beside the experiment file or below it"),
+        ("asked/../../x", "a folder beside the experiment file or below it"),
+        (&outside, "a folder beside the experiment file or below it"),
+        ("link", "is a link that leads out of the folder"),
+        ("linked", "is a link that leads out of the folder"),
+        ("nowhere", "cannot read"),
+        ("half", "user.txt"),
+        ("broken", "the template user.txt does not parse"),
+        ("asked", "the template user.txt uses `body_color`; it is given history_text"),
+    ] {
+        refused_in(&bench, 3, &HEAD.replace("\"exploration\"", &format!("{prompt:?}")), &[expected]);
+    }
+}
+
+#[test]
+fn files_that_are_no_experiments() {
+    let bench = Bench::new();
+    let folder = bench.folder.path();
+    let place = bench.path("mine.toml");
+    refused_in(&bench, 1, "", &["no experiment", "add a table such as"]);
+    refused_in(&bench, 1, "title = \"Mine\"", &["unknown key `title`"]);
+    refused_in(&bench, 1, "[experiment.mine\n", &["not TOML"]);
+    refused_in(&bench, 1, &format!("x = {}", "[".repeat(100_000)), &["not TOML"]);
+    refused_in(&bench, 1, &format!("x = {}", "{y=".repeat(100_000)), &["not TOML"]);
+    refused_in(&bench, 5, &format!("{HEAD}mirror = [{}]\n", "{},".repeat(300_000)), &["found 300000"]);
+    let many: String = (0..2000).map(|at| HEAD.replace("mine", &format!("mine-{at}"))).collect();
+    refused_in(&bench, 1, &many, &["at most 64 experiments, found 2000"]);
+
+    let unreadable = |expected: &str| refused(folder, &["cannot read the experiment file `mine.toml`", expected]);
+    fs::write(&place, format!("{HEAD}mirror = [{}]\n", "{},".repeat(1_000_000))).unwrap();
+    unreadable("longer than 1048576 bytes");
+    fs::write(&place, b"[experiment.mine]\ntitle = \"\xff\xfe\"\n").unwrap();
+    unreadable("expected UTF-8 text");
+    fs::remove_file(&place).unwrap();
+    unreadable("No such file");
+    fs::create_dir(&place).unwrap();
+    unreadable("expected a file");
+    fs::remove_dir(&place).unwrap();
+    symlink("/dev/zero", &place).unwrap();
+    unreadable("expected a file");
+    fs::remove_file(&place).unwrap();
+    succeeds(Command::new("mkfifo").arg(&place));
+    unreadable("expected a file");
+}
+
+#[test]
+fn a_room_too_small_for_its_cubes() {
+    let bench = Bench::new();
+    let cubes = HEAD.replace("kind = \"none\"", "kind = \"candidates\", count = 10");
+    fs::write(bench.path("mine.toml"), cubes.replace("exploration", "cube-selection")).unwrap();
+    run(bench.folder.path(), &["experiments", "check", "mine.toml"]).done();
+    let small = fs::read_to_string(bench.path("small.toml")).unwrap();
+    fs::write(bench.path("small.toml"), format!("{small}room.size = 5.0\nmirror.width = 1.0\n")).unwrap();
+    let before = bench.files("");
+    let words = "record --agent frozen --experiment mine.toml --seeds 1 --runs 1 --config small.toml --out runs";
+    let said = run(bench.folder.path(), &words.split(' ').collect::<Vec<_>>()).refused();
+    for expected in ["no room for the cubes", "--> mine.toml:4:", "^", "help: fewer cubes or others"] {
+        assert!(said.contains(expected), "{said}");
+    }
+    assert_same(&bench.files(""), &before);
+}

@@ -29,6 +29,7 @@
 //! | [`engine`] | other engines for the SQL lowering: Polars, Spark |
 //! | [`stats`] | grouping, exact moments, intervals, tests |
 //! | [`score`] | logical plan to physical plan to kernels over Arrow batches; the episode table |
+//! | [`experiment`] | what a world shows, what an agent is asked and how the answer is decided: files, built in or of one's own |
 //! | [`metric`] | definition files: TOML, SQL expressions, types, plans |
 //! | [`trace`] | what an episode is: schema, writer, reader, validation |
 //! | [`base`] | exact numbers to text, hashes, near names, files that are replaced |

@@ -128,7 +128,7 @@ impl Faults {
         let renderer = if colored { Renderer::styled() } else { Renderer::plain() };
         let mut texts: Vec<String> = self.0.iter().map(|fault| fault.render(&renderer)).collect();
         if texts.len() > 1 {
-            texts.push(format!("error: {} faults in the definitions", texts.len()));
+            texts.push(format!("error: {} faults", texts.len()));
         }
         texts.join("\n\n")
     }

@@ -10,9 +10,23 @@ use std::path::{Path, PathBuf};
 use regex::Regex;
 
 /// From the top to the bottom: a room imports only from the rooms below it.
-const ROOMS: [&str; 15] = [
-    "cli", "study", "record", "replay", "agent", "sim", "log", "report", "figures", "engine", "stats", "score",
-    "metric", "trace", "base",
+const ROOMS: [&str; 16] = [
+    "cli",
+    "study",
+    "record",
+    "replay",
+    "agent",
+    "sim",
+    "log",
+    "report",
+    "figures",
+    "engine",
+    "stats",
+    "score",
+    "experiment",
+    "metric",
+    "trace",
+    "base",
 ];
 
 /// The rooms between a trace and a report, which know nothing of how episodes come about.
@@ -293,7 +307,7 @@ fn base_knows_no_arrow_starts_no_thread_and_opens_files_to_replace_them_alone() 
 }
 
 /// Files outside `trace` that open files, or read Parquet; none of them opens a trace.
-const OPENS_OTHER_FILES: [&str; 13] = [
+const OPENS_OTHER_FILES: [&str; 15] = [
     // Files that appear whole or not at all.
     "src/base/replace/",
     // Logs.
@@ -313,6 +327,9 @@ const OPENS_OTHER_FILES: [&str; 13] = [
     "src/record/",
     // The files that an agent's command names, for their hashes.
     "src/agent/exec/files.rs",
+    // Experiments and prompts, of bounded length.
+    "src/experiment/file.rs",
+    "src/experiment/prompt.rs",
     // Answers of models.
     "src/agent/vlm/journal.rs",
 ];

@@ -6,9 +6,9 @@ use std::process::Command;
 use serde_json::{Value, json};
 
 use super::recordings::Bench;
-use crate::harness::files::{assert_same, fixture};
+use crate::harness::files::{assert_same, fixture, repository};
 use crate::harness::need;
-use crate::harness::program::{run, stderr, succeeds};
+use crate::harness::program::{PROGRAM, run, stderr, stdout, succeeds};
 use crate::harness::traces::{recording, texts};
 
 const ECHO: &str = r#"
@@ -81,7 +81,7 @@ fn a_script_plays_it_and_reports_show_it_beside_the_five() {
     fs::remove_dir_all(bench.path("asked")).unwrap();
     run(at, &["validate", "runs"]).done();
     let replayed: Value = run(at, &["replay", "runs/late-echo-random.parquet", "--json"]).json();
-    assert_eq!(replayed["matches"], true, "{replayed}");
+    assert_eq!((&replayed["episodes"], &replayed["divergences"]), (&json!(8), &json!([])));
 
     let recorded = fixture("recorded/E1-oracle.parquet").display().to_string();
     run(at, &["report", "runs", &recorded, "--out", "report"]).done();
@@ -151,4 +151,62 @@ fn a_program_is_asked_in_its_words_and_another_prompt_is_another_recording() {
     assert_ne!(one, other);
     let differ: Vec<_> = old.as_object().unwrap().iter().filter(|(key, part)| new[*key] != **part).collect();
     assert_eq!(differ.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>(), ["prompts"]);
+}
+
+/// The block of commands that stands first in this section of the README.
+fn commands_of(section: &str) -> String {
+    let readme = fs::read_to_string(repository().join("README.md")).unwrap();
+    let (_, rest) = readme.split_once(&format!("### {section}\n")).unwrap();
+    let (_, block) = rest.split_once("```sh\n").unwrap();
+    block.split_once("```\n").unwrap().0.to_owned()
+}
+
+#[test]
+fn the_example_of_the_readme_works_as_it_is_pasted() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = std::path::Path::new(PROGRAM).parent().unwrap().display();
+    let mut shell = Command::new("sh");
+    shell.current_dir(folder.path()).env("PATH", format!("{place}:{}", std::env::var("PATH").unwrap()));
+    let said = stdout(&succeeds(shell.args(["-e", "-c", &commands_of("Experiments are files")])));
+    assert!(said.contains("late/echo.toml: no fault") && said.contains("A late echo"), "{said}");
+    assert!(said.contains("a mirror that shows the room 3 steps late"), "{said}");
+    assert!(folder.path().join("late/report/tables/main.md").exists());
+}
+
+#[test]
+fn scenes_and_sheets_show_any_experiment() {
+    let bench = bench();
+    let at = bench.folder.path();
+    let scenes = |list: &str| -> Vec<Value> {
+        let text = run(at, &["world", "scene", list, "--run", "2"]).done();
+        serde_json::Deserializer::from_str(&text).into_iter().map(Result::unwrap).collect()
+    };
+    fs::write(bench.path("two.toml"), format!("{ECHO}\n{}", ECHO.replace("late-echo", "echo"))).unwrap();
+    let names: Vec<Value> = scenes("E1,two.toml").iter().map(|scene| scene["experiment"].clone()).collect();
+    assert_eq!(names, ["E1", "late-echo", "echo"]);
+    let [e1, echo] = ["E1", "echo.toml"].map(|list| scenes(list).remove(0));
+    assert_eq!((&e1["cubes"], &e1["start"], &e1["body_color"]), (&echo["cubes"], &echo["start"], &echo["body_color"]));
+
+    need::drawing();
+    let height = |list: &[&str]| {
+        let words = ["world", "sheet", "--config", "small.toml", "--out", "sheet"];
+        run(at, &[&words[..], list].concat()).done();
+        let png = fs::read(bench.path("sheet/sheet.png")).unwrap();
+        u32::from_be_bytes(png[20..24].try_into().unwrap())
+    };
+    // A row is half a small frame and 22 pixels of words; 6 pixels are around all.
+    let of_rows = |rows: u32| rows * (24 + 22) + 6;
+    assert_eq!(height(&[]), of_rows(5));
+    assert_eq!(height(&["--experiment", "mark"]), of_rows(1));
+    assert_eq!(height(&["--experiment", "two.toml,E2"]), of_rows(3));
+    let said = run(at, &["world", "sheet", "--experiment", "E9"]).ends(2).stderr;
+    assert!(said.contains("or mine.toml, found `E9`"), "{said}");
+}
+
+#[test]
+fn the_schemas_of_files_and_footers_are_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let schema = |name: &str| run(folder.path(), &["schema", name]).json();
+    assert_eq!(schema("experiment")["title"], "Experiment");
+    assert_eq!(schema("experiments")["title"], "ExperimentFile");
 }

@@ -155,7 +155,8 @@ fn a_room_too_small_for_its_cubes() {
     fs::write(bench.path("mine.toml"), cubes.replace("exploration", "cube-selection")).unwrap();
     run(bench.folder.path(), &["experiments", "check", "mine.toml"]).done();
     let small = fs::read_to_string(bench.path("small.toml")).unwrap();
-    fs::write(bench.path("small.toml"), format!("{small}room.size = 5.0\nmirror.width = 1.0\n")).unwrap();
+    fs::write(bench.path("small.toml"), format!("{small}room.size = 5.0\nmirror.width = 1.0\ncubes.spacing = 1.6\n"))
+        .unwrap();
     let before = bench.files("");
     let words = "record --agent frozen --experiment mine.toml --seeds 1 --runs 1 --config small.toml --out runs";
     let said = run(bench.folder.path(), &words.split(' ').collect::<Vec<_>>()).refused();

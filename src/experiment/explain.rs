@@ -35,7 +35,7 @@ pub fn explained(experiment: Experiment) -> String {
         line("mirror", "none".to_owned());
     }
     for mark in &experiment.marks {
-        line("mark", self::mark(mark));
+        line("mark", self::mark(*mark));
     }
     let stated = match experiment.stated_color {
         Stated::None => "",
@@ -120,7 +120,7 @@ fn pane(pane: &Pane) -> String {
     format!("{what}, on {wall}")
 }
 
-fn mark(mark: &Mark) -> String {
+fn mark(mark: Mark) -> String {
     let who = match mark.on {
         Wearer::Own => "on the own body",
         Wearer::Other => "on the first of the others",

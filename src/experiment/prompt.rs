@@ -80,7 +80,9 @@ impl Templates {
     /// The built-in prompt of this name.
     pub fn built_in(name: &str) -> Option<Self> {
         let (_, own) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
-        Some(Self::of(OWN.into_iter().zip(*own).map(|(name, text)| (name.to_owned(), text.to_owned())).collect()))
+        let own: Vec<Template> =
+            OWN.into_iter().zip(*own).map(|(name, text)| (name.to_owned(), text.to_owned())).collect();
+        Some(Self::of(&own))
     }
 
     /// The names of the built-in prompts.
@@ -117,13 +119,13 @@ impl Templates {
                 own.push((name.to_owned(), text_of(&path)?));
             }
         }
-        let templates = Self::of(own);
+        let templates = Self::of(&own);
         templates.check()?;
         Ok(templates)
     }
 
     /// Own templates, and the shared ones for the rest.
-    fn of(own: Vec<Template>) -> Self {
+    fn of(own: &[Template]) -> Self {
         let shared = |name: &str| SHARED.iter().find(|(known, _)| *known == name).map(|(_, text)| (*text).to_owned());
         let text = |name: &str| own.iter().find(|(known, _)| known == name).map(|(_, text)| text.clone());
         let all = NAMES.iter().filter_map(|(name, _)| Some(((*name).to_owned(), text(name).or_else(|| shared(name))?)));

@@ -50,7 +50,7 @@ pub struct ExperimentTable {
     pub others: Option<OthersTable>,
     /// How the agent stands at the start; `facing_away` if absent.
     pub start: Option<Start>,
-    /// The column that holds the decision; `selected_cube` if absent, `self_color` where there are no cubes.
+    /// The column that holds the decision; `selected_cube` if absent, `self_color` where there are no candidates.
     pub decision: Option<Decision>,
     /// The column that holds what the decision should name; `body_color` if absent, `mark_color` for `mark_report`.
     pub truth: Option<Truth>,

@@ -456,13 +456,13 @@ fn mark(place: &Place, mut keys: Keys<'_>, steps: Option<u32>, faults: &mut Vec<
     let color = match keys.text("color", faults) {
         None => MarkColor::Random,
         Some((name, _)) if name == "random" => MarkColor::Random,
-        Some((name, at)) => match Color::named(&name) {
-            Some(color) => MarkColor::Named(color),
-            None => {
+        Some((name, at)) => Color::named(&name).map_or_else(
+            || {
                 faults.push(no_color(&name, at).help("or `random`"));
                 MarkColor::Random
-            }
-        },
+            },
+            MarkColor::Named,
+        ),
     };
     let from_t = keys.count("from_t", [1, steps.unwrap_or(MOST_STEPS)], faults).map_or(1, |(from_t, _)| from_t);
     let on = keys.choice("on", &pairs(Wearer::ALL, Wearer::name), faults).unwrap_or_default();

@@ -118,13 +118,11 @@ impl<'a> Keys<'a> {
         let place = self.value_place(name);
         let value = self.integer(name, faults)?;
         let place = place?;
-        match u32::try_from(value).ok().filter(|value| (least..=most).contains(value)) {
-            Some(value) => Some((value, place)),
-            None => {
-                faults.push(Fault::new(place, format!("`{name}` may be {least} to {most}, but is {value}")));
-                None
-            }
+        if let Some(value) = u32::try_from(value).ok().filter(|value| (least..=most).contains(value)) {
+            return Some((value, place));
         }
+        faults.push(Fault::new(place, format!("`{name}` may be {least} to {most}, but is {value}")));
+        None
     }
 
     /// A length from `least` to `most`, in the unit in which it is written.

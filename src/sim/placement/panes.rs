@@ -59,7 +59,7 @@ impl Layout<'_> {
         }
         let mut marks: Vec<WornMark> = Vec::new();
         for (at, mark) in (16_u64..).zip(&self.experiment.marks) {
-            marks.extend(self.worn(mark, &marks, &mut stream(at)));
+            marks.extend(self.worn(*mark, &marks, &mut stream(at)));
         }
         Extras { stated_color, panes, marks }
     }
@@ -143,7 +143,7 @@ impl Layout<'_> {
     }
 
     /// A mark on a body, in a colour that neither its wearer nor a mark before it has.
-    fn worn(&self, mark: &Mark, before: &[WornMark], chance: &mut Rng) -> Option<WornMark> {
+    fn worn(&self, mark: Mark, before: &[WornMark], chance: &mut Rng) -> Option<WornMark> {
         let (wearer, body) = match mark.on {
             Wearer::Own => (0, self.body_color),
             Wearer::Other => (1, self.others.first()?.color),

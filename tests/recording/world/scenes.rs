@@ -151,7 +151,7 @@ fn shares_shown(world: &mut World, open: &mut World) -> Vec<f64> {
         let figure = Figure::standing(Pose { x: spot[0], y: spot[1], heading });
         let [shown, whole] = [&mut *world, &mut *open].map(|world| {
             world.place(&[figure]);
-            labels(world, 160, 120).codes.iter().filter(|code| **code == own.code()).count()
+            labels(world, 160, 120).codes.iter().map(|code| usize::from(*code == own.code())).sum::<usize>()
         });
         if whole > 0 {
             #[expect(clippy::cast_precision_loss, reason = "pixels of a view")]

@@ -5,6 +5,9 @@
 //!                                                   └── prompt (a folder of templates, hashed)
 //! ```
 //!
+//! `table` reads one `[experiment.NAME]` key by key; [`schema`] is the same shape as types, for the JSON Schema; [`explain`] says
+//! a [`Spec`] in words; [`balance`] deals colours out equally.
+//!
 //! The paper's five experiments are five such files. A trace carries the whole [`Spec`] in its footer, so that a replay
 //! and a report need no file.
 //!

@@ -6,7 +6,7 @@ use std::process::Command;
 use serde_json::{Value, json};
 
 use super::recordings::Bench;
-use crate::harness::files::{assert_same, fixture, repository};
+use crate::harness::files::{assert_same, fixture, repository, write_small_world};
 use crate::harness::need;
 use crate::harness::program::{PROGRAM, run, stderr, stdout, succeeds};
 use crate::harness::traces::{recording, texts};
@@ -213,4 +213,17 @@ fn the_schemas_of_files_and_footers_are_printed() {
     let schema = |name: &str| run(folder.path(), &["schema", name]).json();
     assert_eq!(schema("experiment")["title"], "Experiment");
     assert_eq!(schema("experiments")["title"], "ExperimentFile");
+}
+
+#[test]
+fn a_narrower_view_is_in_the_footer_and_not_pooled_with_the_studys() {
+    let bench = Bench::new();
+    let at = bench.folder.path();
+    bench.recorded("far", "--agent random --experiment E1 --seeds 1 --runs 2 --no-log --shard 1/2");
+    write_small_world(at, "eye.fovy = 60.0\n");
+    bench.recorded("near", "--agent random --experiment E1 --seeds 1 --runs 2 --no-log --shard 2/2");
+    let view = |out: &str| recording(&bench.path(&format!("{out}/E1-random.parquet")))["view"]["fov_y"].clone();
+    assert_eq!((view("far"), view("near")), (json!(110.0), json!(60.0)));
+    let said = run(at, &["stats", "far", "near"]).refused();
+    assert!(said.contains("eye.fovy") && said.contains("--condition NAME"), "{said}");
 }

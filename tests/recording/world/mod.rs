@@ -1,6 +1,7 @@
 //! The MuJoCo world: what is drawn by seed, how things move, and what the census says about pictures.
 
 mod body;
+mod framing;
 mod motion;
 mod paint;
 mod poses;

@@ -3,6 +3,7 @@
 mod body;
 mod motion;
 mod paint;
+mod panes;
 mod poses;
 mod scenes;
 mod switching;

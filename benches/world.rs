@@ -86,6 +86,55 @@ fn switching(config: &WorldConfig) -> [Duration; 2] {
     })
 }
 
+/// How round parts were drawn before: slices, stacks, divisions of flat parts.
+const FINER: &str = "eye.slices = 28\neye.stacks = 16\neye.quads = 4\nothers.least = 6";
+/// Levels of 255 by which a pixel is another one to the eye.
+const LEVELS: u8 = 8;
+
+/// Frames of an experiment drawn with finer round parts and with those of the configuration, by turns.
+fn fineness(experiment: Experiment, config: &WorldConfig) {
+    let finer = WorldConfig::from_toml(FINER).expect("finer parts are allowed");
+    let mut eyes = [&finer, config].map(|config| Camera::new(config).expect("there is something to draw with"));
+    let (mut spent, mut frames) = ([Duration::ZERO; 2], 0_u32);
+    let (mut changed, mut pixels) = (0_usize, 0_usize);
+    for seed in 1..=EPISODES {
+        let mut worlds = [&finer, config].map(|config| {
+            let scene = Scene::draw(config, experiment, seed, 1).expect("the default has room for all");
+            World::new(config, scene).expect("the default is a world")
+        });
+        for t in 0..STEPS / 2 {
+            // The rays are the same for both.
+            for world in &worlds {
+                std::hint::black_box(world.labels());
+            }
+            let mut drawn = [None, None];
+            for at in if t % 2 == 0 { [0, 1] } else { [1, 0] } {
+                let frame = timed(&mut spent[at], || eyes[at].frame(&worlds[at]));
+                drawn[at] = Some(frame.expect("there is something to draw with"));
+            }
+            if let [Some(fine), Some(coarse)] = &drawn {
+                let pairs = fine.rgb.chunks_exact(3).zip(coarse.rgb.chunks_exact(3));
+                changed += pairs.filter(|(a, b)| (0..3).any(|part| a[part].abs_diff(b[part]) > LEVELS)).count();
+                pixels += fine.rgb.len() / 3;
+            }
+            frames += 1;
+            let action = if t % 4 == 3 { Action::TurnLeft } else { Action::MoveForward };
+            for world in &mut worlds {
+                world.act(Some(action));
+            }
+        }
+    }
+    let [fine, coarse] = spent.map(|spent| f64::from(frames) / spent.as_secs_f64());
+    #[expect(clippy::cast_precision_loss, reason = "pixels of some frames")]
+    let share = 100.0 * changed as f64 / pixels as f64;
+    println!(
+        "  {}: {coarse:.0} frames/s, {fine:.0} with parts as round as before: {:.2} times; {share:.2} % of pixels differ by \
+         more than {LEVELS} levels",
+        experiment.name(),
+        coarse / fine
+    );
+}
+
 fn main() {
     // `cargo test` runs benches too, with nothing to measure.
     if std::env::args().any(|argument| argument == "--test") {
@@ -128,6 +177,8 @@ fn main() {
                 one.as_secs_f64() * 1e3,
                 many.as_secs_f64() * 1e3
             );
+            println!("frames alone, seven humanoids, by turns with rounder parts");
+            [Experiment::E4, Experiment::E5].iter().for_each(|experiment| fineness(*experiment, &config));
         }
     }
 }

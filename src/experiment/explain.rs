@@ -70,10 +70,10 @@ fn cubes(cubes: Cubes) -> String {
     match cubes {
         Cubes::None => "none".to_owned(),
         Cubes::Candidates { count } => format!("{count} of different colours, one of them the body's"),
-        Cubes::Clutter { least: None, most: None } => {
+        Cubes::Clutter { least: None, most: None, .. } => {
             "clutter, as much as the world says, some of it before the first mirror".to_owned()
         }
-        Cubes::Clutter { least, most } => format!(
+        Cubes::Clutter { least, most, .. } => format!(
             "clutter, {} to {}, some of it before the first mirror",
             number(least, "the world's least"),
             number(most, "the world's most")

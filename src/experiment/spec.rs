@@ -116,6 +116,10 @@ pub enum Cubes {
         /// How many at most; the world's if absent.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         most: Option<u32>,
+        /// Of a hundred places before the first pane, those from which it hides half of the body or more, at least; the
+        /// world's if absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        hides: Option<u32>,
     },
 }
 

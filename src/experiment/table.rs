@@ -68,7 +68,8 @@ pub(super) fn read(
     let first_wall = panes.first().map_or(Wall::Random, |pane| pane.wall);
     let (scenes, layout) = scenes(name, &mut keys, first_wall, beside, faults);
     let decision_place = keys.value_place("decision").unwrap_or_else(|| place.clone());
-    let default = if layout.cubes == Cubes::None { Decision::SelfColor } else { Decision::SelectedCube };
+    let has_candidates = matches!(layout.cubes, Cubes::Candidates { .. });
+    let default = if has_candidates { Decision::SelectedCube } else { Decision::SelfColor };
     let decision = keys.choice("decision", &pairs(Decision::ALL, Decision::name), faults).unwrap_or(default);
     let truth = keys.choice("truth", &pairs(Truth::ALL, Truth::name), faults);
     let truth = truth.unwrap_or(if decision == Decision::MarkReport { Truth::MarkColor } else { Truth::BodyColor });
@@ -266,7 +267,9 @@ fn cubes(keys: &mut Keys<'_>, palette: usize, faults: &mut Vec<Fault>) -> Option
             let least = keys.count("least", [0, MOST_CUBES], faults);
             let most = keys.count("most", [0, MOST_CUBES], faults);
             in_order(least.as_ref(), most.as_ref(), faults);
-            Some(Cubes::Clutter { least: least.map(|(least, _)| least), most: most.map(|(most, _)| most) })
+            let hides = keys.count("hides", [0, 100], faults);
+            let [least, most, hides] = [least, most, hides].map(|count| count.map(|(count, _)| count));
+            Some(Cubes::Clutter { least, most, hides })
         }
         None => None,
     };

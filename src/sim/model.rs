@@ -52,6 +52,9 @@ pub mod group {
     pub const HIDDEN: i32 = 5;
 }
 
+/// Slices and stacks of round parts, and divisions of flat ones, in pictures of labels.
+const LABELLED_PARTS: [u32; 3] = [40, 24, 2];
+
 const ROOM: &str = include_str!("../../assets/world/room.xml");
 const HUMANOID: &str = include_str!("../../assets/world/humanoid.xml");
 
@@ -231,6 +234,12 @@ impl Stage {
         self.data.forward();
     }
 
+    /// Where every shown geom is: its number, centre and rotation.
+    pub fn placed(&self) -> Vec<(usize, [f64; 3], [f64; 9])> {
+        let shown = (0..self.items.len()).filter(|geom| self.is_shown(*geom));
+        shown.map(|geom| (geom, self.data.geom_xpos()[geom], self.data.geom_xmat()[geom])).collect()
+    }
+
     /// Where a piece is: its number is that of its agent times five, plus its own.
     pub(super) fn piece_place(&self, number: usize) -> ([f64; 3], [f64; 4]) {
         let (mocap, _) = self.pieces[number];
@@ -370,9 +379,14 @@ fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: Paint, size: [usi
     (visual.global.offwidth, visual.global.offheight) = (width, height);
     let samples = if paint == Paint::Lit { config.eye.samples } else { 0 };
     visual.quality.offsamples = i32::try_from(samples).unwrap_or(0);
-    // Drawing takes its time by the triangles of round parts; a body is some hundred pixels high at most.
+    // Drawing takes its time by the triangles of round parts; a body is some hundred pixels high at most. Labels are what
+    // the rays are held against, and are as round as it gets.
+    let parts = match paint {
+        Paint::Lit => [config.eye.slices, config.eye.stacks, config.eye.quads],
+        Paint::Labels => LABELLED_PARTS,
+    };
     [visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads] =
-        [config.eye.slices, config.eye.stacks, config.eye.quads].map(|count| i32::try_from(count).unwrap_or(i32::MAX));
+        parts.map(|count| i32::try_from(count).unwrap_or(i32::MAX));
 }
 
 /// Four equal lamps, one towards each wall, so that no wall is lit otherwise than another; one from below.

@@ -249,7 +249,7 @@ impl World {
             Look::Direct => (self.figures(), self.t, None),
             Look::Through(pane) => {
                 let late = self.scene.panes[pane].delay;
-                (self.figures_in(pane), self.t.saturating_sub(late), Some(passage::eye(self, pane)))
+                (self.figures_in(pane), self.t.saturating_sub(late).max(1), Some(passage::eye(self, pane)))
             }
         };
         let mut bodies = [None; BODIES];

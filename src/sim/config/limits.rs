@@ -51,6 +51,7 @@ fn ranges(config: &WorldConfig) -> Vec<Limit> {
         ("clutter.most", f64::from(clutter.most), 0.0, 12.0),
         ("clutter.before_mirror_percent", f64::from(clutter.before_mirror_percent), 0.0, 100.0),
         ("clutter.stack_percent", f64::from(clutter.stack_percent), 0.0, 100.0),
+        ("clutter.hides_percent", f64::from(clutter.hides_percent), 0.0, 100.0),
         ("placement.wall_margin", placement.wall_margin, 0.05, 1.0),
         ("placement.clearance", placement.clearance, 0.05, 1.0),
         ("evidence.mirror_self_px", f64::from(evidence.mirror_self_px), 1.0, 1e6),

@@ -185,6 +185,8 @@ pub struct ClutterConfig {
     pub before_mirror_percent: u32,
     /// Of a hundred cubes, those that have another on top.
     pub stack_percent: u32,
+    /// Of a hundred places before the mirror, those from which they hide half of the body or more, at least.
+    pub hides_percent: u32,
     /// Between the mirror's wall and the centre of a cube before it at most, m.
     pub mirror_distance: f64,
 }
@@ -283,7 +285,8 @@ impl WorldConfig {
         put(&mut world.others.most, most);
         put(&mut world.others.twin_percent, twin_percent);
         world.others.least = world.others.least.min(world.others.most);
-        if let Cubes::Clutter { least, most } = experiment.layout.cubes {
+        if let Cubes::Clutter { least, most, hides } = experiment.layout.cubes {
+            put(&mut world.clutter.hides_percent, hides);
             put(&mut world.clutter.least, least);
             put(&mut world.clutter.most, most);
             world.clutter.least = world.clutter.least.min(world.clutter.most);

@@ -21,8 +21,8 @@ const ACROSS: [f64; 3] = [-0.16, 0.0, 0.16];
 const ENOUGH: f64 = 0.75;
 
 /// Whether the agent can walk to a place before the mirror with its reflection clear, and to each candidate, within a
-/// third of the episode each; and whether clutter, where there is any, hides half of the body or more from at least half
-/// of the places before the mirror (paper, section 3: mirror evidence in E5 is partial or occluded).
+/// third of the episode each; and whether clutter, where there is any, hides half of the body or more from as many
+/// of the places before the mirror as asked for (paper, section 3: mirror evidence in E5 is partial or occluded).
 pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan) -> bool {
     let steps = lengths(scene, plan);
     let budget = f64::from(config.episode.steps) / 3.0 * config.body.step_length;
@@ -33,7 +33,7 @@ pub(super) fn is_solvable(config: &WorldConfig, scene: &Scene, plan: &FloorPlan)
     let reaches =
         |cube: &Cube| near.iter().any(|spot| cube.square().distance(*spot) <= plan.radius + config.body.step_length);
     shares.iter().any(|share| *share >= ENOUGH)
-        && (!has_clutter || 2 * hidden >= shares.len())
+        && (!has_clutter || 100 * hidden >= config.clutter.hides_percent as usize * shares.len())
         && (!scene.experiment.has_candidates() || scene.cubes.iter().all(reaches))
 }
 

@@ -4,6 +4,7 @@ mod body;
 mod framing;
 mod motion;
 mod paint;
+mod panes;
 mod poses;
 mod scenes;
 mod switching;

@@ -1,0 +1,342 @@
+//! What is seen through panes of every kind: the census against drawn labels and MuJoCo's rays, and against what each kind
+//! must show.
+
+use mirrorstats::base::palette::Color;
+use mirrorstats::experiment::Experiment;
+use mirrorstats::experiment::file;
+use mirrorstats::metric::fault::Source;
+use mirrorstats::sim::camera::{Camera, LabelCamera};
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::model::Item;
+use mirrorstats::sim::passage;
+use mirrorstats::sim::rng::Rng;
+use mirrorstats::sim::scene::{HungPane, Scene};
+use mirrorstats::sim::visibility::{LabelImage, Shown, labels, labels_by_mujoco};
+use mirrorstats::sim::world::World;
+use mirrorstats::trace::episode::Action;
+
+use super::poses::scatter;
+use crate::harness::need;
+
+/// Everything that a pane can be, in rooms with others.
+const KINDS: &str = r#"
+[experiment.mirrors]
+title = "Three mirrors"
+prompt = "exploration"
+cubes = { kind = "clutter", least = 3, most = 3, hides = 0 }
+others = { least = 1, most = 2 }
+mirror = [{}, { wall = "opposite" }, { width = 2.0, height = 1.5 }]
+
+[experiment.late]
+title = "Late, with marks"
+prompt = "mark"
+decision = "mark_report"
+cubes = { kind = "none" }
+others = { least = 1, most = 1 }
+mirror = [{ kind = "delayed", delay = 3 }]
+mark = [{ part = "head", from_t = 2 }, { part = "back" }, { part = "chest", on = "other" }]
+
+[experiment.painted]
+title = "A decoy in another colour"
+prompt = "exploration"
+cubes = { kind = "none" }
+others = { least = 1, most = 1 }
+mirror = [{ kind = "decoy", color = "other" }]
+
+[experiment.stranger]
+title = "A decoy that moves by itself"
+prompt = "exploration"
+cubes = { kind = "none" }
+others = { least = 1, most = 1 }
+mirror = [{ kind = "decoy", body = "independent" }]
+
+[experiment.window]
+title = "A window"
+prompt = "exploration"
+cubes = { kind = "none" }
+others = { least = 1, most = 1 }
+mirror = [{ kind = "window", color = "other" }]
+"#;
+
+/// The experiments above, by name.
+fn kind(name: &str) -> Experiment {
+    // A window of this name is built in, which a text without a folder may be called too.
+    let source = Source { name: "kinds".to_owned(), text: KINDS.to_owned() };
+    let entries = file::read(source, None).unwrap();
+    let entry = entries.into_iter().find(|entry| entry.known.spec.name == name).unwrap();
+    Experiment::register(entry.known).unwrap()
+}
+
+fn world(experiment: Experiment, seed: i32) -> World {
+    let config = WorldConfig::default();
+    World::new(&config, Scene::draw(&config, experiment, seed, 1).unwrap()).unwrap()
+}
+
+/// Walks a little, so that a late pane has a past, with everybody elsewhere each time.
+fn wander(world: &mut World, chance: &mut Rng) {
+    for _ in 0..4 {
+        scatter(world, chance);
+        world.act(Some(chance.one_of(&[Action::MoveForward, Action::TurnLeft, Action::TurnRight])));
+    }
+}
+
+/// Per code that is seen: the share of pixels that both images show, of those that either shows.
+fn overlaps_of(one: &LabelImage, other: &LabelImage) -> Vec<(f64, Shown)> {
+    let mut counts = [[0_u32; 256]; 3];
+    for (a, b) in one.codes.iter().zip(&other.codes) {
+        counts[0][usize::from(*a)] += 1;
+        counts[1][usize::from(*b)] += 1;
+        counts[2][usize::from(*a)] += u32::from(a == b);
+    }
+    let share = |code: usize| {
+        let [one, other, both] = counts.map(|count| count[code]);
+        let shown = Shown::of_code(u8::try_from(code).unwrap());
+        let is_body = matches!(shown, Shown::Through(_, Item::Agent(_) | Item::Double));
+        (is_body && one >= LEAST).then(|| (f64::from(both) / f64::from(one + other - both), shown))
+    };
+    (0..256).filter_map(share).collect()
+}
+
+/// Pixels of a view whose overlap says something.
+const LEAST: u32 = 30;
+/// Poses of each kind.
+const POSES: i32 = 200;
+
+/// Bodies, cubes and marks through each pane, drawn as labels, on 200 poses: mean overlap above .99, none under .95.
+fn holds_against_pictures(name: &str) {
+    need::drawing();
+    let experiment = kind(name);
+    let mut eye = LabelCamera::new(&WorldConfig::default(), 640, 480).unwrap();
+    let mut chance = Rng::of(77, 1, 2);
+    let mut overlaps: Vec<(f64, Shown)> = Vec::new();
+    for seed in 0..POSES / 20 {
+        let mut world = world(experiment, 1 + seed);
+        for _ in 0..20 {
+            wander(&mut world, &mut chance);
+            let (cast, drawn) = (world.labels().clone(), eye.labels(&world).unwrap());
+            let differ = cast.codes.iter().zip(&drawn.codes).filter(|(cast, drawn)| cast != drawn).count();
+            assert!(differ * 500 < cast.codes.len(), "{name}: {differ} pixels differ");
+            overlaps.extend(overlaps_of(&cast, &drawn));
+        }
+    }
+    let doubles = overlaps.iter().filter(|(_, shown)| matches!(shown, Shown::Through(_, Item::Double))).count();
+    let sum: f64 = overlaps.iter().map(|(share, _)| share).sum();
+    #[expect(clippy::cast_precision_loss, reason = "some views")]
+    let mean = sum / overlaps.len() as f64;
+    let worst = overlaps.iter().min_by(|a, b| a.0.total_cmp(&b.0)).unwrap();
+    println!("{name}: {} views of {LEAST} px or more, mean overlap {mean:.4}, worst {worst:?}", overlaps.len());
+    assert!(overlaps.len() >= 40, "{} views alone", overlaps.len());
+    assert!(mean > 0.99 && worst.0 >= 0.95, "{name}: mean {mean}, worst {worst:?}");
+    assert_eq!(doubles > 0, ["stranger", "window"].contains(&name), "{name}");
+}
+
+#[test]
+fn several_mirrors_hold_against_pictures() {
+    holds_against_pictures("mirrors");
+}
+
+#[test]
+fn late_mirrors_hold_against_pictures() {
+    holds_against_pictures("late");
+}
+
+#[test]
+fn painted_decoys_hold_against_pictures() {
+    holds_against_pictures("painted");
+}
+
+#[test]
+fn decoys_that_move_by_themselves_hold_against_pictures() {
+    holds_against_pictures("stranger");
+}
+
+#[test]
+fn windows_hold_against_pictures() {
+    holds_against_pictures("window");
+}
+
+#[test]
+fn the_census_through_panes_is_what_the_rays_of_mujoco_meet() {
+    let mut chance = Rng::of(78, 1, 2);
+    let (mut differ, mut through) = (0_usize, 0_usize);
+    for name in ["mirrors", "late", "painted", "stranger", "window"] {
+        let mut world = world(kind(name), 3);
+        for _ in 0..8 {
+            wander(&mut world, &mut chance);
+            let cast = labels(&world, 160, 120);
+            let met = labels_by_mujoco(&world, 160, 120).unwrap();
+            differ += cast.codes.iter().zip(&met.codes).filter(|(cast, met)| cast != met).count();
+            through += cast.codes.iter().filter(|code| Shown::of_code(**code).pane().is_some()).count();
+        }
+    }
+    assert!(through > 10_000, "{through}");
+    assert_eq!(differ, 0, "of {through} through panes");
+}
+
+#[test]
+fn every_pane_is_counted_by_itself_and_all_together() {
+    let mut chance = Rng::of(79, 1, 2);
+    let mut world = world(kind("mirrors"), 2);
+    assert_eq!(world.scene().panes.len(), 3);
+    for _ in 0..20 {
+        wander(&mut world, &mut chance);
+        let visibility = world.visibility();
+        let count = |shown: Shown| world.labels().codes.iter().filter(|code| **code == shown.code()).count();
+        for (pane, sighting) in visibility.panes.iter().enumerate() {
+            assert_eq!(sighting.self_px as usize, count(Shown::Through(pane, Item::Agent(0))));
+        }
+        assert_eq!(visibility.self_px, visibility.panes.iter().map(|pane| pane.self_px).sum::<u32>());
+        assert_eq!(visibility.mirror_px, visibility.panes.iter().map(|pane| pane.px).sum::<u32>());
+    }
+}
+
+/// A late mirror shows the room as a mirror showed it before: the same counts for the same eye and bodies.
+#[test]
+fn a_late_mirror_shows_the_past() {
+    let late = kind("late");
+    let delay = late.panes[0].delay as usize;
+    let mut world = world(late, 4);
+    let mut past = vec![world.figures()];
+    let mut chance = Rng::of(80, 1, 2);
+    for step in 0..20 {
+        scatter(&mut world, &mut chance);
+        past.push(world.figures());
+        // What was put there is the state of now; before there is such a past it is the first one.
+        let shown = past[past.len().saturating_sub(1 + delay)].clone();
+        assert_eq!(world.figures_in(0), shown, "step {step}");
+        // An ordinary mirror with everybody where they were, seen from where the eye is now.
+        let scene = world.scene().clone();
+        let plain = Scene { panes: vec![HungPane { delay: 0, ..scene.panes[0] }], ..scene };
+        let mut then = World::new(world.config(), plain).unwrap();
+        then.place(&shown);
+        let counted = |world: &World| world.beyond()[0].placed();
+        assert_eq!(counted(&world), counted(&then), "step {step}");
+    }
+}
+
+#[test]
+fn marks_appear_at_their_step_and_later_in_a_late_mirror() {
+    let mut world = world(kind("late"), 5);
+    let is_shown = |world: &World| {
+        let shown = |stage: &mirrorstats::sim::model::Stage| {
+            stage.items().iter().enumerate().any(|(geom, item)| *item == Item::Mark(0) && stage.is_shown(geom))
+        };
+        [shown(world.stage()), shown(&world.beyond()[0])]
+    };
+    let mut seen = Vec::new();
+    for _ in 0..6 {
+        seen.push((world.t(), is_shown(&world), world.scene().own_mark_at(world.t()).is_some()));
+        world.act(None);
+    }
+    let expected = [
+        (1, [false, false], true),
+        (2, [true, false], true),
+        (3, [true, false], true),
+        (4, [true, false], true),
+        (5, [true, true], true),
+        (6, [true, true], true),
+    ];
+    assert_eq!(seen, expected, "the mark on the back is there from the start");
+}
+
+#[test]
+fn a_mark_has_a_colour_that_its_wearer_and_the_own_body_have_not() {
+    for seed in 1..40 {
+        let world = world(kind("late"), seed);
+        let scene = world.scene();
+        for mark in &scene.marks {
+            let wearer = if mark.wearer == 0 { scene.body_color } else { scene.others[mark.wearer - 1].color };
+            assert!(mark.color != wearer && mark.color != scene.body_color, "{scene:?}");
+        }
+    }
+}
+
+/// The commonest paint of the pixels that show something.
+fn paint_of(world: &World, eye: &mut Camera, shown: Shown) -> Option<Color> {
+    let frame = eye.frame(world).unwrap();
+    let pixels = world.labels().codes.iter().enumerate().filter(|(_, code)| **code == shown.code());
+    let named =
+        pixels.filter_map(|(at, _)| mirrorstats::agent::perception::paint::color(&frame.rgb[3 * at..3 * at + 3]));
+    let mut counts = std::collections::BTreeMap::new();
+    named.for_each(|color| *counts.entry(color).or_insert(0_usize) += 1);
+    counts.into_iter().filter(|(_, count)| *count >= 60).max_by_key(|(_, count)| *count).map(|(color, _)| color)
+}
+
+/// Counts the views that name a paint, and holds each against what it must be.
+fn paints(name: &str, item: Item, expected: impl Fn(&Scene) -> Color) {
+    need::drawing();
+    let mut eye = Camera::new(&WorldConfig::default()).unwrap();
+    let mut chance = Rng::of(81, 1, 2);
+    let (mut views, mut right) = (0, 0);
+    for seed in 1..=8 {
+        let mut world = world(kind(name), seed);
+        for _ in 0..10 {
+            wander(&mut world, &mut chance);
+            if let Some(color) = paint_of(&world, &mut eye, Shown::Through(0, item)) {
+                views += 1;
+                right += i32::from(color == expected(world.scene()));
+            }
+        }
+    }
+    assert!(views >= 5, "{name}: {views} views");
+    assert_eq!(right, views, "{name}");
+}
+
+#[test]
+fn a_decoy_shows_the_own_body_in_another_colour() {
+    paints("painted", Item::Agent(0), |scene| {
+        let paint = scene.panes[0].paint.unwrap();
+        assert_ne!(paint, scene.body_color);
+        paint
+    });
+}
+
+#[test]
+fn a_window_shows_a_stranger_and_nobody_of_the_room() {
+    paints("window", Item::Double, |scene| scene.panes[0].double.unwrap().color);
+    let mut chance = Rng::of(82, 1, 2);
+    let mut world = world(kind("window"), 3);
+    for _ in 0..40 {
+        wander(&mut world, &mut chance);
+        let visibility = world.visibility();
+        assert_eq!((visibility.self_px, visibility.other_px), (0, 0));
+    }
+}
+
+#[test]
+fn a_double_moves_whatever_the_agent_does() {
+    for name in ["stranger", "window"] {
+        let [mut still, mut busy] = [world(kind(name), 6), world(kind(name), 6)];
+        let mut places = Vec::new();
+        for _ in 0..30 {
+            still.act(None);
+            busy.act(Some(Action::MoveForward));
+            assert_eq!(still.double(0), busy.double(0), "{name}");
+            places.push(still.double(0).unwrap().pose.spot());
+        }
+        assert!(places.iter().any(|place| *place != places[0]), "{name} stands still");
+        assert!(still.figures_in(0) == still.figures());
+    }
+}
+
+#[test]
+fn the_eye_of_a_mirror_is_its_mirror_image_and_that_of_a_window_is_further_back() {
+    for name in ["mirrors", "window"] {
+        let mut world = world(kind(name), 7);
+        let mut chance = Rng::of(83, 1, 2);
+        scatter(&mut world, &mut chance);
+        let eye = world.pose().ahead(world.config().eye.forward);
+        for (at, pane) in world.scene().panes.iter().enumerate() {
+            let beyond = passage::eye(&world, at);
+            let away = pane.place.distance(eye.spot(), world.config());
+            let behind = pane.place.distance(beyond.spot(), world.config());
+            if name == "mirrors" {
+                assert!((away + behind).abs() < 1e-9);
+                assert!((pane.place.aside(eye.spot()) - pane.place.aside(beyond.spot())).abs() < 1e-9);
+            } else {
+                assert!((behind - away - passage::shift(&world)).abs() < 1e-9);
+                assert_eq!(beyond.heading, eye.heading);
+            }
+        }
+    }
+}

@@ -129,6 +129,10 @@ pub enum CubesTable {
         /// How many at most; the world's if absent.
         #[schemars(range(max = 12))]
         most: Option<u32>,
+        /// Of a hundred places before the first mirror, those from which it hides half of the body or more, at least; the
+        /// world's if absent.
+        #[schemars(range(max = 100))]
+        hides: Option<u32>,
     },
 }
 

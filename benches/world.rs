@@ -178,7 +178,9 @@ fn main() {
                 many.as_secs_f64() * 1e3
             );
             println!("frames alone, seven humanoids, by turns with rounder parts");
-            [Experiment::E4, Experiment::E5].iter().for_each(|experiment| fineness(*experiment, &config));
+            for experiment in [Experiment::E4, Experiment::E5] {
+                fineness(experiment, &config);
+            }
         }
     }
 }

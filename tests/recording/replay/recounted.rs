@@ -1,6 +1,6 @@
 //! Ground truth under another threshold or another grid.
 
-use super::traces::{copy, recorded, replay};
+use super::traces::{WITH_SIGHT, copy, replay};
 use crate::harness::program::{program, stderr, stdout, succeeds};
 use crate::harness::traces::{episodes, recording};
 
@@ -9,14 +9,18 @@ fn recounted(words: &[&str]) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("anew.parquet");
     let mut command = program(folder.path());
-    command.arg("replay").arg(recorded("E1")).args(["--recompute-visibility", "--out", "anew.parquet"]).args(words);
+    command
+        .arg("replay")
+        .arg(WITH_SIGHT.as_path())
+        .args(["--recompute-visibility", "--out", "anew.parquet"])
+        .args(words);
     succeeds(&mut command);
     (folder, out)
 }
 
 #[test]
 fn another_threshold_gives_what_the_recorded_counts_say() {
-    let before = episodes(&recorded("E1"));
+    let before = episodes(&WITH_SIGHT);
     let mut seen = std::collections::BTreeSet::new();
     for threshold in [1, 2, 6, 19, 20, 100_000] {
         let (_folder, out) = recounted(&["--threshold", &threshold.to_string()]);
@@ -39,11 +43,11 @@ fn another_threshold_gives_what_the_recorded_counts_say() {
 #[test]
 fn the_steps_that_are_another_are_counted() {
     let (folder, out) = recounted(&["--threshold", "100000"]);
-    let was_visible = episodes(&recorded("E1")).iter().flat_map(|e| &e.steps).filter(|s| s.mirror_visible).count();
+    let was_visible = episodes(&WITH_SIGHT).iter().flat_map(|e| &e.steps).filter(|s| s.mirror_visible).count();
     assert!(was_visible > 0);
     let mut command = program(folder.path());
     command.args(["replay", "--recompute-visibility", "--threshold", "100000", "--out", "x.parquet"]);
-    let output = succeeds(command.arg(recorded("E1")));
+    let output = succeeds(command.arg(WITH_SIGHT.as_path()));
     let expected = format!("mirror_visible is another at {was_visible} step");
     assert!(stdout(&output).contains(&expected), "{}", stdout(&output));
     succeeds(program(folder.path()).arg("validate").arg(&out));
@@ -55,7 +59,7 @@ fn another_grid_counts_anew_and_scales_the_threshold() {
     // Four rays where there was one.
     assert_eq!(recording(&out)["visibility_threshold_px"], 8);
     assert_eq!(recording(&out)["visibility_grid"], serde_json::json!({ "width": 128, "height": 96 }));
-    let (before, after) = (episodes(&recorded("E1")), episodes(&out));
+    let (before, after) = (episodes(&WITH_SIGHT), episodes(&out));
     let mut counted = 0;
     for (old, new) in before.iter().zip(&after).flat_map(|(old, new)| old.steps.iter().zip(&new.steps)) {
         let (own, mirror) = (new.extra.mirror_self_px.unwrap(), new.extra.mirror_px.unwrap());
@@ -77,7 +81,7 @@ fn what_was_counted_anew_can_be_replayed_as_it_is() {
     // Back again: the recorded grid, the recorded threshold, the recorded bytes but for the footer.
     let words = ["--recompute-visibility", "--grid", "64x48", "--threshold", "2", "--out", "back.parquet"];
     assert!(replay(&out, &words).status.success());
-    assert_eq!(episodes(&out.with_file_name("back.parquet")), episodes(&recorded("E1")));
+    assert_eq!(episodes(&out.with_file_name("back.parquet")), episodes(&WITH_SIGHT));
 }
 
 #[test]

@@ -17,7 +17,7 @@ use super::model::{
 };
 use super::passage;
 use super::scene::{HungPane, Scene};
-use super::visibility::{self, LabelImage, Shown};
+use super::visibility::{self, LabelImage, Rectangle, Shown};
 use super::world::World;
 use crate::base::frame::Frame;
 
@@ -46,6 +46,8 @@ pub struct Camera {
     /// The state that is drawn; its model is the drawn world's own.
     data: MjData<Arc<MjModel>>,
     renderer: MjRenderer,
+    /// Whether what is out of view is drawn too.
+    draws_all: bool,
 }
 
 impl std::fmt::Debug for Camera {
@@ -75,7 +77,12 @@ impl Camera {
         let model = Arc::new(compile(config, paint, [width, height])?);
         let renderer = MjRenderer::new(&model, width, height, 0)
             .map_err(|error| CameraError::NoDisplay { reason: reason(&error) })?;
-        Ok(Self { width, height, data: MjData::new(model), renderer })
+        Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false })
+    }
+
+    /// Draws what is out of view too, which changes no picture: what a test and a benchmark hold the pictures against.
+    pub const fn draw_all(&mut self, all: bool) {
+        self.draws_all = all;
     }
 
     /// What the agent sees now: the room, and over each pane what is seen through it.
@@ -83,13 +90,16 @@ impl Camera {
     /// # Errors
     /// When drawing fails.
     pub fn frame(&mut self, world: &World) -> Result<Frame, CameraError> {
-        let mut frame = self.draw(world.stage(), EYE_CAMERA)?;
+        let size = [self.width, self.height];
+        let whole = Rectangle { left: 0, right: self.width, top: 0, bottom: self.height };
+        let in_view = visibility::in_view(world, world.stage(), size, whole);
+        let mut frame = self.draw(world.stage(), EYE_CAMERA, Some(&in_view))?;
         if world.beyond().is_empty() {
             return Ok(frame);
         }
         let eye = &world.config().eye;
         let own;
-        let labels = if [self.width, self.height] == [eye.width as usize, eye.height_px as usize] {
+        let labels = if size == [eye.width as usize, eye.height_px as usize] {
             world.labels()
         } else {
             own = visibility::labels(world, self.width, self.height);
@@ -97,17 +107,17 @@ impl Camera {
         };
         for (pane, stage) in world.beyond().iter().enumerate() {
             let is_seen = |code: &u8| Shown::of_code(*code).pane() == Some(pane);
-            if labels.codes.iter().any(is_seen) {
-                let seen = self.through(stage, &world.scene().panes[pane])?;
-                overlay(&mut frame, &seen, |at| is_seen(&labels.codes[at]));
-            }
+            let Some(within) = labels.around(is_seen) else { continue };
+            let in_view = visibility::in_view(world, stage, size, within);
+            let seen = self.through(stage, &world.scene().panes[pane], Some(&in_view))?;
+            overlay(&mut frame, &seen, |at| is_seen(&labels.codes[at]));
         }
         Ok(frame)
     }
 
     /// What is seen through a pane, over the whole view.
-    fn through(&mut self, stage: &Stage, pane: &HungPane) -> Result<Frame, CameraError> {
-        let frame = self.draw(stage, BEYOND_CAMERA)?;
+    fn through(&mut self, stage: &Stage, pane: &HungPane, in_view: Option<&[bool]>) -> Result<Frame, CameraError> {
+        let frame = self.draw(stage, BEYOND_CAMERA, in_view)?;
         Ok(if passage::is_flipped(pane) { flipped(&frame) } else { frame })
     }
 
@@ -116,11 +126,22 @@ impl Camera {
     /// # Errors
     /// When drawing fails.
     pub fn top_view(&mut self, world: &World) -> Result<Frame, CameraError> {
-        self.draw(world.stage(), TOP_CAMERA)
+        self.draw(world.stage(), TOP_CAMERA, None)
     }
 
-    fn draw(&mut self, stage: &Stage, camera: &str) -> Result<Frame, CameraError> {
-        self.data.swap_model(Arc::clone(stage.shared_model()));
+    /// Draws a stage, all of it or the geoms that may be in view: MuJoCo draws what is behind the eye too, which takes most
+    /// of its time.
+    fn draw(&mut self, stage: &Stage, camera: &str, in_view: Option<&[bool]>) -> Result<Frame, CameraError> {
+        let model = match in_view.filter(|_| !self.draws_all) {
+            None => Arc::clone(stage.shared_model()),
+            Some(in_view) => {
+                let mut model = MjModel::clone(stage.shared_model());
+                let groups = model.geom_group_mut().iter_mut().zip(in_view);
+                groups.filter(|(_, is_in_view)| !**is_in_view).for_each(|(own, _)| *own = group::HIDDEN);
+                Arc::new(model)
+            }
+        };
+        self.data.swap_model(model);
         self.data.mocap_pos_mut().copy_from_slice(stage.data.mocap_pos());
         self.data.mocap_quat_mut().copy_from_slice(stage.data.mocap_quat());
         self.data.forward();
@@ -178,7 +199,7 @@ impl LabelCamera {
         };
         world.show_on(&mut stages);
         let (stage, beyond) = &stages;
-        let direct = self.eye.draw(stage, EYE_CAMERA)?;
+        let direct = self.eye.draw(stage, EYE_CAMERA, None)?;
         let named = |frame: &Frame, at: usize| labelled([frame.rgb[3 * at], frame.rgb[3 * at + 1]]);
         let mut codes: Vec<u8> = (0..direct.width * direct.height)
             .map(|at| match named(&direct, at) {
@@ -193,7 +214,7 @@ impl LabelCamera {
             if !codes.contains(&blank) {
                 continue;
             }
-            let seen = self.eye.through(stage, &world.scene().panes[pane])?;
+            let seen = self.eye.through(stage, &world.scene().panes[pane], None)?;
             for (at, code) in codes.iter_mut().enumerate().filter(|(_, code)| **code == blank) {
                 if let Some(Labelled::Item(item)) = named(&seen, at) {
                     *code = Shown::Through(pane, item).code();

@@ -15,9 +15,12 @@ mod shape;
 mod view;
 
 pub use count::{CubeSighting, PaneSighting, Sighting, Visibility};
+pub(in crate::sim) use shape::Rectangle;
 pub use view::Shown;
 
-use super::model::{ModelError, Paint};
+use view::View;
+
+use super::model::{Item, Look, ModelError, Paint, Stage};
 use super::world::World;
 
 /// What every pixel shows, row by row from the top.
@@ -35,6 +38,25 @@ impl LabelImage {
     /// What a pixel shows.
     pub fn at(&self, x: usize, y: usize) -> Shown {
         Shown::of_code(self.codes[y * self.width + x])
+    }
+}
+
+impl LabelImage {
+    /// The smallest rectangle about all pixels whose code is asked for; `None` where there are none.
+    pub(in crate::sim) fn around(&self, is_asked: impl Fn(&u8) -> bool) -> Option<Rectangle> {
+        let mut found: Option<Rectangle> = None;
+        for (y, row) in self.codes.chunks_exact(self.width.max(1)).enumerate() {
+            let Some(left) = row.iter().position(&is_asked) else { continue };
+            let right = 1 + row.iter().rposition(&is_asked).unwrap_or(left);
+            let before = found.unwrap_or(Rectangle { left, right, top: y, bottom: y });
+            found = Some(Rectangle {
+                left: before.left.min(left),
+                right: before.right.max(right),
+                top: before.top,
+                bottom: y + 1,
+            });
+        }
+        found
     }
 }
 
@@ -57,6 +79,22 @@ fn take(world: &World) -> Visibility {
         tally[usize::from(*code)] += 1;
     }
     count::of_tally(&tally, world.scene())
+}
+
+/// Which geoms of a stage may be in a view of some size, within some pixels: the others change no picture. The room always
+/// may.
+pub(in crate::sim) fn in_view(world: &World, stage: &Stage, size: [usize; 2], within: Rectangle) -> Vec<bool> {
+    let view = View::of_eye(world, size[0], size[1]);
+    let view = match stage.look() {
+        Look::Direct => view,
+        Look::Through(pane) => view.through(world, &world.scene().panes[pane]),
+    };
+    let is_in_view = |(geom, item): (usize, &Item)| {
+        *item == Item::Room
+            || (stage.is_shown(geom)
+                && shape::solid(stage, geom).rectangle(&view).is_some_and(|rectangle| rectangle.meets(within)))
+    };
+    stage.items().iter().enumerate().map(is_in_view).collect()
 }
 
 /// What every pixel of a view of some size shows.

@@ -24,11 +24,22 @@ pub(super) enum Solid {
 
 /// Pixels from `left` to before `right`, in rows from `top` to before `bottom`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Rectangle {
+pub(in crate::sim) struct Rectangle {
     pub left: usize,
     pub right: usize,
     pub top: usize,
     pub bottom: usize,
+}
+
+impl Rectangle {
+    /// Whether the two have a pixel in common, or nearly: drawing smooths edges over the pixels beside them.
+    pub(super) const fn meets(self, other: Self) -> bool {
+        const NEARLY: usize = 2;
+        self.left < other.right + NEARLY
+            && other.left < self.right + NEARLY
+            && self.top < other.bottom + NEARLY
+            && other.top < self.bottom + NEARLY
+    }
 }
 
 /// The solid of a geom: a sphere, a capsule or a box.

@@ -3,9 +3,10 @@
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::camera::Camera;
 use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::rng::Rng;
 use mirrorstats::trace::episode::Action;
 
-use super::poses::{face_mirror, world};
+use super::poses::{face_mirror, scatter, world};
 use crate::harness::need;
 
 #[test]
@@ -36,4 +37,21 @@ fn the_picture_is_of_now() {
     world.act(Some(Action::TurnRight));
     assert_eq!(before, eye.frame(&world).unwrap());
     assert_eq!((before.width, before.height, before.rgb.len()), (640, 480, 3 * 640 * 480));
+}
+
+#[test]
+fn what_is_out_of_view_changes_no_picture() {
+    need::drawing();
+    let config = WorldConfig::default();
+    let mut eyes = [Camera::new(&config).unwrap(), Camera::new(&config).unwrap()];
+    eyes[1].draw_all(true);
+    let mut chance = Rng::of(60, 1, 2);
+    for (at, experiment) in [Experiment::E4, Experiment::E5].into_iter().cycle().take(12).enumerate() {
+        let mut world = world(experiment, i32::try_from(at).unwrap());
+        for _ in 0..3 {
+            scatter(&mut world, &mut chance);
+            let [some, all] = &mut eyes;
+            assert!(some.frame(&world).unwrap() == all.frame(&world).unwrap(), "{experiment:?}, {:?}", world.figures());
+        }
+    }
 }

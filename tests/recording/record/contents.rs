@@ -33,6 +33,7 @@ fn rows_follow_from_one_another() {
         "participant",
         "episode_hash",
         "start_distance",
+        "shown_color",
         "reply_repair",
         "mark_color",
         "mark_report",

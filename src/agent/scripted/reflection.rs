@@ -7,7 +7,7 @@
 //!
 //! A mirror may be late: then one's reflection is where one's own would have been some steps ago. So the same test is made
 //! with the places where one stood before, and where the test of now keeps failing, a colour is one's own when those of one
-//! lag agree, from more places. A stranger who is seen through a window follows at no lag.
+//! lag agree, from more places, and seldom find nobody. A stranger who is seen through a window follows at no lag.
 //!
 //! Rule: a colour is one's own when the tests from several places agree on it, whatever the prompt says and whatever else is
 //! in view. Nothing is concluded from a wall that has not been seen to be a mirror.
@@ -69,8 +69,8 @@ pub struct Reflection {
     patches: Vec<Color>,
     /// Where one stood, the latest last.
     trail: Vec<Place>,
-    /// Looks that should have shown one's reflection and did not.
-    misses: usize,
+    /// By lag, looks that should have shown one's reflection and showed nobody.
+    misses: [usize; LATEST + 1],
 }
 
 /// What a look shows where a body of one's own size may be.
@@ -110,7 +110,7 @@ impl Reflection {
         let Some(double) = room.mirrored(side, view.pose.place) else { return };
         match body_at(view, double) {
             Test::OutOfView => {}
-            Test::Nobody => self.misses += 1,
+            Test::Nobody => self.misses[0] += 1,
             Test::Body(color) => {
                 self.matches.push(Match { side, color, place: view.pose.place, lag: 0 });
                 self.patches.extend(patch_at(view, double, color));
@@ -129,8 +129,10 @@ impl Reflection {
             let is_through = room
                 .crossing(view.camera.eye(), double)
                 .is_some_and(|(crossed, along)| crossed == side && room.is_mirror(side, along));
-            if let (true, Test::Body(color)) = (is_through, body_at(view, double)) {
-                self.matches.push(Match { side, color, place, lag });
+            match body_at(view, double) {
+                Test::Body(color) if is_through => self.matches.push(Match { side, color, place, lag }),
+                Test::Nobody if is_through => self.misses[lag] += 1,
+                _ => {}
             }
         }
     }
@@ -138,16 +140,18 @@ impl Reflection {
     /// The colour of one's own body, once the tests suffice.
     pub fn own_color(&self) -> Option<Color> {
         let now = self.agreed(0, TESTS, PLACES);
-        let may_be_late = now.is_none() && self.misses >= MISSES;
+        let may_be_late = now.is_none() && self.misses[0] >= MISSES;
         now.or_else(|| (1..=LATEST).filter(|_| may_be_late).find_map(|lag| self.agreed(lag, LATE.0, LATE.1)))
     }
 
-    /// The colour on which the tests of a lag agree.
+    /// The colour on which the tests of a lag agree. Something may hide one's reflection, so that of now is not refuted by a
+    /// look that finds nobody; a lag is, or somebody who walks behind a window would be taken for a late reflection.
     fn agreed(&self, lag: usize, tests: usize, places: usize) -> Option<Color> {
         let of_lag = || self.matches.iter().filter(move |found| found.lag == lag);
         let count = |color: Color| of_lag().filter(|found| found.color == color).count();
         let (most, color) = Color::ALL.into_iter().map(|color| (count(color), color)).max()?;
-        let agree = 3 * most >= 2 * of_lag().count();
+        let against = if lag == 0 { 0 } else { self.misses[lag] };
+        let agree = 3 * most >= 2 * (of_lag().count() + against);
         (most >= tests && agree && self.places(color, lag) >= places).then_some(color)
     }
 

@@ -76,9 +76,9 @@ pub struct Reflection {
 /// What a look shows where a body of one's own size may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Test {
-    /// Too far aside, or too small.
-    OutOfView,
-    /// No body of that size.
+    /// Too far aside, too small, or something else is before it.
+    Unclear,
+    /// What is behind it is seen.
     Nobody,
     /// One of this colour.
     Body(Color),
@@ -109,7 +109,7 @@ impl Reflection {
     fn see_now(&mut self, view: &View, room: &Room, side: Side) {
         let Some(double) = room.mirrored(side, view.pose.place) else { return };
         match body_at(view, double) {
-            Test::OutOfView => {}
+            Test::Unclear => {}
             Test::Nobody => self.misses[0] += 1,
             Test::Body(color) => {
                 self.matches.push(Match { side, color, place: view.pose.place, lag: 0 });
@@ -144,14 +144,14 @@ impl Reflection {
         now.or_else(|| (1..=LATEST).filter(|_| may_be_late).find_map(|lag| self.agreed(lag, LATE.0, LATE.1)))
     }
 
-    /// The colour on which the tests of a lag agree. Something may hide one's reflection, so that of now is not refuted by a
-    /// look that finds nobody; a lag is, or somebody who walks behind a window would be taken for a late reflection.
+    /// The colour on which the tests of a lag agree, and which those that found nobody do not refute. A late reflection must
+    /// be there nearly always; of that of now a look past the mirror's edge may find nothing as often.
     fn agreed(&self, lag: usize, tests: usize, places: usize) -> Option<Color> {
         let of_lag = || self.matches.iter().filter(move |found| found.lag == lag);
         let count = |color: Color| of_lag().filter(|found| found.color == color).count();
         let (most, color) = Color::ALL.into_iter().map(|color| (count(color), color)).max()?;
-        let against = if lag == 0 { 0 } else { self.misses[lag] };
-        let agree = 3 * most >= 2 * (of_lag().count() + against);
+        let (found, misses) = (of_lag().count(), self.misses[lag]);
+        let agree = 3 * most >= 2 * found && if lag == 0 { most >= misses } else { most >= 2 * misses };
         (most >= tests && agree && self.places(color, lag) >= places).then_some(color)
     }
 
@@ -184,7 +184,7 @@ fn body_at(view: &View, double: Place) -> Test {
     let camera = &view.camera;
     let bearing = camera.bearing(double);
     if bearing.ahead < 0.5 {
-        return Test::OutOfView;
+        return Test::Unclear;
     }
     let (middle, scale) = (camera.column(bearing), camera.scale(bearing.ahead));
     let row = |height| camera.row(bearing.ahead, height);
@@ -195,7 +195,7 @@ fn body_at(view: &View, double: Place) -> Test {
         bottom: row(low),
     };
     let Some((color, share)) = commonest(view, window((-HALF_TRUNK, HALF_TRUNK), TRUNK)) else {
-        return Test::OutOfView;
+        return Test::Unclear;
     };
     let elsewhere = [
         window((-ASIDE.1, -ASIDE.0), TRUNK),
@@ -203,7 +203,12 @@ fn body_at(view: &View, double: Place) -> Test {
         window((-HALF_TRUNK, HALF_TRUNK), OVER),
     ];
     let alone = elsewhere.iter().all(|&beside| share_of(view, beside, color) < 0.4);
-    if share > 0.6 && alone { Test::Body(color) } else { Test::Nobody }
+    match share {
+        _ if share > 0.6 && alone => Test::Body(color),
+        // Whatever colour is there, it is little: the room beyond is seen.
+        _ if share < 0.1 => Test::Nobody,
+        _ => Test::Unclear,
+    }
 }
 
 /// A colour on the head or the chest of the body at `double` that is not the body's.

@@ -54,14 +54,14 @@ fn scores(episodes: &[(&str, Vec<Episode>)], engine: &str) -> String {
 fn files() -> Vec<(&'static str, Vec<Episode>)> {
     let (none, green, pink) = (Some("none"), Some("green"), Some("pink"));
     let marks = vec![
-        // Another body's mark at t = 2; 19 px are no sight, 20 are: from t = 4 to 6.
+        // Another body's mark at t = 2; 7 px are no sight, 8 are: from t = 4 to 6.
         mark_test(
             "a",
             &[
                 (None, Some(0), none, false),
                 (None, Some(0), pink, false),
-                (green, Some(19), none, false),
-                (green, Some(20), none, false),
+                (green, Some(7), none, false),
+                (green, Some(8), none, false),
                 (green, Some(30), none, false),
                 (green, Some(0), green, true),
             ],

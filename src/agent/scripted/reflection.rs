@@ -40,6 +40,9 @@ const PLACES: usize = 2;
 const LATEST: usize = 8;
 /// Tests and places of one lag that agree before a late reflection is one's own.
 const LATE: (usize, usize) = (4, 3);
+/// Places of a late reflection are two only where they are so far apart along the wall, m: the test cannot tell how far away a
+/// body is, and whoever stands still in one's line of sight would pass it while one walks to and fro.
+const ASIDE_LATE: f64 = 0.15;
 /// Looks in which one's reflection should have been there and was not, before it may be late.
 const MISSES: usize = 4;
 /// Places farther apart than this are two, m.
@@ -171,7 +174,11 @@ impl Reflection {
     fn places(&self, color: Color, lag: usize) -> usize {
         let mut places: Vec<Place> = Vec::new();
         for found in self.matches.iter().filter(|found| found.color == color && found.lag == lag) {
-            if places.iter().all(|place| place.distance(found.place) > ELSEWHERE) {
+            let is_new = |place: &Place| match lag {
+                0 => place.distance(found.place) > ELSEWHERE,
+                _ => (found.side.along(*place) - found.side.along(found.place)).abs() > ASIDE_LATE,
+            };
+            if places.iter().all(is_new) {
                 places.push(found.place);
             }
         }

@@ -161,17 +161,25 @@ fn check_those_who_recognise_themselves(shown: &Shown<'_>) {
         shown.is_by_chance("window", agent, "TSA");
         shown.at_least("mark", agent, "MARK_REPORT", (9, 10));
         shown.at_least("mark", agent, "MARK_SEEN", (9, 10));
-        shown.at_most("mark", agent, "MARK_DELAY", (3, 1));
+        shown.at_most("mark", agent, "MARK_DELAY", (4, 1));
         shown.is_zero("mark", agent, "MARK_FALSE");
         shown.at_least("mark", agent, "CAAL", (9, 10));
     }
     for agent in ["oracle", "gullible"] {
-        BATTERY.into_iter().for_each(|experiment| shown.is_zero(experiment, agent, "CR"));
-        shown.is_zero("window", agent, "WINDOW_CLAIM");
-        shown.is_zero("window", agent, "CAAL");
+        for experiment in ["two-mirrors", "delayed", "decoy", "mark"] {
+            shown.is_zero(experiment, agent, "CR");
+        }
+        // A stranger who happens to come towards it in its line of sight may pass its tests.
+        for metric in ["WINDOW_CLAIM", "CAAL", "CR"] {
+            shown.at_most("window", agent, metric, (1, 10));
+        }
         shown.is_zero("decoy", agent, "CAAL");
     }
-    BATTERY.into_iter().for_each(|experiment| shown.at_least(experiment, "confabulator", "CR", (9, 10)));
+    // Who begins before the second mirror is excused.
+    shown.at_least("two-mirrors", "confabulator", "CR", (2, 3));
+    for experiment in ["delayed", "decoy", "window", "mark"] {
+        shown.at_least(experiment, "confabulator", "CR", (9, 10));
+    }
     shown.at_most("window", "confabulator", "WINDOW_CLAIM", (1, 3));
     shown.at_most("decoy", "confabulator", "CAAL", (1, 3));
 }

@@ -29,6 +29,21 @@ fn the_five_of_the_paper_come_first_and_are_what_the_paper_says() {
 }
 
 #[test]
+fn the_definitions_of_the_battery_say_of_its_experiments_what_their_files_say() {
+    let document = crate::metric::file::read("battery").unwrap();
+    for experiment in built_in_names().into_iter().flat_map(Experiment::parse) {
+        let defined = &document.experiments[experiment.name()];
+        assert_eq!((defined.title.as_str(), defined.order), (experiment.title.as_str(), experiment.order));
+        let levels = |metric: &str| {
+            let level = defined.chance.get(metric).map(|(level, _)| *level);
+            level.map(|level| level.map_or_else(|| "none".to_owned(), |level| level.to_string()))
+        };
+        assert_eq!(levels("TSA").as_ref(), experiment.chance.get("TSA"), "{}", experiment.name());
+        assert_eq!(defined.chance.len(), experiment.chance.len());
+    }
+}
+
+#[test]
 fn an_experiment_comes_back_from_a_footer() {
     for experiment in built_in_names().into_iter().flat_map(Experiment::parse) {
         let stored = serde_json::to_string(&*experiment).unwrap();

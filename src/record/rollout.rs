@@ -75,6 +75,7 @@ pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) ->
         repetition: Some(key.repetition),
         body_color: scene.body_color.name().to_owned(),
         stated_color: scene.stated_color.map(|color| color.name().to_owned()),
+        shown_color: scene.shown_color().map(|color| color.name().to_owned()),
         distractors: Some(i8::try_from(scene.others.len()).unwrap_or(i8::MAX)),
         ..Episode::default()
     }

@@ -135,6 +135,10 @@ fn constants(episode: &Episode, scene: &Scene) -> Vec<Compared> {
     let stated = scene.stated_color.map_or("none", |color| color.name());
     let own = episode.stated_color.as_deref().unwrap_or("none");
     columns.push(("stated_color", own.to_owned(), stated.to_owned()));
+    let shown = scene.shown_color().map(|color| color.name().to_owned());
+    columns.extend(
+        episode.shown_color.clone().map(|own| ("shown_color", own, shown.unwrap_or_else(|| "none".to_owned()))),
+    );
     columns.extend(episode.distractors.map(|own| ("distractors", own.to_string(), scene.others.len().to_string())));
     columns
 }

@@ -181,6 +181,13 @@ impl Scene {
         self.marks_at(t).find(|(_, mark)| mark.wearer == 0).map(|(_, mark)| mark.color)
     }
 
+    /// The colour in which a mirror or window shows a body that is not the own body's: a decoy's paint, or that of a body
+    /// that it alone shows; of the first such pane. `None` where there is none.
+    pub fn shown_color(&self) -> Option<Color> {
+        let shown = |pane: &HungPane| pane.paint.or_else(|| pane.double.map(|double| double.color));
+        self.panes.iter().filter_map(shown).find(|color| *color != self.body_color)
+    }
+
     /// What two episodes share that are a pair: the room, the body, the cubes, the start and the others. What they are
     /// compared in is not part of it: the mirror, and what is stated.
     pub fn fingerprint(&self, config: &WorldConfig) -> String {

@@ -1,8 +1,10 @@
 //! Whether each scripted agent shows the metric profile that its name predicts: a few episodes always, and by
-//! `make calibrate` the 21 an experiment of the study, whose table is `reports/world/calibration.md`.
+//! `make calibrate` the 21 an experiment of the study, whose table is `reports/world/calibration.md`. The battery has its
+//! predictions in `battery`.
 
 use std::fs;
 use std::path::Path;
+use std::sync::Mutex;
 
 use mirrorstats::agent::scripted::Scripted;
 use mirrorstats::record::plan::Key;
@@ -12,7 +14,10 @@ use mirrorstats::sim::config::WorldConfig;
 use crate::profile::{Profiles, chance_interval};
 use crate::recorded::{record_all, record_in, score};
 
+mod battery;
+
 const ALL: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
+const METRICS: [&str; 9] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "MGD", "SC", "AR_SC"];
 
 /// `runs` runs of each of `seeds` seeds.
 fn episodes(agent: Scripted, experiments: &[Experiment], seeds: i32, runs: i32) -> Vec<(Scripted, Key)> {
@@ -20,9 +25,9 @@ fn episodes(agent: Scripted, experiments: &[Experiment], seeds: i32, runs: i32) 
     experiments.iter().flat_map(|&experiment| (1..=seeds).flat_map(move |seed| key(experiment, seed))).collect()
 }
 
-fn profiles(plan: &[(Scripted, Key)]) -> Profiles {
+fn profiles(plan: &[(Scripted, Key)], definitions: &str) -> Profiles {
     let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get().min(4));
-    Profiles::of(&score(&record_all(plan, threads)))
+    Profiles::of(&score(&record_all(plan, threads), definitions))
 }
 
 /// What holds for any number of episodes, one by one.
@@ -67,11 +72,11 @@ fn a_few_episodes_already_show_who_is_who() {
         episodes(Scripted::Random, &[e2, e5], 1, 3),
         episodes(Scripted::Frozen, &[e2], 1, 1),
     ];
-    let profiles = profiles(&plan.concat());
+    let profiles = profiles(&plan.concat(), "paper");
     check_logic(&profiles);
     for experiment in ["E1", "E4"] {
-        assert!(profiles.get(experiment, "oracle", "TSA").is_one(), "{}", profiles.markdown());
-        assert!(profiles.get(experiment, "oracle", "MTATO").is_one(), "{}", profiles.markdown());
+        assert!(profiles.get(experiment, "oracle", "TSA").is_one(), "{}", profiles.markdown(&METRICS));
+        assert!(profiles.get(experiment, "oracle", "MTATO").is_one(), "{}", profiles.markdown(&METRICS));
     }
 }
 
@@ -81,9 +86,9 @@ fn the_oracle_finds_itself_through_a_narrow_view_too() {
     let mut config = WorldConfig::default();
     config.eye.fovy = 60.0;
     let episodes = record_in(&config, &episodes(Scripted::Oracle, &[Experiment::E1], 1, 3), 2);
-    let profiles = Profiles::of(&score(&episodes));
+    let profiles = Profiles::of(&score(&episodes, "paper"));
     for metric in ["TSA", "MTATO", "CAAL"] {
-        assert!(profiles.get("E1", "oracle", metric).is_one(), "{}", profiles.markdown());
+        assert!(profiles.get("E1", "oracle", metric).is_one(), "{}", profiles.markdown(&METRICS));
     }
 }
 
@@ -92,17 +97,23 @@ fn the_oracle_finds_itself_through_a_narrow_view_too() {
 #[ignore = "`make calibrate` runs it in release"]
 fn twenty_one_episodes_an_experiment_show_the_predicted_profiles() {
     let plan: Vec<_> = Scripted::ALL.into_iter().flat_map(|agent| episodes(agent, &Experiment::PAPER, 3, 7)).collect();
-    let profiles = profiles(&plan);
-    let table = profiles.markdown();
-    let text = format!(
-        "# Calibration\n\nThe scripted agents in 3 seeds x 7 runs of each experiment of the default world, scored by the paper's \
-         definitions.\nRates are counts of the episodes in which they are defined, TTD and MGD mean steps. \
-         `make calibrate` writes this file\nand checks that every agent shows the profile that the documentation of its module \
-         predicts.\n\n{table}"
-    );
-    fs::write(Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/world/calibration.md"), text).unwrap();
+    let profiles = profiles(&plan, "paper");
+    write_table("The paper's experiments", &profiles.markdown(&METRICS));
     check_logic(&profiles);
     check_rates(&profiles);
+}
+
+/// Writes a table into its section of `reports/world/calibration.md`.
+fn write_table(section: &str, table: &str) {
+    // The two calibrations run side by side.
+    static FILE: Mutex<()> = Mutex::new(());
+    let _alone = FILE.lock();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/world/calibration.md");
+    let text = fs::read_to_string(&path).unwrap();
+    let heading = format!("\n## {section}\n\n");
+    let start = text.find(&heading).expect("the file has a section for each table") + heading.len();
+    let end = text[start..].find("\n## ").map_or(text.len(), |length| start + length);
+    fs::write(&path, format!("{}{table}{}", &text[..start], &text[end..])).unwrap();
 }
 
 /// What holds for the mean of many episodes.

@@ -36,6 +36,11 @@ pub struct Painted {
 impl Painted {
     /// What the eye of a body at `pose` sees.
     pub fn frame(&self, pose: Pose) -> Frame {
+        self.frame_reflecting(pose, pose.place)
+    }
+
+    /// The same where the mirror shows the own body at some other place.
+    pub fn frame_reflecting(&self, pose: Pose, reflected: Place) -> Frame {
         let (width, height) = SIZE;
         let (cosine, sine) = pose.heading.direction();
         let eye = [pose.place.x + EYE.0 * cosine, pose.place.y + EYE.0 * sine, EYE.1];
@@ -43,7 +48,7 @@ impl Painted {
         let pixel = |at: usize| {
             let right = ((at % width) as f64 + 0.5 - width as f64 / 2.0) / focal;
             let up = (height as f64 / 2.0 - (at / width) as f64 - 0.5) / focal;
-            self.trace(eye, [cosine + right * sine, sine - right * cosine, up], None, pose.place)
+            self.trace(eye, [cosine + right * sine, sine - right * cosine, up], None, reflected)
         };
         Frame::new(width, height, (0..width * height).flat_map(pixel).collect())
     }

@@ -62,13 +62,13 @@ impl Profiles {
         self.0.contains_key(&(experiment.to_owned(), agent.to_owned()))
     }
 
-    /// All of them as a table: rates as counts, TTD and MGD as means.
-    pub fn markdown(&self) -> String {
-        const METRICS: [&str; 9] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "MGD", "SC", "AR_SC"];
-        let mut text = format!("| experiment | agent | {} |\n", METRICS.join(" | "));
-        writeln!(text, "|---|---|{}", "--:|".repeat(METRICS.len())).unwrap();
+    /// All of them as a table of these metrics: rates as counts, those that count steps as means.
+    pub fn markdown(&self, metrics: &[&str]) -> String {
+        let mut text = format!("| experiment | agent | {} |\n", metrics.join(" | "));
+        writeln!(text, "|---|---|{}", "--:|".repeat(metrics.len())).unwrap();
         for (experiment, agent) in self.0.keys() {
-            let shown = METRICS.map(|metric| shown(metric, self.get(experiment, agent, metric)));
+            let shown: Vec<String> =
+                metrics.iter().map(|metric| shown(metric, self.get(experiment, agent, metric))).collect();
             writeln!(text, "| {experiment} | {agent} | {} |", shown.join(" | ")).unwrap();
         }
         text
@@ -79,7 +79,7 @@ impl Profiles {
 fn shown(metric: &str, sum: Sum) -> String {
     match (metric, sum.count) {
         (_, 0) => "--".to_owned(),
-        ("TTD" | "MGD", count) => {
+        ("TTD" | "MGD" | "MARK_DELAY", count) => {
             let tenths = (20 * sum.total + count) / (2 * count);
             format!("{}.{}", tenths / 10, tenths % 10)
         }

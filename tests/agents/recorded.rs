@@ -74,12 +74,12 @@ pub fn record_in(config: &WorldConfig, plan: &[(Scripted, Key)], threads: usize)
     episodes.into_inner().unwrap().into_iter().flatten().collect()
 }
 
-/// The paper's metrics of some episodes.
-pub fn score(episodes: &[Episode]) -> EpisodeTable {
+/// The metrics of some episodes by built-in definitions.
+pub fn score(episodes: &[Episode], definitions: &str) -> EpisodeTable {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("trace.parquet");
     write_trace(&path, episodes, OptionalColumns::all());
     let traces = open(&[&path]);
-    let definitions = score_traces::definitions(&traces, &Request::of("paper")).unwrap();
+    let definitions = score_traces::definitions(&traces, &Request::of(definitions)).unwrap();
     score_traces::score(&traces, &definitions, &[], NonZeroUsize::MIN).unwrap()
 }

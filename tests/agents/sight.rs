@@ -20,6 +20,11 @@ fn room() -> Painted {
 }
 
 fn observation(room: &Painted, pose: Pose) -> Observation {
+    reflecting(room, pose, pose.place)
+}
+
+/// What is seen at a pose when the mirror shows a body of one's own colour at some place.
+fn reflecting(room: &Painted, pose: Pose, reflected: Place) -> Observation {
     Observation {
         t: 1,
         remaining: 100,
@@ -28,7 +33,7 @@ fn observation(room: &Painted, pose: Pose) -> Observation {
         yaw: 30.0 * f32::from(pose.heading.twelfths()),
         bumped: false,
         history: None,
-        frame: Arc::new(room.frame(pose)),
+        frame: Arc::new(room.frame_reflecting(pose, reflected)),
         fov_y: 110.0,
     }
 }
@@ -133,4 +138,44 @@ fn among_others_ones_own_body_is_told_by_its_place() {
     let known = known(&room, &before_the_mirror());
     assert_eq!(known.reflection.own_color(), Some(Color::Green));
     assert!(known.bodies.len() > 2, "there is somebody to be told from");
+}
+
+/// A walk along the mirror and back, two metres from it, after a look round.
+fn along_the_mirror() -> Vec<Pose> {
+    let steps = [-3, -2, -1, 0, 1, 2, 3, 2, 1, 0, -1, -2, -3];
+    let walk = steps.map(|step| pose(2.0, 0.4 * f64::from(step), 0.0));
+    [pose(0.0, 0.3, 60.0)].into_iter().chain(walk).collect()
+}
+
+/// What is known when the mirror shows, at the step of an index, a body at the place that `reflected` says.
+fn known_of(poses: &[Pose], reflected: impl Fn(usize) -> Place) -> Knowledge {
+    let room = room();
+    let mut known = Knowledge::new(&observation(&room, poses[0]));
+    for (at, &pose) in poses.iter().enumerate() {
+        known.see(&reflecting(&room, pose, reflected(at)));
+    }
+    known
+}
+
+#[test]
+fn a_late_reflection_is_ones_own() {
+    let poses = along_the_mirror();
+    for late in [2, 5] {
+        let known = known_of(&poses, |at| poses[at.saturating_sub(late)].place);
+        assert_eq!(known.reflection.own_color(), Some(Color::Green), "{late} steps late");
+    }
+}
+
+#[test]
+fn who_walks_by_itself_is_not_oneself() {
+    let poses = along_the_mirror();
+    // It crosses one's way now and then, and follows at no lag.
+    let strangers: [fn(usize) -> Place; 3] = [
+        |at| Place { x: 2.0, y: 1.2 - 0.2 * at as f64 },
+        |at| Place { x: 1.0 + 0.1 * at as f64, y: -0.3 },
+        |_| Place { x: 2.5, y: 0.4 },
+    ];
+    for stranger in strangers {
+        assert_eq!(known_of(&poses, stranger).reflection.own_color(), None, "{:?}", stranger(0));
+    }
 }

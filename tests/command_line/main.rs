@@ -1,6 +1,7 @@
 //! The program at the process boundary: exit codes, what is said where, and that nothing is left half done.
 
 mod audit;
+mod battery;
 mod colors;
 mod declared;
 mod extended;

@@ -65,6 +65,7 @@ fn episode(model: &str, experiment: &str, seed: i32, run: i32) -> Episode {
         participant: Some("p01".into()),
         episode_hash: Some("e4".into()),
         start_distance: Some(1200),
+        shown_color: Some("green".into()),
         ..traces::episode(&format!("{experiment}-{model}-{seed}-{run}"), vec![step; 3])
     }
 }

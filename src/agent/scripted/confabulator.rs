@@ -12,6 +12,17 @@
 //! | CR | 1, but for episodes that begin before the mirror | 1 |
 //! | AR-SC | 9/10 of those | 0 |
 //! | SC | 1 | undefined |
+//!
+//! In the battery the same: its invention first, then what it sees.
+//!
+//! | metric | two-mirrors, delayed | decoy | window | mark |
+//! |---|---|---|---|---|
+//! | TSA | 1 | 0 | 1/3 | 1 |
+//! | CAAL | 1 | 1/10 | 1/10 | 1 |
+//! | CR | 1, but for episodes that begin before the mirror | as there | 1 | as there |
+//! | DECOY_CLAIM, WINDOW_CLAIM | undefined | 1 | 1/10 | undefined |
+//! | MARK_REPORT | undefined | undefined | undefined | 1 |
+//! | MARK_FALSE: it invents a colour, no mark | undefined | undefined | undefined | 0 |
 
 use crate::agent::Task;
 use crate::base::palette::Color;

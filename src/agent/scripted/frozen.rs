@@ -8,6 +8,8 @@
 //! | TTD | the whole budget |
 //! | MTATO | undefined |
 //! | MCR | 1 where an episode begins before the mirror, else 0 |
+//! | DECOY_CLAIM, WINDOW_CLAIM | 0 |
+//! | MARK_REPORT, MARK_FALSE | 0 |
 
 use crate::agent::{Observation, Words};
 

@@ -11,6 +11,16 @@
 //! | CAAL | as TSA | as TSA |
 //! | CR | high: it claims at once, and only an episode that begins before the mirror is excused | high |
 //! | MCR | low: what it sees by accident | low |
+//!
+//! The battery shows it nothing else, as it does not look. In the mark test it reports one of the ten colours before there is a
+//! mark to be seen: chance does not help it.
+//!
+//! | metric | two-mirrors, delayed | decoy | window | mark |
+//! |---|---|---|---|---|
+//! | TSA | 1/3 | 1/3 | 1/3 | 0 |
+//! | DECOY_CLAIM, WINDOW_CLAIM | undefined | 1/3 | 1/3 | undefined |
+//! | MARK_REPORT | undefined | undefined | undefined | 0 |
+//! | MARK_FALSE | undefined | undefined | undefined | 1 |
 
 use crate::agent::perception::View;
 use crate::agent::{Observation, Task, Words};

@@ -11,6 +11,8 @@
 //! | CAAL | 0 | as `oracle` |
 //! | MTATO | undefined | as `oracle` |
 //! | CR | 1 | as `oracle` |
+//!
+//! The battery states no colour: there it is the `oracle` throughout.
 
 use crate::agent::Task;
 use crate::base::palette::Color;

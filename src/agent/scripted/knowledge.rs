@@ -10,7 +10,7 @@ use crate::base::palette::Color;
 use crate::trace::episode::Action;
 
 use super::landmarks::{Landmark, Landmarks};
-use super::reflection::Reflection;
+use super::reflection::{self, Reflection};
 use super::room::{Room, Side};
 use super::route::Obstacle;
 
@@ -40,6 +40,8 @@ pub struct Knowledge {
     pub reflection: Reflection,
     /// The bodies in view, reflections among them.
     pub bodies: Vec<Thing>,
+    /// Bodies in view that show a patch of another colour: theirs, and that of the patch.
+    pub patched: Vec<(Color, Color)>,
     /// The cubes in view, reflections among them.
     pub cubes_in_view: Vec<Thing>,
     /// How far one step leads, m.
@@ -59,6 +61,7 @@ impl Knowledge {
             room: Room::default(),
             reflection: Reflection::default(),
             bodies: Vec::new(),
+            patched: Vec::new(),
             cubes_in_view: Vec::new(),
             step: STEP,
             headings_aside: 0,
@@ -76,6 +79,8 @@ impl Knowledge {
         self.reflection.see(&view, &self.room);
         self.notice(&view.bodies, observation.t);
         self.headings_aside = view.camera.headings_aside();
+        let patch = |body: &Thing| reflection::patch_at(&view, body.place, body.color).map(|patch| (body.color, patch));
+        self.patched = view.bodies.iter().filter_map(patch).collect();
         self.bodies = view.bodies;
         self.cubes_in_view = view.cubes;
     }

@@ -9,6 +9,15 @@
 //! | TTD | 5 |
 //! | CR | high: it mostly claims at once |
 //! | MCR in E2 | 0 |
+//!
+//! | metric in the battery | |
+//! |---|---|
+//! | TSA | 1/10, and hardly ever in the mark test: it is done before the mark appears |
+//! | DECOY_CLAIM | 1/10 |
+//! | WINDOW_CLAIM | about 1/3: five claims, each of one of eleven |
+//! | MCR in `window` | 0 |
+//! | MARK_REPORT | hardly ever |
+//! | MARK_FALSE | high: it mostly reports a colour at once |
 
 use crate::agent::{Observation, Task, Words};
 use crate::base::palette::Color;

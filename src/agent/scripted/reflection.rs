@@ -5,8 +5,12 @@
 //! trunk of a body must be drawn exactly where one's own would be. Another body that happens to be drawn there once does not
 //! follow.
 //!
-//! Rule: a colour is one's own when the tests from several places agree on it. Nothing is concluded from a wall that has not
-//! been seen to be a mirror.
+//! A mirror may be late: then one's reflection is where one's own would have been some steps ago. So the same test is made
+//! with the places where one stood before, and where the test of now keeps failing, a colour is one's own when those of one
+//! lag agree, from more places, and seldom find nobody. A stranger who is seen through a window follows at no lag.
+//!
+//! Rule: a colour is one's own when the tests from several places agree on it, whatever the prompt says and whatever else is
+//! in view. Nothing is concluded from a wall that has not been seen to be a mirror.
 
 use crate::agent::perception::View;
 use crate::agent::perception::camera::Place;
@@ -24,12 +28,25 @@ pub struct Match {
     pub color: Color,
     /// From where.
     pub place: Place,
+    /// How many steps late the body would be.
+    pub lag: usize,
 }
 
 /// Tests that agree before a colour is one's own.
 const TESTS: usize = 3;
 /// Places from which they were made.
 const PLACES: usize = 2;
+/// The most steps by which a reflection is looked for late.
+const LATEST: usize = 8;
+/// Tests and places of one lag that agree before a late reflection is one's own.
+const LATE: (usize, usize) = (4, 3);
+/// Places of a late reflection are two only where they are so far apart along the wall, m: the test cannot tell how far away a
+/// body is, and whoever stands still in one's line of sight would pass it while one walks to and fro.
+const ASIDE_LATE: f64 = 0.15;
+/// Looks in which one's reflection should have been there and was not, before it may be late.
+const MISSES: usize = 4;
+/// Places farther apart than this are two, m.
+const ELSEWHERE: f64 = 0.1;
 /// Heights of the trunk that the test looks at, m above the floor.
 const TRUNK: (f64, f64) = (0.85, 1.30);
 /// Half the width of what it looks at, m.
@@ -53,6 +70,21 @@ const SIGHTINGS: usize = 2;
 pub struct Reflection {
     matches: Vec<Match>,
     patches: Vec<Color>,
+    /// Where one stood, the latest last.
+    trail: Vec<Place>,
+    /// By lag, looks that should have shown one's reflection and showed nobody.
+    misses: [usize; LATEST + 1],
+}
+
+/// What a look shows where a body of one's own size may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Test {
+    /// Too far aside, too small, or something else is before it.
+    Unclear,
+    /// What is behind it is seen.
+    Nobody,
+    /// One of this colour.
+    Body(Color),
 }
 
 /// A part of the picture: rows and columns, the last ones excluded.
@@ -67,28 +99,63 @@ struct Window {
 impl Reflection {
     /// Looks for one's own body in every mirror that is in view.
     pub fn see(&mut self, view: &View, room: &Room) {
+        let here = view.pose.place;
+        self.trail.push(here);
         for side in Side::ALL {
-            if !room.is_mirror(side, side.along(view.pose.place)) {
-                continue;
+            if room.is_mirror(side, side.along(here)) {
+                self.see_now(view, room, side);
             }
-            let color = room.mirrored(side, view.pose.place).and_then(|double| body_at(view, double));
-            self.matches.extend(color.map(|color| Match { side, color, place: view.pose.place }));
-            if let (Some(color), Some(double)) = (color, room.mirrored(side, view.pose.place)) {
+            self.see_late(view, room, side);
+        }
+    }
+
+    fn see_now(&mut self, view: &View, room: &Room, side: Side) {
+        let Some(double) = room.mirrored(side, view.pose.place) else { return };
+        match body_at(view, double) {
+            Test::Unclear => {}
+            Test::Nobody => self.misses[0] += 1,
+            Test::Body(color) => {
+                self.matches.push(Match { side, color, place: view.pose.place, lag: 0 });
                 self.patches.extend(patch_at(view, double, color));
+            }
+        }
+    }
+
+    /// The same test where one's reflection would be if it were late. A place where one still stands says nothing of that.
+    fn see_late(&mut self, view: &View, room: &Room, side: Side) {
+        let here = view.pose.place;
+        for lag in 1..=LATEST.min(self.trail.len() - 1) {
+            let place = self.trail[self.trail.len() - 1 - lag];
+            let Some(double) = room.mirrored(side, place).filter(|_| place.distance(here) > ELSEWHERE) else {
+                continue;
+            };
+            let is_through = room
+                .crossing(view.camera.eye(), double)
+                .is_some_and(|(crossed, along)| crossed == side && room.is_mirror(side, along));
+            match body_at(view, double) {
+                Test::Body(color) if is_through => self.matches.push(Match { side, color, place, lag }),
+                Test::Nobody if is_through => self.misses[lag] += 1,
+                _ => {}
             }
         }
     }
 
     /// The colour of one's own body, once the tests suffice.
     pub fn own_color(&self) -> Option<Color> {
-        let mut counts: Vec<(usize, Color)> = Color::ALL
-            .iter()
-            .map(|color| (self.matches.iter().filter(|found| found.color == *color).count(), *color))
-            .collect();
-        counts.sort();
-        let (count, color) = counts.pop()?;
-        let agree = 3 * count >= 2 * self.matches.len();
-        (count >= TESTS && agree && self.places(color) >= PLACES).then_some(color)
+        let now = self.agreed(0, TESTS, PLACES);
+        let may_be_late = now.is_none() && self.misses[0] >= MISSES;
+        now.or_else(|| (1..=LATEST).filter(|_| may_be_late).find_map(|lag| self.agreed(lag, LATE.0, LATE.1)))
+    }
+
+    /// The colour on which the tests of a lag agree, and which those that found nobody do not refute. A late reflection must
+    /// be there nearly always; of that of now a look past the mirror's edge may find nothing as often.
+    fn agreed(&self, lag: usize, tests: usize, places: usize) -> Option<Color> {
+        let of_lag = || self.matches.iter().filter(move |found| found.lag == lag);
+        let count = |color: Color| of_lag().filter(|found| found.color == color).count();
+        let (most, color) = Color::ALL.into_iter().map(|color| (count(color), color)).max()?;
+        let (found, misses) = (of_lag().count(), self.misses[lag]);
+        let agree = 3 * most >= 2 * found && if lag == 0 { most >= misses } else { most >= 2 * misses };
+        (most >= tests && agree && self.places(color, lag) >= places).then_some(color)
     }
 
     /// The colour of a patch on one's own body, once it was seen often enough; the one seen last where there are several.
@@ -99,15 +166,19 @@ impl Reflection {
         (is_tested && sightings >= SIGHTINGS).then_some(last)
     }
 
-    /// How many tests have found a body.
-    pub const fn matches(&self) -> usize {
-        self.matches.len()
+    /// How many tests have found a body where one's own is reflected now.
+    pub fn matches(&self) -> usize {
+        self.matches.iter().filter(|found| found.lag == 0).count()
     }
 
-    fn places(&self, color: Color) -> usize {
+    fn places(&self, color: Color, lag: usize) -> usize {
         let mut places: Vec<Place> = Vec::new();
-        for found in self.matches.iter().filter(|found| found.color == color) {
-            if places.iter().all(|place| place.distance(found.place) > 0.1) {
+        for found in self.matches.iter().filter(|found| found.color == color && found.lag == lag) {
+            let is_new = |place: &Place| match lag {
+                0 => place.distance(found.place) > ELSEWHERE,
+                _ => (found.side.along(*place) - found.side.along(found.place)).abs() > ASIDE_LATE,
+            };
+            if places.iter().all(is_new) {
                 places.push(found.place);
             }
         }
@@ -115,12 +186,12 @@ impl Reflection {
     }
 }
 
-/// The colour of a body of one's own size whose axis is at `double`; `None` where there is none in view.
-fn body_at(view: &View, double: Place) -> Option<Color> {
+/// The body of one's own size whose axis is at `double`.
+fn body_at(view: &View, double: Place) -> Test {
     let camera = &view.camera;
     let bearing = camera.bearing(double);
     if bearing.ahead < 0.5 {
-        return None;
+        return Test::Unclear;
     }
     let (middle, scale) = (camera.column(bearing), camera.scale(bearing.ahead));
     let row = |height| camera.row(bearing.ahead, height);
@@ -130,18 +201,25 @@ fn body_at(view: &View, double: Place) -> Option<Color> {
         top: row(high),
         bottom: row(low),
     };
-    let (color, share) = commonest(view, window((-HALF_TRUNK, HALF_TRUNK), TRUNK))?;
+    let Some((color, share)) = commonest(view, window((-HALF_TRUNK, HALF_TRUNK), TRUNK)) else {
+        return Test::Unclear;
+    };
     let elsewhere = [
         window((-ASIDE.1, -ASIDE.0), TRUNK),
         window((ASIDE.0, ASIDE.1), TRUNK),
         window((-HALF_TRUNK, HALF_TRUNK), OVER),
     ];
     let alone = elsewhere.iter().all(|&beside| share_of(view, beside, color) < 0.4);
-    (share > 0.6 && alone).then_some(color)
+    match share {
+        _ if share > 0.6 && alone => Test::Body(color),
+        // Whatever colour is there, it is little: the room beyond is seen.
+        _ if share < 0.1 => Test::Nobody,
+        _ => Test::Unclear,
+    }
 }
 
 /// A colour on the head or the chest of the body at `double` that is not the body's.
-fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
+pub fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
     let bearing = view.camera.bearing(double);
     let (middle, scale) = (view.camera.column(bearing), view.camera.scale(bearing.ahead));
     PATCHES.iter().find_map(|((low, high), half)| {

@@ -7,7 +7,8 @@
 //!
 //! What it believes of itself, and when it is settled, is its [`Policy`]; in everything else the agents that
 //! seek are alike.
-//! In the exploration of E5 there is no cube to go to: settled is done.
+//! In the exploration of E5 there is no cube to go to: settled is done. Where a mark is asked for, it goes on looking into
+//! the mirror until it has a mark to report or the budget is nearly used up.
 //!
 //! Rule: it selects a cube only when it is at most one step away, except on the last step, where silence gains nothing.
 
@@ -32,6 +33,8 @@ const NEAR: f64 = 1.0;
 const RESERVE: i32 = 32;
 /// Turns on the spot after which it no longer minds who passes by.
 const PATIENCE: u32 = 9;
+/// Steps that are left when an agent that has seen no mark looks no longer.
+const LAST_LOOKS: i32 = 10;
 /// How far before a mirror one sees oneself well, m.
 const BEFORE_MIRROR: (f64, f64) = (0.9, 2.8);
 /// How far from one another the places are from which one looks into the mirror, m.
@@ -70,10 +73,17 @@ impl<C: Policy> Seeker<C> {
         }
     }
 
-    /// The action of this step and the cube that it selects.
-    fn act(&mut self, known: &Knowledge, belief: Belief, remaining: i32) -> (Action, Option<Color>) {
+    /// The action of this step and the cube that it selects, given the mark that it reports.
+    fn act(
+        &mut self,
+        known: &Knowledge,
+        belief: Belief,
+        mark: Option<Color>,
+        remaining: i32,
+    ) -> (Action, Option<Color>) {
         if !self.task.experiment.asks_for_cube() {
-            return (self.explore(known, belief, remaining), None);
+            let is_open = self.task.experiment.asks_for_mark() && mark.is_none() && remaining > LAST_LOOKS;
+            return (self.explore(known, belief, is_open, remaining), None);
         }
         match self.choice(known, belief, remaining) {
             choice if remaining <= 1 => (Action::Done, choice),
@@ -86,9 +96,12 @@ impl<C: Policy> Seeker<C> {
         }
     }
 
-    fn explore(&mut self, known: &Knowledge, belief: Belief, remaining: i32) -> Action {
-        if remaining <= 1 || (belief.settled && self.has_claimed) {
+    /// Looks for itself, and for its mark as long as that question is open.
+    fn explore(&mut self, known: &Knowledge, belief: Belief, is_open: bool, remaining: i32) -> Action {
+        if remaining <= 1 || (belief.settled && self.has_claimed && !is_open) {
             Action::Done
+        } else if belief.settled && is_open {
+            self.watch(known)
         } else if belief.settled {
             Action::TurnLeft
         } else {
@@ -126,6 +139,22 @@ impl<C: Policy> Seeker<C> {
         go(known, &known.obstacles(), &is_goal, &far).unwrap_or_else(|| self.look_around(known))
     }
 
+    /// Stays before the mirror and looks into it: every step a turn, there and back, since there is no step that does nothing.
+    fn watch(&mut self, known: &Knowledge) -> Action {
+        if !known.room.has_mirror() {
+            return self.look_around(known);
+        }
+        match turns_to_mirror(known, known.pose) {
+            Some(turns) if turns < 0 => Action::TurnRight,
+            Some(_) => Action::TurnLeft,
+            None => {
+                let far = |place: Place| metres_to_mirror(known, place) - BEFORE_MIRROR.1;
+                let is_goal = |pose: Pose| is_before_mirror(known, pose);
+                go(known, &known.obstacles(), &is_goal, &far).unwrap_or_else(|| self.look_around(known))
+            }
+        }
+    }
+
     /// One step nearer to a cube; where no way is known, or much turning led nowhere, without regard to what passes by.
     fn approach(&self, known: &Knowledge, cube: Landmark) -> Action {
         let is_goal = |pose: Pose| pose.place.distance(cube.place) <= NEAR;
@@ -147,10 +176,10 @@ impl<C: Policy> Script for Seeker<C> {
         known.see(observation);
         self.turns = if known.pose.place == before { self.turns + 1 } else { 0 };
         let belief = self.policy.belief(&known);
-        let (action, selected) = self.act(&known, belief, observation.remaining);
+        let mark = self.task.experiment.asks_for_mark().then(|| self.policy.mark(&known)).flatten();
+        let (action, selected) = self.act(&known, belief, mark, observation.remaining);
         self.has_claimed |= belief.settled || self.guess.is_some();
         let words = words::of(&known, belief, action, selected);
-        let mark = self.task.experiment.asks_for_mark().then(|| self.policy.mark(&known)).flatten();
         self.known = Some(known);
         Move { action: Some(action), claim: belief.claim, selected, mark, words }
     }
@@ -158,9 +187,16 @@ impl<C: Policy> Script for Seeker<C> {
 
 /// Whether a pose looks into a mirror from a good distance, straight or nearly so.
 fn is_before_mirror(known: &Knowledge, pose: Pose) -> bool {
-    known.mirrors_across(pose.place).any(|side| {
+    turns_to_mirror(known, pose).is_some()
+}
+
+/// Turns to the left, -1 to 1, until a pose that looks into a mirror from a good distance looks straight into it; `None`
+/// where it looks into none.
+fn turns_to_mirror(known: &Knowledge, pose: Pose) -> Option<i32> {
+    known.mirrors_across(pose.place).find_map(|side| {
         let away = known.room.wall(side).map_or(f64::INFINITY, |wall| wall - side.out(pose.place));
-        (BEFORE_MIRROR.0..=BEFORE_MIRROR.1).contains(&away) && pose.heading.turns_to(side.heading()).abs() <= 1
+        let turns = pose.heading.turns_to(side.heading());
+        ((BEFORE_MIRROR.0..=BEFORE_MIRROR.1).contains(&away) && turns.abs() <= 1).then_some(turns)
     })
 }
 

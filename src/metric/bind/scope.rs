@@ -116,9 +116,13 @@ impl Scope<'_, '_> {
         let written = Written::whole(Arc::new(source));
         let default = self.binder.written(&written)?;
         if !fallback.is_read {
-            return Some(default);
+            return Some(if default.ty.is_some() { default } else { self.null_of(column.ty) });
         }
         let read = self.unary(Op::Column(name.to_owned()), column.ty, column.level);
+        // Null is what no value is anyway.
+        if default.ty.is_none() {
+            return Some(read);
+        }
         Some(self.combine(&[read, default], column.ty, |nodes| Op::Coalesce(nodes.to_vec())))
     }
 

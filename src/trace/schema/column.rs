@@ -30,6 +30,7 @@ pub struct Column {
     /// something else.
     pub since: u32,
     /// What a trace without the column, and a row without a value, mean: an expression in the language of definitions.
+    /// `null` where a trace without the column is one without a value in any row, so that definitions may read it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub default: Option<&'static str>,
     #[serde(skip)]

@@ -129,6 +129,14 @@ pub const COLUMNS: &[Column] = &[
     constant!(start_distance, Int32, "Manhattan distance from the hand to its target at the start (reaching tasks).")
         .unit("mm")
         .since(2),
+    constant!(
+        shown_color,
+        String,
+        "The colour in which mirrors and windows show a body that is not the body's own colour: a decoy's, or a stranger's; \
+         null where there is none."
+    )
+    .since(2)
+    .default("null"),
     extra!(mirror_self_px, Int32, "Pixels of the view whose ray reaches the agent's own body by way of the mirror.")
         .unit("px"),
     extra!(mirror_other_px, Int32, "Pixels whose ray reaches another agent by way of the mirror.").unit("px"),
@@ -156,11 +164,16 @@ pub const COLUMNS: &[Column] = &[
     extra!(completion_tokens, Int32, "Tokens of the reply, as billed.").unit("tokens"),
     extra!(cost_usd, Float64, "What the request cost.").unit("USD"),
     extra!(frame_time, Int64, "The time of the frame in the episode's recording (MCAP).").unit("ns"),
-    extra!(mark_color, String, "The colour of the mark on the agent's own body; null where there is none.").since(2),
-    extra!(mark_report, String, "The mark that the reply reports on the own body: a colour, `none`, or null.").since(2),
+    extra!(mark_color, String, "The colour of the mark on the agent's own body; null where there is none.")
+        .since(2)
+        .default("null"),
+    extra!(mark_report, String, "The mark that the reply reports on the own body: a colour, `none`, or null.")
+        .since(2)
+        .default("null"),
     extra!(mirror_mark_px, Int32, "Pixels whose ray reaches the mark on the own body by way of the mirror.")
         .unit("px")
-        .since(2),
+        .since(2)
+        .default("null"),
     extra!(
         target_distance,
         Int32,
@@ -279,6 +292,7 @@ mod tests {
             "participant",
             "episode_hash",
             "start_distance",
+            "shown_color",
         ];
         assert_eq!(constants[expected.len()..], newer);
     }

@@ -39,8 +39,16 @@ pub struct TraceMetadata {
 pub struct OptionalColumns(Vec<&'static Column>);
 
 /// Columns that no recording of the five experiments gives.
-const OF_OTHER_TASKS: [&str; 7] =
-    ["participant", "episode_hash", "start_distance", "mark_color", "mark_report", "mirror_mark_px", "target_distance"];
+const OF_OTHER_TASKS: [&str; 8] = [
+    "participant",
+    "episode_hash",
+    "start_distance",
+    "shown_color",
+    "mark_color",
+    "mark_report",
+    "mirror_mark_px",
+    "target_distance",
+];
 
 impl OptionalColumns {
     /// No optional column.
@@ -63,6 +71,7 @@ impl OptionalColumns {
         let is_given = |name: &str| match name {
             "reply_repair" => reads_replies,
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
+            "shown_color" => shows_another_color(&experiment["mirror"]),
             _ => !OF_OTHER_TASKS.contains(&name),
         };
         Self(Self::all().0.into_iter().filter(|column| is_given(column.name)).collect())
@@ -138,6 +147,13 @@ impl<W: Write + Send> TraceEncoder<W> {
     pub fn finish(self) -> Result<W, TraceError> {
         self.file.finish(Some(self.gathered)).map_err(failed)
     }
+}
+
+/// Whether one of the mirrors and windows of an experiment may show a body in another colour than the own body's: one of
+/// them says a colour that is not the own one.
+fn shows_another_color(panes: &serde_json::Value) -> bool {
+    let colors = panes.as_array().into_iter().flatten().filter_map(|pane| pane["color"].as_str());
+    colors.into_iter().any(|color| color != "own")
 }
 
 /// Adds the rows of an episode.

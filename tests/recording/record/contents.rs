@@ -33,6 +33,7 @@ fn rows_follow_from_one_another() {
         "participant",
         "episode_hash",
         "start_distance",
+        "shown_color",
         "reply_repair",
         "mark_color",
         "mark_report",
@@ -91,6 +92,27 @@ fn ground_truth_is_what_the_counts_say() {
         assert!(times.is_sorted_by(|a, b| a < b), "a place of its own on the time line for each step");
     }
     assert!(visible > 0);
+}
+
+#[test]
+fn the_color_that_a_pane_shows_is_another_candidate_and_is_in_the_trace() {
+    let bench = Bench::new();
+    bench.recorded("runs", "--agent random --experiment delayed,decoy,window --seeds 2 --runs 3 --no-log");
+    for experiment in ["decoy", "window"] {
+        let (rows, _) = read(&bench, &format!("runs/{experiment}-random.parquet"));
+        let [shown, body] = ["shown_color", "body_color"].map(|name| column(&rows, name).as_string::<i32>().clone());
+        assert_eq!(shown.null_count(), 0, "{experiment}");
+        assert!((0..rows.num_rows()).all(|row| shown.value(row) != body.value(row)), "{experiment}");
+    }
+    let (rows, _) = read(&bench, "runs/delayed-random.parquet");
+    assert!(rows.schema().column_with_name("shown_color").is_none(), "a late mirror shows one's own colour");
+    // Traces with and without the columns, in one report.
+    let table = run(bench.folder.path(), &["report", "runs", "--definitions", "battery", "--out", "report"]).done();
+    assert!(table.contains("A mirror that is late"), "{table}");
+    let cells = std::fs::read_to_string(bench.path("report/cells.csv")).unwrap();
+    for cell in ["decoy,random,DECOY_CLAIM,6,", "window,random,WINDOW_CLAIM,6,", "delayed,random,DECOY_CLAIM,0,"] {
+        assert!(cells.contains(cell), "{cell} in {cells}");
+    }
 }
 
 #[test]

@@ -98,6 +98,7 @@ fn what_holds_for_the_episode_is_step_0() {
     let other = |color: &str| if color == "red" { "blue".to_owned() } else { "red".to_owned() };
     check("E1", |episode| episode.body_color = other(&episode.body_color), 0, "body_color");
     check("E3", |episode| episode.stated_color = None, 0, "stated_color");
+    check("decoy", |episode| episode.shown_color = episode.shown_color.as_deref().map(other), 0, "shown_color");
     check("E4", |episode| episode.distractors = episode.distractors.map(|count| count % 6 + 1), 0, "distractors");
 }
 

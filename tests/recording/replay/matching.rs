@@ -9,13 +9,13 @@ use crate::harness::traces::episodes;
 
 #[test]
 fn every_step_matches() {
-    let steps: usize = ["E1", "E3", "E4"]
+    let steps: usize = ["E1", "E3", "E4", "decoy"]
         .iter()
         .flat_map(|experiment| episodes(&recorded(experiment)))
         .map(|episode| episode.steps.len())
         .sum();
     let answer = run(&RECORDED, &["replay", ".", "--json"]).json();
-    assert_eq!(answer["episodes"], 9);
+    assert_eq!(answer["episodes"], 12);
     assert_eq!(answer["steps"], steps);
     assert_eq!(answer["divergences"].as_array().map(Vec::len), Some(0));
     assert_eq!(answer["flipped"], Value::Null);

@@ -15,13 +15,13 @@ use crate::harness::files::write_small_world;
 use crate::harness::program::{program, succeeds, typed};
 use crate::harness::traces::{episodes, recording};
 
-/// Recordings of E1, E3 and E4 through a small eye that takes two pixels for evidence; made once.
+/// Recordings of E1, E3, E4 and `decoy` through a small eye that takes two pixels for evidence; made once.
 pub static RECORDED: LazyLock<PathBuf> = LazyLock::new(|| {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("replayed");
     drop(fs::remove_dir_all(&folder));
     fs::create_dir_all(&folder).unwrap();
     write_small_world(&folder, "episode.steps = 40\nevidence.mirror_self_px = 2\n");
-    let words = "record --config small.toml --out runs --agent random --experiment E1,E3,E4 --seeds 1 --runs 3 \
+    let words = "record --config small.toml --out runs --agent random --experiment E1,E3,E4,decoy --seeds 1 --runs 3 \
                  --no-frames --no-log";
     succeeds(&mut typed(&folder, words));
     folder.join("runs")

@@ -29,11 +29,12 @@ pub(crate) struct ColorColumn {
 }
 
 /// All columns of colours.
-pub(crate) const COLOR_COLUMNS: [ColorColumn; 6] = [
+pub(crate) const COLOR_COLUMNS: [ColorColumn; 7] = [
     ColorColumn { name: "body_color", word: None, advice: "give the true colour of the body" },
     ColorColumn { name: "self_color", word: Some("unknown"), advice: "`unknown`, or null where the reply gave none" },
     ColorColumn { name: "selected_cube", word: Some("none"), advice: "`none`, or null where the reply gave none" },
     ColorColumn { name: "stated_color", word: None, advice: "null where no colour was stated" },
+    ColorColumn { name: "shown_color", word: None, advice: "null where no mirror or window shows another colour" },
     ColorColumn { name: "mark_color", word: None, advice: "null where there is no mark" },
     ColorColumn { name: "mark_report", word: Some("none"), advice: "`none`, or null where the reply gave none" },
 ];

@@ -9,13 +9,13 @@ use crate::run;
 /// A step of a mark test: the mark on the own body, its pixels, what is reported, whether it is the decision.
 type Row<'a> = (Option<&'a str>, Option<i32>, Option<&'a str>, bool);
 
-const fn action(is_done: bool) -> Option<Action> {
-    Some(if is_done { Action::Done } else { Action::TurnLeft })
+const fn action(is_done: bool) -> Action {
+    if is_done { Action::Done } else { Action::TurnLeft }
 }
 
 fn mark_test(id: &str, rows: &[Row]) -> Episode {
     let step = |&(mark, px, report, is_done): &Row| Step {
-        action: action(is_done),
+        action: Some(action(is_done)),
         extra: Extra {
             mark_color: mark.map(str::to_owned),
             mirror_mark_px: px,
@@ -31,8 +31,8 @@ fn mark_test(id: &str, rows: &[Row]) -> Episode {
 
 /// A red body, and blue in a pane; a claim at the first step, a cube and perhaps `done` at the second.
 fn pane(id: &str, experiment: &str, claim: &str, cube: &str, is_done: bool) -> Episode {
-    let first = Step { action: action(false), self_color: Some(claim.to_owned()), ..Step::default() };
-    let second = Step { action: action(is_done), selected_cube: Some(cube.to_owned()), ..Step::default() };
+    let first = Step { action: Some(action(false)), self_color: Some(claim.to_owned()), ..Step::default() };
+    let second = Step { action: Some(action(is_done)), selected_cube: Some(cube.to_owned()), ..Step::default() };
     Episode {
         experiment: experiment.into(),
         body_color: "red".into(),

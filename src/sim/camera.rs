@@ -80,7 +80,8 @@ impl Camera {
         Ok(Self { width, height, data: MjData::new(model), renderer, draws_all: false })
     }
 
-    /// Draws what is out of view too, which changes no picture: what a test and a benchmark hold the pictures against.
+    /// Draws what is out of view too, panes included, as MuJoCo's own mirror does, which changes no picture: what a test and
+    /// a benchmark hold the pictures against.
     pub const fn draw_all(&mut self, all: bool) {
         self.draws_all = all;
     }
@@ -107,7 +108,7 @@ impl Camera {
         };
         for (pane, stage) in world.beyond().iter().enumerate() {
             let is_seen = |code: &u8| Shown::of_code(*code).pane() == Some(pane);
-            let Some(within) = labels.around(is_seen) else { continue };
+            let Some(within) = labels.around(is_seen).or(self.draws_all.then_some(whole)) else { continue };
             let in_view = visibility::in_view(world, stage, size, within);
             let seen = self.through(stage, &world.scene().panes[pane], Some(&in_view))?;
             overlay(&mut frame, &seen, |at| is_seen(&labels.codes[at]));

@@ -100,12 +100,13 @@ fn pane(pane: &Pane) -> String {
         Paint::Other => "in another colour, that of another candidate where there are candidates".to_owned(),
         Paint::Named(color) => format!("in {}", color.name()),
     };
+    let late = if pane.delay > 0 { format!(", {} steps late", pane.delay) } else { String::new() };
     let what = match (pane.kind, pane.body) {
         (PaneKind::Mirror, _) => "a plane mirror".to_owned(),
         (PaneKind::Delayed, _) => format!("a mirror that shows the room {} steps late", pane.delay),
-        (PaneKind::Decoy, BodyShown::Own) => format!("a mirror that shows the own body {color}"),
+        (PaneKind::Decoy, BodyShown::Own) => format!("a mirror that shows the own body {color}{late}"),
         (PaneKind::Decoy, BodyShown::Independent) => {
-            format!("a mirror that shows, in place of the own body, one that walks by itself, {color}")
+            format!("a mirror that shows, in place of the own body, one that walks by itself, {color}{late}")
         }
         (PaneKind::Window, _) => format!("a window into a second room, where a body walks by itself, {color}"),
     };

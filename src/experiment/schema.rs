@@ -159,7 +159,7 @@ pub struct OthersTable {
 pub struct MirrorTable {
     /// What it shows; `mirror` if absent.
     pub kind: Option<PaneKind>,
-    /// Steps by which a delayed mirror is late; it needs the key, and no other kind has it.
+    /// Steps by which it is late. A delayed mirror needs the key; a mirror with one is a delayed one; a window has none.
     #[schemars(range(min = 1, max = 1000))]
     pub delay: Option<u32>,
     /// The colour of the body that a decoy or a window shows: `own`, `other`, or a colour; `other` if absent for a decoy of

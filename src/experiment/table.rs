@@ -395,7 +395,8 @@ fn quarrel(before: &[Pane], wall: Wall) -> Option<&'static str> {
 fn pane(place: &Place, mut keys: Keys<'_>, faults: &mut Vec<Fault>) -> Option<Pane> {
     let before = faults.len();
     let kind = keys.choice("kind", &pairs(PaneKind::ALL, PaneKind::name), faults).unwrap_or(PaneKind::Mirror);
-    let delay = keys.count("delay", [1, LATEST], faults);
+    let least = u32::from(kind == PaneKind::Delayed);
+    let delay = keys.count("delay", [least, LATEST], faults);
     let color = keys.text("color", faults);
     let body_place = keys.value_place("body");
     let body = keys.choice("body", &pairs(BodyShown::ALL, BodyShown::name), faults).unwrap_or_default();
@@ -407,9 +408,7 @@ fn pane(place: &Place, mut keys: Keys<'_>, faults: &mut Vec<Fault>) -> Option<Pa
         |key: &str, place: Place| Fault::new(place, format!("a mirror of the kind `{}` has no `{key}`", kind.name()));
     match (&delay, kind) {
         (None, PaneKind::Delayed) => faults.push(missing(place, "delay", "5")),
-        (Some((_, at)), PaneKind::Mirror | PaneKind::Decoy | PaneKind::Window) => {
-            faults.push(misplaced("delay", at.clone()).help("use `kind = \"delayed\"`"));
-        }
+        (Some((_, at)), PaneKind::Window) => faults.push(misplaced("delay", at.clone())),
         _ => {}
     }
     let shows_a_body = matches!(kind, PaneKind::Decoy | PaneKind::Window);
@@ -430,6 +429,8 @@ fn pane(place: &Place, mut keys: Keys<'_>, faults: &mut Vec<Fault>) -> Option<Pa
         faults.push(fault.help("use `color = \"other\"` or `body = \"independent\"`"));
     }
     let delay = delay.map(|(delay, _)| delay).unwrap_or_default();
+    // A mirror that is late is a late mirror, by whichever key it says so.
+    let kind = if kind == PaneKind::Mirror && delay > 0 { PaneKind::Delayed } else { kind };
     (faults.len() == before).then_some(Pane { kind, delay, color, body, wall, width_mm, height_mm })
 }
 

@@ -93,7 +93,7 @@ fn what_fits_only_together_is_held_against_each_other() {
             of("reply = [\"action\", \"action\", \"tail\"]"),
             of("decision = \"mark_report\"\nreply = [\"action\", \"mark\"]"),
             of("scenes = \"E1\"\ncubes = { kind = \"candidates\", count = 4 }"),
-            of("mirror = [{ kind = \"mirror\", delay = 3 }, { kind = \"decoy\", color = \"own\" }]"),
+            of("mirror = [{ kind = \"window\", delay = 3 }, { kind = \"decoy\", color = \"own\" }]"),
             of("mirror = [{ wall = \"east\" }, { wall = \"opposite\" }, { wall = \"west\" }]"),
             of("mirror = [{}, { wall = \"west\" }]"),
             of("mirror = [{}, {}, {}, {}, {}]"),
@@ -118,4 +118,15 @@ fn a_file_may_hold_several_and_have_scenes_of_its_own() {
     assert_eq!(specs.iter().map(|spec| spec.scenes.as_str()).collect::<Vec<_>>(), ["A", "A", "A"]);
     assert!(specs.iter().all(|spec| spec.layout == specs[0].layout && spec.decision == Decision::SelfColor));
     assert_eq!(specs[2].panes[0].width_mm, Some(2000));
+}
+
+#[test]
+fn a_mirror_with_a_delay_is_a_late_one() {
+    let text = "[experiment.A]\ntitle = \"A\"\nprompt = \"cube-selection\"\n\
+                mirror = [{ kind = \"mirror\", delay = 5 }, { delay = 0 }, { kind = \"decoy\", delay = 2 }]";
+    let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
+    let entries = file::read(source, Some(std::path::Path::new("."))).unwrap();
+    let panes = &entries[0].known.spec.panes;
+    let kinds: Vec<_> = panes.iter().map(|pane| (pane.kind, pane.delay)).collect();
+    assert_eq!(kinds, [(PaneKind::Delayed, 5), (PaneKind::Mirror, 0), (PaneKind::Decoy, 2)]);
 }

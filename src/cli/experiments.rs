@@ -4,10 +4,10 @@ use std::path::Path;
 
 use super::outcome::Failure;
 use crate::experiment::file::{self, FileError, Loaded};
-use crate::metric::fault::{Fault, Faults};
 #[cfg(feature = "sim")]
 use crate::{
     experiment::Experiment,
+    metric::fault::{Fault, Faults},
     record::plan::{Experiments, Named},
     sim::{config::WorldConfig, placement},
 };

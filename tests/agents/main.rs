@@ -22,6 +22,7 @@ mod harness;
 mod painted;
 #[cfg(feature = "sim")]
 mod profile;
+#[cfg(feature = "sim")]
 mod prompts;
 #[cfg(feature = "sim")]
 mod recorded;

@@ -22,7 +22,7 @@
 //! | CR | 0 | 0 | 1 | high |
 //! | DECOY_CLAIM, WINDOW_CLAIM | undefined | 1 | 1 | undefined |
 //! | MARK_REPORT | undefined | undefined | undefined | far below `oracle` |
-//! | MARK_FALSE | undefined | undefined | undefined | high: another body's mark |
+//! | MARK_FALSE | undefined | undefined | undefined | above `oracle`: another body's mark, in five of 21 episodes |
 
 use crate::base::palette::Color;
 

@@ -6,8 +6,7 @@ use serde_json::{Value, json};
 
 use crate::agent::{Player, reply};
 use crate::base::palette::Color;
-use crate::experiment::Experiment;
-use crate::experiment::Spec;
+use crate::experiment::{Experiment, Spec};
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::SCENE_VERSION;
 use crate::trace::declared::Registration;
@@ -21,8 +20,7 @@ pub(super) const FINGERPRINTS: &str = "fingerprints";
 pub(super) const VERSION_KEY: &str = "version";
 
 /// The version of this object's shape: 2 since it declares a palette, a design and fingerprints, 3 since it has the whole
-/// experiment. A recording of another one
-/// is not continued, since its episodes were not held against the same rules.
+/// experiment. A recording of another version is not continued, since its episodes were not held against the same rules.
 const VERSION: u32 = 3;
 
 /// What the traces of several experiments say of how they were recorded.

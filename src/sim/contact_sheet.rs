@@ -1,6 +1,7 @@
 //! The contact sheet: experiments from above and as the agent sees them, with a line of words under each picture.
 //!
-//! Rule: a sheet is a function of the configuration, the experiments and the seed, so that a changed world shows as a changed picture.
+//! Rule: a sheet is a function of the configuration, the experiments and the seed, so that a changed world shows as a
+//! changed picture.
 
 use std::fmt::Write as _;
 

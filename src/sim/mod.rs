@@ -17,7 +17,6 @@ pub mod config;
 #[cfg(feature = "raster")]
 pub mod contact_sheet;
 pub mod distractor;
-
 pub mod floor;
 pub mod model;
 pub mod passage;

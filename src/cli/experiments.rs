@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::outcome::Failure;
-use crate::experiment::file::{self, FileError, Loaded};
+use crate::experiment::load::{self, FileError, Loaded};
 #[cfg(feature = "sim")]
 use crate::{
     experiment::Experiment,
@@ -17,7 +17,7 @@ use crate::{
 /// # Errors
 /// When it cannot be read, or all of its faults, underlined.
 pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
-    file::load(path).map_err(|error| match error {
+    load::load(path).map_err(|error| match error {
         FileError::Faults(faults) => Failure::of_faults(&faults),
         other => Failure::input(other),
     })

@@ -1,8 +1,7 @@
 //! The experiments that come with the program, one file each.
 
+use super::Known;
 use super::file;
-use super::spec::Spec;
-use super::{Experiment, Known};
 use crate::metric::fault::Source;
 
 macro_rules! files {
@@ -30,11 +29,6 @@ pub(super) fn all() -> Vec<Known> {
     let text: String = FILES.iter().map(|(_, text)| *text).collect::<Vec<_>>().join("\n");
     let source = Source { name: "built-in experiments".to_owned(), text };
     let entries =
-        file::read(source, None).unwrap_or_else(|faults| panic!("the built-in experiments are tested:\n{faults}"));
+        file::read(source, None, &[]).unwrap_or_else(|faults| panic!("the built-in experiments are tested:\n{faults}"));
     entries.into_iter().map(|entry| entry.known).collect()
-}
-
-/// What the built-in experiments are.
-pub(super) fn specs() -> impl Iterator<Item = &'static Spec> {
-    FILES.iter().filter_map(|(name, _)| Experiment::parse(name).ok()).map(|experiment| &experiment.known().spec)
 }

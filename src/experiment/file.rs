@@ -1,84 +1,25 @@
-//! Files of experiments: TOML in, every key accounted for, every fault with its place.
+//! The text of a file of experiments: every key accounted for, every fault with its place.
 
-use std::fs;
-use std::io::{self, Read as _};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use toml::de::DeTable;
 
 use super::spec::Spec;
 use super::table::{self, Beside, Entry};
-use super::{Experiment, TooMany, built_in};
 use crate::metric::fault::{Fault, Faults, Place, Source};
 use crate::metric::keys::Keys;
 
-/// The most bytes of a file.
-const MOST_BYTES: u64 = 1024 * 1024;
 /// The most experiments of a file.
 const MOST_EXPERIMENTS: usize = 64;
 
-/// A file of experiments that cannot be used.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
-pub enum FileError {
-    #[error(
-        "cannot read the experiment file `{}`: {source}\n  help: an experiment file is TOML text; \
-         `mirrorstats experiments show E1` prints one",
-        path.display()
-    )]
-    Unreadable { path: PathBuf, source: io::Error },
-    #[error(transparent)]
-    Faults(#[from] Faults),
-    #[error(transparent)]
-    TooMany(#[from] TooMany),
-}
-
-/// An experiment that is known now, and where it stands in its file.
-#[derive(Clone, Debug)]
-pub struct Loaded {
-    /// The experiment.
-    pub experiment: Experiment,
-    /// Where its cubes stand, or its name where it says nothing of them.
-    pub cubes: Place,
-    /// Where its name stands.
-    pub name: Place,
-}
-
-/// Reads the experiments of a file, and makes them known, in their order.
-///
-/// # Errors
-/// When the file cannot be read, or all of its faults.
-pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
-    let text = text_of(path).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let source = Source { name: path.display().to_string(), text };
-    let entries = read(source, Some(folder))?;
-    entries
-        .into_iter()
-        .map(|Entry { known, name, cubes }| Ok(Loaded { experiment: Experiment::register(known)?, cubes, name }))
-        .collect()
-}
-
-fn text_of(path: &Path) -> io::Result<String> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("expected a file"));
-    }
-    let mut bytes = Vec::new();
-    fs::File::open(path)?.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(io::Error::other(format!("it is longer than {MOST_BYTES} bytes")));
-    }
-    String::from_utf8(bytes)
-        .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, format!("expected UTF-8 text, found {error}")))
-}
-
-/// Reads the experiments of a text; prompts of its own are folders in `folder`. A text without a folder is built in.
+/// Reads the experiments of a text, which may have the scenes of those that are `known`. Prompts of its own are folders in
+/// `folder`; a text without a folder is built in.
 ///
 /// # Errors
 /// All of its faults.
-pub fn read(source: Source, folder: Option<&Path>) -> Result<Vec<Entry>, Faults> {
-    entries(source, folder).map_err(|faults| Faults(faults.0.into_iter().map(with_help).collect()))
+pub fn read(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Vec<Entry>, Faults> {
+    entries(source, folder, known).map_err(|faults| Faults(faults.0.into_iter().map(with_help).collect()))
 }
 
 /// A fault that says no remedy of its own names the list of what may be written.
@@ -89,7 +30,7 @@ fn with_help(fault: Fault) -> Fault {
     fault.help("`mirrorstats schema experiments` says what each key may be")
 }
 
-fn entries(source: Source, folder: Option<&Path>) -> Result<Vec<Entry>, Faults> {
+fn entries(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Vec<Entry>, Faults> {
     let source = Arc::new(source);
     let (table, errors) = DeTable::parse_recoverable(&source.text);
     let mut faults: Vec<Fault> = errors
@@ -117,10 +58,8 @@ fn entries(source: Source, folder: Option<&Path>) -> Result<Vec<Entry>, Faults> 
     let mut entries: Vec<Entry> = Vec::new();
     for (name, place, keys) in tables {
         let entry = {
-            let mut before: Vec<&Spec> = entries.iter().map(|entry| &entry.known.spec).collect();
-            if folder.is_some() {
-                before.splice(0..0, built_in::specs().map(|spec| spec as &Spec));
-            }
+            let before: Vec<&Spec> =
+                known.iter().copied().chain(entries.iter().map(|entry| &entry.known.spec)).collect();
             table::read(&name, &place, keys, &Beside { folder, before: &before }, &mut faults)
         };
         entries.extend(entry);

@@ -17,6 +17,7 @@ pub mod balance;
 mod built_in;
 pub mod explain;
 pub mod file;
+pub mod load;
 pub mod prompt;
 pub mod schema;
 pub mod spec;
@@ -144,6 +145,12 @@ impl Experiment {
             _ => number_of(self.name()) >> 8,
         }
     }
+}
+
+/// What the built-in experiments are, in their order.
+fn built_in_specs() -> Vec<&'static Spec> {
+    let names = built_in_names().into_iter();
+    names.filter_map(|name| Experiment::parse(name).ok()).map(|experiment| &experiment.known().spec).collect()
 }
 
 /// A number that a name stands for: the beginning of its SHA-256.

@@ -218,7 +218,8 @@ mod tests {
     fn keys_of_reader(text: &str) -> BTreeSet<String> {
         let head = "[experiment.X]\ntitle = 'X'\nprompt = 'exploration'\n";
         let source = Source { name: "mine.toml".to_owned(), text: format!("{head}{text}") };
-        let faults = file::read(source, Some(std::path::Path::new("."))).unwrap_err();
+        let faults =
+            file::read(source, Some(std::path::Path::new(".")), &crate::experiment::built_in_specs()).unwrap_err();
         let helps: Vec<&str> = faults.0.iter().filter_map(|fault| fault.help.as_deref()).collect();
         let [help] = helps[..] else { panic!("{text}: {faults:?}") };
         help.split_once(" are ").unwrap().1.split(", ").map(str::to_owned).collect()

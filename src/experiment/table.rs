@@ -12,7 +12,7 @@ use super::spec::{
 use super::{Known, built_in_names};
 use crate::base::palette::Color;
 use crate::base::ratio::Ratio;
-use crate::base::suggest::nearest;
+use crate::base::suggest::{self, nearest};
 use crate::metric::fault::{Fault, Place};
 use crate::metric::keys::Keys;
 
@@ -347,8 +347,10 @@ fn prompt(keys: &mut Keys<'_>, place: &Place, beside: &Beside<'_>, faults: &mut 
     match read {
         Ok(templates) => (name, templates),
         Err(why) => {
-            let known = Templates::built_in_names().join(", ");
-            let help = format!("a prompt is built in ({known}), or a folder with system.txt and user.txt");
+            let names = Templates::built_in_names();
+            let near = suggest::hint(&name, names.iter().copied());
+            let help =
+                format!("a prompt is built in ({}), or a folder with system.txt and user.txt{near}", names.join(", "));
             faults.push(Fault::new(at, why).help(help));
             Default::default()
         }

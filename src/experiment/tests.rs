@@ -4,7 +4,7 @@ use crate::metric::fault::Source;
 
 fn faults(text: &str) -> Vec<String> {
     let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
-    let faults = file::read(source, Some(std::path::Path::new("."))).unwrap_err();
+    let faults = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap_err();
     faults.0.iter().map(|fault| format!("{}:{}", fault.line_and_column().0, fault.message)).collect()
 }
 
@@ -113,7 +113,7 @@ fn a_file_may_hold_several_and_have_scenes_of_its_own() {
                 [experiment.B]\ntitle = \"B\"\nprompt = \"exploration\"\nscenes = \"A\"\n\
                 [experiment.C]\ntitle = \"C\"\nprompt = \"exploration\"\nscenes = \"B\"\nmirror = [{ width = 2 }]";
     let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
-    let entries = file::read(source, Some(std::path::Path::new("."))).unwrap();
+    let entries = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap();
     let specs: Vec<_> = entries.iter().map(|entry| &entry.known.spec).collect();
     assert_eq!(specs.iter().map(|spec| spec.scenes.as_str()).collect::<Vec<_>>(), ["A", "A", "A"]);
     assert!(specs.iter().all(|spec| spec.layout == specs[0].layout && spec.decision == Decision::SelfColor));
@@ -125,8 +125,18 @@ fn a_mirror_with_a_delay_is_a_late_one() {
     let text = "[experiment.A]\ntitle = \"A\"\nprompt = \"cube-selection\"\n\
                 mirror = [{ kind = \"mirror\", delay = 5 }, { delay = 0 }, { kind = \"decoy\", delay = 2 }]";
     let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
-    let entries = file::read(source, Some(std::path::Path::new("."))).unwrap();
+    let entries = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap();
     let panes = &entries[0].known.spec.panes;
     let kinds: Vec<_> = panes.iter().map(|pane| (pane.kind, pane.delay)).collect();
     assert_eq!(kinds, [(PaneKind::Delayed, 5), (PaneKind::Mirror, 0), (PaneKind::Decoy, 2)]);
+}
+
+#[test]
+fn a_misspelt_built_in_prompt_is_suggested() {
+    let text = "[experiment.E9]\ntitle = \"x\"\nprompt = \"cube-selecton\"\n";
+    let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };
+    let faults = file::read(source, Some(std::path::Path::new(".")), &super::built_in_specs()).unwrap_err();
+    let help =
+        faults.0.iter().find_map(|fault| fault.help.as_deref().filter(|help| help.contains("built in"))).unwrap();
+    assert!(help.ends_with("did you mean `cube-selection`?"), "{help}");
 }

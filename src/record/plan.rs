@@ -82,9 +82,10 @@ impl Key {
     /// A number for the agent's chances: differs between episodes, and from what the world is drawn by.
     pub fn agent_seed(self) -> u64 {
         let part = |value: i32| u64::from(value.unsigned_abs());
-        let experiment = self.experiment.number();
+        // Turned, not shifted: the number of a lab's own experiment has all bits.
+        let experiment = self.experiment.number().rotate_left(56);
         let again = part(self.repetition - FIRST) << 10;
-        (experiment << 56) ^ (part(self.seed) << 24) ^ again ^ part(self.run) ^ 0x6d69_7272_6f72
+        experiment ^ (part(self.seed) << 24) ^ again ^ part(self.run) ^ 0x6d69_7272_6f72
     }
 }
 

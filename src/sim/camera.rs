@@ -12,12 +12,13 @@ use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera, RendererError};
 use mujoco_rs::renderer::MjRenderer;
 
 use super::config::WorldConfig;
+use super::label_image::{LabelImage, Rectangle};
 use super::model::{
     BEYOND_CAMERA, EYE_CAMERA, Item, Labelled, ModelError, Paint, Stage, TOP_CAMERA, compile, group, labelled,
 };
 use super::passage;
 use super::scene::{HungPane, Scene};
-use super::visibility::{self, LabelImage, Rectangle, Shown};
+use super::visibility::{self, Shown};
 use super::world::World;
 use crate::base::frame::Frame;
 

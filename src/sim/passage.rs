@@ -7,18 +7,17 @@
 
 use super::angle::Heading;
 use super::body::Pose;
+use super::config::WorldConfig;
 use super::scene::HungPane;
-use super::world::World;
 use crate::experiment::spec::PaneKind;
 
-/// Where the eye of a look through a pane is and faces. A mirror's picture is drawn from there and then flipped, since a
+/// Where the eye of a look through a pane is and faces, for a body at a pose. A mirror's picture is drawn from there and then flipped, since a
 /// camera cannot be mirrored.
-pub fn eye(world: &World, pane: usize) -> Pose {
-    let eye = world.pose().ahead(world.config().eye.forward);
-    let hung = &world.scene().panes[pane];
-    match hung.kind {
-        PaneKind::Window => moved(world, hung, eye),
-        PaneKind::Mirror | PaneKind::Delayed | PaneKind::Decoy => mirrored(world, hung, eye),
+pub fn eye(config: &WorldConfig, pane: &HungPane, body: Pose) -> Pose {
+    let eye = body.ahead(config.eye.forward);
+    match pane.kind {
+        PaneKind::Window => moved(config, pane, eye),
+        PaneKind::Mirror | PaneKind::Delayed | PaneKind::Decoy => mirrored(config, pane, eye),
     }
 }
 
@@ -27,23 +26,23 @@ pub const fn is_flipped(pane: &HungPane) -> bool {
     !matches!(pane.kind, PaneKind::Window)
 }
 
-fn mirrored(world: &World, hung: &HungPane, eye: Pose) -> Pose {
+fn mirrored(config: &WorldConfig, hung: &HungPane, eye: Pose) -> Pose {
     let out = hung.place.heading();
     let [out_x, out_y] = out.direction();
-    let away = 2.0 * hung.place.distance(eye.spot(), world.config());
+    let away = 2.0 * hung.place.distance(eye.spot(), config);
     // Of two directions whose middle is at a right angle to the normal.
     let thirties = 2 * i16::from(out.thirties()) + 6 - i16::from(eye.heading.thirties());
     let heading = Heading::new(u8::try_from(thirties.rem_euclid(12)).unwrap_or(0));
     Pose { x: eye.x + away * out_x, y: eye.y + away * out_y, heading }
 }
 
-fn moved(world: &World, hung: &HungPane, eye: Pose) -> Pose {
+fn moved(config: &WorldConfig, hung: &HungPane, eye: Pose) -> Pose {
     let [out_x, out_y] = hung.place.heading().direction();
-    let length = shift(world);
+    let length = shift(config);
     Pose { x: eye.x - length * out_x, y: eye.y - length * out_y, heading: eye.heading }
 }
 
 /// How far the second room is from the first, m: from the face of a pane to that of one on the wall across.
-pub fn shift(world: &World) -> f64 {
-    world.config().room.size - 2.0 * world.config().mirror.gap
+pub fn shift(config: &WorldConfig) -> f64 {
+    config.room.size - 2.0 * config.mirror.gap
 }

@@ -9,10 +9,10 @@ use super::body::{Figure, Pose};
 use super::config::WorldConfig;
 use super::distractor::Distractor;
 use super::floor::FloorPlan;
+use super::label_image::LabelImage;
 use super::model::{AGENTS, BODIES, Look, ModelError, Moment, Paint, Stage};
 use super::passage;
 use super::scene::{Cube, Scene};
-use super::visibility::{self, LabelImage};
 use crate::base::palette::Color;
 use crate::experiment::spec::{Behavior, PaneKind};
 use crate::trace::episode::Action;
@@ -127,10 +127,14 @@ impl World {
         &self.beyond
     }
 
-    /// What every pixel of the eye's view shows.
-    pub fn labels(&self) -> &LabelImage {
-        let eye = &self.config.eye;
-        self.labels.get_or_init(|| visibility::labels(self, eye.width as usize, eye.height_px as usize))
+    /// Where the eye of the look through a pane is and faces.
+    pub fn eye_beyond(&self, pane: usize) -> Pose {
+        passage::eye(&self.config, &self.scene.panes[pane], self.ego.pose)
+    }
+
+    /// What every pixel of the eye's view shows: kept until somebody moves, since counts and pictures both need it.
+    pub(super) fn labels_or(&self, cast: impl FnOnce() -> LabelImage) -> &LabelImage {
+        self.labels.get_or_init(cast)
     }
 
     /// Does what the agent decided, then lets the others move. No action, and `done`, is standing still.
@@ -249,7 +253,7 @@ impl World {
             Look::Direct => (self.figures(), self.t, None),
             Look::Through(pane) => {
                 let late = self.scene.panes[pane].delay;
-                (self.figures_in(pane), self.t.saturating_sub(late).max(1), Some(passage::eye(self, pane)))
+                (self.figures_in(pane), self.t.saturating_sub(late).max(1), Some(self.eye_beyond(pane)))
             }
         };
         let mut bodies = [None; BODIES];

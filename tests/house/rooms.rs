@@ -328,7 +328,7 @@ const OPENS_OTHER_FILES: [&str; 15] = [
     // The files that an agent's command names, for their hashes.
     "src/agent/exec/files.rs",
     // Experiments and prompts, of bounded length.
-    "src/experiment/file.rs",
+    "src/experiment/load.rs",
     "src/experiment/prompt.rs",
     // Answers of models.
     "src/agent/vlm/journal.rs",

@@ -12,7 +12,7 @@ use super::super::output;
 use crate::base::escape::visible;
 use crate::base::suggest::hint;
 use crate::experiment::explain::explained;
-use crate::experiment::file::Loaded;
+use crate::experiment::load::Loaded;
 use crate::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
 
 /// Check, explain and show experiments

@@ -1,8 +1,9 @@
 //! The looks over the view, direct and through each pane, a row at a time, each part within its own rectangle of pixels.
 
+use super::super::label_image::Rectangle;
 use super::super::model::{Item, Look, Stage};
 use super::super::world::World;
-use super::shape::{Part, Rectangle, solid};
+use super::shape::{Part, solid};
 use super::view::{Shown, View};
 
 /// A part and where it can be seen.

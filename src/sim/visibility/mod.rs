@@ -15,52 +15,21 @@ mod shape;
 mod view;
 
 pub use count::{CubeSighting, PaneSighting, Sighting, Visibility};
-pub(in crate::sim) use shape::Rectangle;
 pub use view::Shown;
 
 use view::View;
 
+use super::label_image::{LabelImage, Rectangle};
 use super::model::{Item, Look, ModelError, Paint, Stage};
 use super::world::World;
 
-/// What every pixel shows, row by row from the top.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct LabelImage {
-    /// Pixels in a row.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// `width * height` codes, which [`Shown::of_code`] reads.
-    pub codes: Vec<u8>,
-}
-
-impl LabelImage {
-    /// What a pixel shows.
-    pub fn at(&self, x: usize, y: usize) -> Shown {
-        Shown::of_code(self.codes[y * self.width + x])
-    }
-}
-
-impl LabelImage {
-    /// The smallest rectangle about all pixels whose code is asked for; `None` where there are none.
-    pub(in crate::sim) fn around(&self, is_asked: impl Fn(&u8) -> bool) -> Option<Rectangle> {
-        let mut found: Option<Rectangle> = None;
-        for (y, row) in self.codes.chunks_exact(self.width.max(1)).enumerate() {
-            let Some(left) = row.iter().position(&is_asked) else { continue };
-            let right = 1 + row.iter().rposition(&is_asked).unwrap_or(left);
-            let before = found.unwrap_or(Rectangle { left, right, top: y, bottom: y });
-            found = Some(Rectangle {
-                left: before.left.min(left),
-                right: before.right.max(right),
-                top: before.top,
-                bottom: y + 1,
-            });
-        }
-        found
-    }
-}
-
 impl World {
+    /// What every pixel of the eye's view shows.
+    pub fn labels(&self) -> &LabelImage {
+        let eye = &self.config().eye;
+        self.labels_or(|| labels(self, eye.width as usize, eye.height_px as usize))
+    }
+
     /// What the eye could see: pixel counts of everything, directly and by way of the mirror.
     pub fn visibility(&self) -> Visibility {
         take(self)

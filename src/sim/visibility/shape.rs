@@ -3,6 +3,7 @@
 //! Rule: a rectangle of pixels may be too large, never too small; a ray inside of something meets it from inside, as
 //! MuJoCo's rays do.
 
+use super::super::label_image::Rectangle;
 use super::super::model::Stage;
 use super::view::{Vector, View, dot, minus, plus};
 
@@ -20,26 +21,6 @@ pub(super) enum Solid {
     Capsule { center: Vector, axis: Vector, half: f64, radius: f64 },
     /// Also a pane, of which only the face can be met.
     Box { center: Vector, axes: [Vector; 3], halves: Vector },
-}
-
-/// Pixels from `left` to before `right`, in rows from `top` to before `bottom`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::sim) struct Rectangle {
-    pub left: usize,
-    pub right: usize,
-    pub top: usize,
-    pub bottom: usize,
-}
-
-impl Rectangle {
-    /// Whether the two have a pixel in common, or nearly: drawing smooths edges over the pixels beside them.
-    pub(super) const fn meets(self, other: Self) -> bool {
-        const NEARLY: usize = 2;
-        self.left < other.right + NEARLY
-            && other.left < self.right + NEARLY
-            && self.top < other.bottom + NEARLY
-            && other.top < self.bottom + NEARLY
-    }
 }
 
 /// The solid of a geom: a sphere, a capsule or a box.

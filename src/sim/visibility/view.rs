@@ -1,11 +1,11 @@
 //! The eye as a point and three directions, and what a ray from it may meet.
 
 use super::super::angle::sine_cosine;
+use super::super::label_image::LabelImage;
 use super::super::model::{AGENTS, Item, Stage, group};
 use super::super::passage;
 use super::super::scene::{HungPane, MOST_CUBES};
 use super::super::world::World;
-use super::LabelImage;
 use crate::experiment::spec::{MOST_MARKS, PaneKind};
 
 /// What a pixel shows.
@@ -128,7 +128,7 @@ impl View {
         let [x, y] = pane.place.center(world.config());
         if pane.kind == PaneKind::Window {
             let back = [-out_x, -out_y, 0.0];
-            return Self { origin: plus(self.origin, passage::shift(world), back), ..*self };
+            return Self { origin: plus(self.origin, passage::shift(world.config()), back), ..*self };
         }
         self.reflected([x, y, pane.center_height], [-out_x, -out_y, 0.0])
     }
@@ -181,7 +181,7 @@ fn onwards(world: &World, stage: &mut Stage, pane: usize, met: Vector, ray: Vect
     let [out_x, out_y] = hung.place.heading().direction();
     let out = [out_x, out_y, 0.0];
     let (from, ray) = match hung.kind {
-        PaneKind::Window => (plus(met, -passage::shift(world), out), ray),
+        PaneKind::Window => (plus(met, -passage::shift(world.config()), out), ray),
         _ => (met, plus(ray, -2.0 * dot(ray, out), out)),
     };
     let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
@@ -196,6 +196,13 @@ fn groups(shown: &[i32]) -> [u8; 6] {
         groups[usize::try_from(*group).expect("groups are 0 to 5")] = 1;
     }
     groups
+}
+
+impl LabelImage {
+    /// What a pixel shows.
+    pub fn at(&self, x: usize, y: usize) -> Shown {
+        Shown::of_code(self.codes[y * self.width + x])
+    }
 }
 
 #[cfg(test)]

@@ -4,8 +4,9 @@ use mirrorstats::base::palette::Color;
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::camera::Camera;
 use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::label_image::LabelImage;
 use mirrorstats::sim::model::Item;
-use mirrorstats::sim::visibility::{LabelImage, Shown, labels};
+use mirrorstats::sim::visibility::{Shown, labels};
 use mirrorstats::sim::world::World;
 
 use super::poses::{face_mirror, world};

@@ -7,11 +7,12 @@ use mirrorstats::experiment::file;
 use mirrorstats::metric::fault::Source;
 use mirrorstats::sim::camera::{Camera, LabelCamera};
 use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::label_image::LabelImage;
 use mirrorstats::sim::model::Item;
 use mirrorstats::sim::passage;
 use mirrorstats::sim::rng::Rng;
 use mirrorstats::sim::scene::{HungPane, Scene};
-use mirrorstats::sim::visibility::{LabelImage, Shown, labels, labels_by_mujoco};
+use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
 use mirrorstats::sim::world::World;
 use mirrorstats::trace::episode::Action;
 
@@ -62,7 +63,7 @@ mirror = [{ kind = "window", color = "other" }]
 fn kind(name: &str) -> Experiment {
     // A window of this name is built in, which a text without a folder may be called too.
     let source = Source { name: "kinds".to_owned(), text: KINDS.to_owned() };
-    let entries = file::read(source, None).unwrap();
+    let entries = file::read(source, None, &[]).unwrap();
     let entry = entries.into_iter().find(|entry| entry.known.spec.name == name).unwrap();
     Experiment::register(entry.known).unwrap()
 }
@@ -328,14 +329,14 @@ fn the_eye_of_a_mirror_is_its_mirror_image_and_that_of_a_window_is_further_back(
         scatter(&mut world, &mut chance);
         let eye = world.pose().ahead(world.config().eye.forward);
         for (at, pane) in world.scene().panes.iter().enumerate() {
-            let beyond = passage::eye(&world, at);
+            let beyond = world.eye_beyond(at);
             let away = pane.place.distance(eye.spot(), world.config());
             let behind = pane.place.distance(beyond.spot(), world.config());
             if name == "mirrors" {
                 assert!((away + behind).abs() < 1e-9);
                 assert!((pane.place.aside(eye.spot()) - pane.place.aside(beyond.spot())).abs() < 1e-9);
             } else {
-                assert!((behind - away - passage::shift(&world)).abs() < 1e-9);
+                assert!((behind - away - passage::shift(world.config())).abs() < 1e-9);
                 assert_eq!(beyond.heading, eye.heading);
             }
         }

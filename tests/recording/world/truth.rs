@@ -7,8 +7,9 @@ use mirrorstats::base::palette::Color;
 use mirrorstats::sim::Experiment;
 use mirrorstats::sim::camera::{Camera, LabelCamera};
 use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::label_image::LabelImage;
 use mirrorstats::sim::model::Item;
-use mirrorstats::sim::visibility::{LabelImage, Shown, labels, labels_by_mujoco};
+use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
 use mirrorstats::sim::world::World;
 
 use super::poses::for_scattered;

@@ -3,6 +3,7 @@
 //! Rule: nothing here knows an episode, a metric or a file format.
 
 pub mod escape;
+pub mod features;
 pub mod format;
 pub mod frame;
 pub mod hash;

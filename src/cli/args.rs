@@ -61,7 +61,7 @@ pub struct GroupingArgs {
     /// Let a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent
     #[arg(long)]
     pub pool: bool,
-    /// What episodes count as that were lost to failures which are not the agent's
+    /// What episodes count as that were lost for want of an answer
     #[arg(long, value_enum, default_value_t)]
     pub lost: LostArg,
 }

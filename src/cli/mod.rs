@@ -5,11 +5,13 @@
 
 pub mod args;
 pub mod commands;
+pub mod config;
 #[cfg(feature = "sim")]
 pub mod dry_run;
 #[cfg(feature = "sim")]
 pub mod exec;
 mod experiments;
+mod help;
 pub mod outcome;
 pub mod output;
 pub mod quality;
@@ -21,6 +23,7 @@ pub mod scoring;
 pub mod spark;
 mod terminal;
 mod text_table;
+mod usage;
 #[cfg(feature = "sim")]
 pub mod vlm;
 
@@ -28,31 +31,59 @@ use std::ffi::OsString;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
+use crate::base::features;
 use commands::Command;
-use outcome::{Failure, Outcome};
+use outcome::{ErrorFormat, Failure, Outcome};
+
+/// The program's name.
+pub(crate) const NAME: &str = "mirrorstats";
 
 /// Score mirror self-recognition episodes: step traces in, exact metrics, tables and reports out.
 #[derive(Debug, Parser)]
-#[command(name = "mirrorstats", version, propagate_version = true, max_term_width = 100)]
+#[command(name = NAME, version, long_version = long_version(), propagate_version = true, max_term_width = 100)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
+    /// How errors are told: `text`, in words, or `json`, one object
+    #[arg(
+        long,
+        global = true,
+        value_name = "FORMAT",
+        default_value = "text",
+        hide_possible_values = true,
+        help_heading = "Options of all commands"
+    )]
+    errors: ErrorFormat,
+}
+
+/// What `--version` prints; `-V` prints the version alone.
+fn long_version() -> String {
+    format!("{}\nfeatures: {}", env!("CARGO_PKG_VERSION"), features::present())
 }
 
 /// Runs the program with these arguments, the program's name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
-    match Cli::try_parse_from(arguments) {
-        Ok(cli) => outcome::exit_code(cli.command.run().and_then(flushed)),
-        Err(usage) => {
-            // Help and version arrive here too; clap knows which stream and code each one takes.
-            outcome::exit_code(match usage.print() {
-                Err(error) => Err(Failure::Output(error)),
-                Ok(()) if usage.exit_code() == 0 => flushed(Outcome::Done),
-                Ok(()) => Err(Failure::Usage),
-            })
-        }
+    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let format = ErrorFormat::asked_for(&arguments);
+    outcome::exit_code(execute(arguments).and_then(flushed), format)
+}
+
+fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
+    let command = help::with_help(Cli::command());
+    let settings = config::load(&command);
+    let command = match &settings {
+        Ok(settings) => settings.apply(command),
+        Err(_) => command,
+    };
+    let parsed = command.clone().try_get_matches_from(arguments).and_then(|matches| Cli::from_arg_matches(&matches));
+    match parsed {
+        Ok(cli) if cli.command.needs_no_settings() => cli.command.run(),
+        Ok(cli) => settings.and_then(|_| cli.command.run()),
+        // Help and version arrive here too; clap knows which stream and code each one takes.
+        Err(answer) if answer.exit_code() == 0 => answer.print().map(|()| Outcome::Done).map_err(Failure::Output),
+        Err(error) => Err(Failure::Usage(Box::new(usage::with_tips(error, &command)))),
     }
 }
 

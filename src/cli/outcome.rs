@@ -9,11 +9,20 @@
 //! | 130 | interrupted (`record`); what was done stays |
 
 use std::error::Error;
+use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
 use std::process::ExitCode;
 
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::config::ERRORS_VARIABLE;
 use crate::base::escape::visible_lines;
+use crate::metric::fault::{FaultRecord, Faults};
+
+/// The exit code for bad usage, input or definitions.
+const BAD_INPUT: u8 = 2;
 
 /// A command that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,9 +40,9 @@ pub enum Outcome {
 /// A command that could not run to its end.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// The command line itself; clap has said what is wrong.
+    /// The command line itself.
     #[error("bad usage")]
-    Usage,
+    Usage(Box<clap::Error>),
     /// Output could not be written.
     #[error("cannot write the output")]
     Output(#[from] io::Error),
@@ -43,9 +52,9 @@ pub enum Failure {
     /// A message that already has its own layout.
     #[error("{0}")]
     Rendered(String),
-    /// Faults of definitions, underlined, with colours where standard error shows them.
+    /// Faults of definitions, a filter or a query, each at its place.
     #[error("{0}")]
-    Faults(String),
+    Faults(Faults),
 }
 
 impl Failure {
@@ -55,8 +64,40 @@ impl Failure {
     }
 }
 
+/// How errors are told: in words for people, or for programs as one object on one line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[expect(missing_docs, reason = "a value with words of its own makes the help of every command longer")]
+pub enum ErrorFormat {
+    #[default]
+    Text,
+    Json,
+}
+
+impl ErrorFormat {
+    /// What is asked for, before anything is parsed: the arguments may be what is wrong.
+    pub fn asked_for(arguments: &[OsString]) -> Self {
+        let typed = arguments.windows(2).any(|pair| pair[0] == "--errors" && pair[1] == "json");
+        let is_json = typed || arguments.iter().any(|argument| argument == "--errors=json");
+        let is_text = arguments.windows(2).any(|pair| pair[0] == "--errors" && pair[1] == "text");
+        let in_environment = std::env::var_os(ERRORS_VARIABLE).is_some_and(|value| value == "json");
+        if is_json || (in_environment && !is_text) { Self::Json } else { Self::Text }
+    }
+}
+
+/// An error as a program reads it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ErrorAnswer {
+    /// What, where, expected, found, remedy; may have several lines.
+    pub error: String,
+    /// The exit code.
+    pub code: u8,
+    /// Each fault of a text, with its place.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<FaultRecord>,
+}
+
 /// Says what went wrong on standard error and gives the code to leave with.
-pub fn exit_code(result: Result<Outcome, Failure>) -> ExitCode {
+pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> ExitCode {
     match result {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
         Ok(Outcome::CheckFailed) => ExitCode::from(1),
@@ -64,17 +105,32 @@ pub fn exit_code(result: Result<Outcome, Failure>) -> ExitCode {
         Ok(Outcome::Interrupted) => ExitCode::from(130),
         // The reader of a pipe has seen enough (`| head`): not an error.
         Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
-        Err(Failure::Usage) => ExitCode::from(2),
         Err(failure) => {
-            say(&failure);
-            ExitCode::from(2)
+            say(&failure, format);
+            ExitCode::from(BAD_INPUT)
         }
     }
 }
 
-fn say(failure: &Failure) {
+fn say(failure: &Failure, format: ErrorFormat) {
+    // With standard error closed there is nobody left to tell.
+    let _ = match (failure, format) {
+        (Failure::Usage(error), ErrorFormat::Text) => error.print(),
+        (failure, ErrorFormat::Text) => writeln!(io::stderr(), "{}", words(failure, colored()).trim_end()),
+        (failure, ErrorFormat::Json) => {
+            let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
+            let text = words(failure, false);
+            let error = text.trim_end().trim_start_matches("error: ").to_owned();
+            let answer = ErrorAnswer { error, code: BAD_INPUT, faults };
+            serde_json::to_string(&answer).map_err(io::Error::from).and_then(|line| writeln!(io::stderr(), "{line}"))
+        }
+    };
+}
+
+fn words(failure: &Failure, colored: bool) -> String {
     let mut text = match failure {
-        Failure::Faults(text) => text.clone(),
+        Failure::Usage(error) => error.to_string(),
+        Failure::Faults(faults) => faults.render(colored),
         Failure::Rendered(text) => visible_lines(text),
         other => visible_lines(&format!("error: {other}")),
     };
@@ -87,6 +143,10 @@ fn say(failure: &Failure) {
         }
         cause = error.source();
     }
-    // With standard error closed there is nobody left to tell.
-    let _ = writeln!(io::stderr(), "{}", text.trim_end());
+    text
+}
+
+/// Whether standard error shows colours.
+fn colored() -> bool {
+    io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

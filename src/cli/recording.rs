@@ -45,7 +45,7 @@ pub struct RecordAnswer {
     pub elsewhere: usize,
     /// The replies of this start.
     pub replies: RepliesAnswer,
-    /// Episodes that were lost to failures which are not the agent's: in no trace, listed in `lost.jsonl` of the folder.
+    /// Episodes that were lost for want of an answer: in no trace, listed in `lost.jsonl` of the folder.
     pub lost: Vec<LostEpisode>,
     /// Episodes under way that a limit of what may be spent has stopped; they are not lost, and go on under a higher limit.
     pub stopped_by_limit: usize,
@@ -228,7 +228,12 @@ pub(super) fn dollars(value: f64) -> String {
 }
 
 /// Says what became of the episodes, where those that were lost are listed, and where the time went.
-pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, times: Spent) -> io::Result<()> {
+pub(super) fn say(
+    answer: &RecordAnswer,
+    (folder, lost_list): (&Path, &Path),
+    elapsed: Duration,
+    times: Spent,
+) -> io::Result<()> {
     let mut out = io::stderr().lock();
     let seconds = elapsed.as_secs_f64();
     #[expect(clippy::cast_precision_loss, reason = "a rate for people")]
@@ -260,12 +265,14 @@ pub(super) fn say(answer: &RecordAnswer, lost_list: &Path, elapsed: Duration, ti
         let episodes = counted(answer.lost.len() as u64, "episode");
         writeln!(
             out,
-            "lost {episodes} to failures that are not the agent's: in no trace, listed in {}; the same command tries again",
+            "lost {episodes} for want of an answer (a crash, a rate limit, a server error, a timeout): in no trace, listed in {}; the \
+             same command tries again",
             visible(&lost_list.display().to_string())
         )?;
     }
-    if let Some(words) = stopped(answer) {
-        writeln!(out, "{words}")?;
+    match stopped(answer) {
+        Some(words) => writeln!(out, "{words}")?,
+        None => writeln!(out, "next: mirrorstats report {}", visible(&folder.display().to_string()))?,
     }
     Ok(())
 }

@@ -80,11 +80,6 @@ impl From<StudyError> for Failure {
 impl Failure {
     /// Faults of definitions, a filter or a query, underlined.
     pub fn of_faults(faults: &Faults) -> Self {
-        Self::Faults(faults.render(colored()))
+        Self::Faults(faults.clone())
     }
-}
-
-/// Whether standard error shows colours.
-fn colored() -> bool {
-    io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

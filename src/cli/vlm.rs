@@ -30,7 +30,7 @@ pub struct VlmArgs {
     /// Who serves the model, instead of what the models' file says: openai, openrouter, google, anthropic, compatible
     #[arg(long, value_name = "NAME")]
     backend: Option<String>,
-    /// The address of a server that takes OpenAI's chat completions, such as <http://localhost:8000/v1>
+    /// The address of a server that takes OpenAI's chat completions, such as `http://localhost:8000/v1`
     #[arg(long, value_name = "URL")]
     base_url: Option<String>,
     /// Let the prompt alone ask for the reply's shape, and not the provider enforce it

@@ -12,7 +12,8 @@
 //! | `sum(x)` | every step where x is neither null nor 0 |
 //! | `at(x, t0)` | t0, where there is such a step |
 //!
-//! Where nothing holds, nothing decided: the list is empty.
+//! Where nothing holds, nothing decided: the list is empty. What the episode is compared with, such as the colour of its
+//! body, is told too; no timestep decides it.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt;
@@ -31,7 +32,7 @@ use super::segments::{Segments, truths};
 use super::vectors::Vector;
 use crate::base::escape::visible;
 use crate::base::suggest::nearest;
-use crate::metric::columns::Type;
+use crate::metric::columns::{Level, Type};
 use crate::metric::definitions::Definitions;
 use crate::metric::plan::{Aggregate, NodeId, Op, Plan};
 use crate::trace::open::TraceSet;
@@ -61,17 +62,19 @@ pub struct MetricEvidence {
     pub facts: Vec<Fact>,
 }
 
-/// One aggregate of one episode.
+/// One aggregate of one episode, or a column of the episode that something is compared with.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct Fact {
     /// The name of the `let` or metric that is exactly this aggregate, if one is.
     pub name: Option<String>,
-    /// The aggregate as written.
+    /// The aggregate as written, or the column.
     pub expression: String,
     /// Its value as text; null where there is none.
     pub value: Option<String>,
     /// The timesteps that decided it, ascending.
     pub timesteps: Vec<i64>,
+    /// Whether it is a column of the episode, the same at every timestep.
+    pub is_of_episode: bool,
 }
 
 /// Why an episode could not be explained.
@@ -239,8 +242,10 @@ impl Reading<'_> {
             Type::Bool => i64::from(values.bools().value(0)),
             _ => values.ints().value(0),
         });
-        let facts: Vec<Fact> =
-            self.plan().needed_by([self.decisive(node)]).into_iter().filter_map(|id| self.fact(id)).collect();
+        let needed = self.plan().needed_by([self.decisive(node)]);
+        let truths = self.truths(&needed);
+        let fact = |id: NodeId| self.fact(id).or_else(|| truths.contains(&id).then(|| self.truth(id)));
+        let facts: Vec<Fact> = needed.iter().filter_map(|id| fact(*id)).collect();
         let timesteps: BTreeSet<i64> = facts.iter().flat_map(|fact| fact.timesteps.iter().copied()).collect();
         MetricEvidence { metric: name.to_owned(), value, timesteps: timesteps.into_iter().collect(), facts }
     }
@@ -263,7 +268,40 @@ impl Reading<'_> {
             _ => return None,
         };
         let expression = self.plan().sources.get(&id).cloned().unwrap_or_default();
-        Some(Fact { name: self.reader.definitions.name_of(id), expression, value: self.text(id), timesteps })
+        Some(Fact {
+            name: self.reader.definitions.name_of(id),
+            expression,
+            value: self.text(id),
+            timesteps,
+            is_of_episode: false,
+        })
+    }
+
+    /// Columns of the episode that one of these values is a comparison with; those compared with constants tell nothing new.
+    fn truths(&self, needed: &[NodeId]) -> BTreeSet<NodeId> {
+        let pairs = needed.iter().filter_map(|id| match &self.plan().node(*id).op {
+            Op::Compare(_, a, b) | Op::Distinct(a, b) => Some([(*a, *b), (*b, *a)]),
+            _ => None,
+        });
+        let told = pairs.flatten().filter(|(_, other)| !matches!(self.plan().node(*other).op, Op::Constant(_)));
+        told.map(|(id, _)| self.unspread(id)).filter(|id| self.is_of_episode(*id)).collect()
+    }
+
+    fn unspread(&self, id: NodeId) -> NodeId {
+        if let Op::Spread(inner) = self.plan().node(id).op { inner } else { id }
+    }
+
+    fn is_of_episode(&self, id: NodeId) -> bool {
+        let node = self.plan().node(id);
+        node.level == Level::Episode && matches!(node.op, Op::Column(_))
+    }
+
+    fn truth(&self, id: NodeId) -> Fact {
+        let expression = match &self.plan().node(id).op {
+            Op::Column(name) => name.clone(),
+            _ => String::new(),
+        };
+        Fact { name: None, expression, value: self.text(id), timesteps: Vec::new(), is_of_episode: true }
     }
 
     fn moment(&self, moments: &Int64Array) -> Option<i64> {
@@ -338,13 +376,10 @@ impl fmt::Display for Evidence {
             for fact in &metric.facts {
                 let value = fact.value.as_deref().unwrap_or("null");
                 let name = fact.name.as_ref().map_or_else(String::new, |name| format!("{name} = "));
-                write!(
-                    f,
-                    "\n  {name}{} is {}   ({})",
-                    visible(&fact.expression),
-                    visible(value),
-                    decided(&fact.timesteps)
-                )?;
+                write!(f, "\n  {name}{} is {}", visible(&fact.expression), visible(value))?;
+                if !fact.is_of_episode {
+                    write!(f, "   ({})", decided(&fact.timesteps))?;
+                }
             }
         }
         Ok(())

@@ -39,7 +39,7 @@ pub struct EpisodeKeys {
 /// The label of what a study varies besides the model.
 pub const CONDITION: &str = "condition";
 
-/// The label of episodes that were lost to failures which are not the agent's.
+/// The label of episodes that were lost for want of an answer.
 pub const LOST: &str = "lost";
 
 /// What names an episode. The derived order is the order of the table.

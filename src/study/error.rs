@@ -220,7 +220,8 @@ pub enum StudyError {
     /// This build lacks a feature.
     #[error(
         "`{what}` needs Polars, which this build has not\n  \
-         help: build with it: cargo build --release --features polars"
+         help: build with it: cargo build --release --features {}",
+        crate::base::features::with("polars")
     )]
     WithoutPolars {
         /// The option or the command.

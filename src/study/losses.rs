@@ -1,4 +1,4 @@
-//! Episodes that were lost to failures which are not the agent's: ended by the infrastructure, or never recorded.
+//! Episodes that were lost for want of an answer: ended by the infrastructure, or never recorded.
 //!
 //! Rule: a lost episode is neither a success nor a failure. It is in no denominator, or in all of them as a failure where
 //! that is asked for; either is said. A file of scores keeps its row, marked by the label `lost`.

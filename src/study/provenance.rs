@@ -68,8 +68,15 @@ impl fmt::Display for TraceFault {
     }
 }
 
+/// The most traces that a message tells one by one: what to do about them must stay in view.
+const TOLD: usize = 5;
+
 fn lines(faults: &[TraceFault]) -> String {
-    faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
+    let mut lines: Vec<String> = faults.iter().take(TOLD).map(ToString::to_string).collect();
+    if let Some(more) = faults.len().checked_sub(TOLD).filter(|more| *more > 0) {
+        lines.push(format!("  and {more} more"));
+    }
+    lines.join("\n")
 }
 
 /// The manifest of a report's folder.

@@ -129,9 +129,7 @@ impl Study {
                 LostAs::Nothing => "in no denominator (--lost as-failure counts them)",
                 LostAs::Failure => "counted as failures",
             };
-            notes.push(format!(
-                "{total} {noun} {verb} lost to failures that are not the agent's: {counted}; see tables/quality.md"
-            ));
+            notes.push(format!("{total} {noun} {verb} lost for want of an answer: {counted}; see tables/quality.md"));
         }
         notes
     }

@@ -213,7 +213,7 @@ impl Trial {
         }
         if lost > 0 {
             let (noun, verb) = if lost == 1 { ("episode", "was") } else { ("episodes", "were") };
-            notes.push(format!("{lost} {noun} {verb} lost to failures that are not the agent's: in no denominator"));
+            notes.push(format!("{lost} {noun} {verb} lost for want of an answer: in no denominator"));
         }
         notes
     }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::inputs::Input;
 use crate::base::escape::visible;
 
-/// An episode that was lost to a failure which is not the agent's.
+/// An episode that was lost for want of an answer.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 pub struct LostEpisode {
     /// Its id.

@@ -6,9 +6,10 @@ use std::path::Path;
 use crate::assert_shown;
 use crate::run;
 
-/// The commands that a help text lists, `help` itself apart.
+/// The commands that a help text lists, `help` itself apart: below headings, two spaces before the name.
 fn commands(help: &str) -> Vec<String> {
-    let listed = help.lines().skip_while(|line| *line != "Commands:").skip(1).take_while(|line| !line.is_empty());
+    let listed = help.lines().skip_while(|line| !line.starts_with("Usage:")).skip(1);
+    let listed = listed.take_while(|line| !line.starts_with("Options") && !line.starts_with("Arguments"));
     let names = listed.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
     names.map(|line| line.split_whitespace().next().unwrap().to_owned()).filter(|name| name != "help").collect()
 }
@@ -29,7 +30,12 @@ fn every_command_tells_its_options() {
 }
 
 #[test]
-fn the_version_is_that_of_the_package() {
-    let version = run(Path::new("."), &["--version"]).done();
+fn the_version_is_that_of_the_package_and_the_long_one_tells_the_features() {
+    let version = run(Path::new("."), &["-V"]).done();
     assert_eq!(version, format!("mirrorstats {}\n", env!("CARGO_PKG_VERSION")));
+    let long = run(Path::new("."), &["--version"]).done();
+    let (first, features) = long.split_once('\n').unwrap();
+    assert_eq!(format!("{first}\n"), version);
+    assert_eq!(features.contains("sim"), cfg!(feature = "sim"));
+    assert_eq!(features.contains("polars"), cfg!(feature = "polars"));
 }

@@ -3,6 +3,7 @@
 mod audit;
 mod battery;
 mod colors;
+mod config;
 mod declared;
 mod extended;
 mod filters;

@@ -56,7 +56,7 @@ fn a_threshold_that_matters_is_told_in_sentences() {
     let arguments =
         ["sensitivity", ".", "--definitions", "chance.toml", "--metrics", "MCR,MGD,TSA", "--thresholds", "1,10,60,101"];
     let answer = run(folder.path(), &arguments);
-    assert_eq!(answer.stderr, "note: 1 episode was lost to failures that are not the agent's: in no denominator\n");
+    assert_eq!(answer.stderr, "note: 1 episode was lost for want of an answer: in no denominator\n");
     assert_shown!(arguments.join(" "), answer.done());
     let none = run(folder.path(), &["sensitivity", ".", "--where", "experiment = 'E1'", "--thresholds", "60"]).done();
     assert!(none.ends_with("\nNo conclusion changes.\n"), "{none}");

@@ -3,6 +3,8 @@
 pub mod audit;
 pub mod check;
 pub mod compare;
+pub mod completions;
+pub mod config;
 pub mod definitions;
 pub mod diff;
 pub mod experiments;
@@ -11,6 +13,7 @@ pub mod figure;
 pub mod filmstrip;
 pub mod import;
 pub mod info;
+pub mod man;
 pub mod plan;
 pub mod query;
 #[cfg(feature = "sim")]
@@ -65,9 +68,17 @@ pub enum Command {
     Experiments(experiments::ExperimentsArgs),
     #[cfg(feature = "sim")]
     World(world::WorldArgs),
+    Config(config::ConfigArgs),
+    Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
 }
 
 impl Command {
+    /// Whether it runs where the configuration cannot be used: what it does depends on no default.
+    pub const fn needs_no_settings(&self) -> bool {
+        matches!(self, Self::Config(_) | Self::Completions(_) | Self::Man(_))
+    }
+
     /// Does it.
     ///
     /// # Errors
@@ -103,6 +114,9 @@ impl Command {
             Self::Experiments(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::World(args) => args.run(),
+            Self::Config(args) => args.run(),
+            Self::Completions(args) => args.run(),
+            Self::Man(args) => args.run(),
         }
     }
 }

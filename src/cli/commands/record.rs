@@ -33,7 +33,7 @@ use crate::sim::config::WorldConfig;
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
 /// The same command again continues where it stopped. Several at once divide the episodes among themselves. Ctrl-C ends a
-/// recording when the steps under way are done, a second one at once; whole episodes stay. Exits with 1 if episodes were lost to failures that are not the agent's,
+/// recording when the steps under way are done, a second one at once; whole episodes stay. Exits with 1 if episodes were lost for want of an answer,
 /// with 2 if the agent could not go on, and with 130 if it was interrupted.
 #[derive(Clone, Debug, clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
@@ -60,7 +60,7 @@ pub struct RecordArgs {
     #[arg(long, value_name = "I/N", default_value = "1/1")]
     shard: Shard,
     /// The folder for traces and logs
-    #[arg(long, value_name = "DIR", default_value = "runs")]
+    #[arg(short, long, value_name = "DIR", default_value = "runs")]
     out: PathBuf,
     /// What the study varies besides the model, by name: a column of traces and tables, and part of each episode's id
     #[arg(long, value_name = "NAME", value_parser = condition)]
@@ -206,7 +206,7 @@ impl RecordArgs {
             traces: files(plan, |experiment| store.trace(experiment)),
             logs: files(plan, |experiment| store.log(experiment)),
         };
-        recording::say(&answer, &store.lost_list(), start.elapsed(), shares.spent())?;
+        recording::say(&answer, (&self.out, &store.lost_list()), start.elapsed(), shares.spent())?;
         if self.json {
             output::print_json(&answer)?;
         }

@@ -27,7 +27,7 @@ pub struct ReportArgs {
     #[command(flatten)]
     pub engine: EngineArgs,
     /// The folder to write
-    #[arg(long, value_name = "DIR", default_value = "reports/latest")]
+    #[arg(short, long, value_name = "DIR", default_value = "reports/latest")]
     pub out: PathBuf,
     /// How tables look: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
@@ -81,6 +81,10 @@ impl ReportArgs {
         }
         let episodes = counted(report.results.episodes.len() as u64, "episode");
         output::say(&format!("{episodes}; the report is in {}", self.out.display()));
+        if !self.no_figures {
+            output::say(&format!("open {}", self.out.join("report.html").display()));
+        }
+        output::say("next: `mirrorstats stats` with the same traces tells what these numbers can bear");
         Ok(Outcome::Done)
     }
 }

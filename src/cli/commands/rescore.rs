@@ -29,7 +29,7 @@ pub struct RescoreArgs {
     #[arg(long, value_name = "NAME|FILE")]
     pub definitions: String,
     /// The folder to write [default: REPORT_DIR-rescored]
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Where the traces are: folders or files
     #[arg(long, value_name = "PLACE", num_args = 1..)]

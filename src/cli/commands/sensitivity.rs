@@ -29,7 +29,7 @@ pub struct SensitivityArgs {
     #[arg(long)]
     pub pool: bool,
     /// Write sensitivity.csv, .md and .tex, and the figure in every format, into this folder
-    #[arg(long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Write the figure here; the ending says the format
     #[arg(long, value_name = "FILE")]

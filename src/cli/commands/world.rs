@@ -54,7 +54,7 @@ struct SceneArgs {
 #[derive(Clone, Debug, clap::Args)]
 struct SheetArgs {
     /// The folder for `sheet.png`
-    #[arg(long, value_name = "DIR", default_value = "reports/world")]
+    #[arg(short, long, value_name = "DIR", default_value = "reports/world")]
     out: PathBuf,
     /// Which experiments, a row each: E1, E1..E5, E1,E3, or a file such as mine.toml
     #[arg(long, value_name = "LIST", default_value = "E1..E5")]

@@ -162,7 +162,7 @@ fn losses(statistics: &Statistics) -> Option<String> {
     let total: u64 = lost.iter().map(|(.., lost)| lost).sum();
     (total > 0).then(|| {
         format!(
-            "{total} episodes were lost to failures that are not the agent's (rate limit, server error, timeout): they are \
+            "{total} episodes were lost for want of an answer (a crash, a rate limit, a server error, a timeout): they are \
              in no denominator; the bounds under losses say what they could have changed."
         )
     })

@@ -27,6 +27,7 @@ use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use crate::trace::catch_panic::contained;
 use crate::trace::declared::Declared;
 use crate::trace::footer_shape;
+use crate::trace::schema::COLUMNS;
 
 /// The footer key that tells scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -51,7 +52,10 @@ pub fn holds_scores(file: &impl ChunkReader, folders: &[(String, Option<String>)
     let columns = metadata.file_metadata().schema_descr().root_schema().get_fields().iter();
     let outside = folders.iter().map(|(name, _)| name.as_str());
     let names: Vec<&str> = columns.map(|column| column.name()).chain(outside).collect();
-    !names.contains(&"t") && KEYS.iter().all(|key| names.contains(key))
+    let is_of_steps =
+        |name: &str| COLUMNS.iter().any(|column| column.required && !column.constant && column.name == name);
+    // A trace without `t` has the keys too; what it has besides are columns of steps.
+    !names.iter().any(|name| is_of_steps(name)) && KEYS.iter().all(|key| names.contains(key))
 }
 
 /// Whether a file of scores carries the definitions that gave them.

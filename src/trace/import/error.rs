@@ -17,7 +17,9 @@ pub(super) struct Faults {
 
 impl Faults {
     pub(super) fn add(&mut self, fault: Fault) {
-        if self.told.len() < TOLD {
+        if let Some(same) = self.told.iter_mut().find(|told| told.is_alike(&fault)) {
+            same.further_lines += 1;
+        } else if self.told.len() < TOLD {
             self.told.push(fault);
         } else {
             self.more += 1;

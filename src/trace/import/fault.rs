@@ -34,9 +34,17 @@ pub struct Fault {
     pub found: String,
     /// What to do about it.
     pub help: String,
+    /// How many lines after it have the same fault.
+    pub further_lines: u64,
 }
 
 impl Fault {
+    /// Whether another one is the same fault in another line of the file.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        let of_line = |fault: &Self| Self { line: None, further_lines: 0, ..fault.clone() };
+        self.line.is_some() && other.line.is_some() && of_line(self) == of_line(other)
+    }
+
     /// A fault of a whole file, its words still to be said.
     pub(super) fn of_file(file: &str) -> Self {
         Self { file: file.to_owned(), ..Self::default() }
@@ -67,6 +75,11 @@ impl fmt::Display for Fault {
         }
         if let Some(key) = &self.key {
             write!(f, ", key `{}`", visible(key))?;
+        }
+        match self.further_lines {
+            0 => {}
+            1 => f.write_str(", and in one more line")?,
+            more => write!(f, ", and in {more} more lines")?,
         }
         write!(f, "\n  expected {}\n  found {}\n  help: {}", self.expected, self.found, self.help)
     }

@@ -1,0 +1,366 @@
+//! Defaults of options out of `mirrorstats.toml` and the environment.
+//!
+//! A setting is a default of an option of one command, or of every command that has the option. What is typed comes
+//! before all; then the environment, then the file; in each, the setting of one command before that of all.
+//!
+//! Rule: a setting that no command has, or whose value its option does not take, is refused, before anything runs.
+
+use std::env;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::{Arg, Command};
+use schemars::JsonSchema;
+use serde::Serialize;
+use toml::de::{DeTable, DeValue};
+
+use crate::base::escape::visible;
+use crate::base::suggest;
+use crate::cli::outcome::Failure;
+use crate::metric::fault::{Fault, Faults, Place, Source};
+
+/// The file's name.
+const FILE: &str = "mirrorstats.toml";
+/// The variable that names another file, or none if it is empty.
+pub const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
+/// Which form errors have, which is decided before anything is parsed.
+pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
+/// What variables of settings begin with.
+const PREFIX: &str = "MIRRORSTATS_";
+/// The most bytes of a file.
+const MOST_BYTES: u64 = 1 << 20;
+
+/// Where a setting comes from.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Origin {
+    /// The configuration file.
+    File(String),
+    /// A variable of the environment.
+    Variable(String),
+}
+
+/// A default of an option.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Setting {
+    /// The command, such as `definitions check`; none for every command that has the option.
+    pub command: Option<String>,
+    /// The option's long name.
+    pub option: String,
+    /// Its values.
+    pub values: Vec<String>,
+    /// Where it comes from.
+    pub origin: Origin,
+}
+
+/// All settings that hold here.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// The file that was read.
+    pub file: Option<String>,
+    /// In the order of the file, then by variable.
+    pub all: Vec<Setting>,
+}
+
+impl fmt::Display for Origin {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File(name) | Self::Variable(name) => f.write_str(&visible(name)),
+        }
+    }
+}
+
+/// An option of a command.
+struct Choice<'a> {
+    command: String,
+    arg: &'a Arg,
+}
+
+/// The settings that hold for a command line.
+///
+/// # Errors
+/// When the file cannot be read, and for everything in it or in the environment that is no setting.
+pub fn load(command: &Command) -> Result<Settings, Failure> {
+    let choices = choices(command, "");
+    let mut settings = Settings::default();
+    if let Some(path) = file()? {
+        let name = path.display().to_string();
+        settings.all = of_file(&path, &name, &choices)?;
+        settings.file = Some(name);
+    }
+    settings.all.extend(of_environment(&choices)?);
+    Ok(settings)
+}
+
+impl Settings {
+    /// A command with these as its defaults.
+    pub fn apply(&self, command: Command) -> Command {
+        self.applied(command, "")
+    }
+
+    fn applied(&self, command: Command, path: &str) -> Command {
+        let inner: Vec<String> = command.get_subcommands().map(|inner| inner.get_name().to_owned()).collect();
+        let command = inner.into_iter().fold(command, |command, name| {
+            let path = joined(path, &name);
+            command.mut_subcommand(name, |inner| self.applied(inner, &path))
+        });
+        if path.is_empty() {
+            return command;
+        }
+        command.mut_args(|arg| match arg.get_long().and_then(|long| self.of(path, long)) {
+            Some(setting) => arg.default_values(setting.values.clone()),
+            None => arg,
+        })
+    }
+
+    /// The setting of an option of a command.
+    fn of(&self, command: &str, option: &str) -> Option<&Setting> {
+        let rank = |setting: &Setting| (matches!(setting.origin, Origin::Variable(_)), setting.command.is_some());
+        let meant = self
+            .all
+            .iter()
+            .filter(|setting| setting.option == option && setting.command.as_deref().is_none_or(|own| own == command));
+        meant.max_by_key(|setting| rank(setting))
+    }
+}
+
+/// The file that holds here: the one that the variable names, else the nearest at or above the current folder.
+fn file() -> Result<Option<PathBuf>, Failure> {
+    if let Some(named) = env::var_os(FILE_VARIABLE) {
+        return Ok(Some(PathBuf::from(named)).filter(|path| !path.as_os_str().is_empty()));
+    }
+    let here = env::current_dir().map_err(|error| Failure::input(format!("the current folder: {error}")))?;
+    let mut relative = PathBuf::new();
+    for folder in here.ancestors() {
+        if folder.join(FILE).is_file() {
+            return Ok(Some(relative.join(FILE)));
+        }
+        relative.push("..");
+    }
+    Ok(None)
+}
+
+/// Every option of every command.
+fn choices<'a>(command: &'a Command, path: &str) -> Vec<Choice<'a>> {
+    let mut all = Vec::new();
+    for inner in command.get_subcommands() {
+        let path = joined(path, inner.get_name());
+        let options =
+            inner.get_arguments().filter(|arg| arg.get_long().is_some_and(|long| long != "help" && long != "version"));
+        all.extend(options.map(|arg| Choice { command: path.clone(), arg }));
+        all.extend(choices(inner, &path));
+    }
+    all
+}
+
+fn joined(path: &str, name: &str) -> String {
+    format!("{path} {name}").trim_start().to_owned()
+}
+
+fn of_file(path: &Path, name: &str, choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
+    let text = text_of(path).map_err(|error| {
+        Failure::input(format!(
+            "cannot read the configuration file `{name}`: {error}\n  help: `{FILE_VARIABLE}=` reads none"
+        ))
+    })?;
+    let source = Arc::new(Source { name: name.to_owned(), text });
+    let (table, errors) = DeTable::parse_recoverable(&source.text);
+    let mut faults: Vec<Fault> = errors
+        .into_iter()
+        .map(|error| {
+            let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
+            Fault::new(place, format!("not TOML: {}", error.message()))
+        })
+        .collect();
+    let mut reader = FileReader { source: &source, choices, faults: Vec::new(), found: Vec::new() };
+    if faults.is_empty() {
+        reader.table(table.get_ref(), "");
+        faults = reader.faults;
+    }
+    if faults.is_empty() { Ok(reader.found) } else { Err(Failure::Faults(Faults(faults).in_order())) }
+}
+
+fn text_of(path: &Path) -> io::Result<String> {
+    use std::io::Read as _;
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(io::Error::other("expected a file"));
+    }
+    let mut text = String::new();
+    std::fs::File::open(path)?.take(MOST_BYTES + 1).read_to_string(&mut text)?;
+    if text.len() as u64 > MOST_BYTES { Err(io::Error::other("it is longer than 1 MiB")) } else { Ok(text) }
+}
+
+struct FileReader<'a> {
+    source: &'a Arc<Source>,
+    choices: &'a [Choice<'a>],
+    faults: Vec<Fault>,
+    found: Vec<Setting>,
+}
+
+impl FileReader<'_> {
+    fn fault(&mut self, span: std::ops::Range<usize>, message: String, help: Option<String>) {
+        let place = Place { source: self.source.clone(), span };
+        self.faults.push(Fault::new(place, message).help_if(help));
+    }
+
+    fn table(&mut self, table: &DeTable<'_>, path: &str) {
+        for (key, value) in table {
+            let name = key.get_ref().as_ref();
+            if let DeValue::Table(inner) = value.get_ref() {
+                let path = joined(path, name);
+                if self.choices.iter().any(|choice| is_within(&choice.command, &path)) {
+                    self.table(inner, &path);
+                } else {
+                    let known = self.choices.iter().map(|choice| choice.command.as_str());
+                    let near = suggest::nearest(&path, known).map(|near| format!("did you mean `[{near}]`?"));
+                    self.fault(key.span(), format!("no command `{path}`"), near);
+                }
+                continue;
+            }
+            let command = (!path.is_empty()).then(|| path.to_owned());
+            let Some(values) = values(value.get_ref()) else {
+                let message = format!(
+                    "expected a text, a number, true, false, or a list of them, found {}",
+                    value.get_ref().type_str()
+                );
+                self.fault(value.span(), message, None);
+                continue;
+            };
+            let origin = Origin::File(self.source.name.clone());
+            let setting = Setting { command, option: name.to_owned(), values, origin };
+            match check(&setting, self.choices) {
+                Ok(()) => self.found.push(setting),
+                Err(Refusal::Option(message, help)) => self.fault(key.span(), message, help),
+                Err(Refusal::Value(message)) => self.fault(value.span(), message, None),
+            }
+        }
+    }
+}
+
+fn is_within(command: &str, path: &str) -> bool {
+    command.strip_prefix(path).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+}
+
+/// A value as it would be typed.
+fn values(value: &DeValue<'_>) -> Option<Vec<String>> {
+    match value {
+        DeValue::Array(all) => {
+            let each = all.iter().map(|one| values(one.get_ref()).and_then(|mut one| one.pop()));
+            each.collect()
+        }
+        DeValue::String(text) => Some(vec![text.to_string()]),
+        DeValue::Boolean(truth) => Some(vec![truth.to_string()]),
+        DeValue::Integer(number) => Some(vec![number.to_string()]),
+        DeValue::Float(number) => Some(vec![number.to_string()]),
+        DeValue::Datetime(_) | DeValue::Table(_) => None,
+    }
+}
+
+enum Refusal {
+    /// No such option: what, and a remedy.
+    Option(String, Option<String>),
+    /// A value that it does not take.
+    Value(String),
+}
+
+/// Whether a command has the option, and takes the values.
+fn check(setting: &Setting, choices: &[Choice<'_>]) -> Result<(), Refusal> {
+    let of_command = |choice: &&Choice<'_>| setting.command.as_ref().is_none_or(|command| *command == choice.command);
+    let meant: Vec<&Choice<'_>> = choices.iter().filter(of_command).collect();
+    let taken: Vec<&&Choice<'_>> =
+        meant.iter().filter(|choice| choice.arg.get_long() == Some(setting.option.as_str())).collect();
+    if taken.is_empty() {
+        let near = suggest::nearest(&setting.option, meant.iter().filter_map(|choice| choice.arg.get_long()));
+        let of = setting.command.as_ref().map_or("any command".to_owned(), |command| format!("`{command}`"));
+        let message = format!("no option `--{}` of {of}", visible(&setting.option));
+        return Err(Refusal::Option(message, near.map(|near| format!("did you mean `{near}`?"))));
+    }
+    taken.into_iter().try_for_each(|choice| takes(choice, setting))
+}
+
+/// Whether an option takes the values, by a command that has it alone.
+fn takes(choice: &Choice<'_>, setting: &Setting) -> Result<(), Refusal> {
+    let own = choice.arg;
+    if !own.get_action().takes_values() {
+        return match setting.values.as_slice() {
+            [one] if ["true", "false"].contains(&one.as_str()) => Ok(()),
+            _ => Err(Refusal::Value("expected true or false".to_owned())),
+        };
+    }
+    let mut twin = Arg::new(own.get_id().clone())
+        .long(setting.option.clone())
+        .action(own.get_action().clone())
+        .value_parser(own.get_value_parser().clone());
+    if let Some(delimiter) = own.get_value_delimiter() {
+        twin = twin.value_delimiter(delimiter);
+    }
+    let typed = setting.values.iter().flat_map(|value| [format!("--{}={value}", setting.option)]);
+    let command = Command::new("mirrorstats").arg(twin).disable_help_flag(true).disable_version_flag(true);
+    match command.try_get_matches_from(std::iter::once("mirrorstats".to_owned()).chain(typed)) {
+        Ok(_) => Ok(()),
+        Err(error) => {
+            let words = error.to_string();
+            let first = words.lines().next().unwrap_or_default();
+            Err(Refusal::Value(first.trim_start_matches("error: ").to_owned()))
+        }
+    }
+}
+
+/// Settings in the environment: `MIRRORSTATS_THREADS` for every command, `MIRRORSTATS_RECORD_OUT` for one.
+fn of_environment(choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
+    let mut found = Vec::new();
+    for choice in choices {
+        let long = choice.arg.get_long().unwrap_or_default();
+        let of_all = (None, format!("{PREFIX}{}", spelled(long)));
+        let of_one = (Some(choice.command.clone()), format!("{PREFIX}{}_{}", spelled(&choice.command), spelled(long)));
+        for (command, variable) in [of_all, of_one] {
+            let Some(value) = env::var_os(&variable) else { continue };
+            let value = value.into_string().map_err(|_| refused(&variable, "expected UTF-8 text"))?;
+            let origin = Origin::Variable(variable.clone());
+            let setting = Setting { command, option: long.to_owned(), values: vec![value], origin };
+            if found.contains(&setting) {
+                continue;
+            }
+            match check(&setting, choices) {
+                Ok(()) => found.push(setting),
+                Err(Refusal::Option(message, _) | Refusal::Value(message)) => return Err(refused(&variable, &message)),
+            }
+        }
+    }
+    found.sort_by(|a, b| a.origin.cmp(&b.origin));
+    Ok(found)
+}
+
+/// Variables that look like settings and are none, as a misspelt one: each with what may be meant.
+pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
+    let choices = choices(command, "");
+    let known: Vec<String> = choices
+        .iter()
+        .flat_map(|choice| {
+            let long = spelled(choice.arg.get_long().unwrap_or_default());
+            [format!("{PREFIX}{long}"), format!("{PREFIX}{}_{long}", spelled(&choice.command))]
+        })
+        .chain([FILE_VARIABLE.to_owned(), ERRORS_VARIABLE.to_owned()])
+        .collect();
+    let names = env::vars_os().filter_map(|(name, _)| name.into_string().ok());
+    let mut unknown: Vec<String> = names.filter(|name| name.starts_with(PREFIX) && !known.contains(name)).collect();
+    unknown.sort_unstable();
+    let with_hint = |name: String| {
+        let near = suggest::nearest(&name, known.iter().map(String::as_str)).map(str::to_owned);
+        (name, near)
+    };
+    unknown.into_iter().map(with_hint).collect()
+}
+
+fn spelled(name: &str) -> String {
+    name.replace(['-', ' '], "_").to_ascii_uppercase()
+}
+
+fn refused(variable: &str, why: &str) -> Failure {
+    Failure::input(format!(
+        "the environment variable {}: {why}\n  help: unset it, or see `mirrorstats config --help`",
+        visible(variable)
+    ))
+}

@@ -1,0 +1,70 @@
+//! What a refused command line is told beside clap's own words.
+
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Command, Error};
+
+use crate::base::{features, suggest};
+
+/// The commands of the feature `sim`.
+const OF_SIM: [&str; 4] = ["record", "replay", "filmstrip", "world"];
+
+/// An error that names the commands which have a refused option, and the feature that has a refused command.
+pub fn with_tips(mut error: Error, command: &Command) -> Error {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.clone()),
+        _ => None,
+    };
+    let tip = match error.kind() {
+        ErrorKind::UnknownArgument => text(ContextKind::InvalidArg).and_then(|option| of_others(&option, command)),
+        ErrorKind::InvalidSubcommand => text(ContextKind::InvalidSubcommand)
+            .and_then(|name| of_feature(&name).or_else(|| Some(similar(&name, command)))),
+        _ => None,
+    };
+    if error.kind() == ErrorKind::InvalidSubcommand {
+        // Clap's own idea of a similar name is a wide one: `filmstrip` for `ls`.
+        error.remove(ContextKind::SuggestedSubcommand);
+    }
+    if let Some(tip) = tip {
+        // A similar name of this command is no better than the same name of another.
+        error.remove(ContextKind::SuggestedArg);
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
+    }
+    error
+}
+
+/// The commands that have an option, in words.
+fn of_others(option: &str, command: &Command) -> Option<String> {
+    let long = option.strip_prefix("--")?.split('=').next()?;
+    let mut paths = Vec::new();
+    collect(command, "", long, &mut paths);
+    let paths: Vec<String> = paths.iter().map(|path| format!("`{path}`")).collect();
+    (!paths.is_empty()).then(|| format!("`--{long}` is an option of {}", paths.join(", ")))
+}
+
+fn collect(command: &Command, path: &str, long: &str, found: &mut Vec<String>) {
+    for inner in command.get_subcommands() {
+        let path = format!("{path} {}", inner.get_name()).trim_start().to_owned();
+        if inner.get_arguments().any(|arg| arg.get_long() == Some(long)) {
+            found.push(path.clone());
+        }
+        collect(inner, &path, long, found);
+    }
+}
+
+/// What a command of a feature needs that this build has not.
+fn of_feature(name: &str) -> Option<String> {
+    (!cfg!(feature = "sim") && OF_SIM.contains(&name)).then(|| {
+        format!(
+            "`{name}` needs the feature `sim`, which this build has not: build with `--features {}`",
+            features::with("sim")
+        )
+    })
+}
+
+/// The command whose name is nearest, or where they are listed.
+fn similar(name: &str, command: &Command) -> String {
+    match suggest::nearest(name, command.get_subcommands().map(Command::get_name)) {
+        Some(near) => format!("a similar command exists: `{near}`"),
+        None => "`mirrorstats help` lists the commands".to_owned(),
+    }
+}

@@ -1,0 +1,168 @@
+//! Defaults out of a file and the environment, and what a refused command line is told.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+
+use crate::harness::program::{Answer, answer, program};
+use crate::{fixture, run};
+
+/// A folder with a configuration file.
+fn configured(text: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("mirrorstats.toml"), text).unwrap();
+    folder
+}
+
+fn with(folder: &Path, variables: &[(&str, &str)], arguments: &[&str]) -> Answer {
+    answer(program(folder).args(arguments).envs(variables.iter().copied()))
+}
+
+/// Where `report` wrote its folder: what each source of a default says is told apart by it.
+fn written(folder: &Path, variables: &[(&str, &str)], typed: &[&str]) -> String {
+    let traces = fixture("recorded/E1-oracle.parquet");
+    let arguments = [&["report", traces.to_str().unwrap(), "--no-figures", "--json"], typed].concat();
+    with(folder, variables, &arguments).json()["out"].as_str().unwrap().to_owned()
+}
+
+#[test]
+fn what_is_typed_comes_before_the_environment_and_that_before_the_file() {
+    let folder = configured("out = \"of-all\"\n[report]\nout = \"of-report\"\n");
+    let here = folder.path();
+    let of_all = ("MIRRORSTATS_OUT", "of-variable");
+    let of_one = ("MIRRORSTATS_REPORT_OUT", "of-variable-of-report");
+    assert_eq!(written(here, &[], &[]), "of-report");
+    assert_eq!(written(here, &[of_all], &[]), "of-variable");
+    assert_eq!(written(here, &[of_all, of_one], &[]), "of-variable-of-report");
+    assert_eq!(written(here, &[of_all, of_one], &["-o", "typed"]), "typed");
+    assert_eq!(written(here, &[("MIRRORSTATS_CONFIG_FILE", "")], &[]), "reports/latest");
+    let below = here.join("a/b");
+    fs::create_dir_all(&below).unwrap();
+    assert_eq!(written(&below, &[], &[]), "of-report", "the file of a folder above");
+    fs::write(below.join("mirrorstats.toml"), "").unwrap();
+    assert_eq!(written(&below, &[], &[]), "reports/latest", "the nearest file alone");
+}
+
+#[test]
+fn flags_and_lists_may_stand_in_the_file() {
+    let folder =
+        configured("threads = 1\n[report]\nno-figures = true\nby = [\"model\", \"seed\"]\nstyle = \"paper\"\n");
+    let traces = fixture("recorded/E1-oracle.parquet");
+    let report = run(folder.path(), &["report", traces.to_str().unwrap(), "--json"]).json();
+    assert_eq!(report["manifest"]["by"], json!(["model", "seed"]));
+    assert_eq!(report["manifest"]["style"]["name"], "paper");
+    assert!(!folder.path().join("reports/latest/figures").exists());
+    let help = run(folder.path(), &["report", "--help"]).done();
+    assert!(help.contains("[default: paper]"), "{help}");
+}
+
+#[test]
+fn every_setting_is_shown_with_where_it_comes_from() {
+    let folder = configured("threads = 2\n[\"definitions\".check]\njson = true\n");
+    let variables = [("MIRRORSTATS_RECORD_OUT", "runs"), ("MIRRORSTATS_TREADS", "3")];
+    let shown = with(folder.path(), &variables, &["config", "--json"]);
+    let expected = json!({
+        "file": "mirrorstats.toml",
+        "settings": [
+            {"command": null, "option": "threads", "values": ["2"], "origin": {"file": "mirrorstats.toml"}},
+            {"command": "definitions check", "option": "json", "values": ["true"], "origin": {"file": "mirrorstats.toml"}},
+            {"command": "record", "option": "out", "values": ["runs"], "origin": {"variable": "MIRRORSTATS_RECORD_OUT"}},
+        ],
+        "unknown_variables": ["MIRRORSTATS_TREADS"],
+    });
+    let settings = if cfg!(feature = "sim") {
+        expected
+    } else {
+        let mut expected = expected;
+        expected["settings"].as_array_mut().unwrap().pop();
+        expected["unknown_variables"] = json!(["MIRRORSTATS_RECORD_OUT", "MIRRORSTATS_TREADS"]);
+        expected
+    };
+    assert_eq!(serde_json::from_str::<Value>(&shown.stdout).unwrap(), settings);
+    let Answer { stdout: text, stderr, .. } = with(folder.path(), &variables, &["config"]);
+    assert!(stderr.contains("MIRRORSTATS_TREADS sets nothing") && stderr.contains("did you mean"), "{stderr}");
+    assert!(text.contains("configuration file: mirrorstats.toml") && text.contains("--threads"), "{text}");
+}
+
+#[test]
+fn every_fault_of_the_file_is_underlined_before_anything_runs() {
+    let folder =
+        configured("threads = 0\nstyl = \"x\"\n[report]\nno-figures = \"perhaps\"\nby = { a = 1 }\n[recrd]\nx = 1\n");
+    let refused = run(folder.path(), &["report", "x"]).refused();
+    for words in [
+        "invalid value '0' for '--threads <threads>'",
+        "no option `--styl` of any command",
+        "did you mean `style`?",
+        "expected true or false",
+        "no command `report by`",
+        "no command `recrd`",
+        "5 faults",
+    ] {
+        assert!(refused.contains(words), "{words}\n{refused}");
+    }
+    assert!(!folder.path().join("reports").exists());
+    assert!(run(folder.path(), &["report", "--help"]).done().contains("Usage"));
+    assert!(run(folder.path(), &["completions", "bash"]).done().contains("mirrorstats"));
+    let refused = run(folder.path(), &["config"]).refused();
+    assert!(refused.contains("5 faults"), "{refused}");
+    let wrong =
+        with(tempfile::tempdir().unwrap().path(), &[("MIRRORSTATS_THREADS", "many")], &["score", "x"]).refused();
+    assert!(wrong.contains("the environment variable MIRRORSTATS_THREADS: invalid value 'many'"), "{wrong}");
+    let gone = with(folder.path(), &[("MIRRORSTATS_CONFIG_FILE", "gone.toml")], &["score", "x"]).refused();
+    assert!(gone.contains("cannot read the configuration file `gone.toml`"), "{gone}");
+}
+
+#[test]
+fn errors_are_told_as_one_json_object_where_that_is_asked_for() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("wrong.toml"), "[metric.A]\nkind = \"rate\"\nvalue = \"actoin = 1\"\n").unwrap();
+    let told = |variables: &[(&str, &str)], arguments: &[&str]| -> Value {
+        let stderr = with(folder.path(), variables, arguments).ends(2).stderr;
+        assert_eq!(stderr.lines().count(), 1, "{stderr}");
+        serde_json::from_str(&stderr).unwrap()
+    };
+    let faults = told(&[], &["definitions", "check", "wrong.toml", "--errors", "json"]);
+    assert_eq!(faults["code"], 2);
+    assert_eq!(faults["faults"][0]["file"], "wrong.toml");
+    assert!(faults["faults"].as_array().unwrap().iter().any(|fault| fault["line"] == 3), "{faults}");
+    let missing = told(&[("MIRRORSTATS_ERRORS", "json")], &["score", "gone"]);
+    assert!(missing["error"].as_str().unwrap().contains("gone"), "{missing}");
+    let usage = told(&[], &["--errors=json", "score"]);
+    assert!(usage["error"].as_str().unwrap().contains("<TRACES>"), "{usage}");
+    let in_words =
+        with(folder.path(), &[("MIRRORSTATS_ERRORS", "json")], &["score", "gone", "--errors", "text"]).refused();
+    assert!(serde_json::from_str::<Value>(&in_words).is_err(), "{in_words}");
+}
+
+#[test]
+fn a_refused_option_or_command_is_told_where_it_is() {
+    let here = Path::new(".");
+    let refused = run(here, &["stats", "runs", "--published", "x.csv"]).refused();
+    assert!(refused.contains("tip: `--published` is an option of `compare`"), "{refused}");
+    let refused = run(here, &["ls"]).refused();
+    assert!(
+        refused.contains("tip: `mirrorstats help` lists the commands") && !refused.contains("filmstrip"),
+        "{refused}"
+    );
+    let refused = run(here, &["valdate"]).refused();
+    assert!(refused.contains("a similar command exists: `validate`"), "{refused}");
+}
+
+#[test]
+fn shells_and_manuals_know_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
+        assert!(run(folder.path(), &["completions", shell]).done().contains("renormalize"), "{shell}");
+    }
+    run(folder.path(), &["man", "pages/man1"]).ends(0);
+    let page = fs::read_to_string(folder.path().join("pages/man1/mirrorstats-score.1")).unwrap();
+    assert!(page.contains("\\-\\-explain") && page.contains("Examples:"), "{page}");
+    let nested = folder.path().join("pages/man1/mirrorstats-definitions-check.1");
+    assert!(nested.is_file());
+    let whole = fs::read_to_string(folder.path().join("pages/man1/mirrorstats.1")).unwrap();
+    for command in ["report", "config", "renormalize"] {
+        assert!(whole.contains(command), "{command}");
+    }
+}

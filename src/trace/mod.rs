@@ -12,6 +12,7 @@
 
 pub mod bits;
 pub(crate) mod catch_panic;
+pub mod checksums;
 pub mod declared;
 pub mod declared_experiment;
 pub mod diagnostic;

@@ -63,6 +63,9 @@ pub enum FormatError {
     /// The Parquet library's own words.
     #[error("not a readable Parquet file of scores: {0}")]
     Parquet(#[from] ::parquet::errors::ParquetError),
+    /// Bytes that contradict the file's own checksums.
+    #[error("the file is damaged: {0}; restore it from its source, or score the traces again")]
+    Damaged(String),
     /// A column that is missing or has another type.
     #[error("column `{column}`: expected {expected}, found {found}; scores are written by `mirrorstats score`")]
     Column {

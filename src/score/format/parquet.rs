@@ -25,6 +25,7 @@ use crate::metric::catalog::Catalog;
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use crate::trace::catch_panic::contained;
+use crate::trace::checksums::{self, CREATED_BY, Held};
 use crate::trace::declared::Declared;
 use crate::trace::footer_shape;
 
@@ -90,7 +91,7 @@ pub struct Encoder<'a> {
 
 /// Takes what was encoded, in the order of the jobs.
 pub struct Writer<W: Write + Send> {
-    file: SerializedFileWriter<W>,
+    file: SerializedFileWriter<Held<W>>,
     columns: usize,
     /// The columns so far of the row group under way.
     group: Vec<ArrowColumnChunk>,
@@ -103,7 +104,8 @@ pub struct Writer<W: Write + Send> {
 pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder<'_>, Writer<W>), FormatError> {
     let header = table.header();
     let schema = Arc::new(schema(&header));
-    let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties(&header, &table.declared)?))?;
+    let properties = properties(&header, &table.declared)?;
+    let parquet = ArrowWriter::try_new(Held::new(out), Arc::clone(&schema), Some(properties))?;
     let (file, factory) = parquet.into_serialized_writer()?;
     let writer = Writer { file, columns: schema.fields().len(), group: Vec::new() };
     let groups = (0..table.len().div_ceil(ROW_GROUP_ROWS)).map(|_| Mutex::default()).collect();
@@ -204,6 +206,7 @@ impl<W: Write + Send> Writer<W> {
             let mut group = self.file.next_row_group()?;
             self.group.drain(..).try_for_each(|column| column.append_to_row_group(&mut group))?;
             group.close()?;
+            checksums::pass_on(&mut self.file)?;
         }
         Ok(())
     }
@@ -213,7 +216,7 @@ impl<W: Write + Send> Writer<W> {
     /// # Errors
     /// Whatever writing gives.
     pub fn finish(self) -> Result<(), FormatError> {
-        self.file.close()?;
+        checksums::finish(self.file)?;
         Ok(())
     }
 }
@@ -233,6 +236,7 @@ fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, 
         metadata.push(pair(DECLARED_KEY, &text));
     }
     let mut properties = WriterProperties::builder()
+        .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         // Who reads scores reads all of them.
         .set_statistics_enabled(EnabledStatistics::None)
@@ -261,6 +265,9 @@ pub(super) fn read(input: impl ChunkReader + 'static, partition: &Partition<'_>)
 }
 
 fn decode(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+    if let Some(metadata) = metadata(&input) {
+        checksums::verify_file(&input, &metadata).map_err(FormatError::Damaged)?;
+    }
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
     let catalog = match (footer::value(builder.metadata().file_metadata(), DEFINITIONS_KEY), partition.definitions) {

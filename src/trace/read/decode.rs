@@ -14,7 +14,7 @@ use parquet::basic::Type as Physical;
 
 use super::column::{Column, Runs, all_within};
 use super::footer::{plain, rows_of};
-use super::open::{TraceFile, text_type};
+use super::open::{Readable, TraceFile, text_type};
 use super::pages::{self, Cursor, FaultSlot, Form, Place, Store, Unsupported};
 use super::projection::{EPISODE_ID, Layout, T};
 use crate::trace::catch_panic::contained;
@@ -69,7 +69,7 @@ pub(in crate::trace) struct Ids {
 pub(in crate::trace) struct RowGroup<'a> {
     file: &'a TraceFile,
     layout: &'a Layout,
-    footer: Arc<ArrowReaderMetadata>,
+    readable: Arc<Readable>,
     index: usize,
     /// The ids of the episodes, if they are known already.
     ids: Option<Ids>,
@@ -132,17 +132,18 @@ impl<'a> RowGroup<'a> {
         ids: Option<Ids>,
     ) -> Result<Self, Box<Finding>> {
         let store = store(file)?;
-        let footer = file.footer()?;
+        let readable = file.footer()?;
         let roots = (0..layout.columns.len()).filter_map(|at| root(file, layout, at));
-        let text = roots.filter_map(|root| text_bytes(&footer, root, row_group)).max().unwrap_or(0);
+        let text = roots.filter_map(|root| text_bytes(&readable.footer, root, row_group)).max().unwrap_or(0);
         let at_a_time = rows_at_a_time(file.row_group_rows(row_group), text);
         let sources = Vec::new();
-        let mut rows = Self { file, layout, footer, index: row_group, ids, sources, first: 0, at_a_time, over: false };
+        let mut rows =
+            Self { file, layout, readable, index: row_group, ids, sources, first: 0, at_a_time, over: false };
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {
                 None => Source::Absent,
                 Some(_) if at == EPISODE_ID && rows.ids.is_some() => Source::Ahead,
-                Some(root) => match contained(|| cursor(&rows.footer, &store, root, row_group, form(layout, at))) {
+                Some(root) => match contained(|| cursor(&rows.readable, &store, root, row_group, form(layout, at))) {
                     Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
                     Ok(Err(Unsupported)) | Err(_) => rows.library(at, root)?,
                 },
@@ -279,13 +280,14 @@ impl<'a> RowGroup<'a> {
         first: usize,
         slot: &FaultSlot,
     ) -> parquet::errors::Result<ParquetRecordBatchReader> {
-        let rows = rows_of(self.footer.metadata().row_group(self.index));
-        let (metadata, slot) = (Arc::clone(self.footer.metadata()), Arc::clone(slot));
-        let library = pages::Library { store, metadata, row_groups: vec![self.index], slot };
+        let Readable { footer, chunks } = &*self.readable;
+        let rows = rows_of(footer.metadata().row_group(self.index));
+        let (metadata, checksums, slot) = (Arc::clone(footer.metadata()), chunks.clone(), Arc::clone(slot));
+        let library = pages::Library { store, metadata, checksums, row_groups: vec![self.index], slot };
         let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
         let selection = (first > 0).then(|| RowSelection::from(rest));
-        let column = ProjectionMask::roots(self.footer.parquet_schema(), [root]);
-        library.reader(column, Some(self.footer.schema().fields()), rows.clamp(1, self.at_a_time), selection)
+        let column = ProjectionMask::roots(footer.parquet_schema(), [root]);
+        library.reader(column, Some(footer.schema().fields()), rows.clamp(1, self.at_a_time), selection)
     }
 }
 
@@ -305,8 +307,8 @@ impl Iterator for RowGroup<'_> {
 /// The ids of the episodes of a row group, if its pages are such that they can be had without the other columns.
 pub(in crate::trace) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
     let root = root(file, layout, EPISODE_ID)?;
-    let (store, footer) = (store(file).ok()?, file.footer().ok()?);
-    let read = || cursor(&footer, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
+    let (store, readable) = (store(file).ok()?, file.footer().ok()?);
+    let read = || cursor(&readable, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
     contained(read).ok()?.ok()
 }
 
@@ -327,14 +329,15 @@ fn form(layout: &Layout, at: usize) -> Form {
 }
 
 fn cursor(
-    footer: &ArrowReaderMetadata,
+    readable: &Readable,
     store: &Store,
     root: usize,
     row_group: usize,
     form: Form,
 ) -> Result<Cursor, Unsupported> {
+    let Readable { footer, chunks } = readable;
     let leaf = leaf(footer, root).ok_or(Unsupported)?;
-    let place = Place { metadata: footer.metadata(), row_group, column: leaf };
+    let place = Place { metadata: footer.metadata(), checksums: chunks, row_group, column: leaf };
     Cursor::open(store, place, footer.schema().field(root).data_type(), form)
 }
 

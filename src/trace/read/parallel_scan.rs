@@ -13,12 +13,11 @@ use std::thread;
 
 use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Int32Type;
-use parquet::arrow::arrow_reader::ArrowReaderMetadata;
 
 use super::column::Column;
 use super::decode::{Ids, RowGroup, Rows};
 use super::episode_index::Ahead;
-use super::open::TraceFile;
+use super::open::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout};
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::error::TraceError;
@@ -273,7 +272,7 @@ struct Started<T> {
     job: Job,
     parts: Receiver<Part<T>>,
     /// Held, so that a file's footer is read once for all its row groups.
-    _footer: Option<Arc<ArrowReaderMetadata>>,
+    _footer: Option<Arc<Readable>>,
 }
 
 /// Puts the parts of the row groups together again, on the receiving thread.

@@ -18,16 +18,16 @@ pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {
 }
 
 fn verify_file(file: &TraceFile) -> Result<(), Box<Finding>> {
-    let footer = file.footer()?;
+    let readable = file.footer()?;
     let unreadable = |error: io::Error| {
         Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
     };
     let store = Store::File(file.reader().map_err(unreadable)?);
-    let metadata = footer.metadata();
+    let (metadata, checksums) = (readable.footer.metadata(), &readable.chunks);
     for (row_group, group) in metadata.row_groups().iter().enumerate() {
         for column in 0..group.num_columns() {
             let slot = FaultSlot::default();
-            let walked = contained(|| verify(&store, Place { metadata, row_group, column }, &slot));
+            let walked = contained(|| verify(&store, Place { metadata, checksums, row_group, column }, &slot));
             if let Err(error) = walked.and_then(|walked| walked.map_err(|error| plain(&error))) {
                 return Err(Box::new(damaged(file.name(), &slot, &error).in_row_group(row_group)));
             }

@@ -10,7 +10,6 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Int64Type, SchemaRef};
 use parquet::arrow::ProjectionMask;
-use parquet::file::metadata::ParquetMetaData;
 
 use super::decode_episode::{self, NotAnEpisode};
 use crate::base::replace::{self, NewFile};
@@ -20,7 +19,7 @@ use crate::trace::episode::Episode;
 use crate::trace::error::TraceError;
 use crate::trace::inputs::Input;
 use crate::trace::read::footer::bounds;
-use crate::trace::read::footer::{Extent, footer, plain};
+use crate::trace::read::footer::{Extent, Footer, footer, plain};
 use crate::trace::read::open::is_nested;
 use crate::trace::read::pages::{FaultSlot, Library, Store, damaged};
 use crate::trace::write::row_groups::{Gathered, RowGroups};
@@ -88,15 +87,15 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     let name = path.display().to_string();
     let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
     let file = File::open(path).map_err(|error| unreadable(&name, error.into()))?;
-    let (bytes, metadata) = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
-    match bounds::fault(&name, bytes, &metadata) {
+    let footer = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
+    match bounds::fault(&name, footer.bytes, &footer.metadata) {
         // Whoever puts traces together takes one without rows as it is.
         Some(fault) if fault.code != Code::NoEpisodes => Err(damaged(fault)),
-        _ => decode(&name, file, metadata),
+        _ => decode(&name, file, footer),
     }
 }
 
-fn decode(name: &str, file: File, metadata: ParquetMetaData) -> Result<Vec<EpisodeRows>, TraceError> {
+fn decode(name: &str, file: File, Footer { metadata, chunks, .. }: Footer) -> Result<Vec<EpisodeRows>, TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
     let columns = metadata.file_metadata().schema_descr().columns();
     if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
@@ -105,8 +104,8 @@ fn decode(name: &str, file: File, metadata: ParquetMetaData) -> Result<Vec<Episo
     contained(|| {
         let row_groups = (0..metadata.num_row_groups()).collect();
         let slot = FaultSlot::default();
-        let library =
-            Library { store: Store::File(file), metadata: Arc::new(metadata), row_groups, slot: Arc::clone(&slot) };
+        let (store, metadata) = (Store::File(file), Arc::new(metadata));
+        let library = Library { store, metadata, checksums: chunks, row_groups, slot: Arc::clone(&slot) };
         let damaged = |error: String| failed(damaged(name, &slot, &error).to_string().into());
         let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, None);
         let batches = reader.map_err(|error| damaged(plain(&error)))?.collect::<Result<Vec<_>, _>>();

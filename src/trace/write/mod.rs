@@ -14,6 +14,7 @@ use std::collections::HashSet;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use arrow::datatypes::SchemaRef;
 use parquet::errors::ParquetError;
 
 use self::row_groups::{Gathered, RowGroups};
@@ -101,6 +102,9 @@ impl OptionalColumns {
     }
 }
 
+/// What starts the file of a trace.
+type Make<W> = fn(W, &SchemaRef, Option<&serde_json::Value>) -> parquet::errors::Result<RowGroups<W>>;
+
 /// Encodes episodes as a trace into anything that bytes can be written to.
 pub struct TraceEncoder<W: Write + Send> {
     file: RowGroups<W>,
@@ -117,11 +121,23 @@ impl<W: Write + Send> TraceEncoder<W> {
     /// # Errors
     /// For a `palette` of the recording that is no list of colours, and whatever writing gives.
     pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        Self::with(RowGroups::new, out, metadata)
+    }
+
+    /// Starts a trace without checksums: the bytes that versions before them gave.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn without_checksums(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        Self::with(RowGroups::without_checksums, out, metadata)
+    }
+
+    fn with(make: Make<W>, out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let recording = metadata.recording.as_ref().map(ToString::to_string);
         let palette = Declared::of("stream", recording.as_deref()).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
-        let file = RowGroups::new(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
+        let file = make(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
         Ok(Self { file, columns, gathered, undeclared, palette, seen: HashSet::new() })
     }
 

@@ -21,6 +21,7 @@ use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, Write
 use crate::harness::traces::{self, reader};
 
 mod checksums;
+mod flips;
 #[cfg(unix)]
 mod hostile;
 mod levels;
@@ -42,7 +43,10 @@ fn episodes() -> Vec<Episode> {
 
 fn trace() -> Vec<u8> {
     let columns = OptionalColumns::used_by(&episodes());
-    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns }).unwrap();
+    encoded(TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns }).unwrap())
+}
+
+fn encoded(mut encoder: TraceEncoder<Vec<u8>>) -> Vec<u8> {
     for episode in episodes() {
         encoder.write(&episode).unwrap();
     }

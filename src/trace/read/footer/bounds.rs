@@ -1,8 +1,9 @@
 //! What a footer says about rows and bytes, checked before any page is read: counts add up, columns lie within the file
 //! and apart from each other, and rows are no more than their bytes can hold.
 
-use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
+use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 
+use crate::trace::checksums::range;
 use crate::trace::diagnostic::{Code, Finding};
 
 /// The most rows for which a byte of a row group, of all columns together, is enough. Each episode has an id of its own
@@ -71,11 +72,4 @@ fn group_fault(file: &str, bytes: u64, group: &RowGroupMetaData, ranges: &mut Ve
         return Some(Finding::new(Code::CorruptFooter, file, expected, rows.to_string()));
     }
     None
-}
-
-/// The bytes of a column of a row group: from the first to before the last.
-fn range(chunk: &ColumnChunkMetaData) -> Option<(u64, u64)> {
-    let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
-    let (start, length) = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok())?;
-    start.checked_add(length).map(|end| (start, end))
 }

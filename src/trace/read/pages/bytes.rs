@@ -6,6 +6,7 @@ use std::io::{self, Read as _, Seek as _, SeekFrom};
 use bytes::Bytes;
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 
+use crate::trace::checksums::{self, ChunkChecksums};
 use crate::trace::read::footer::rows_of;
 
 /// One column of one row group of a file.
@@ -13,6 +14,7 @@ use crate::trace::read::footer::rows_of;
 pub(in crate::trace) struct Place<'a> {
     /// The file's footer.
     pub(in crate::trace) metadata: &'a ParquetMetaData,
+    pub(in crate::trace) checksums: &'a ChunkChecksums,
     pub(in crate::trace) row_group: usize,
     /// The column, counted among the leaves of the schema.
     pub(in crate::trace) column: usize,
@@ -21,6 +23,11 @@ pub(in crate::trace) struct Place<'a> {
 impl<'a> Place<'a> {
     pub(super) fn chunk(self) -> &'a ColumnChunkMetaData {
         self.metadata.row_group(self.row_group).column(self.column)
+    }
+
+    /// The CRC-32 of the chunk's bytes, where the file has checksums.
+    pub(super) fn checksum(self) -> Option<u32> {
+        self.checksums.of(self.row_group, self.column)
     }
 
     pub(super) fn rows(self) -> usize {
@@ -53,6 +60,18 @@ impl Store {
         }
         let most = usize::try_from(length).unwrap_or(usize::MAX);
         Ok(Self::Memory { start, bytes: self.read(start, most)? })
+    }
+
+    /// The CRC-32 of `length` bytes from `start` on, or of fewer where the end comes before.
+    pub(super) fn sum(&self, start: u64, length: u64) -> io::Result<u32> {
+        match self {
+            Self::File(file) => {
+                checksums::sum(file, start, length).map_err(|fault| io::Error::other(fault.to_string()))
+            }
+            Self::Memory { .. } => {
+                self.read(start, usize::try_from(length).unwrap_or(usize::MAX)).map(|bytes| crc32fast::hash(&bytes))
+            }
+        }
     }
 
     /// `length` bytes from `start` on, or fewer where the end comes before.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use parquet::column::page::{Page, PageMetadata, PageReader};
-use parquet::errors::{ParquetError, Result};
+use parquet::errors::Result;
 use parquet::file::serialized_reader::SerializedPageReader;
 
 use super::bytes::{Place, Store};
@@ -24,8 +24,7 @@ pub(super) struct Pages {
 impl Pages {
     /// The pages of a column, for a decoder that checks what they hold.
     pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
-        let stored = Verified::new(store, place, slot).map_err(|error| ParquetError::External(Box::new(error)))?;
-        let stored = Arc::new(stored);
+        let stored = Arc::new(Verified::new(store, place, slot)?);
         let inner = SerializedPageReader::new(Arc::clone(&stored), place.chunk(), place.rows(), None)?;
         Ok(Self { stored, inner, next: None, contents: None })
     }

@@ -1,7 +1,8 @@
 //! The stored pages of one column of one row group, verified while they are read.
 //!
 //! Rule: whoever decodes a page of a trace gets its bytes from here, so that no header that contradicts the footer, and
-//! no page that contradicts its checksum, is decoded by anyone.
+//! no page or chunk of pages that contradicts its checksum, is decoded by anyone. A chunk is summed before its first page is
+//! given, as who reads it may stop before its end; one that is too large to be held is read twice for that.
 
 use std::fmt;
 use std::io;
@@ -13,7 +14,7 @@ use parquet::errors::{ParquetError, Result};
 use parquet::file::reader::{ChunkReader, Length};
 
 use super::bytes::{Place, Store};
-use super::error::{FaultSlot, PageFault};
+use super::error::{FaultSlot, PageFault, Part};
 use super::header::{About, Header, Kind};
 use crate::trace::read::thrift;
 
@@ -48,7 +49,7 @@ struct Progress {
 
 impl Verified {
     /// The pages of a column of a row group.
-    pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> io::Result<Self> {
+    pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
         let column = place.chunk();
         let (start, length) = column.byte_range();
         let described = column.column_descr();
@@ -60,8 +61,9 @@ impl Verified {
             rows: place.rows(),
         };
         let flat = described.max_rep_level() == 0 && described.path().parts().len() == 1;
-        Ok(Self {
-            store: store.part(start, length)?,
+        let unreadable = |error: io::Error| ParquetError::External(Box::new(error));
+        let pages = Self {
+            store: store.part(start, length).map_err(unreadable)?,
             row_group: place.row_group,
             column: column.column_path().string(),
             start,
@@ -70,7 +72,16 @@ impl Verified {
             flat,
             progress: Mutex::default(),
             slot,
-        })
+        };
+        let declared = place.checksum();
+        let sums = declared.map(|declared| pages.store.sum(start, length).map(|found| (declared, found)));
+        match sums.transpose().map_err(unreadable)? {
+            Some((declared, found)) if declared != found => {
+                let expected = format!("bytes with the CRC-32 {declared:08x}");
+                Err(pages.fault_of(Part::Chunk(start, pages.end), expected, format!("{found:08x}")))
+            }
+            _ => Ok(pages),
+        }
     }
 
     /// Reads all pages, and decodes none.
@@ -101,8 +112,12 @@ impl Verified {
 
     /// The error of a page at `offset`, kept for whoever asked for the column.
     pub(super) fn fault(&self, offset: u64, expected: impl Into<String>, found: impl fmt::Display) -> ParquetError {
+        self.fault_of(Part::Page(offset), expected.into(), found.to_string())
+    }
+
+    fn fault_of(&self, part: Part, expected: String, found: String) -> ParquetError {
         let (row_group, column) = (self.row_group, self.column.clone());
-        let fault = PageFault { row_group, column, offset, expected: expected.into(), found: found.to_string() };
+        let fault = PageFault { row_group, column, part, expected, found };
         let _ = self.slot.set(fault.clone());
         ParquetError::External(Box::new(fault))
     }

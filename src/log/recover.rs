@@ -1,7 +1,7 @@
 //! What can be saved of a log that was cut off or damaged.
 //!
-//! Rule: an episode is saved if its `begin`, its `end` and every row between are there; anything else that was begun is
-//! lost, and named. What is behind damage is still looked at. What is saved is what was written: of a chunk whose
+//! Rule: an episode is saved if its `begin`, its `end` and every row between are there, and their hash is that of the `end`;
+//! anything else that was begun is lost, and named. What is behind damage is still looked at. What is saved is what was written: of a chunk whose
 //! checksum does not hold nothing is.
 
 use std::collections::BTreeMap;
@@ -20,6 +20,7 @@ use super::read::{Event, event};
 use super::records::{Piece, Records, glimpse, inside};
 use super::{METADATA, METADATA_KEY, topic};
 use crate::trace::episode::{Episode, Step};
+use crate::trace::episode_hash;
 
 /// What was saved of a log, and what was not.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -229,8 +230,8 @@ impl Salvage {
                 self.close("the next episode begins before its end");
                 self.open = Some((*head, Vec::new(), None));
             }
-            Ok(Event::Episode(EpisodeMessage::End { episode_id, steps, fingerprint })) => {
-                self.end(&episode_id, steps, fingerprint);
+            Ok(Event::Episode(EpisodeMessage::End { episode_id, steps, fingerprint, episode_hash })) => {
+                self.end(&episode_id, steps, (fingerprint, episode_hash));
             }
             Ok(Event::Decision(row)) => {
                 let Some((_, rows, fault)) = &mut self.open else {
@@ -255,11 +256,13 @@ impl Salvage {
         }
     }
 
-    fn end(&mut self, episode_id: &str, steps: usize, fingerprint: Option<String>) {
+    fn end(&mut self, episode_id: &str, steps: usize, (fingerprint, hash): (Option<String>, Option<String>)) {
         match self.open.take() {
             Some((head, rows, None)) if head.episode_id == episode_id && rows.len() == steps && steps > 0 => {
-                let fingerprint = fingerprint.or_else(|| head.fingerprint.clone());
-                self.result.episodes.push(Episode { steps: rows, fingerprint, ..head });
+                match ended(head, rows, fingerprint, hash) {
+                    Ok(episode) => self.result.episodes.push(episode),
+                    Err((episode, reason)) => self.lose(episode.episode_id, episode.steps.len(), reason),
+                }
             }
             Some((head, rows, fault)) => {
                 let reason = fault.unwrap_or_else(|| format!("its end says {steps} rows of `{episode_id}`"));
@@ -280,4 +283,25 @@ impl Salvage {
     fn lose(&mut self, episode_id: String, rows: usize, reason: String) {
         self.result.losses.episodes.push(LostEpisode { episode_id, rows, reason });
     }
+}
+
+/// The episode of a begin, its rows, and what its end tells of them.
+///
+/// # Errors
+/// The episode, and in words how its rows are not those that the end tells of.
+pub fn ended(
+    head: Episode,
+    steps: Vec<Step>,
+    fingerprint: Option<String>,
+    hash: Option<String>,
+) -> Result<Episode, (Box<Episode>, String)> {
+    let fingerprint = fingerprint.or_else(|| head.fingerprint.clone());
+    let episode = Episode { steps, fingerprint, episode_hash: None, ..head };
+    let Some(stated) = hash else { return Ok(episode) };
+    let found = episode_hash::of(&episode);
+    if found == stated {
+        return Ok(Episode { episode_hash: Some(stated), ..episode });
+    }
+    let reason = format!("its rows are not those that its end tells of: expected the hash {stated}, found {found}");
+    Err((Box::new(episode), reason))
 }

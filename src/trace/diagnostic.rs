@@ -87,7 +87,7 @@ codes! {
         "the data decodes to what the footer says", "the file is damaged: restore it from its source";
     /// The footer's metadata of mirrorstats cannot be read.
     InvalidMetadata, Error, "invalid-metadata":
-        "`mirrorstats.schema_version` is a whole number from 1; in `mirrorstats.recording` a `palette` lists colours, and an \
+        "`mirrorstats.schema_version` is a whole number from 1; `mirrorstats.checksums` has one of each column chunk; in `mirrorstats.recording` a `palette` lists colours, and an \
          `experiment` is spelled as in a definition file, in all files alike",
         "correct or remove that key in the footer; a file without it is read as the newest version";
     /// The file was written under a newer schema.
@@ -123,6 +123,10 @@ codes! {
     TDuplicate, Error, "t-duplicate": "every t of an episode has one row", "keep one row for each t";
     /// An episode's t goes backward.
     TOrder, Error, "t-order": "t never goes back in an episode", "sort the rows by episode_id and t";
+    /// The hash that an episode carries is that of other rows.
+    EpisodeHash, Error, "episode-hash":
+        "`episode_hash` is the hash of the episode's rows, or null",
+        "the rows were changed: restore the file from its source; where the change is meant, leave the column out";
     /// A value that names the episode or its setting changes within it.
     InconsistentConstant, Error, "inconsistent-constant":
         "a column that belongs to the episode is the same in all its rows",
@@ -152,6 +156,10 @@ codes! {
     UnseenColor, Note, "unseen-color":
         "a claimed colour is that of a body or of a selected cube in the inputs",
         "nothing to do where the agent said so: the claim counts as a wrong one";
+    /// The checksums in the footer are those of the file that this one was made from.
+    StaleChecksums, Note, "stale-checksums":
+        "checksums are those of the program that wrote the file",
+        "nothing to do where another program wrote the file again: its bytes are not checked";
     /// A title, an order or a level of an experiment is another in the definitions than in the footer.
     ExperimentOverridden, Note, "experiment-overridden":
         "the footer and the definitions say the same of an experiment",

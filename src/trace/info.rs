@@ -9,6 +9,7 @@ use arrow::datatypes::{Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::checksums::Checksums;
 use super::error::TraceError;
 use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
@@ -99,6 +100,8 @@ pub struct FileInfo {
     pub schema_version: Option<String>,
     /// The program that wrote it, if the file names one.
     pub writer: Option<String>,
+    /// Whether it has checksums: `present`, `none`, or `stale` where another program wrote the file again.
+    pub checksums: Checksums,
     /// How it was recorded: JSON, or the text as it is where that is no JSON.
     pub recording: Option<serde_json::Value>,
 }
@@ -264,6 +267,7 @@ fn about(file: &TraceFile, episodes: u64) -> Result<FileInfo, TraceError> {
         row_groups: file.row_groups(),
         schema_version: text(VERSION_KEY),
         writer: text(WRITER_KEY),
+        checksums: file.checksums(),
         recording: text(RECORDING_KEY).map(|text| serde_json::from_str(&text).unwrap_or(text.into())),
     })
 }

@@ -17,6 +17,7 @@ pub mod declared;
 pub mod declared_experiment;
 pub mod diagnostic;
 pub mod episode;
+pub mod episode_hash;
 pub mod error;
 pub mod identification;
 pub mod import;

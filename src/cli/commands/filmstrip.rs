@@ -58,12 +58,13 @@ impl FilmstripArgs {
         let strip = Strip { episode: self.episode.clone(), steps };
         let (logs, traces) = self.sources()?;
         output::check_target(&self.out, &logs)?;
-        if let Some(figure) = strip.from_logs(&logs)? {
+        let files = if traces.is_empty() { Ok(Vec::new()) } else { inputs::resolve(&traces, io::stdin()) };
+        let files = files.map_err(Failure::input)?;
+        output::check_target(&self.out, files.iter().map(|file| &file.path))?;
+        if let Some(figure) = strip.from_logs(&logs, &files)? {
             return Ok(figure);
         }
-        if !traces.is_empty() {
-            let files = inputs::resolve(&traces, io::stdin()).map_err(Failure::input)?;
-            output::check_target(&self.out, files.iter().map(|file| &file.path))?;
+        if !files.is_empty() {
             if let Some(figure) = strip.from_traces(&files)? {
                 return Ok(figure);
             }

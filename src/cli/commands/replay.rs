@@ -9,7 +9,7 @@ use crate::base::replace::{self, is_same_file};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
-use crate::log::read::other_episode;
+use crate::log::read::{episode_hashes, other_episode};
 use crate::replay::again::MOST_RAYS;
 use crate::replay::divergence::Divergence;
 use crate::replay::error::ReplayError;
@@ -102,7 +102,24 @@ impl ReplayArgs {
                 output::check_target(&frame_path(folder, &rows.episode_id, t), traces.iter().map(|trace| &trace.path))?;
             }
         }
-        self.check_log()
+        self.check_log()?;
+        self.check_hashes(traces)
+    }
+
+    /// That a log which is there is none of other rows than the traces have.
+    fn check_hashes(&self, traces: &[Recorded]) -> Result<(), Failure> {
+        // What cannot be read as a log is there to be replaced.
+        let Some((log, logged)) = self.mcap.as_ref().and_then(|log| Some((log, episode_hashes(log).ok()?))) else {
+            return Ok(());
+        };
+        for (trace, rows) in traces.iter().flat_map(|trace| trace.rows.iter().map(move |rows| (trace, rows))) {
+            let hashes = rows.stated_hash().zip(logged.get(&rows.episode_id));
+            if let Some((traced, logged)) = hashes.filter(|(traced, logged)| traced != *logged) {
+                let name = trace.path.display().to_string();
+                return Err(ReplayError::apart(&rows.episode_id, (&name, &traced), (log, logged)).into());
+            }
+        }
+        Ok(())
     }
 
     /// That a log which is there holds no episode that this replay leaves out.

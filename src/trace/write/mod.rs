@@ -1,7 +1,7 @@
 //! Writes traces: whole episodes into row groups, and a file that appears whole or not at all.
 //!
 //! Rule: what this writer makes passes `validate` without a note, and the same episodes give the same bytes. A palette that
-//! the recording declares holds for what is written, too.
+//! the recording declares holds for what is written, too. The column `episode_hash` is made here, whatever an episode says.
 //! The optional columns of a file are declared when it is created, so that memory stays flat; a value for a
 //! column that was not declared is refused, never dropped.
 
@@ -19,6 +19,7 @@ use parquet::errors::ParquetError;
 
 use self::row_groups::{Gathered, RowGroups};
 use super::episode::Episode;
+use super::episode_hash::{self, EPISODE_HASH};
 use super::error::TraceError;
 use super::schema::colors::palette::{Declared, Palette};
 use super::schema::rules::{Known, Requirement, Rule, rules_of};
@@ -40,16 +41,8 @@ pub struct TraceMetadata {
 pub struct OptionalColumns(Vec<&'static Column>);
 
 /// Columns that no recording of the five experiments gives.
-const OF_OTHER_TASKS: [&str; 8] = [
-    "participant",
-    "episode_hash",
-    "start_distance",
-    "shown_color",
-    "mark_color",
-    "mark_report",
-    "mirror_mark_px",
-    "target_distance",
-];
+const OF_OTHER_TASKS: [&str; 7] =
+    ["participant", "start_distance", "shown_color", "mark_color", "mark_report", "mirror_mark_px", "target_distance"];
 
 impl OptionalColumns {
     /// No optional column.
@@ -172,10 +165,12 @@ fn shows_another_color(panes: &serde_json::Value) -> bool {
     colors.into_iter().any(|color| color != "own")
 }
 
-/// Adds the rows of an episode.
+/// Adds the rows of an episode, with the hash that they have.
 fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episode) {
     for (column, values) in columns.iter().zip(&mut gathered.columns) {
+        let hash = (column.name == EPISODE_HASH).then(|| episode_hash::of(episode));
         for value in column.of_steps(episode) {
+            let value = hash.as_deref().map(Value::Text).or(value);
             values.push(value).expect("a field gives values of its column's type");
         }
     }

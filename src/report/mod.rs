@@ -23,3 +23,4 @@ pub mod style;
 pub mod table;
 pub mod tables;
 pub mod value;
+pub mod verify;

@@ -25,6 +25,7 @@ use mirrorstats::report::plan::register::RegisteredPlan;
 use mirrorstats::report::sensitivity::Sensitivity;
 use mirrorstats::report::statistics::{Sequential, Statistics};
 use mirrorstats::report::style::Sheet;
+use mirrorstats::report::verify::Verification;
 use mirrorstats::score::evidence::Evidence;
 use mirrorstats::stats::diff::Changes;
 use mirrorstats::trace::describe::SchemaDocument;
@@ -72,6 +73,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("step", Name::Step.document()),
         ("trace", json!(SchemaDocument::current())),
         ("validation", json!(schema_for!(Validation))),
+        ("verify", json!(schema_for!(Verification))),
     ];
     #[cfg(feature = "sim")]
     schemas.extend([

@@ -137,7 +137,8 @@ fn pairs(pairs: &[SeedRun]) -> String {
 }
 
 fn files(info: &Info) -> Table {
-    let mut table = listing(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "checksums", "writer"]);
+    let mut table =
+        listing(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "checksums", "writer"]);
     for file in &info.files {
         table.add_row([
             visible(&file.name),

@@ -11,11 +11,15 @@ use crate::trace::read::parallel_scan::Episodes;
 use crate::trace::read::projection::Layout;
 use crate::trace::schema::Value;
 
-/// The episodes among these whose hash is that of other rows.
-pub(super) fn check(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> Vec<Located> {
+/// The episodes among these whose hash is that of other rows, where all columns that are hashed are read.
+pub(in crate::trace) fn check(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> Vec<Located> {
     let declared = |name: &str| layout.position(name).filter(|_| file.declares(name));
     let Some(hashes) = declared(EPISODE_HASH).map(|at| &episodes.columns[at]) else { return Vec::new() };
-    let held = columns().filter_map(|name| {
+    let present: Vec<&str> = columns().filter(|name| file.declares(name)).collect();
+    if present.iter().any(|name| layout.position(name).is_none()) {
+        return Vec::new();
+    }
+    let held = present.into_iter().filter_map(|name| {
         let values = episodes.columns[declared(name)?].flat();
         Some(values.map(|values| (name, values)))
     });

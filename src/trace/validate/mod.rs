@@ -5,7 +5,7 @@
 
 pub(in crate::trace) mod color_set;
 pub(in crate::trace) mod duplicate_ids;
-mod episode_hashes;
+pub(in crate::trace) mod episode_hashes;
 pub(in crate::trace) mod rules;
 
 use std::num::NonZeroUsize;

@@ -1,7 +1,8 @@
 //! Writes traces: whole episodes into row groups, and a file that appears whole or not at all.
 //!
 //! Rule: what this writer makes passes `validate` without a note, and the same episodes give the same bytes. A palette that
-//! the recording declares holds for what is written, too. The column `episode_hash` is made here, whatever an episode says.
+//! the recording declares holds for what is written, too. An `episode_hash` is made here, whatever an episode
+//! that has one says.
 //! The optional columns of a file are declared when it is created, so that memory stays flat; a value for a
 //! column that was not declared is refused, never dropped.
 
@@ -165,10 +166,11 @@ fn shows_another_color(panes: &serde_json::Value) -> bool {
     colors.into_iter().any(|color| color != "own")
 }
 
-/// Adds the rows of an episode, with the hash that they have.
+/// Adds the rows of an episode, with the hash that they have where the episode is to have one.
 fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episode) {
     for (column, values) in columns.iter().zip(&mut gathered.columns) {
-        let hash = (column.name == EPISODE_HASH).then(|| episode_hash::of(episode));
+        let is_hash = column.name == EPISODE_HASH && episode.episode_hash.is_some();
+        let hash = is_hash.then(|| episode_hash::of(episode));
         for value in column.of_steps(episode) {
             let value = hash.as_deref().map(Value::Text).or(value);
             values.push(value).expect("a field gives values of its column's type");

@@ -24,6 +24,7 @@ use crate::trace::read::decode::RowGroup;
 use crate::trace::read::footer::Extent;
 use crate::trace::read::open::{TraceFile, TraceSet};
 use crate::trace::read::projection::{Layout, T};
+use crate::trace::read::verify::verify_pages;
 use crate::trace::schema::RECORDING_KEY;
 
 /// What a text is made anew from: the episode's id, the timestep, the text to look at, and the text as it is.
@@ -33,7 +34,7 @@ pub(in crate::trace) type Before<'a> = (&'a str, i64, Option<&'a str>, Option<&'
 /// column `source`, and with this recording.
 ///
 /// # Errors
-/// A column that is not there or no text, data that does not decode, whatever writing gives.
+/// A column that is not there or no text, data that does not decode or contradicts its checksum, whatever writing gives.
 pub(in crate::trace) fn rewrite<W: Write + Send>(
     set: &TraceSet,
     [source, target]: [&str; 2],
@@ -43,6 +44,8 @@ pub(in crate::trace) fn rewrite<W: Write + Send>(
 ) -> Result<W, TraceError> {
     let layout = Layout::new(set, [source, target], [])?;
     let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
+    // What is copied gets new checksums, which must not stand for damaged bytes.
+    verify_pages(set)?;
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
     let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;
     let schema = with_text(metadata.file_metadata().schema_descr(), target).map_err(failed)?;

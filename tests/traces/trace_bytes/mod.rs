@@ -26,6 +26,7 @@ mod flips;
 mod hostile;
 mod levels;
 mod oracle;
+mod own_checksums;
 mod pages;
 
 fn episodes() -> Vec<Episode> {

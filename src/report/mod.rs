@@ -23,4 +23,3 @@ pub mod style;
 pub mod table;
 pub mod tables;
 pub mod value;
-pub mod verify;

@@ -27,6 +27,7 @@ mod results;
 mod scan;
 mod scores;
 mod sensitivity;
+pub mod verify;
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};

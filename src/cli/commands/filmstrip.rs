@@ -64,10 +64,10 @@ impl FilmstripArgs {
         if let Some(figure) = strip.from_logs(&logs, &files)? {
             return Ok(figure);
         }
-        if !files.is_empty() {
-            if let Some(figure) = strip.from_traces(&files)? {
-                return Ok(figure);
-            }
+        if !files.is_empty()
+            && let Some(figure) = strip.from_traces(&files)?
+        {
+            return Ok(figure);
         }
         Err(Failure::input(format!(
             "no log or trace in {} has the episode `{}`; `mirrorstats info` lists episodes",

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::report::verify::verify;
+use crate::study::verify::verify;
 
 /// Hold the files of a report against the hashes in its manifest
 ///

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use memchr::memmem;
-use parquet::file::metadata::ParquetMetaData;
+use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 use parquet::file::reader::ChunkReader;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -81,7 +81,7 @@ pub(in crate::trace) fn of_file(
     if !groups.iter().map(|group| group.columns().len()).eq(counts) {
         return Err(Fault::Malformed("checksums of another number of columns or row groups".to_owned()));
     }
-    let chunks = groups.iter().flat_map(|group| group.columns());
+    let chunks = groups.iter().flat_map(RowGroupMetaData::columns);
     let end = chunks.filter_map(range).map(|(_, end)| end).max().unwrap_or(FIRST);
     let found = sum_behind(file, end, (start, footer), text)?;
     if found != stated.footer.0 {

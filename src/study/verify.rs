@@ -4,16 +4,16 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs::{self, File, Metadata};
-use std::io::{self, Read as _};
+use std::fs::{self, Metadata};
+use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::bundle::{MANIFEST, Output};
+use super::input_hashes::of_file;
 use crate::base::escape::visible;
-use crate::base::hash;
+use crate::report::bundle::{MANIFEST, Output};
 
 /// The longest manifest that is read; that of the paper has 20 KB.
 const LONGEST: u64 = 64 << 20;
@@ -126,9 +126,7 @@ fn listed(folder: &Path) -> Result<BTreeMap<String, Output>, VerifyError> {
     if about.len() > LONGEST {
         return Err(malformed(format!("{} bytes, more than {LONGEST}", about.len())));
     }
-    let mut bytes = Vec::new();
-    let read = File::open(&path).and_then(|file| file.take(LONGEST).read_to_end(&mut bytes));
-    read.map_err(|source| VerifyError::Unreadable { path: path.clone(), source })?;
+    let bytes = fs::read(&path).map_err(|source| VerifyError::Unreadable { path: path.clone(), source })?;
     let manifest: Listed = serde_json::from_slice(&bytes).map_err(|error| malformed(error.to_string()))?;
     if manifest.outputs.is_empty() {
         return Err(malformed("one that lists no outputs, as those of earlier versions".to_owned()));
@@ -193,8 +191,7 @@ fn difference(
         return differs(Kind::Changed, kind_of(&about).to_owned());
     }
     let at = folder.join(path);
-    let found = File::open(&at).and_then(hash::of_reader);
-    let found = found.map_err(|source| VerifyError::Unreadable { path: at, source })?;
+    let found = of_file(&at).map_err(|source| VerifyError::Unreadable { path: at, source })?;
     if found == output.sha256.to_ascii_lowercase() && about.len() == output.bytes {
         return Ok(None);
     }

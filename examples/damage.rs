@@ -166,7 +166,6 @@ fn broken_episodes() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
         Ok(file(name, code, damage, parquet(&[&with(&sound(), "t", Arc::new(t))?], None)?))
     };
     let sound = sound();
-    let hashes = Arc::new(StringArray::from(vec!["0".repeat(64); sound.num_rows()]));
     let (first, second) = (sound.slice(0, 4), sound.slice(4, 4));
     let again = concat_batches(&sound.schema(), [&first, &second, &first])?;
     let apart = take_record_batch(&sound, &Int32Array::from(vec![0, 1, 4, 5, 6, 7, 2, 3]))?;
@@ -175,12 +174,6 @@ fn broken_episodes() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
         steps("t-duplicate.parquet", "t-duplicate", "t = 2 is there twice", [1, 2, 2, 3])?,
         steps("t-from-zero.parquet", "t-start", "t starts at 0", [0, 1, 2, 3])?,
         steps("t-order.parquet", "t-order", "t goes back from 3 to 2", [1, 2, 3, 2])?,
-        file(
-            "episode-hash.parquet",
-            "episode-hash",
-            "`episode_hash` is that of other rows",
-            parquet(&[&with(&sound, "episode_hash", hashes)?], Some("2"))?,
-        ),
         file("episode-twice.parquet", "episode-twice", "the first episode again at the end", parquet(&[&again], None)?),
         file(
             "episode-apart.parquet",

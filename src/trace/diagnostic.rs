@@ -84,7 +84,8 @@ codes! {
         "the footer describes the file", "the file is damaged: restore it from its source";
     /// The footer is good and the data behind it is not.
     CorruptData, Error, "corrupt-data":
-        "the data decodes to what the footer says", "the file is damaged: restore it from its source";
+        "the data decodes to what the footer says, and `episode_hash` is that of the rows",
+        "the file is damaged: restore it from its source";
     /// The footer's metadata of mirrorstats cannot be read.
     InvalidMetadata, Error, "invalid-metadata":
         "`mirrorstats.schema_version` is a whole number from 1; `mirrorstats.checksums` has one of each column chunk; in `mirrorstats.recording` a `palette` lists colours, and an \
@@ -123,10 +124,6 @@ codes! {
     TDuplicate, Error, "t-duplicate": "every t of an episode has one row", "keep one row for each t";
     /// An episode's t goes backward.
     TOrder, Error, "t-order": "t never goes back in an episode", "sort the rows by episode_id and t";
-    /// The hash that an episode carries is that of other rows.
-    EpisodeHash, Error, "episode-hash":
-        "`episode_hash` is the hash of the episode's rows, or null",
-        "the rows were changed: restore the file from its source; where the change is meant, leave the column out";
     /// A value that names the episode or its setting changes within it.
     InconsistentConstant, Error, "inconsistent-constant":
         "a column that belongs to the episode is the same in all its rows",

@@ -11,6 +11,10 @@ use crate::trace::read::parallel_scan::Episodes;
 use crate::trace::read::projection::Layout;
 use crate::trace::schema::Value;
 
+/// What to do about rows that were changed.
+const HELP: &str =
+    "the rows were changed: restore the file from its source; where the change is meant, leave the column out";
+
 /// The episodes among these whose hash is that of other rows, where all columns that are hashed are read.
 pub(in crate::trace) fn check(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> Vec<Located> {
     let declared = |name: &str| layout.position(name).filter(|_| file.declares(name));
@@ -36,10 +40,12 @@ pub(in crate::trace) fn check(file: &TraceFile, layout: &Layout, episodes: &Epis
     for (ends, stated) in episodes.offsets.windows(2).zip(stated) {
         let hash = hash(&held, ends[0]..ends[1]);
         if let Some(stated) = stated.filter(|stated| **stated != hash) {
-            let finding = Finding::new(Code::EpisodeHash, file.name(), format!("the hash {hash} of its rows"), stated)
-                .in_row_group(episodes.row_group(ends[0]))
-                .in_column(EPISODE_HASH);
-            let finding = episodes.id(ends[0]).map_or(finding.clone(), |id| finding.in_episode(id));
+            let mut finding =
+                Finding::new(Code::CorruptData, file.name(), format!("the hash {hash} of its rows"), stated)
+                    .in_row_group(episodes.row_group(ends[0]))
+                    .in_column(EPISODE_HASH)
+                    .with_help(HELP);
+            finding.episode = episodes.id(ends[0]).map(str::to_owned);
             found.push(Located { row: ends[0], finding });
         }
     }

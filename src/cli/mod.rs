@@ -30,6 +30,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
+use crate::base::budget;
 use commands::Command;
 use outcome::{Failure, Outcome};
 
@@ -44,7 +45,7 @@ struct Cli {
 /// Runs the program with these arguments, the program's name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
     match Cli::try_parse_from(arguments) {
-        Ok(cli) => outcome::exit_code(cli.command.run().and_then(flushed)),
+        Ok(cli) => outcome::exit_code(budget_setting().and_then(|()| cli.command.run()).and_then(flushed)),
         Err(usage) => {
             // Help and version arrive here too; clap knows which stream and code each one takes.
             outcome::exit_code(match usage.print() {
@@ -54,6 +55,11 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
             })
         }
     }
+}
+
+/// Refuses a factor of all budgets that is none before anything is read.
+fn budget_setting() -> Result<(), Failure> {
+    budget::setting().map(drop).map_err(Failure::input)
 }
 
 /// The outcome, once all of standard output is out: what is left in its buffer at the end is written without a word

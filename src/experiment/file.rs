@@ -1,7 +1,6 @@
 //! Files of experiments: TOML in, every key accounted for, every fault with its place.
 
-use std::fs;
-use std::io::{self, Read as _};
+use std::io::{self};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -10,11 +9,13 @@ use toml::de::DeTable;
 use super::spec::Spec;
 use super::table::{self, Beside, Entry};
 use super::{Experiment, TooMany, built_in};
+use crate::base::budget::Limit;
+use crate::base::input;
 use crate::metric::fault::{Fault, Faults, Place, Source};
 use crate::metric::keys::Keys;
 
 /// The most bytes of a file.
-const MOST_BYTES: u64 = 1024 * 1024;
+const LARGEST: Limit = Limit::new("bytes of an experiment file", 1 << 20);
 /// The most experiments of a file.
 const MOST_EXPERIMENTS: usize = 64;
 
@@ -61,16 +62,7 @@ pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
 }
 
 fn text_of(path: &Path) -> io::Result<String> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("expected a file"));
-    }
-    let mut bytes = Vec::new();
-    fs::File::open(path)?.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(io::Error::other(format!("it is longer than {MOST_BYTES} bytes")));
-    }
-    String::from_utf8(bytes)
-        .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, format!("expected UTF-8 text, found {error}")))
+    input::text(path, LARGEST)
 }
 
 /// Reads the experiments of a text; prompts of its own are folders in `folder`. A text without a folder is built in.

@@ -1,9 +1,7 @@
 //! What a report was made from: the inputs with their hashes, computed beside the scan.
 
-use std::fs::File;
-
 use super::error::StudyError;
-use crate::base::hash;
+use crate::base::{self, hash};
 use crate::report::bundle;
 use crate::trace::inputs::Input;
 
@@ -17,7 +15,7 @@ pub(super) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::Input>, StudyError>
 
 fn hash_of(input: &Input) -> Result<bundle::Input, StudyError> {
     let read = || {
-        let file = File::open(&input.path)?;
+        let file = base::input::open(&input.path)?;
         let bytes = file.metadata()?.len();
         Ok::<_, std::io::Error>((hash::of_reader(file)?, bytes))
     };

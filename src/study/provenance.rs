@@ -4,11 +4,13 @@
 //! that changed or is missing is told at once, and no report is made without them.
 
 use std::fmt;
-use std::fs::{self, File};
+use std::fs::{self};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+use crate::base::budget::Limit;
 use crate::base::hash;
+use crate::base::input;
 use crate::report::bundle::{self, Manifest};
 use crate::trace::inputs::Input;
 use crate::trace::schema::SCHEMA_VERSION;
@@ -72,13 +74,16 @@ fn lines(faults: &[TraceFault]) -> String {
     faults.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n")
 }
 
+/// A trace takes some 200 bytes of it.
+const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
+
 /// The manifest of a report's folder.
 ///
 /// # Errors
 /// A folder without one, one that is not readable, one of a later program.
 pub fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
     let path = report.join("manifest.json");
-    let text = match fs::read_to_string(&path) {
+    let text = match input::text(&path, LARGEST) {
         Ok(text) => text,
         Err(source) => return Err(ProvenanceError::NoManifest { path, source }),
     };
@@ -121,7 +126,7 @@ pub fn traces(manifest: &Manifest, places: &[PathBuf]) -> Result<Vec<Input>, Pro
 fn find(wanted: &bundle::Input, places: &[PathBuf]) -> Result<PathBuf, TraceFault> {
     let mut other = None;
     for path in places.iter().flat_map(|place| candidates(wanted, place)) {
-        let Ok(hash) = File::open(&path).and_then(hash::of_reader) else { continue };
+        let Ok(hash) = input::open(&path).and_then(hash::of_reader) else { continue };
         if hash == wanted.sha256 {
             return Ok(path);
         }

@@ -15,6 +15,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use crate::agent::Status;
+use crate::base::budget::Limit;
+use crate::base::input;
+
+/// The largest answer that is read from a provider has 4 MiB; as JSON in JSON a byte may take six.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of a journal", 32 << 20);
 
 /// One line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -134,14 +139,12 @@ impl Journal {
             fs::create_dir_all(folder).map_err(failed)?;
         }
         let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
-        let text = fs::read(path).map_err(failed)?;
-        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-        if whole < text.len() {
-            file.set_len(whole as u64).map_err(failed)?;
+        let found = read(path)?;
+        if found.whole < file.metadata().map_err(failed)?.len() {
+            file.set_len(found.whole).map_err(failed)?;
             file.flush().map_err(failed)?;
         }
-        let (recorded, requests) = read(path, &text[..whole])?;
-        Ok(Self { path: path.to_owned(), file: Some(file), recorded, requests })
+        Ok(Self { path: path.to_owned(), file: Some(file), recorded: found.recorded, requests: found.requests })
     }
 
     /// Opens the journal of an episode as a cassette, for reading alone.
@@ -149,13 +152,13 @@ impl Journal {
     /// # Errors
     /// When there is none, it cannot be read, or a whole line of it is damaged.
     pub fn cassette(path: &Path) -> Result<Self, JournalError> {
-        let text = fs::read(path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => JournalError::Missing { path: path.to_owned() },
-            _ => JournalError::Io { path: path.to_owned(), source },
+        let found = read(path).map_err(|error| match error {
+            JournalError::Io { source, path } if source.kind() == io::ErrorKind::NotFound => {
+                JournalError::Missing { path }
+            }
+            other => other,
         })?;
-        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-        let (recorded, requests) = read(path, &text[..whole])?;
-        Ok(Self { path: path.to_owned(), file: None, recorded, requests })
+        Ok(Self { path: path.to_owned(), file: None, recorded: found.recorded, requests: found.requests })
     }
 
     /// What there is of a step.
@@ -190,17 +193,33 @@ impl Journal {
     }
 }
 
-fn read(path: &Path, text: &[u8]) -> Result<(BTreeMap<i32, Recorded>, Requests), JournalError> {
-    let (mut recorded, mut requests) = (BTreeMap::new(), Requests::default());
-    for (at, line) in text.split(|byte| *byte == b'\n').enumerate().filter(|(_, line)| !line.is_empty()) {
-        let entry = serde_json::from_slice(line).map_err(|fault| JournalError::Damaged {
+/// What the whole lines of a journal say.
+#[derive(Default)]
+struct Found {
+    recorded: BTreeMap<i32, Recorded>,
+    requests: Requests,
+    /// Their bytes; what follows was cut off.
+    whole: u64,
+}
+
+fn read(path: &Path) -> Result<Found, JournalError> {
+    let failed = |source| JournalError::Io { path: path.to_owned(), source };
+    let mut found = Found::default();
+    for (at, line) in input::lines(path, LONGEST_LINE).map_err(failed)?.enumerate() {
+        let line = line.map_err(failed)?;
+        let Some(text) = line.strip_suffix(b"\n") else { break };
+        found.whole += line.len() as u64;
+        if text.is_empty() {
+            continue;
+        }
+        let entry = serde_json::from_slice(text).map_err(|fault| JournalError::Damaged {
             path: path.to_owned(),
             line: at + 1,
             fault,
         })?;
-        note(&mut recorded, &mut requests, &entry);
+        note(&mut found.recorded, &mut found.requests, &entry);
     }
-    Ok((recorded, requests))
+    Ok(found)
 }
 
 fn note(recorded: &mut BTreeMap<i32, Recorded>, requests: &mut Requests, entry: &Entry) {

@@ -5,7 +5,6 @@
 //! checksum does not hold nothing is.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
 
@@ -14,11 +13,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::chunk::{Budgets, glimpse, inside};
 use super::error::LogError;
 use super::message::EpisodeMessage;
 use super::read::{Event, event};
-use super::records::{Piece, Records, glimpse, inside};
+use super::records::{Piece, Records};
 use super::{METADATA, METADATA_KEY, topic};
+use crate::base::budget::{Budget, Limit};
+use crate::base::input;
 use crate::trace::episode::{Episode, Step};
 
 /// What was saved of a log, and what was not.
@@ -80,7 +82,7 @@ impl Losses {
 /// # Errors
 /// When the file cannot be read, does not begin as a log, or is whole and of something else than a recording.
 pub fn recover(path: &Path) -> Result<Recovered, LogError> {
-    let file = File::open(path).map_err(LogError::io("open", path))?;
+    let file = input::open(path).map_err(LogError::io("open", path))?;
     recover_from(path, BufReader::new(file))
 }
 
@@ -100,17 +102,46 @@ pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, L
     Ok(salvage.finished())
 }
 
+/// How many rows may be held: what is saved is held whole, and a row in memory is far larger than one of few words in a
+/// chunk. A log in use has some hundred bytes for a row without its frame.
+#[derive(Debug)]
+struct Rows(Budget, Limit);
+
+impl Default for Rows {
+    fn default() -> Self {
+        Self::of(0)
+    }
+}
+
+impl Rows {
+    /// Of a log of so many bytes.
+    fn of(bytes: u64) -> Self {
+        let limit = Limit::new("rows in a log of its size", 200_000 + bytes / 8);
+        Self(Budget::new(limit), limit)
+    }
+
+    fn take(&self) -> bool {
+        self.0.spend(1).is_ok()
+    }
+
+    fn words(&self) -> String {
+        self.1.check(u64::MAX).map_or_else(|exceeded| exceeded.to_string(), |()| String::new())
+    }
+}
+
 /// The episode that is being put together.
 #[derive(Default)]
 struct Salvage {
     channels: BTreeMap<u16, String>,
     open: Option<(Episode, Vec<Step>, Option<String>)>,
+    /// Rows that may still be held.
+    rows: Rows,
     result: Recovered,
 }
 
 impl Salvage {
     fn of(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
-        let mut salvage = Self::default();
+        let mut salvage = Self { rows: Rows::of(records.bytes()), ..Self::default() };
         // A chunk does not repeat the channels of earlier ones, which may be damaged; the summary does.
         let channels = records.of_summary()?;
         salvage.channels.extend(channels.into_iter().map(|channel| (channel.id, channel.topic)));
@@ -124,11 +155,11 @@ impl Salvage {
                     break;
                 }
                 Piece::Record(record) => salvage.record(record),
-                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk),
+                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk, records.budgets()),
                 Piece::Damage(fault) => salvage.result.losses.damage.push(fault),
                 Piece::Cut(fault, tail) => {
                     salvage.close("the log ends before the episode does");
-                    salvage.lose_all(&tail, "the log ends before the episode does");
+                    salvage.lose_all(&tail, records.budgets(), "the log ends before the episode does");
                     salvage.result.losses.cut = Some(fault);
                 }
             }
@@ -181,20 +212,20 @@ impl Salvage {
         self.result.recording = text.and_then(|text| serde_json::from_str(text).ok());
     }
 
-    fn chunk(&mut self, at: u64, chunk: &[u8]) {
-        match inside(chunk) {
+    fn chunk(&mut self, at: u64, chunk: &[u8], budgets: &Budgets) {
+        match inside(chunk, budgets) {
             Err(fault) => {
                 self.result.losses.damaged_chunks += 1;
                 self.close(&format!("a chunk with its rows is damaged, at byte {at}: {fault}"));
-                self.lose_all(chunk, &format!("its chunk is damaged, at byte {at}: {fault}"));
+                self.lose_all(chunk, budgets, &format!("its chunk is damaged, at byte {at}: {fault}"));
             }
-            Ok(records) => records.into_iter().for_each(|record| self.record(record)),
+            Ok(records) => records.for_each(|record| self.record(record)),
         }
     }
 
     /// Names the episodes that begin in a chunk which cannot be read to its end, as far as it can.
-    fn lose_all(&mut self, chunk: &[u8], reason: &str) {
-        for record in glimpse(chunk) {
+    fn lose_all(&mut self, chunk: &[u8], budgets: &Budgets, reason: &str) {
+        for record in glimpse(chunk, budgets) {
             match record {
                 Record::Channel(channel) => drop(self.channels.entry(channel.id).or_insert(channel.topic)),
                 Record::Message { header, data } => {
@@ -203,7 +234,9 @@ impl Salvage {
                         (Ok(Event::Episode(EpisodeMessage::Begin(head))), open) => {
                             *open = Some((*head, Vec::new(), None));
                         }
-                        (Ok(Event::Decision(row)), Some((_, rows, _))) => rows.extend(row.into_step()),
+                        (Ok(Event::Decision(row)), Some((_, rows, _))) if self.rows.take() => {
+                            rows.extend(row.into_step())
+                        }
                         _ => {}
                     }
                 }
@@ -242,7 +275,8 @@ impl Salvage {
                     fault.get_or_insert(format!("expected the row of step {expected}, found that of step {}", row.t));
                 }
                 match row.into_step() {
-                    Ok(step) => rows.push(step),
+                    Ok(step) if self.rows.take() => rows.push(step),
+                    Ok(_) => drop(fault.get_or_insert_with(|| self.rows.words())),
                     Err(error) => drop(fault.get_or_insert(error.to_string())),
                 }
             }

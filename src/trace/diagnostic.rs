@@ -7,6 +7,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::budget::Exceeded;
 use crate::base::escape::visible;
 
 /// One thing that is wrong with a trace.
@@ -85,6 +86,10 @@ codes! {
     /// The footer is good and the data behind it is not.
     CorruptData, Error, "corrupt-data":
         "the data decodes to what the footer says", "the file is damaged: restore it from its source";
+    /// Reading the file would take more work than files of its size do.
+    OverBudget, Error, "over-budget":
+        "what comes out of the file is in proportion to its size, its names are short, and its episodes fit into memory",
+        "if you trust the file, the environment variable MIRRORSTATS_BUDGET=10 allows ten times as much of everything";
     /// The footer's metadata of mirrorstats cannot be read.
     InvalidMetadata, Error, "invalid-metadata":
         "`mirrorstats.schema_version` is a whole number from 1; in `mirrorstats.recording` a `palette` lists colours, and an \
@@ -213,6 +218,11 @@ impl Finding {
             found: found.into(),
             help: code.help().into(),
         }
+    }
+
+    /// A file that asks for more than its budget.
+    pub(in crate::trace) fn over_budget(file: &str, exceeded: &Exceeded) -> Self {
+        Self::new(Code::OverBudget, file, exceeded.expected(), "more")
     }
 
     /// In this row group.

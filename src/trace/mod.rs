@@ -30,6 +30,7 @@ pub mod schema;
 pub mod validate;
 pub mod write;
 
+pub(crate) use read::flat::FlatRows;
 pub(crate) use read::footer::shape as footer_shape;
 pub use read::{in_order, open, verify};
 pub use schema::{colors, describe};

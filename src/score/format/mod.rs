@@ -12,10 +12,10 @@ pub mod parquet;
 mod partition;
 
 use std::collections::HashSet;
+use std::fs::File;
 use std::io::{self, Read, Write};
 
 use ::parquet::errors::ParquetError;
-use ::parquet::file::reader::ChunkReader;
 
 use super::table::EpisodeTable;
 use crate::metric::catalog::{Catalog, Kind};
@@ -163,7 +163,7 @@ pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<
 ///
 /// # Errors
 /// A file that is not Parquet, or not one of scores; scores that its definitions cannot have given.
-pub fn read_parquet(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+pub fn read_parquet(input: File, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     checked(parquet::read(input, partition)?)
 }
 

@@ -1,5 +1,6 @@
 //! The episode table as Parquet, the definitions in its footer.
 
+use std::fs::File;
 use std::io::Write;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,7 +9,7 @@ use arrow::array::{Array, ArrayRef, AsArray as _, Int32Array, Int64Array, Record
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
@@ -26,7 +27,7 @@ use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use crate::trace::catch_panic::contained;
 use crate::trace::declared::Declared;
-use crate::trace::footer_shape;
+use crate::trace::{FlatRows, footer_shape};
 
 /// The footer key that tells scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -255,32 +256,34 @@ fn schema(header: &Header) -> Schema {
     Schema::new(keys.chain(labels).chain(metrics).collect::<Vec<_>>())
 }
 
-pub(super) fn read(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+pub(super) fn read(input: File, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     contained(|| decode(input, partition))
         .unwrap_or_else(|panic| Err(FormatError::Parquet(ParquetError::General(panic))))
 }
 
-fn decode(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+fn decode(input: File, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+    footer_shape::check_file(&input).map_err(ParquetError::General)?;
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-    let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
-    let catalog = match (footer::value(builder.metadata().file_metadata(), DEFINITIONS_KEY), partition.definitions) {
+    let about = ArrowReaderMetadata::load(&input, options)?;
+    let rows = FlatRows::new(input, Arc::clone(about.metadata())).map_err(ParquetError::General)?;
+    let catalog = match (footer::value(about.metadata().file_metadata(), DEFINITIONS_KEY), partition.definitions) {
         (Some(text), _) => serde_json::from_str(&text).map_err(|error| FormatError::Definitions(error.to_string()))?,
         (None, Some(named)) => named.clone(),
         (None, None) => return Err(FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`"))),
     };
     // Scores of other programs declare nothing.
-    let declared = match footer::value(builder.metadata().file_metadata(), DECLARED_KEY) {
+    let declared = match footer::value(about.metadata().file_metadata(), DECLARED_KEY) {
         Some(text) => serde_json::from_str(&text).map_err(|error| FormatError::Declared(error.to_string()))?,
         None => Declared::default(),
     };
-    let names: Vec<&str> = builder.schema().fields().iter().map(|field| field.name().as_str()).collect();
+    let names: Vec<&str> = about.schema().fields().iter().map(|field| field.name().as_str()).collect();
     check_unique(&names)?;
     // A part without rows has its columns all the same.
-    let none = partition.complete(&RecordBatch::new_empty(builder.schema().clone()), &catalog)?;
+    let none = partition.complete(&RecordBatch::new_empty(about.schema().clone()), &catalog)?;
     let mut table = TableBuilder::new(header_of(&none, catalog));
     append(&mut table, &none)?;
-    for batch in builder.build()? {
-        let batch = batch.map_err(|error| FormatError::Parquet(error.into()))?;
+    for batch in rows {
+        let batch = batch.map_err(|error| FormatError::Parquet(ParquetError::General(error)))?;
         let batch = partition.complete(&batch, &table.header().catalog)?;
         append(&mut table, &batch)?;
     }
@@ -409,7 +412,9 @@ mod tests {
         let rows: Vec<i64> = groups.row_groups().iter().map(RowGroupMetaData::num_rows).collect();
         assert_eq!(rows, [ROW_GROUP_ROWS, GATHERED_ROWS + 5].map(|rows| i64::try_from(rows).unwrap()));
         let partition = Partition { folders: &[], definitions: None };
-        assert_eq!(read(bytes, &partition).unwrap(), table());
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&bytes).unwrap();
+        assert_eq!(read(file, &partition).unwrap(), table());
     }
 
     /// Takes so many bytes.

@@ -12,11 +12,12 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader, RowSelection, RowSelector};
 use parquet::basic::Type as Physical;
 
+use super::budget::check_names;
 use super::column::{Column, Runs, all_within};
 use super::footer::{plain, rows_of};
 use super::open::{TraceFile, text_type};
 use super::pages::{self, Cursor, FaultSlot, Form, Place, Store, Unsupported};
-use super::projection::{EPISODE_ID, Layout, T};
+use super::projection::{EPISODE_ID, Layout, LayoutColumn, T};
 use crate::trace::catch_panic::contained;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::schema::Kind;
@@ -173,7 +174,8 @@ impl<'a> RowGroup<'a> {
         // Whole episodes where it is known where they end.
         let most = self.at_a_time.min(left);
         let count = self.ids.as_ref().filter(|_| left > 0).map_or(most, |ids| ids.runs.until(self.first, most));
-        let columns = (0..self.sources.len()).map(|at| self.column(at, count));
+        let columns =
+            (0..self.sources.len()).map(|at| self.column(at, count).and_then(|column| self.within(at, column)));
         let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
         if count == 0 {
             return Ok(None);
@@ -185,6 +187,20 @@ impl<'a> RowGroup<'a> {
         let rows = Rows { columns, row_group: self.index, first: self.first, whole };
         self.first += count;
         Ok(Some(rows))
+    }
+
+    /// A column, if its texts are within the budgets.
+    fn within(&self, at: usize, column: Column) -> Result<Column, Box<Finding>> {
+        let LayoutColumn { name, kind, known, .. } = &self.layout.columns[at];
+        if *kind != Kind::String {
+            return Ok(column);
+        }
+        let names = if known.is_some_and(|known| known.constant) { check_names(&column) } else { Ok(()) };
+        let place = (self.index, root(self.file, self.layout, at).unwrap_or(usize::MAX));
+        let checked = names.and_then(|()| self.file.expansion().rows(place, self.first, &column));
+        let over =
+            |exceeded| Finding::over_budget(self.file.name(), &exceeded).in_row_group(self.index).in_column(name);
+        checked.map(|()| column).map_err(|exceeded| Box::new(over(exceeded)))
     }
 
     /// The next `count` rows of a column. At the end, where that is none, there must be none.
@@ -281,7 +297,7 @@ impl<'a> RowGroup<'a> {
     ) -> parquet::errors::Result<ParquetRecordBatchReader> {
         let rows = rows_of(self.footer.metadata().row_group(self.index));
         let (metadata, slot) = (Arc::clone(self.footer.metadata()), Arc::clone(slot));
-        let library = pages::Library { store, metadata, row_groups: vec![self.index], slot };
+        let library = pages::Library { store, metadata, row_groups: vec![self.index], slot, writes_out: false };
         let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
         let selection = (first > 0).then(|| RowSelection::from(rest));
         let column = ProjectionMask::roots(self.footer.parquet_schema(), [root]);
@@ -307,11 +323,12 @@ pub(in crate::trace) fn ids(file: &TraceFile, layout: &Layout, row_group: usize)
     let root = root(file, layout, EPISODE_ID)?;
     let (store, footer) = (store(file).ok()?, file.footer().ok()?);
     let read = || cursor(&footer, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
-    contained(read).ok()?.ok()
+    // Who reads them with the other columns says what is wrong with them.
+    contained(read).ok()?.ok().filter(|ids| check_names(ids).is_ok())
 }
 
 fn store(file: &TraceFile) -> Result<Store, Box<Finding>> {
-    file.reader().map(Store::File).map_err(|error| {
+    file.store().map_err(|error| {
         Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
     })
 }

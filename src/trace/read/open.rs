@@ -3,6 +3,7 @@
 //! No row is read here. A file is held by its name and what it is made of, never by an open handle, so that any number of
 //! files can be open at once.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,9 +16,12 @@ use parquet::basic::ConvertedType;
 use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 
+use super::budget::{Expansion, MOST_COLUMNS};
 use super::footer::bounds;
 use super::footer::{Extent, footer, plain, rows_of};
+use super::pages::Store;
 use crate::base::escape::visible;
+use crate::base::input;
 use crate::base::suggest::nearest;
 use crate::trace::catch_panic::contained;
 use crate::trace::declared_experiment::{self, DeclaredExperiment};
@@ -48,6 +52,8 @@ pub struct TraceFile {
     experiments: Vec<DeclaredExperiment>,
     /// What a reader needs, while somebody reads: footers of many row groups are large.
     footer: Mutex<Weak<ArrowReaderMetadata>>,
+    /// What was made of its bytes.
+    expansion: Arc<Expansion>,
 }
 
 /// A column of one file.
@@ -163,7 +169,8 @@ impl TraceFile {
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
         let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
-        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, experiments, footer })
+        let expansion = Arc::new(Expansion::new(bytes));
+        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, experiments, footer, expansion })
     }
 
     /// The name in messages and outputs.
@@ -176,7 +183,17 @@ impl TraceFile {
     /// # Errors
     /// Whatever the operating system says.
     pub fn reader(&self) -> io::Result<File> {
-        File::open(&self.path)
+        input::open(&self.path)
+    }
+
+    /// The file as its pages are read.
+    pub(in crate::trace) fn store(&self) -> io::Result<Store> {
+        self.reader().map(|file| Store::new(file, Arc::clone(&self.expansion)))
+    }
+
+    /// What was made of its bytes so far.
+    pub(in crate::trace) fn expansion(&self) -> &Expansion {
+        &self.expansion
     }
 
     /// Where it is, for an engine that reads files by itself.
@@ -338,9 +355,14 @@ fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
 }
 
 fn check_columns(file: &str, columns: &[FileColumn], version: u32) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    for (i, column) in columns.iter().enumerate() {
-        if columns[..i].iter().filter(|before| before.name == column.name).count() == 1 {
+    if let Err(exceeded) = MOST_COLUMNS.check(columns.len() as u64) {
+        return vec![Finding::over_budget(file, &exceeded)];
+    }
+    let (mut findings, mut counts) = (Vec::new(), HashMap::new());
+    for column in columns {
+        let count = counts.entry(column.name.as_str()).or_insert(0);
+        *count += 1;
+        if *count == 2 {
             let finding = Finding::new(Code::RepeatedColumn, file, "one column of that name", "more than one");
             findings.push(finding.in_column(&column.name));
         }

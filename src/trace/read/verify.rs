@@ -4,7 +4,7 @@ use std::io;
 
 use super::footer::plain;
 use super::open::{TraceFile, TraceSet};
-use super::pages::{FaultSlot, Place, Store, damaged, verify};
+use super::pages::{FaultSlot, Place, damaged, verify};
 use crate::trace::catch_panic::contained;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::error::TraceError;
@@ -22,7 +22,7 @@ fn verify_file(file: &TraceFile) -> Result<(), Box<Finding>> {
     let unreadable = |error: io::Error| {
         Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
     };
-    let store = Store::File(file.reader().map_err(unreadable)?);
+    let store = file.store().map_err(unreadable)?;
     let metadata = footer.metadata();
     for (row_group, group) in metadata.row_groups().iter().enumerate() {
         for column in 0..group.num_columns() {

@@ -2,7 +2,6 @@
 //!
 //! Rule: the same episodes in the same order give the same bytes, whatever files they came from.
 
-use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -13,12 +12,14 @@ use parquet::arrow::ProjectionMask;
 use parquet::file::metadata::ParquetMetaData;
 
 use super::decode_episode::{self, NotAnEpisode};
+use crate::base::input;
 use crate::base::replace::{self, NewFile};
 use crate::trace::catch_panic::contained;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::episode::Episode;
 use crate::trace::error::TraceError;
 use crate::trace::inputs::Input;
+use crate::trace::read::budget::Expansion;
 use crate::trace::read::footer::bounds;
 use crate::trace::read::footer::{Extent, footer, plain};
 use crate::trace::read::open::is_nested;
@@ -87,16 +88,16 @@ impl EpisodeRows {
 pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     let name = path.display().to_string();
     let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
-    let file = File::open(path).map_err(|error| unreadable(&name, error.into()))?;
+    let file = input::open(path).map_err(|error| unreadable(&name, error.into()))?;
     let (bytes, metadata) = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
     match bounds::fault(&name, bytes, &metadata) {
         // Whoever puts traces together takes one without rows as it is.
         Some(fault) if fault.code != Code::NoEpisodes => Err(damaged(fault)),
-        _ => decode(&name, file, metadata),
+        _ => decode(&name, Store::new(file, Arc::new(Expansion::new(bytes))), metadata),
     }
 }
 
-fn decode(name: &str, file: File, metadata: ParquetMetaData) -> Result<Vec<EpisodeRows>, TraceError> {
+fn decode(name: &str, store: Store, metadata: ParquetMetaData) -> Result<Vec<EpisodeRows>, TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
     let columns = metadata.file_metadata().schema_descr().columns();
     if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
@@ -105,8 +106,8 @@ fn decode(name: &str, file: File, metadata: ParquetMetaData) -> Result<Vec<Episo
     contained(|| {
         let row_groups = (0..metadata.num_row_groups()).collect();
         let slot = FaultSlot::default();
-        let library =
-            Library { store: Store::File(file), metadata: Arc::new(metadata), row_groups, slot: Arc::clone(&slot) };
+        let (metadata, kept) = (Arc::new(metadata), Arc::clone(&slot));
+        let library = Library { store, metadata, row_groups, slot: kept, writes_out: true };
         let damaged = |error: String| failed(damaged(name, &slot, &error).to_string().into());
         let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, None);
         let batches = reader.map_err(|error| damaged(plain(&error)))?.collect::<Result<Vec<_>, _>>();

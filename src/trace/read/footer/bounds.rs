@@ -4,6 +4,7 @@
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
 
 use crate::trace::diagnostic::{Code, Finding};
+use crate::trace::read::budget::most_rows;
 
 /// The most rows for which a byte of a row group, of all columns together, is enough. Each episode has an id of its own
 /// and each of its steps another `t`; the densest traces in use have about one row in a byte.
@@ -25,6 +26,9 @@ pub(in crate::trace) fn fault(file: &str, bytes: u64, metadata: &ParquetMetaData
     ranges.sort_unstable();
     if ranges.windows(2).any(|pair| pair[0].1 > pair[1].0) {
         return Some(Finding::new(Code::CorruptFooter, file, "columns that lie apart", "two in the same bytes"));
+    }
+    if let Err(exceeded) = most_rows(bytes).check(declared.cast_unsigned()) {
+        return Some(Finding::over_budget(file, &exceeded));
     }
     (declared == 0).then(|| Finding::new(Code::NoEpisodes, file, "at least one episode", "no row"))
 }

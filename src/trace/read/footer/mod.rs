@@ -11,6 +11,7 @@ use parquet::file::metadata::{
     ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy, RowGroupMetaData,
 };
 
+use crate::base::input;
 use crate::trace::catch_panic::contained;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::inputs::Input;
@@ -45,7 +46,7 @@ impl Extent {
 pub(in crate::trace) fn footer(input: &Input, extent: Extent) -> Result<(u64, ParquetMetaData), Box<Finding>> {
     let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
     let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
-    let mut file = File::open(&input.path).map_err(unreadable)?;
+    let mut file = input::open(&input.path).map_err(unreadable)?;
     let about = file.metadata().map_err(unreadable)?;
     if about.is_dir() {
         return Err(finding(Code::NotParquet, "a Parquet file", "a folder".into()));

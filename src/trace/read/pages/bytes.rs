@@ -2,10 +2,12 @@
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::sync::Arc;
 
 use bytes::Bytes;
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 
+use crate::trace::read::budget::Expansion;
 use crate::trace::read::footer::rows_of;
 
 /// One column of one row group of a file.
@@ -32,18 +34,37 @@ impl<'a> Place<'a> {
 const LARGEST: u64 = 8 << 20;
 
 /// A file, or part of one in memory, addressed as the file is.
-pub(in crate::trace) enum Store {
+pub(in crate::trace) struct Store {
+    held: Held,
+    expansion: Arc<Expansion>,
+}
+
+enum Held {
     File(File),
     Memory { start: u64, bytes: Bytes },
 }
 
 impl Store {
+    /// A file, and what was made of it so far.
+    pub(in crate::trace) fn new(file: File, expansion: Arc<Expansion>) -> Self {
+        Self { held: Held::File(file), expansion }
+    }
+
+    /// What was made of the file so far.
+    pub(super) fn expansion(&self) -> &Arc<Expansion> {
+        &self.expansion
+    }
+
+    fn of(&self, held: Held) -> Self {
+        Self { held, expansion: Arc::clone(&self.expansion) }
+    }
+
     /// The same, to be read by somebody else. Handles of one file share their position: one thread may have them.
     pub(in crate::trace) fn again(&self) -> io::Result<Self> {
-        Ok(match self {
-            Self::File(file) => Self::File(file.try_clone()?),
-            Self::Memory { start, bytes } => Self::Memory { start: *start, bytes: bytes.clone() },
-        })
+        Ok(self.of(match &self.held {
+            Held::File(file) => Held::File(file.try_clone()?),
+            Held::Memory { start, bytes } => Held::Memory { start: *start, bytes: bytes.clone() },
+        }))
     }
 
     /// A range of bytes, held in memory if it is small.
@@ -52,20 +73,20 @@ impl Store {
             return self.again();
         }
         let most = usize::try_from(length).unwrap_or(usize::MAX);
-        Ok(Self::Memory { start, bytes: self.read(start, most)? })
+        Ok(self.of(Held::Memory { start, bytes: self.read(start, most)? }))
     }
 
     /// `length` bytes from `start` on, or fewer where the end comes before.
     pub(super) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
-        match self {
-            Self::File(file) => {
+        match &self.held {
+            Held::File(file) => {
                 let mut file = file;
                 let mut bytes = Vec::new();
                 file.seek(SeekFrom::Start(start))?;
                 file.take(length as u64).read_to_end(&mut bytes)?;
                 Ok(bytes.into())
             }
-            Self::Memory { start: first, bytes } => {
+            Held::Memory { start: first, bytes } => {
                 let from = start.checked_sub(*first).and_then(|from| usize::try_from(from).ok());
                 let from = from.map_or(bytes.len(), |from| from.min(bytes.len()));
                 Ok(bytes.slice(from..from.saturating_add(length).min(bytes.len())))

@@ -11,6 +11,7 @@ pub(in crate::trace) struct Unsupported;
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the page at byte {offset}: expected {expected}, found {found}")]
 pub(in crate::trace) struct PageFault {
+    pub(in crate::trace) code: Code,
     pub(in crate::trace) row_group: usize,
     pub(in crate::trace) column: String,
     /// Where in the file the page starts, with its header.
@@ -24,9 +25,9 @@ pub(in crate::trace) type FaultSlot = Arc<OnceLock<PageFault>>;
 
 /// The finding about a column that could not be decoded: the fault of its page, or else what the decoder said.
 pub(in crate::trace) fn damaged(file: &str, slot: &FaultSlot, error: &str) -> Finding {
-    if let Some(PageFault { row_group, column, offset, expected, found }) = slot.get() {
+    if let Some(PageFault { code, row_group, column, offset, expected, found }) = slot.get() {
         let expected = format!("{expected} in the page at byte {offset}");
-        Finding::new(Code::CorruptData, file, expected, found).in_row_group(*row_group).in_column(column)
+        Finding::new(*code, file, expected, found).in_row_group(*row_group).in_column(column)
     } else {
         let found = error.split_whitespace().collect::<Vec<_>>().join(" ");
         Finding::new(Code::CorruptData, file, "data that decodes", found)

@@ -25,6 +25,8 @@ pub(in crate::trace) struct Library {
     pub(in crate::trace) row_groups: Vec<usize>,
     /// Where the first fault of a page is left.
     pub(in crate::trace) slot: FaultSlot,
+    /// Whether texts are asked for row by row, not as keys into a dictionary.
+    pub(in crate::trace) writes_out: bool,
 }
 
 impl Library {
@@ -50,7 +52,8 @@ impl RowGroups for Library {
     fn column_chunks(&self, column: usize) -> Result<Box<dyn PageIterator>> {
         let store = self.store.again().map_err(|error| ParquetError::External(Box::new(error)))?;
         let (metadata, slot) = (Arc::clone(&self.metadata), Arc::clone(&self.slot));
-        Ok(Box::new(Chunks { store, metadata, column, row_groups: self.row_groups.clone().into_iter(), slot }))
+        let (row_groups, writes_out) = (self.row_groups.clone().into_iter(), self.writes_out);
+        Ok(Box::new(Chunks { store, metadata, column, row_groups, slot, writes_out }))
     }
 
     fn row_groups(&self) -> Box<dyn Iterator<Item = &RowGroupMetaData> + '_> {
@@ -69,6 +72,7 @@ struct Chunks {
     column: usize,
     row_groups: vec::IntoIter<usize>,
     slot: FaultSlot,
+    writes_out: bool,
 }
 
 impl Iterator for Chunks {
@@ -76,7 +80,7 @@ impl Iterator for Chunks {
 
     fn next(&mut self) -> Option<Self::Item> {
         let place = Place { metadata: &self.metadata, row_group: self.row_groups.next()?, column: self.column };
-        let pages = Pages::checked(&self.store, place, Arc::clone(&self.slot));
+        let pages = Pages::checked(&self.store, place, Arc::clone(&self.slot), self.writes_out);
         Some(pages.map(|pages| Box::new(pages) as _))
     }
 }

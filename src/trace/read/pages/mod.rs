@@ -11,6 +11,7 @@
 mod bytes;
 mod contents;
 mod cursor;
+mod delta;
 mod dictionary;
 mod error;
 mod header;

@@ -31,10 +31,10 @@ impl Pages {
     }
 
     /// The same for a decoder that does not check what they hold.
-    pub(super) fn checked(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
+    pub(super) fn checked(store: &Store, place: Place<'_>, slot: FaultSlot, writes_out: bool) -> Result<Self> {
         let about = place.chunk().column_descr();
         let flat = about.max_rep_level() == 0 && about.max_def_level() <= 1;
-        let contents = flat.then(|| Contents::new(about));
+        let contents = flat.then(|| Contents::new(about, writes_out));
         Ok(Self { contents, ..Self::new(store, place, slot)? })
     }
 
@@ -42,8 +42,9 @@ impl Pages {
         let Some(page) = self.inner.get_next_page()? else {
             return self.stored.finish().map(|()| None);
         };
-        if let Some(Err((expected, found))) = self.contents.as_mut().map(|contents| contents.check(&page)) {
-            return Err(self.stored.fault(self.stored.offset(), expected, found));
+        match self.contents.as_mut().map_or(Ok(0), |contents| contents.check(&page)) {
+            Ok(bytes) => self.stored.texts(bytes)?,
+            Err((expected, found)) => return Err(self.stored.fault(self.stored.offset(), expected, found)),
         }
         Ok(Some(page))
     }

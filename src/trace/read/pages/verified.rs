@@ -15,6 +15,8 @@ use parquet::file::reader::{ChunkReader, Length};
 use super::bytes::{Place, Store};
 use super::error::{FaultSlot, PageFault};
 use super::header::{About, Header, Kind};
+use crate::base::budget::Exceeded;
+use crate::trace::diagnostic::Code;
 use crate::trace::read::thrift;
 
 /// How much of a file is read to find a header in; most are shorter than 100 bytes.
@@ -25,7 +27,8 @@ const LONGEST_HEADER: usize = 16 << 20;
 /// The pages of a column as they are stored.
 pub(super) struct Verified {
     store: Store,
-    row_group: usize,
+    /// The row group and the column.
+    place: (usize, usize),
     column: String,
     start: u64,
     end: u64,
@@ -62,7 +65,7 @@ impl Verified {
         let flat = described.max_rep_level() == 0 && described.path().parts().len() == 1;
         Ok(Self {
             store: store.part(start, length)?,
-            row_group: place.row_group,
+            place: (place.row_group, place.column),
             column: column.column_path().string(),
             start,
             end: start.saturating_add(length),
@@ -101,10 +104,25 @@ impl Verified {
 
     /// The error of a page at `offset`, kept for whoever asked for the column.
     pub(super) fn fault(&self, offset: u64, expected: impl Into<String>, found: impl fmt::Display) -> ParquetError {
-        let (row_group, column) = (self.row_group, self.column.clone());
-        let fault = PageFault { row_group, column, offset, expected: expected.into(), found: found.to_string() };
+        self.keep(Code::CorruptData, offset, expected.into(), found.to_string())
+    }
+
+    /// The error of a page that asks for more than the budget of its file.
+    pub(super) fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
+        self.keep(Code::OverBudget, offset, exceeded.expected(), "more".to_owned())
+    }
+
+    fn keep(&self, code: Code, offset: u64, expected: String, found: String) -> ParquetError {
+        let (row_group, column) = (self.place.0, self.column.clone());
+        let fault = PageFault { code, row_group, column, offset, expected, found };
         let _ = self.slot.set(fault.clone());
         ParquetError::External(Box::new(fault))
+    }
+
+    /// The texts of a page take so many bytes when they are written out.
+    pub(super) fn texts(&self, bytes: u64) -> Result<()> {
+        let offset = self.offset();
+        self.store.expansion().texts(self.place, offset, bytes).map_err(|exceeded| self.over(offset, &exceeded))
     }
 
     /// The page that starts at `offset`: the bytes of its header, and what they say.
@@ -124,6 +142,10 @@ impl Verified {
         {
             return Err(self.fault(offset, expected, found));
         }
+        self.store
+            .expansion()
+            .page(self.place, offset, header.whole)
+            .map_err(|exceeded| self.over(offset, &exceeded))?;
         progress.pages += 1;
         if matches!(header.kind, Kind::Data | Kind::DataV2) {
             progress.values += header.values;

@@ -19,7 +19,7 @@ use super::message::EpisodeMessage;
 use super::read::{Event, event};
 use super::records::{Piece, Records};
 use super::{METADATA, METADATA_KEY, topic};
-use crate::base::budget::{Budget, Limit};
+use crate::base::budget::{Budget, Limit, SETTING};
 use crate::base::input;
 use crate::trace::episode::{Episode, Step};
 
@@ -216,6 +216,9 @@ impl Salvage {
         match inside(chunk, budgets) {
             Err(fault) => {
                 self.result.losses.damaged_chunks += 1;
+                if fault.contains(SETTING) {
+                    self.result.losses.damage.push(format!("the chunk at byte {at} is not unpacked: {fault}"));
+                }
                 self.close(&format!("a chunk with its rows is damaged, at byte {at}: {fault}"));
                 self.lose_all(chunk, budgets, &format!("its chunk is damaged, at byte {at}: {fault}"));
             }

@@ -9,12 +9,14 @@ use arrow::datatypes::{Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::diagnostic::Finding;
 use super::error::TraceError;
 use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
 use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{self, Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
+use crate::base::budget::Limit;
 use crate::base::hash;
 
 /// A summary of some traces.
@@ -103,6 +105,9 @@ pub struct FileInfo {
     pub recording: Option<serde_json::Value>,
 }
 
+/// What each model has of the seeds and runs of all: a study of seven models, five experiments and 20,000 runs has 700,000.
+const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
+
 /// Summarises these traces; reads the key columns and `reply_status` of all rows, and every byte for its hash.
 ///
 /// # Errors
@@ -138,6 +143,11 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let pairs: BTreeSet<SeedRun> = cells.values().flat_map(|pairs| pairs.keys()).copied().collect();
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
+    let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
+    MOST_COVERED.check(asked as u64).map_err(|exceeded| {
+        let file = set.files().first().map_or("", TraceFile::name);
+        TraceError::from(Finding::over_budget(file, &exceeded))
+    })?;
     Ok(Info {
         episodes: summary.episodes,
         steps: summary.steps,

@@ -21,8 +21,8 @@ impl Layout<'_> {
             return String::new();
         }
         let text = text();
-        self.spend(text.len());
-        text
+        // What is not written to its end is not repeated in what contains it.
+        if self.spend(text.len()) { text } else { String::new() }
     }
 
     fn name(&self, name: &str) -> String {

@@ -32,8 +32,8 @@ pub(super) struct Layout<'p> {
 }
 
 /// A node that others read is written out for each of them, so that what is written may double with every definition.
-/// The longest statement, each of its bytes within some twenty nodes.
-const MOST_WRITTEN: Limit = Limit::new("bytes written of a statement", 80 << 20);
+/// The longest statement, each of its bytes within some five nodes.
+const MOST_WRITTEN: Limit = Limit::new("bytes written of a statement", 20 << 20);
 
 impl<'p> Layout<'p> {
     pub(super) fn new(

@@ -45,7 +45,7 @@ fn what_is_no_file_is_refused_without_being_opened() {
             &["score", "a.parquet", "--definitions", name],
             &["report", "a.parquet", "--style", name],
             &["report", "a.parquet", "--definitions", name],
-            &["audit", "a.parquet", "--against", name],
+            &["audit", "--n", "21", name],
             &["import", name, "-o", "x.parquet"],
             &["renormalize", name, "-o", "x.parquet"],
         ] {

@@ -28,6 +28,9 @@ pub(in crate::trace) fn most_rows(bytes: u64) -> Limit {
     Limit::in_proportion("rows in a file of its size", 8_000_000, 16, bytes)
 }
 
+/// What comes out of a stored byte, of a file that is not small.
+pub(in crate::trace) const INFLATED_PER_BYTE: u64 = 96;
+
 /// Texts of which all rows together cannot be much are not counted.
 const UNCOUNTED: usize = 64 << 10;
 
@@ -50,9 +53,14 @@ enum Kind {
 impl Expansion {
     /// Nothing yet of a file of so many bytes.
     pub(in crate::trace) fn new(bytes: u64) -> Self {
-        let inflated = Limit::in_proportion("bytes inflated from a file of its size", 128 << 20, 128, bytes);
-        let written_out =
-            Limit::in_proportion("bytes of texts in the rows of a file of its size", 128 << 20, 128, bytes);
+        let inflated =
+            Limit::in_proportion("bytes inflated from a file of its size", 64 << 20, INFLATED_PER_BYTE, bytes);
+        let written_out = Limit::in_proportion(
+            "bytes of texts in the rows of a file of its size",
+            64 << 20,
+            INFLATED_PER_BYTE,
+            bytes,
+        );
         Self { inflated: Budget::new(inflated), written_out: Budget::new(written_out), read: Mutex::default() }
     }
 
@@ -132,7 +140,7 @@ mod tests {
     #[test]
     fn what_is_read_again_counts_once() {
         let expansion = Expansion::new(0);
-        let half = (128 << 20) / 2;
+        let half = (64 << 20) / 2;
         assert!(expansion.page((0, 0), 4, half).is_ok() && expansion.page((0, 0), 4, half).is_ok());
         assert!(expansion.page((0, 1), 4, half).is_ok());
         assert!(expansion.page((1, 0), 4, 1).is_err());

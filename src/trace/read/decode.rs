@@ -12,7 +12,7 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader, RowSelection, RowSelector};
 use parquet::basic::Type as Physical;
 
-use super::budget::check_names;
+use super::budget::{INFLATED_PER_BYTE, check_names};
 use super::column::{Column, Runs, all_within};
 use super::footer::{plain, rows_of};
 use super::open::{TraceFile, text_type};
@@ -25,8 +25,9 @@ use crate::trace::schema::Kind;
 /// Rows that are decoded at a time: the columns of so many stay in a core's cache.
 const BATCH_ROWS: usize = 32 * 1024;
 
-/// Bytes of one column's texts that are decoded at a time, about: an array holds 2 GiB, and texts are not all as long.
-const BATCH_TEXT: u64 = 256 << 20;
+/// Bytes of one column's texts that are decoded at a time, about: the decoder makes room for them several
+/// times, and texts are not all as long.
+const BATCH_TEXT: u64 = 64 << 20;
 
 /// Some rows of one row group: a column for each of the layout, in its order.
 #[derive(Clone, Debug)]
@@ -364,7 +365,9 @@ fn leaf(footer: &ArrowReaderMetadata, root: usize) -> Option<usize> {
 fn text_bytes(footer: &ArrowReaderMetadata, root: usize, row_group: usize) -> Option<u64> {
     let column = footer.metadata().row_group(row_group).columns().get(leaf(footer, root)?)?;
     let written_out = column.unencoded_byte_array_data_bytes().unwrap_or_default();
-    let bytes = u64::try_from(column.uncompressed_size().max(written_out)).unwrap_or_default();
+    // What the file says may be too little. Of what is stored no more than this is inflated.
+    let most = column.compressed_size().saturating_mul(INFLATED_PER_BYTE.cast_signed());
+    let bytes = u64::try_from(column.uncompressed_size().max(written_out).max(most)).unwrap_or_default();
     (column.column_type() == Physical::BYTE_ARRAY).then_some(bytes)
 }
 
@@ -440,7 +443,7 @@ mod tests {
             (0, 0, BATCH_ROWS),
             (100_000, 0, BATCH_ROWS),
             (100_000, 100_000 * 100, BATCH_ROWS),
-            (100_000, 100_000 << 16, 4096),
+            (100_000, 100_000 << 16, 1024),
             (10, 10 * BATCH_TEXT, 1),
             (10, u64::MAX, 1),
         ] {

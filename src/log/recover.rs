@@ -238,7 +238,7 @@ impl Salvage {
                             *open = Some((*head, Vec::new(), None));
                         }
                         (Ok(Event::Decision(row)), Some((_, rows, _))) if self.rows.take() => {
-                            rows.extend(row.into_step())
+                            rows.extend(row.into_step());
                         }
                         _ => {}
                     }

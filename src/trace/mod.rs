@@ -31,6 +31,7 @@ pub mod validate;
 pub mod write;
 
 pub(crate) use read::flat::FlatRows;
+pub use read::flat::TableFile;
 pub(crate) use read::footer::shape as footer_shape;
 pub use read::{in_order, open, verify};
 pub use schema::{colors, describe};

@@ -12,13 +12,13 @@ pub mod parquet;
 mod partition;
 
 use std::collections::HashSet;
-use std::fs::File;
 use std::io::{self, Read, Write};
 
 use ::parquet::errors::ParquetError;
 
 use super::table::EpisodeTable;
 use crate::metric::catalog::{Catalog, Kind};
+use crate::trace::TableFile;
 
 pub use self::parquet::{
     DECLARED_KEY, DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores,
@@ -163,7 +163,7 @@ pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<
 ///
 /// # Errors
 /// A file that is not Parquet, or not one of scores; scores that its definitions cannot have given.
-pub fn read_parquet(input: File, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+pub fn read_parquet(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     checked(parquet::read(input, partition)?)
 }
 

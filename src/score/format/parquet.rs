@@ -1,6 +1,5 @@
 //! The episode table as Parquet, the definitions in its footer.
 
-use std::fs::File;
 use std::io::Write;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -27,7 +26,7 @@ use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use crate::trace::catch_panic::contained;
 use crate::trace::declared::Declared;
-use crate::trace::{FlatRows, footer_shape};
+use crate::trace::{FlatRows, TableFile, footer_shape};
 
 /// The footer key that tells scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -256,12 +255,12 @@ fn schema(header: &Header) -> Schema {
     Schema::new(keys.chain(labels).chain(metrics).collect::<Vec<_>>())
 }
 
-pub(super) fn read(input: File, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+pub(super) fn read(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     contained(|| decode(input, partition))
         .unwrap_or_else(|panic| Err(FormatError::Parquet(ParquetError::General(panic))))
 }
 
-fn decode(input: File, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+fn decode(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     footer_shape::check_file(&input).map_err(ParquetError::General)?;
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let about = ArrowReaderMetadata::load(&input, options)?;

@@ -17,6 +17,9 @@ use crate::trace::diagnostic::{Code, Finding};
 /// Rows that are decoded at a time.
 const BATCH_ROWS: usize = 1024;
 
+/// An open file that may be a table.
+pub type TableFile = File;
+
 /// All rows of a file, some at a time.
 pub(crate) struct FlatRows {
     reader: ParquetRecordBatchReader,
@@ -28,7 +31,7 @@ impl FlatRows {
     ///
     /// # Errors
     /// A footer that contradicts itself, a column that is nested, more rows or columns than the budget allows, in words.
-    pub(crate) fn new(file: File, metadata: Arc<ParquetMetaData>) -> Result<Self, String> {
+    pub(crate) fn new(file: TableFile, metadata: Arc<ParquetMetaData>) -> Result<Self, String> {
         let bytes = file.metadata().map_err(|error| error.to_string())?.len();
         let columns = metadata.file_metadata().schema_descr().columns();
         MOST_COLUMNS.check(columns.len() as u64).map_err(|exceeded| exceeded.to_string())?;

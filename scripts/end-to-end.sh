@@ -40,8 +40,7 @@ mirrorstats definitions check paper
 mirrorstats definitions check extended
 
 echo "end-to-end: the same scores from the SQL lowering on an independent engine"
-packages=$target/python
-fetch "$packages" duckdb duckdb==2.0.0
+packages=$(scripts/get-duckdb.sh)
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper --where "seed <> 2 and TSA = 1"
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper \

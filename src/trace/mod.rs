@@ -17,6 +17,8 @@ pub mod declared_experiment;
 pub mod diagnostic;
 pub mod episode;
 pub mod error;
+#[cfg(feature = "fuzz")]
+pub mod fuzz;
 pub mod identification;
 pub mod import;
 pub mod info;

@@ -374,12 +374,12 @@ pub(in crate::trace) fn held_as(kind: Kind) -> DataType {
 }
 
 /// Why a decoded column is not taken.
-enum Refused {
+pub(in crate::trace) enum Refused {
     Unreadable(String),
     TooLarge { row: usize, value: u64 },
 }
 
-fn normal_column(column: &ArrayRef, kind: Kind) -> Result<ArrayRef, Refused> {
+pub(in crate::trace) fn normal_column(column: &ArrayRef, kind: Kind) -> Result<ArrayRef, Refused> {
     let held = held_as(kind);
     match column.data_type() {
         same if *same == held => {

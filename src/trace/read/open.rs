@@ -300,7 +300,7 @@ fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding
 }
 
 /// The columns of the file, or that it has none that can be made out.
-fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
+pub(in crate::trace) fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
     let corrupt = |found| vec![Finding::new(Code::CorruptFooter, file, "a schema of known types", found)];
     let fields = contained(|| parquet_to_arrow_schema(descriptor, None))
         .map_err(corrupt)?
@@ -369,7 +369,7 @@ fn check_columns(file: &str, columns: &[FileColumn], version: u32) -> Vec<Findin
 }
 
 /// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
-fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
+pub(in crate::trace) fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
     let make = || {
         let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
         let fields = plain_schema.fields().iter().zip(columns).map(|(field, column)| match column.kind {

@@ -42,7 +42,8 @@ pub fn episodes(count: usize) -> Vec<Episode> {
 pub fn trace(count: usize) -> Vec<u8> {
     let episodes = episodes(count);
     let columns = OptionalColumns::used_by(&episodes);
-    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns }).expect("known columns");
+    let mut encoder =
+        TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns }).expect("known columns");
     for episode in &episodes {
         encoder.write(episode).expect("a sound episode");
     }

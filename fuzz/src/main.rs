@@ -34,7 +34,9 @@ fn main() -> std::process::ExitCode {
             return campaign::run(number(count), number(seed), number(threads));
         }
         _ => {
-            eprintln!("usage: mirrorstats-fuzz targets | seeds FOLDER | run TARGET FILE... | pages MUTANTS SEED THREADS");
+            eprintln!(
+                "usage: mirrorstats-fuzz targets | seeds FOLDER | run TARGET FILE... | pages MUTANTS SEED THREADS"
+            );
             return std::process::ExitCode::from(2);
         }
     }

@@ -16,7 +16,10 @@ pub fn path(name: &str) -> PathBuf {
         let memory = Path::new("/dev/shm");
         let of = || {
             let place = if memory.is_dir() { memory.to_owned() } else { std::env::temp_dir() };
-            tempfile::Builder::new().prefix("mirrorstats-fuzz-").tempdir_in(place).expect("a folder for temporary files")
+            tempfile::Builder::new()
+                .prefix("mirrorstats-fuzz-")
+                .tempdir_in(place)
+                .expect("a folder for temporary files")
         };
         folder.get_or_insert_with(of).path().join(name)
     })

@@ -49,7 +49,9 @@ pub fn of(target: &str) -> Vec<Vec<u8>> {
         "definitions" => definitions(),
         "manifest" => vec![read("reports/paper/manifest.json")],
         "style" => vec![read("assets/styles/default.toml"), read("assets/styles/paper.toml"), STYLE.into()],
-        "world" => vec![WorldConfig::default_text().into(), b"[eye]\nwidth = 64\n".into(), b"[others]\nleast = 2\n".into()],
+        "world" => {
+            vec![WorldConfig::default_text().into(), b"[eye]\nwidth = 64\n".into(), b"[others]\nleast = 2\n".into()]
+        }
         "experiments" => folder("assets/experiments"),
         "plan" => vec![registered()],
         "lost" => vec![LOST.into()],
@@ -91,7 +93,9 @@ fn lines() -> Vec<Vec<u8>> {
         let line = |(t, step)| {
             let mut row = json!(episode);
             let decision = json!(Decision::of(t, step));
-            let (Some(row_keys), Some(keys)) = (row.as_object_mut(), decision.as_object()) else { return String::new() };
+            let (Some(row_keys), Some(keys)) = (row.as_object_mut(), decision.as_object()) else {
+                return String::new();
+            };
             row_keys.extend(keys.clone());
             row_keys.retain(|_, value| !value.is_null());
             row.to_string()
@@ -108,7 +112,8 @@ fn logs() -> Vec<Vec<u8>> {
     for (at, episode) in episodes::episodes(3).into_iter().enumerate() {
         let path = scratch::path(&format!("part-{at}.mcap"));
         let head = mirrorstats::trace::episode::Episode { steps: Vec::new(), ..episode.clone() };
-        let mut log = EpisodeLog::create(&path, &head, &json!({ "type": "object" }), 1).expect("a folder for temporary files");
+        let mut log =
+            EpisodeLog::create(&path, &head, &json!({ "type": "object" }), 1).expect("a folder for temporary files");
         for (t, step) in (1..).zip(&episode.steps) {
             let time = u64::try_from(t).unwrap_or(1) * 1_000_000_000;
             log.decided(time, &Decision::of(t, step)).expect("a folder for temporary files");

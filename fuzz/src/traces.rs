@@ -75,7 +75,8 @@ pub fn import_lines(data: &[u8]) {
         Ok(imported) => {
             let report = validate(&[Input::new(&out)], None, NonZeroUsize::MIN).expect("threads can be started");
             assert_eq!(report.count(Severity::Error), 0, "{:?}", report.findings);
-            let lines = data.split(|byte| *byte == b'\n').filter(|line| line.iter().any(|byte| !byte.is_ascii_whitespace()));
+            let lines =
+                data.split(|byte| *byte == b'\n').filter(|line| line.iter().any(|byte| !byte.is_ascii_whitespace()));
             let lines = lines.filter(|line| *line != "\u{feff}".as_bytes() && *line != "\u{feff}\r".as_bytes()).count();
             assert_eq!((imported.steps, report.files[0].steps), (lines, lines as u64));
         }

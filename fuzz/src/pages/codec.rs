@@ -26,7 +26,10 @@ pub fn decompress(codec: Compression, data: &[u8]) -> Vec<u8> {
     match codec {
         Compression::SNAPPY => out = snap::raw::Decoder::new().decompress_vec(data).expect("a sound page"),
         Compression::ZSTD(_) => {
-            zstd::Decoder::new(data).and_then(|of| of.take(MOST).read_to_end(&mut out)).map(drop).expect("a sound page");
+            zstd::Decoder::new(data)
+                .and_then(|of| of.take(MOST).read_to_end(&mut out))
+                .map(drop)
+                .expect("a sound page");
         }
         Compression::GZIP(_) => {
             flate2::read::GzDecoder::new(data).take(MOST).read_to_end(&mut out).map(drop).expect("a sound page");

@@ -65,14 +65,17 @@ pub fn outcome(data: &[u8]) -> Outcome {
         (Err(refusal), Ok(theirs)) => {
             let known = refusal.expected.as_deref().and_then(stricter::of).and_then(|(reason, _)| reason);
             let read = || theirs.iter().map(shown).collect::<String>();
-            Outcome::Stricter(known.unwrap_or_else(|| panic!("no listed reason: {refusal:?}; the library reads {}", read())))
+            Outcome::Stricter(
+                known.unwrap_or_else(|| panic!("no listed reason: {refusal:?}; the library reads {}", read())),
+            )
         }
     }
 }
 
 /// An array for people; what the library lets through need not be one that can be printed.
 fn shown(array: &ArrayRef) -> String {
-    quiet::contained(|| format!("{array:?}")).unwrap_or_else(|panic| format!("an array that cannot be printed: {panic}"))
+    quiet::contained(|| format!("{array:?}"))
+        .unwrap_or_else(|panic| format!("an array that cannot be printed: {panic}"))
 }
 
 fn depth(refusal: &Refusal) -> Depth {

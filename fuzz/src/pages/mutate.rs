@@ -66,7 +66,11 @@ pub fn mutant(bases: &[Base], data: &[u8]) -> Mutant {
         first.get_or_insert(place);
         write(base, page, changes, &mut bytes);
     }
-    Mutant { metadata: metadata(base, footer, &bytes, data_at, dictionary_at), bytes: bytes.into(), at_once: at_once(head[2]) }
+    Mutant {
+        metadata: metadata(base, footer, &bytes, data_at, dictionary_at),
+        bytes: bytes.into(),
+        at_once: at_once(head[2]),
+    }
 }
 
 fn at_once(byte: u8) -> usize {
@@ -199,7 +203,11 @@ fn write(base: &Base, page: &Page, changes: &Changes, out: &mut Vec<u8>) {
     let mut header = page.header.clone();
     let is_plain = header.kind == 3 && (header.is_compressed == Some(false) || page.body.is_empty());
     let mut stored = page.levels.clone();
-    if is_plain { stored.extend(&page.body) } else { stored.extend(compress(base.codec, &page.body)) }
+    if is_plain {
+        stored.extend(&page.body)
+    } else {
+        stored.extend(compress(base.codec, &page.body))
+    }
     for (place, value) in &changes.stored {
         set(&mut stored, *place, *value);
     }
@@ -232,8 +240,10 @@ fn metadata(
     let rows = group.num_rows();
     let change = |byte: u8| if byte == 0 { rows } else { (rows + i64::from(byte) - 128).max(0) };
     let chunk = group.column(0).clone().into_builder();
-    let chunk = chunk.set_data_page_offset(data_at.unwrap_or(START.cast_signed())).set_dictionary_page_offset(dictionary_at);
-    let chunk = chunk.set_total_compressed_size(i64::try_from(bytes.len()).expect("small")).set_num_values(change(footer[0]));
+    let chunk =
+        chunk.set_data_page_offset(data_at.unwrap_or(START.cast_signed())).set_dictionary_page_offset(dictionary_at);
+    let chunk =
+        chunk.set_total_compressed_size(i64::try_from(bytes.len()).expect("small")).set_num_values(change(footer[0]));
     let chunk = chunk.set_column_index_offset(None).set_column_index_length(None);
     let chunk = chunk.set_offset_index_offset(None).set_offset_index_length(None);
     let chunk = chunk.build().expect("a column as it was");

@@ -83,15 +83,23 @@ pub fn all() -> Vec<Base> {
 
 /// Values with runs and without, every `nulls`-th of them null.
 fn values(ty: &DataType, rows: usize, nulls: Option<usize>, salt: usize) -> ArrayRef {
-    let at = |row: usize| (nulls.is_none_or(|every| row % every != every - 1)).then(|| if salt % 2 == 0 { row / 5 } else { row * 7 % 11 });
+    let at = |row: usize| {
+        (nulls.is_none_or(|every| row % every != every - 1)).then(|| if salt % 2 == 0 { row / 5 } else { row * 7 % 11 })
+    };
     let rows = (0..rows).map(at);
     let small = |value: usize| i8::try_from(value % 100).unwrap_or(0);
     match ty {
         DataType::Boolean => Arc::new(rows.map(|row| row.map(|row| row % 2 == 0)).collect::<BooleanArray>()),
-        DataType::Int32 => Arc::new(rows.map(|row| row.map(|row| i32::from(small(row)) * 70_000)).collect::<Int32Array>()),
+        DataType::Int32 => {
+            Arc::new(rows.map(|row| row.map(|row| i32::from(small(row)) * 70_000)).collect::<Int32Array>())
+        }
         DataType::Int64 => Arc::new(rows.map(|row| row.map(|row| i64::from(small(row)) << 40)).collect::<Int64Array>()),
-        DataType::Float32 => Arc::new(rows.map(|row| row.map(|row| f32::from(small(row)) / 3.0)).collect::<Float32Array>()),
-        DataType::Float64 => Arc::new(rows.map(|row| row.map(|row| f64::from(small(row)) / 3.0)).collect::<Float64Array>()),
+        DataType::Float32 => {
+            Arc::new(rows.map(|row| row.map(|row| f32::from(small(row)) / 3.0)).collect::<Float32Array>())
+        }
+        DataType::Float64 => {
+            Arc::new(rows.map(|row| row.map(|row| f64::from(small(row)) / 3.0)).collect::<Float64Array>())
+        }
         DataType::Int8 => Arc::new(rows.map(|row| row.map(small)).collect::<Int8Array>()),
         DataType::UInt64 => Arc::new(rows.map(|row| row.map(|row| row as u64)).collect::<UInt64Array>()),
         _ => Arc::new(rows.map(|row| row.map(|row| format!("text é {row}"))).collect::<StringArray>()),

@@ -385,6 +385,7 @@ pub(in crate::trace) fn normal_column(column: &ArrayRef, kind: Kind) -> Result<A
         same if *same == held => {
             if kind == Kind::String {
                 check_keys(column)?;
+                check_texts(column)?;
             }
             Ok(Arc::clone(column))
         }
@@ -411,6 +412,25 @@ fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
     let good = column.values().null_count() == 0
         && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
     if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
+}
+
+/// Every text is UTF-8. The Parquet library looks at all texts of a delta-encoded page at once, and takes a character of
+/// which one text has the first bytes and the next text the rest.
+fn check_texts(column: &ArrayRef) -> Result<(), Refused> {
+    let texts = column.as_any_dictionary().values().as_string::<i32>();
+    let (bytes, offsets) = (texts.value_data(), texts.value_offsets());
+    let begins = |offset: &i32| {
+        let next = usize::try_from(*offset).ok().and_then(|at| bytes.get(at..))?.first();
+        // A byte that goes on with a character begins none.
+        Some(next.is_none_or(|byte| byte & 0xc0 != 0x80))
+    };
+    let (first, last) = (offsets.first().copied().unwrap_or(0), offsets.last().copied().unwrap_or(0));
+    let range = usize::try_from(first).ok().zip(usize::try_from(last).ok());
+    let is_text = range.and_then(|(first, last)| std::str::from_utf8(bytes.get(first..last)?).ok()).is_some();
+    if is_text && offsets.iter().all(|offset| begins(offset) == Some(true)) {
+        return Ok(());
+    }
+    Err(Refused::Unreadable("texts that are not UTF-8".into()))
 }
 
 #[cfg(test)]

@@ -369,7 +369,10 @@ fn check_columns(file: &str, columns: &[FileColumn], version: u32) -> Vec<Findin
 }
 
 /// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
-pub(in crate::trace) fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
+pub(in crate::trace) fn readable(
+    metadata: ParquetMetaData,
+    columns: &[FileColumn],
+) -> Result<ArrowReaderMetadata, String> {
     let make = || {
         let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
         let fields = plain_schema.fields().iter().zip(columns).map(|(field, column)| match column.kind {

@@ -66,7 +66,8 @@ pub fn rows(answers: &Answers) -> Option<Vec<Rows>> {
 /// What an engine answers to each case.
 pub fn answers(engine: Engine, cases: &[Case]) -> Vec<Answers> {
     let folder = tempfile::tempdir().unwrap();
-    let prepared: Vec<Prepared> = cases.iter().enumerate().map(|(at, case)| Prepared::of(folder.path(), at, case)).collect();
+    let prepared: Vec<Prepared> =
+        cases.iter().enumerate().map(|(at, case)| Prepared::of(folder.path(), at, case)).collect();
     match engine {
         Engine::Native => each(&prepared, |traces, definitions| {
             score_traces::score(traces, definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())
@@ -102,10 +103,7 @@ impl Prepared {
     }
 }
 
-fn each(
-    cases: &[Prepared],
-    score: impl Fn(&TraceSet, &Definitions) -> Result<EpisodeTable, String>,
-) -> Vec<Answers> {
+fn each(cases: &[Prepared], score: impl Fn(&TraceSet, &Definitions) -> Result<EpisodeTable, String>) -> Vec<Answers> {
     let one = |case: &Prepared| {
         let answer = |definitions| score(&case.traces, definitions).map(|table| of_table(&table));
         case.definitions.iter().map(answer).collect()
@@ -127,7 +125,8 @@ fn outside(engine: &str, packages: &Path, dialect: Dialect, folder: &Path, cases
     fs::write(&file, json!(request).to_string()).unwrap();
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scoring/metamorphic/outside.py");
     let mut command = Command::new(need::python());
-    let output = command.arg(script).arg(engine).arg(&file).env("PYTHONPATH", packages).current_dir(folder).output().unwrap();
+    let output =
+        command.arg(script).arg(engine).arg(&file).env("PYTHONPATH", packages).current_dir(folder).output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let answers: Vec<Vec<Value>> = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(answers.len(), cases.len());

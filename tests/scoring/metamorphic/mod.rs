@@ -136,7 +136,8 @@ fn random_definitions_are_the_same_on_duckdb() {
 
 #[test]
 fn what_does_not_fit_together_is_a_fault() {
-    let names = ["all", "t", "f", "n"].map(|part| ["count", "any", "first", "last", "min", "max", "sum"].map(|name| format!("{part}_{name}")));
+    let names = ["all", "t", "f", "n"]
+        .map(|part| ["count", "any", "first", "last", "min", "max", "sum"].map(|name| format!("{part}_{name}")));
     let mut names = names.concat();
     names.extend(["norec_p", "count_p", "holds"].map(str::to_owned));
     let row = |count: i64| {

@@ -7,7 +7,7 @@ trap 'rm -rf "$out"' EXIT
 
 # The program that the tests build: `cargo build` alone would compile the large dependencies a second time, with fewer of
 # their features.
-cargo test --quiet --all-features --no-run
+cargo test --quiet --workspace --all-features --no-run
 target=${CARGO_TARGET_DIR:-target}
 mirrorstats() { "$target/debug/mirrorstats" "$@"; }
 # Python packages, fetched once into a folder: the folder, the module that tells whether they are there, the packages.

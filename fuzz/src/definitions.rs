@@ -8,6 +8,7 @@ use mirrorstats::metric::definitions::Definitions;
 use mirrorstats::metric::sql::{self, Dialect};
 use mirrorstats::score::score_traces;
 
+use crate::depth::reached;
 use crate::episodes;
 
 static COLUMNS: LazyLock<Columns> = LazyLock::new(|| score_traces::trace_columns(episodes::open()));
@@ -27,6 +28,7 @@ pub fn target(data: &[u8]) {
             return;
         }
     };
+    reached("bound");
     for dialect in [Dialect::Portable, Dialect::Spark, Dialect::Duckdb, Dialect::Polars] {
         let first = sql::lower(&definitions.plan, dialect);
         assert_eq!(first, sql::lower(&definitions.plan, dialect), "two statements of one plan");
@@ -45,6 +47,7 @@ fn values(definitions: &Definitions, restored: &Definitions) {
         assert!(score(restored).is_err(), "definitions that were restored give values where the others give none");
         return;
     };
+    reached("values");
     assert_eq!(score(restored).expect("the same definitions").metrics, all.metrics);
     for metric in all.metrics.iter().take(6) {
         let mut one = definitions.clone();

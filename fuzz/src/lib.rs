@@ -5,6 +5,7 @@
 //! and counts.
 
 mod definitions;
+pub mod depth;
 mod episodes;
 mod logs;
 pub mod pages;

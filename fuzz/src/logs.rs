@@ -13,6 +13,7 @@ use mirrorstats::trace::validate::validate;
 use mirrorstats::trace::write::OptionalColumns;
 use serde_json::json;
 
+use crate::depth::reached;
 use crate::scratch;
 
 fn recovered(data: &[u8]) -> Option<Recovered> {
@@ -22,6 +23,7 @@ fn recovered(data: &[u8]) -> Option<Recovered> {
 /// The bytes as a log: what is saved of it makes a trace that keeps every rule, or `recover` says which rule is broken.
 pub fn recover(data: &[u8]) {
     let Some(found) = recovered(data) else { return };
+    reached("log");
     assert_eq!(recovered(data).as_ref(), Some(&found), "saved twice, and not the same");
     let columns = found.recording.as_ref().map_or_else(OptionalColumns::all, OptionalColumns::recorded);
     let rows = found.episodes.iter().map(|episode| merge::rows(episode, &columns));
@@ -33,6 +35,7 @@ pub fn recover(data: &[u8]) {
         return;
     }
     let report = validate(&[Input::new(&out)], None, NonZeroUsize::MIN).expect("threads can be started");
+    reached("trace");
     let broken: Vec<_> = report.findings.iter().filter(|finding| finding.severity == Severity::Error).collect();
     if broken.is_empty() {
         assert_eq!(report.files[0].steps, steps as u64);
@@ -50,6 +53,7 @@ pub fn assembled(data: &[u8]) {
     match assemble::write(&out, &[(place, part)], &json!({ "kind": "recording" })) {
         Err(_) => assert!(!out.exists(), "a refused log leaves a file"),
         Ok(()) => {
+            reached("whole");
             let bytes = std::fs::read(&out).expect("a log that was written");
             let whole = recovered(&bytes);
             if let Some(whole) = whole {

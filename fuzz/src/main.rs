@@ -11,7 +11,14 @@ mod fuzzed {
         mirrorstats_fuzz::target(&name)
     });
 
-    libfuzzer_sys::fuzz_target!(|data: &[u8]| TARGET(data));
+    static TELLS_DEPTH: LazyLock<bool> = LazyLock::new(|| std::env::var_os("FUZZ_DEPTH").is_some());
+
+    libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+        TARGET(data);
+        if *TELLS_DEPTH {
+            eprintln!("depth: {}", mirrorstats_fuzz::depth::taken());
+        }
+    });
 }
 
 #[cfg(not(mirrorstats_libfuzzer))]

@@ -8,6 +8,7 @@ use mirrorstats::agent::vlm::journal::{Entry, Journal, Recorded};
 use mirrorstats::agent::vlm::wire_format::Dialect;
 use mirrorstats::experiment::Experiment;
 
+use crate::depth::reached;
 use crate::scratch;
 
 const DIALECTS: [Dialect; 4] =
@@ -22,7 +23,9 @@ fn text(raw: &str, ending: Ending) {
         let is_read = matches!(reading.status, Status::Ok | Status::Repaired);
         assert_eq!(is_read, reading.fault.is_none() && reading.action.is_some() && ending == Ending::Whole);
         assert_eq!(reading.status == Status::Repaired, !reading.repairs.is_empty());
-        if !is_read {
+        if is_read {
+            reached("decision");
+        } else {
             assert!(reading.selected_cube.is_none() && reading.self_color.is_none(), "{reading:?}");
         }
     }
@@ -37,6 +40,7 @@ pub fn target(data: &[u8]) {
         return;
     };
     if let Ok(Some(answer)) = dialect.read(body) {
+        reached("answer");
         assert_eq!(dialect.read(body).ok().flatten(), Some(answer.clone()));
         text(&answer.text, answer.ending);
     }
@@ -54,6 +58,7 @@ pub fn journal(data: &[u8]) {
         assert!(cassette.is_err(), "a cassette plays a journal that is refused");
         return;
     };
+    reached("opened");
     assert_eq!(all(&journal), cassette.expect("a journal is a cassette"));
     let entry = Entry::Answer {
         t: 7,
@@ -73,6 +78,7 @@ pub fn cassette(data: &[u8]) {
     let path = scratch::file("cassette.jsonl", data);
     let Ok(cassette) = Journal::cassette(&path) else { return };
     assert!(fs::read(&path).is_ok_and(|bytes| bytes == data), "a cassette is not written to");
+    reached("played");
     for recorded in cassette.answers() {
         let Recorded::Answer { body, .. } = recorded else { continue };
         for dialect in DIALECTS {

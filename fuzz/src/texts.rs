@@ -17,6 +17,7 @@ use mirrorstats::score::score_traces;
 use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::trace::lost;
 
+use crate::depth::reached;
 use crate::{episodes, scratch};
 
 static PAPER: LazyLock<Catalog> = LazyLock::new(|| {
@@ -31,10 +32,12 @@ pub fn manifest(data: &[u8]) {
     fs::write(folder.join("manifest.json"), data).expect("a folder for temporary files");
     let _ = check_old(&folder, &[]);
     let Ok(manifest) = serde_json::from_slice::<Manifest>(data) else { return };
+    reached("parsed");
     let again: Manifest = serde_json::from_str(&manifest.json()).expect("a manifest that was printed");
     assert_eq!((&again, again.json()), (&manifest, manifest.json()));
     let columns = score_traces::trace_columns(episodes::open());
     if let Ok(definitions) = Definitions::of_catalog(&manifest.definitions, &columns) {
+        reached("definitions");
         assert_eq!(definitions.catalog.hash, manifest.definitions.hash);
     }
 }
@@ -43,6 +46,7 @@ pub fn manifest(data: &[u8]) {
 pub fn style(data: &[u8]) {
     let path = scratch::file("style.toml", data);
     let Ok(style) = Style::load(path.to_str().expect("a path in UTF-8")) else { return };
+    reached("parsed");
     let _ = style.check_against(&PAPER);
     assert!(style.sheet.table.contains_key("main"));
     for table in style.sheet.table.values() {
@@ -55,6 +59,7 @@ pub fn style(data: &[u8]) {
 pub fn world(data: &[u8]) {
     let Ok(text) = std::str::from_utf8(data) else { return };
     let Ok(config) = WorldConfig::from_toml(text) else { return };
+    reached("parsed");
     let printed = toml::to_string(&config).expect("numbers and texts");
     let again = WorldConfig::from_toml(&printed).unwrap_or_else(|fault| panic!("{fault}\n{printed}"));
     assert_eq!((again.hash(), &again), (config.hash(), &config));
@@ -71,6 +76,7 @@ pub fn experiments(data: &[u8]) {
             return;
         }
     };
+    reached("parsed");
     assert!(!entries.is_empty());
     for entry in entries {
         let printed = serde_json::to_string(&entry.known.spec).expect("numbers, texts and lists");
@@ -82,6 +88,7 @@ pub fn experiments(data: &[u8]) {
 /// A registered plan.
 pub fn plan(data: &[u8]) {
     let Ok(plan) = serde_json::from_slice::<RegisteredPlan>(data) else { return };
+    reached("parsed");
     let again: RegisteredPlan = serde_json::from_str(&plan.to_json()).expect("a plan that was printed");
     assert_eq!((again.to_json(), again.is_unchanged()), (plan.to_json(), plan.is_unchanged()));
 }
@@ -89,6 +96,7 @@ pub fn plan(data: &[u8]) {
 /// `lost.jsonl`.
 pub fn lost_episodes(data: &[u8]) {
     let Ok(lost) = lost::read(&scratch::file("lost.jsonl", data)) else { return };
+    reached("parsed");
     let lines: Vec<String> = lost.iter().map(|lost| serde_json::to_string(lost).expect("texts and integers")).collect();
     let again = lost::read(&scratch::file("lost-again.jsonl", lines.join("\n").as_bytes()));
     assert_eq!(again.expect("a list that was printed"), lost);
@@ -103,6 +111,7 @@ pub fn scores(data: &[u8]) {
         _ => format::read_text(format, &PAPER, io::Cursor::new(bytes.to_vec())),
     };
     let Ok(table) = read(data) else { return };
+    reached("parsed");
     let mut written = Vec::new();
     format::write(&table, format, &mut written).expect("memory takes any bytes");
     let again = read(&written).expect("scores that were written");

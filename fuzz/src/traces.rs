@@ -12,6 +12,7 @@ use mirrorstats::trace::open::TraceSet;
 use mirrorstats::trace::scan::Projection;
 use mirrorstats::trace::validate::validate;
 
+use crate::depth::reached;
 use crate::{episodes, scratch};
 
 /// A sound trace, and where its footer starts.
@@ -51,6 +52,7 @@ fn scan_and_validate(path: &Path) {
         assert!(report.count(Severity::Error) > 0, "a footer that is refused is no finding");
         return;
     };
+    reached("footer");
     let of_one_kind = |name: &&str| set.column(name).is_some_and(|column| column.conflict.is_none());
     let steps = set.column_names().into_iter().filter(of_one_kind).map(str::to_owned).collect();
     let (mut rows, projection) = (0, Projection { steps, ..Projection::default() });
@@ -60,6 +62,7 @@ fn scan_and_validate(path: &Path) {
     };
     let each = |batch: mirrorstats::trace::scan::EpisodeBatch| Ok::<_, TraceError>(batch.steps.num_rows() as u64);
     if set.scan(&projection, NonZeroUsize::MIN, each, count).is_ok() {
+        reached("rows");
         assert_eq!(report.count(Severity::Error), 0, "a scan reads what `validate` refuses: {:?}", report.findings);
         assert_eq!(report.files.iter().map(|file| file.steps).sum::<u64>(), rows);
     }
@@ -73,6 +76,7 @@ pub fn import_lines(data: &[u8]) {
     match import(&mut [text], &out, Limits::default()) {
         Err(_) => assert!(!out.exists(), "a refused import leaves a file"),
         Ok(imported) => {
+            reached("imported");
             let report = validate(&[Input::new(&out)], None, NonZeroUsize::MIN).expect("threads can be started");
             assert_eq!(report.count(Severity::Error), 0, "{:?}", report.findings);
             let lines =

@@ -18,6 +18,7 @@ use arrow::compute::{cast, concat};
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use mirrorstats::trace::fuzz::{OneColumn, Refusal};
 
+use crate::depth::reached;
 use crate::quiet;
 use mutate::{Mutant, START, mutant};
 use stricter::{Depth, Reason};
@@ -43,7 +44,14 @@ pub fn bases() -> usize {
 
 /// The target.
 pub fn target(data: &[u8]) {
-    outcome(data);
+    reached(match outcome(data) {
+        Outcome::Agreed => "rows",
+        Outcome::Stricter(_) => "stricter",
+        Outcome::Refused(Depth::Header) => "header",
+        Outcome::Refused(Depth::Body) => "body",
+        Outcome::Refused(Depth::Levels) => "levels",
+        Outcome::Refused(Depth::Values) => "values",
+    });
 }
 
 /// What becomes of the mutant that these bytes stand for.

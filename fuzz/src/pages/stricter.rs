@@ -51,8 +51,6 @@ pub enum Depth {
     Levels,
     /// The values were looked at, and refused.
     Values,
-    /// Everything was read.
-    Read,
 }
 
 /// What the program says it expected, its numbers left out; the reason that it is; how far the mutant came.

@@ -54,7 +54,7 @@ for name in "$@"; do
     -max_total_time="$seconds" -artifact_prefix="$found/$name/" "$work/$name" "fuzz/corpus/$name" \
     >"$log/$name" 2>&1 || true
   last=$(grep -a '^#[0-9]*: cov: ' "$log/$name" | tail -1)
-  field() { echo "$last" | sed -n "s/.* $1: *\([0-9]*\).*/\1/p"; }
+  field() { echo "$last" | sed -n "s|.* $1: *\([0-9]*\).*|\1|p"; }
   executions=$(echo "$last" | sed -n 's/^#\([0-9]*\):.*/\1/p')
   depth=$(FUZZ_TARGET=$name FUZZ_DEPTH=1 "$program" -runs=0 $limits "$work/$name" "fuzz/corpus/$name" 2>&1 |
     sed -n 's/^depth: //p' | sort | uniq -c | sort -rn | awk '{ printf "%s%s %s", sep, $2, $1; sep = ", " }')

@@ -8,7 +8,7 @@ use std::thread;
 
 use mirrorstats_fuzz::pages::{self, Outcome, mutate::CHANGE};
 
-/// Draws (SplitMix64).
+/// Draws (`SplitMix64`).
 struct Random(u64);
 
 impl Random {
@@ -60,7 +60,7 @@ pub fn run(count: u64, seed: u64, threads: u64) -> ExitCode {
     println!("| disagreements | {} |", disagreements.len());
     println!("| all | {} |", outcomes.values().sum::<u64>() + disagreements.len() as u64);
     for data in disagreements.iter().take(20) {
-        eprintln!("disagreement: {}", data.iter().map(|byte| format!("{byte:02x}")).collect::<String>());
+        eprintln!("disagreement: {data:02x?}");
     }
     if disagreements.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

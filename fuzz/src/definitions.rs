@@ -51,7 +51,7 @@ fn values(definitions: &Definitions, restored: &Definitions) {
     assert_eq!(score(restored).expect("the same definitions").metrics, all.metrics);
     for metric in all.metrics.iter().take(6) {
         let mut one = definitions.clone();
-        one.select(&[metric.name.clone()]).expect("a metric of these");
+        one.select(std::slice::from_ref(&metric.name)).expect("a metric of these");
         let alone = score(&one).expect("a part of what was computed");
         assert_eq!(&alone.metrics[0], metric, "alone, and among all");
     }

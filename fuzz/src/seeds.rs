@@ -98,6 +98,9 @@ fn lines() -> Vec<Vec<u8>> {
             };
             row_keys.extend(keys.clone());
             row_keys.retain(|_, value| !value.is_null());
+            for key in ["action", "self_color", "selected_cube"] {
+                row_keys.entry(key).or_insert(Value::Null);
+            }
             row.to_string()
         };
         (1..).zip(&episode.steps).map(line).collect::<Vec<_>>().join("\n")
@@ -195,7 +198,7 @@ fn scores() -> Vec<Vec<u8>> {
     (0..).zip(formats).map(of).collect()
 }
 
-const REPLY: &str = r#"{"view_description":"a mirror","reasoning":"it is me","action":"d","selected_cube":"red","identification":"I am red","summary":"s"}"#;
+const REPLY: &str = r#"{"view-description":"a mirror","reasoning":"it is me","action":"d","selected_cube":"red","identification":"I am red","summary":"s"}"#;
 
 /// An answer in each provider's language.
 fn bodies() -> [Value; 4] {

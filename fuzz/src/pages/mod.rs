@@ -103,7 +103,7 @@ fn ours(mutant: &Mutant) -> Result<ArrayRef, Refusal> {
     });
     for runs in [false, true] {
         let (cut, is_whole) = column.short_cut(runs, mutant.at_once).expect("the short cut does not panic");
-        let count: usize = cut.iter().map(|rows| rows.len()).sum();
+        let count: usize = cut.iter().map(arrow::array::Array::len).sum();
         match &whole {
             Ok(whole) if whole.data_type() == &DataType::Null => assert_eq!(count, 0),
             Ok(whole) => {

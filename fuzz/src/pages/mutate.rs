@@ -61,7 +61,7 @@ pub fn mutant(bases: &[Base], data: &[u8]) -> Mutant {
     let mut bytes = Vec::new();
     let (mut data_at, mut dictionary_at) = (None, None);
     for (page, changes) in &pages {
-        let place = i64::try_from(START as usize + bytes.len()).expect("small");
+        let place = START.cast_signed() + i64::try_from(bytes.len()).expect("small");
         let first = if page.header.kind == 2 { &mut dictionary_at } else { &mut data_at };
         first.get_or_insert(place);
         write(base, page, changes, &mut bytes);
@@ -204,9 +204,9 @@ fn write(base: &Base, page: &Page, changes: &Changes, out: &mut Vec<u8>) {
     let is_plain = header.kind == 3 && (header.is_compressed == Some(false) || page.body.is_empty());
     let mut stored = page.levels.clone();
     if is_plain {
-        stored.extend(&page.body)
+        stored.extend(&page.body);
     } else {
-        stored.extend(compress(base.codec, &page.body))
+        stored.extend(compress(base.codec, &page.body));
     }
     for (place, value) in &changes.stored {
         set(&mut stored, *place, *value);

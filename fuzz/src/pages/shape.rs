@@ -84,7 +84,8 @@ pub fn all() -> Vec<Base> {
 /// Values with runs and without, every `nulls`-th of them null.
 fn values(ty: &DataType, rows: usize, nulls: Option<usize>, salt: usize) -> ArrayRef {
     let at = |row: usize| {
-        (nulls.is_none_or(|every| row % every != every - 1)).then(|| if salt % 2 == 0 { row / 5 } else { row * 7 % 11 })
+        (nulls.is_none_or(|every| row % every != every - 1))
+            .then(|| if salt.is_multiple_of(2) { row / 5 } else { row * 7 % 11 })
     };
     let rows = (0..rows).map(at);
     let small = |value: usize| i8::try_from(value % 100).unwrap_or(0);

@@ -114,7 +114,7 @@ fn each(cases: &[Prepared], score: impl Fn(&TraceSet, &Definitions) -> Result<Ep
 fn of_table(table: &EpisodeTable) -> Rows {
     let names = table.metrics.iter().map(|metric| metric.name.clone()).collect();
     let row = |row: usize| table.metrics.iter().map(|metric| metric.get(row)).collect();
-    let values = table.keys.iter().enumerate().map(|(at, key)| (key.to_owned().episode_id.to_string(), row(at)));
+    let values = table.keys.iter().enumerate().map(|(at, key)| (key.episode_id.to_owned(), row(at)));
     Rows { names, values: values.collect() }
 }
 

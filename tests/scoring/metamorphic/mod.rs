@@ -1,6 +1,6 @@
-//! Questions whose answers must fit together, in the manner of SQLancer, on every engine.
+//! Questions whose answers must fit together, in the manner of `SQLancer`, on every engine.
 //!
-//! TLP: what holds of some steps holds of those where a condition is true, false and null, put together. NoREC: `where`
+//! TLP: what holds of some steps holds of those where a condition is true, false and null, put together. `NoREC`: `where`
 //! leaves the episodes for which the condition, as a metric that nothing can be left out for, is 1. Both need no other
 //! engine; on another one the answers must be those of the native engine, too. Source: Rigger and Su, "Finding Bugs in
 //! Database Systems via Query Partitioning" (2020), "Detecting Optimization Bugs in Database Engines via Non-Optimizing
@@ -34,7 +34,9 @@ fn cases<S>(strategy: impl Strategy<Value = S>, count: usize, rng_seed: RngSeed)
 /// Files that any engine puts together: integers of one width.
 fn plain(mut sheets: Vec<Sheet>) -> Vec<Sheet> {
     let wide = sheets[0].wide;
-    sheets.iter_mut().for_each(|sheet| sheet.wide = wide);
+    for sheet in &mut sheets {
+        sheet.wide = wide;
+    }
     sheets
 }
 

@@ -4,7 +4,9 @@
 use std::collections::BTreeMap;
 use std::panic::{self, AssertUnwindSafe};
 use std::process::ExitCode;
+use std::sync::{Arc, Mutex};
 use std::thread;
+use std::time::{Duration, Instant};
 
 use mirrorstats_fuzz::pages::{self, Outcome, mutate::CHANGE};
 
@@ -27,15 +29,36 @@ impl Random {
     }
 }
 
+/// How long a mutant may take: decoders of some hundred rows take less than a millisecond.
+const LONGEST: Duration = Duration::from_secs(30);
+
+/// Ends the campaign at a mutant that takes long, before memory ends.
+fn watch(under_way: &Mutex<(Instant, Vec<u8>)>) {
+    loop {
+        thread::sleep(Duration::from_millis(500));
+        let (since, data) = under_way.lock().expect("nothing panics with it").clone();
+        if since.elapsed() > LONGEST && !data.is_empty() {
+            eprintln!("takes long: {data:02x?}");
+            std::process::exit(1);
+        }
+    }
+}
+
 /// Runs `count` mutants on some threads, and prints counts as lines of a table.
 pub fn run(count: u64, seed: u64, threads: u64) -> ExitCode {
     let of_thread = |thread: u64| {
+        let under_way = Arc::new(Mutex::new((Instant::now(), Vec::new())));
+        thread::spawn({
+            let under_way = Arc::clone(&under_way);
+            move || watch(&under_way)
+        });
         move || {
             let mut random = Random(seed.wrapping_mul(1000) + thread);
             let mut outcomes = BTreeMap::<Outcome, u64>::new();
             let mut disagreements = Vec::new();
             for _ in (thread..count).step_by(usize::try_from(threads).unwrap_or(1)) {
                 let data = random.mutant();
+                *under_way.lock().expect("nothing panics with it") = (Instant::now(), data.clone());
                 match panic::catch_unwind(AssertUnwindSafe(|| pages::outcome(&data))) {
                     Ok(outcome) => *outcomes.entry(outcome).or_default() += 1,
                     Err(_) => disagreements.push(data),

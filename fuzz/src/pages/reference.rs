@@ -17,7 +17,8 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use super::mutate::{Mutant, START};
 use super::thrift::Header;
 
-/// A page is given its memory before it is decompressed: the library is not asked for more than this.
+/// A page is given its memory before it is decompressed, and a dictionary before its values are there: the library is asked
+/// for no more bytes and values than this.
 const MOST: i64 = 1 << 22;
 
 /// The bytes, and where the header that was read last starts.
@@ -45,7 +46,7 @@ impl ChunkReader for Stored {
     fn get_read(&self, start: u64) -> Result<Self::T> {
         let at = self.place(start);
         *self.1.lock().expect("one thread") = at;
-        if Header::read(&self.0[at..]).is_some_and(|(header, _)| header.whole > MOST) {
+        if Header::read(&self.0[at..]).is_some_and(|(header, _)| header.whole > MOST || header.get(1) > MOST) {
             return Err(refused("larger than the reference is asked for"));
         }
         Ok(self.0.slice(at..).reader())

@@ -275,8 +275,10 @@ impl Author {
 }
 
 /// The parts of the steps where `q` holds, by what `p` is: true, false, null.
+#[cfg(feature = "polars")]
 pub const PARTS: [&str; 3] = ["t", "f", "n"];
 
+#[cfg(feature = "polars")]
 impl Author {
     /// Lets `q` and `p`, conditions of steps, `x`, an integer of steps, and `e`, a condition of the episode; then metrics over
     /// the steps where `q` holds, named `all_` and the aggregate, and the same over each part, named by it. `norec_p` counts

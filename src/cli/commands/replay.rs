@@ -1,7 +1,6 @@
 //! `mirrorstats replay`: a trace's episodes again, held against what was recorded.
 
 use std::fmt;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -134,9 +133,7 @@ impl From<ReplayError> for Failure {
 
 /// Writes the frame of a step.
 fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
-    let folder = replace::folder_of(path);
-    fs::create_dir_all(folder)
-        .map_err(|error| Failure::input(format!("cannot make the folder `{}`: {error}", folder.display())))?;
+    output::make_folder(replace::folder_of(path))?;
     output::write_file(path, png)
 }
 

@@ -52,8 +52,17 @@ pub struct TraceFault {
     pub path: String,
     /// Its hash in the manifest.
     pub expected: String,
-    /// The hash of the file in its place, and where that is; `None` where there is no such file.
-    pub found: Option<(String, PathBuf)>,
+    /// What is in its place, and where that is; `None` where there is no such file.
+    pub found: Option<(Found, PathBuf)>,
+}
+
+/// What is in the place of a trace.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// A file of this hash.
+    Other(String),
+    /// A file that cannot be read, for this reason.
+    Unreadable(String),
 }
 
 impl fmt::Display for TraceFault {
@@ -61,8 +70,11 @@ impl fmt::Display for TraceFault {
         let Self { path, expected, found } = self;
         match found {
             None => write!(f, "  {path}: missing; expected sha256 {expected}"),
-            Some((hash, at)) => {
+            Some((Found::Other(hash), at)) => {
                 write!(f, "  {path}: changed; expected sha256 {expected}, found {hash} in {}", at.display())
+            }
+            Some((Found::Unreadable(why), at)) => {
+                write!(f, "  {path}: cannot read `{}`: {why}; expected sha256 {expected}", at.display())
             }
         }
     }
@@ -121,11 +133,11 @@ pub fn traces(manifest: &Manifest, places: &[PathBuf]) -> Result<Vec<Input>, Pro
 fn find(wanted: &bundle::Input, places: &[PathBuf]) -> Result<PathBuf, TraceFault> {
     let mut other = None;
     for path in places.iter().flat_map(|place| candidates(wanted, place)) {
-        let Ok(hash) = File::open(&path).and_then(hash::of_reader) else { continue };
-        if hash == wanted.sha256 {
-            return Ok(path);
+        match File::open(&path).and_then(hash::of_reader) {
+            Ok(hash) if hash == wanted.sha256 => return Ok(path),
+            Ok(hash) => other = other.or(Some((Found::Other(hash), path))),
+            Err(error) => other = other.or(Some((Found::Unreadable(error.to_string()), path))),
         }
-        other = other.or(Some((hash, path)));
     }
     Err(TraceFault { path: wanted.path.clone(), expected: wanted.sha256.clone(), found: other })
 }

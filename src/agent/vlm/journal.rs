@@ -4,17 +4,20 @@
 //! another when its answer is whole; only then does the agent act on it. So a recording that was killed asks for no
 //! answer twice that it had, and a journal kept is a cassette: it plays the episode again without a network.
 //!
-//! A line that was cut off by the end of a process is dropped when the file is opened again: nothing was done with it.
+//! A line that was cut off by the end of a process, or of which a loss of power left zeros, is dropped when the file is
+//! opened again: nothing was done with it. One process at a time writes a journal.
+//!
 //! Nothing here holds a key: answers are written after [`Secrets`](super::secrets) were taken out.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use crate::agent::Status;
+use crate::base::replace::{folder_of, make_folder, sync_folder};
 
 /// One line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -105,7 +108,7 @@ pub struct Requests {
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
-    /// `None` for a cassette, which is not written to.
+    /// `None` for a cassette, which is not written to, and after a line that could not be written.
     file: Option<File>,
     recorded: BTreeMap<i32, Recorded>,
     requests: Requests,
@@ -119,6 +122,8 @@ pub enum JournalError {
     Io { path: PathBuf, source: io::Error },
     #[error("line {line} of the journal `{}` is damaged: {fault}\n  help: remove the file to ask the model again", path.display())]
     Damaged { path: PathBuf, line: usize, fault: serde_json::Error },
+    #[error("the journal `{}` is being written by another process\n  help: wait for its end, or record into another folder", path.display())]
+    Busy { path: PathBuf },
     #[error("the cassette has no `{}`\n  help: record the episode with its model first, or choose fewer episodes", path.display())]
     Missing { path: PathBuf },
 }
@@ -127,20 +132,23 @@ impl Journal {
     /// Opens the journal of an episode, for going on with it.
     ///
     /// # Errors
-    /// When the file cannot be read or written, or a whole line of it is damaged.
+    /// When the file cannot be read or written, another process writes it, or a whole line of it is damaged.
     pub fn open(path: &Path) -> Result<Self, JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(failed)?;
-        }
+        make_folder(folder_of(path)).map_err(failed)?;
         let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
-        let text = fs::read(path).map_err(failed)?;
-        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-        if whole < text.len() {
-            file.set_len(whole as u64).map_err(failed)?;
-            file.flush().map_err(failed)?;
+        // Where the file system has no locks, the lock of the episode is all there is.
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            return Err(JournalError::Busy { path: path.to_owned() });
         }
-        let (recorded, requests) = read(path, &text[..whole])?;
+        let text = fs::read(path).map_err(failed)?;
+        let whole = whole(&text);
+        if whole.len() < text.len() {
+            file.set_len(whole.len() as u64).map_err(failed)?;
+        }
+        let (recorded, requests) = read(path, whole)?;
+        // What a killed process wrote last may not be on the disk yet, and is about to be relied on.
+        file.flush().and_then(|()| file.sync_all()).and_then(|()| sync_folder(folder_of(path))).map_err(failed)?;
         Ok(Self { path: path.to_owned(), file: Some(file), recorded, requests })
     }
 
@@ -153,8 +161,7 @@ impl Journal {
             io::ErrorKind::NotFound => JournalError::Missing { path: path.to_owned() },
             _ => JournalError::Io { path: path.to_owned(), source },
         })?;
-        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-        let (recorded, requests) = read(path, &text[..whole])?;
+        let (recorded, requests) = read(path, whole(&text))?;
         Ok(Self { path: path.to_owned(), file: None, recorded, requests })
     }
 
@@ -173,21 +180,37 @@ impl Journal {
         self.requests
     }
 
-    /// Adds a line and waits until it is on the disk.
+    /// Adds a line and waits until it is on the disk. After a line that could not be written none is added any more: what
+    /// came behind half of it could not be read.
     ///
     /// # Errors
     /// Whatever writing gives; a cassette refuses.
     pub fn append(&mut self, entry: &Entry) -> Result<(), JournalError> {
         let failed = |source| JournalError::Io { path: self.path.clone(), source };
-        let Some(file) = &mut self.file else {
+        let Some(mut file) = self.file.take() else {
             return Err(failed(io::Error::other("a cassette is played, not written")));
         };
         let mut line = serde_json::to_vec(entry).map_err(|fault| failed(fault.into()))?;
         line.push(b'\n');
-        file.write_all(&line).and_then(|()| file.sync_data()).map_err(failed)?;
+        let before = file.metadata().map_err(failed)?.len();
+        if let Err(error) = file.write_all(&line).and_then(|()| file.sync_data()) {
+            // What cannot be taken back is dropped when the file is opened again.
+            let _ = file.set_len(before);
+            return Err(failed(error));
+        }
+        self.file = Some(file);
         note(&mut self.recorded, &mut self.requests, entry);
         Ok(())
     }
+}
+
+/// The lines that were written to their ends.
+fn whole(text: &[u8]) -> &[u8] {
+    let lines = &text[..text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1)];
+    let last = lines.strip_suffix(b"\n").unwrap_or_default();
+    let start = last.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
+    // JSON has no zero byte; a disk has them where it was told of a file's length before its bytes.
+    if last[start..].contains(&0) { &text[..start] } else { lines }
 }
 
 fn read(path: &Path, text: &[u8]) -> Result<(BTreeMap<i32, Recorded>, Requests), JournalError> {
@@ -215,5 +238,76 @@ fn note(recorded: &mut BTreeMap<i32, Recorded>, requests: &mut Requests, entry: 
             recorded.insert(*t, Recorded::GivenUp { question: question.clone(), status });
         }
         Entry::Failure { .. } => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::{Path, PathBuf};
+
+    use super::{Entry, Journal, JournalError, Recorded};
+
+    fn answer(t: i32) -> Entry {
+        let (question, body) = (format!("question {t}"), format!("answer {t}"));
+        Entry::Answer { t, attempt: 1, question, latency_ms: 1, model: None, body }
+    }
+
+    fn answered(journal: &Journal) -> Vec<String> {
+        let body = |recorded: &Recorded| match recorded {
+            Recorded::Answer { body, .. } => body.clone(),
+            Recorded::GivenUp { .. } => "none".to_owned(),
+        };
+        journal.answers().map(body).collect()
+    }
+
+    fn with_lines(folder: &Path, count: i32) -> PathBuf {
+        let path = folder.join("deep/E1-m-s1-r1.jsonl");
+        let mut journal = Journal::open(&path).unwrap();
+        (1..=count).for_each(|t| journal.append(&answer(t)).unwrap());
+        path
+    }
+
+    #[test]
+    fn what_a_loss_of_power_leaves_of_the_last_line_is_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 2);
+        let whole = fs::read(&path).unwrap();
+        // Half a line, nothing but zeros, and zeros for the first page of a line.
+        for torn in [&b"{\"kind\":\"ans"[..], b"\0\0\0", b"\0\0\0\n", b"\0\0\0\0nswer\"}\n", b"{\"kind\":\0\0\0\n"] {
+            fs::write(&path, [&whole, torn].concat()).unwrap();
+            assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1", "answer 2"]);
+            let mut journal = Journal::open(&path).unwrap();
+            assert_eq!(answered(&journal), ["answer 1", "answer 2"], "{torn:?}");
+            assert_eq!(fs::read(&path).unwrap(), whole);
+            journal.append(&answer(3)).unwrap();
+            assert_eq!(answered(&Journal::cassette(&path).unwrap()).len(), 3);
+        }
+    }
+
+    #[test]
+    fn a_damaged_line_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 3);
+        let text = fs::read_to_string(&path).unwrap();
+        for (damaged, line) in
+            [(text.replacen("\"kind\"", "\"k\\u0000d\"", 1), 1), (text.replace("\"t\":3", "\"t\":x"), 3)]
+        {
+            fs::write(&path, &damaged).unwrap();
+            let error = Journal::open(&path).unwrap_err();
+            assert!(matches!(error, JournalError::Damaged { line: found, .. } if found == line), "{error}");
+            assert_eq!(fs::read_to_string(&path).unwrap(), damaged);
+        }
+    }
+
+    #[test]
+    fn one_writes_at_a_time_and_others_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 1);
+        let first = Journal::open(&path).unwrap();
+        assert!(matches!(Journal::open(&path).unwrap_err(), JournalError::Busy { .. }));
+        assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1"]);
+        drop(first);
+        assert_eq!(answered(&Journal::open(&path).unwrap()), ["answer 1"]);
     }
 }

@@ -5,8 +5,8 @@ use std::process::Stdio;
 use std::thread::sleep;
 use std::time::Duration;
 
-use super::recordings::{Bench, outcome, three_steps};
-use crate::harness::program::{interrupt, wait_for};
+use super::recordings::{Bench, FORWARD, outcome, three_steps};
+use crate::harness::program::{interrupt, stderr, wait_for};
 
 /// Waits until a file has so many lines, and gives them.
 fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
@@ -92,6 +92,42 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
     }
     let ends: Vec<_> = bench.heard().into_iter().filter(|line| line["kind"] == "end").collect();
     assert_eq!((ends.len(), &ends[0]["reason"]), (1, &"stopped".into()));
+}
+
+/// Recordings that are interrupted twice while their renderer is made, used and taken apart: the second time ends each at
+/// once, with the code of an interruption, and without what the exit handlers of a renderer in use have to say.
+fn check_twice(rounds: u64) {
+    let bench = Bench::new();
+    // All episodes start their programs; the steps go on for as long as nobody interrupts.
+    bench.program(&format!("echo $$ >> ids; echo '{FORWARD}'"));
+    for round in 0..rounds {
+        let _ = fs::remove_file(bench.path("ids"));
+        let mut command = bench.record(&["--runs", "6", "--threads", "2", "--in-flight", "4"]);
+        let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut ids = lines(&bench, "ids", 1);
+        sleep(Duration::from_millis(round * 7 % 23));
+        interrupt(&child);
+        // Two that come at once are one to the system.
+        sleep(Duration::from_millis(15));
+        interrupt(&child);
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "round {round}: {}: {}", output.status, stderr(&output));
+        ids.extend(fs::read_to_string(bench.path("ids")).unwrap().lines().map(str::to_owned));
+        assert!(are_gone(&ids), "round {round}");
+        // One that had recorded nothing before the second time has taken its folder away itself.
+        let _ = fs::remove_dir_all(bench.path("runs"));
+    }
+}
+
+#[test]
+fn a_second_ctrl_c_ends_a_recording_that_draws() {
+    check_twice(8);
+}
+
+#[test]
+#[ignore = "soak: 200 recordings, interrupted twice each"]
+fn soak_a_second_ctrl_c_ends_a_recording_that_draws() {
+    check_twice(200);
 }
 
 #[test]

@@ -3,9 +3,9 @@
 use std::fs;
 use std::process::Stdio;
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use super::recordings::{Bench, FORWARD, outcome, three_steps};
+use super::recordings::{Bench, outcome, three_steps};
 use crate::harness::program::{interrupt, stderr, wait_for};
 
 /// Waits until a file has so many lines, and gives them.
@@ -94,34 +94,36 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
     assert_eq!((ends.len(), &ends[0]["reason"]), (1, &"stopped".into()));
 }
 
-/// Recordings that are interrupted twice while their renderer is made, used and taken apart: the second time ends each at
-/// once, with the code of an interruption, and without what the exit handlers of a renderer in use have to say.
+/// Recordings that are interrupted again and again while their renderer draws: the second time ends each at once, with the
+/// code of an interruption, and without what the exit handlers of a renderer in use have to say.
 fn check_twice(rounds: u64) {
     let bench = Bench::new();
-    // All episodes start their programs; the steps go on for as long as nobody interrupts.
-    bench.program(&format!("echo $$ >> ids; echo '{FORWARD}'"));
+    // No program ever answers; while the first one waits, the frames of the others are drawn.
+    bench.program("echo $$ >> ids; sleep 600");
     for round in 0..rounds {
         let _ = fs::remove_file(bench.path("ids"));
-        let mut command = bench.record(&["--runs", "6", "--threads", "2", "--in-flight", "4"]);
-        let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        let mut ids = lines(&bench, "ids", 1);
-        sleep(Duration::from_millis(round * 7 % 23));
-        interrupt(&child);
-        // Two that come at once are one to the system.
-        sleep(Duration::from_millis(15));
-        interrupt(&child);
+        let mut command = bench.record(&["--runs", "6", "--threads", "2", "--in-flight", "6"]);
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        lines(&bench, "ids", 1);
+        sleep(Duration::from_millis(round % 10 * 4));
+        let begin = Instant::now();
+        // Two that come in one moment are one to the system.
+        while child.try_wait().unwrap().is_none() {
+            interrupt(&child);
+            sleep(Duration::from_millis(4 + round % 3 * 4));
+            assert!(begin.elapsed() < Duration::from_mins(1), "round {round}: a step that hangs is waited for");
+        }
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(130), "round {round}: {}: {}", output.status, stderr(&output));
-        ids.extend(fs::read_to_string(bench.path("ids")).unwrap().lines().map(str::to_owned));
+        let ids: Vec<String> = fs::read_to_string(bench.path("ids")).unwrap().lines().map(str::to_owned).collect();
         assert!(are_gone(&ids), "round {round}");
-        // One that had recorded nothing before the second time has taken its folder away itself.
         let _ = fs::remove_dir_all(bench.path("runs"));
     }
 }
 
 #[test]
 fn a_second_ctrl_c_ends_a_recording_that_draws() {
-    check_twice(8);
+    check_twice(16);
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! Programs as processes: one an episode, and none of them is there afterwards.
 
 use std::fs;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use super::recordings::{Bench, outcome, three_steps};
-use crate::harness::program::{interrupt, stderr, wait_for};
+use crate::harness::program::{interrupt, stderr, succeeds, wait_for};
 
 /// Waits until a file has so many lines, and gives them.
 fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
@@ -98,19 +98,22 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
 /// code of an interruption, and without what the exit handlers of a renderer in use have to say.
 fn check_twice(rounds: u64) {
     let bench = Bench::new();
-    // No program ever answers; while the first one waits, the frames of the others are drawn.
-    bench.program("echo $$ >> ids; sleep 600");
+    // Programs are there before the first frame is drawn, and never answer.
+    fs::write(bench.path("program.sh"), "echo $$ >> ids; sleep 600").unwrap();
     for round in 0..rounds {
         let _ = fs::remove_file(bench.path("ids"));
-        let mut command = bench.record(&["--runs", "6", "--threads", "2", "--in-flight", "6"]);
+        let mut command = bench.record(&["--runs", "4", "--threads", "1", "--in-flight", "4"]);
         let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         lines(&bench, "ids", 1);
         sleep(Duration::from_millis(round % 10 * 4));
-        let begin = Instant::now();
+        let pause = ["0.003", "0.006", "0.009", "0.012"][usize::try_from(round % 4).unwrap()];
+        let twice = ["-c", "kill -INT $0; sleep $1; kill -INT $0", &child.id().to_string(), pause];
+        succeeds(Command::new("sh").args(twice));
         // Two that come in one moment are one to the system.
+        let begin = Instant::now();
         while child.try_wait().unwrap().is_none() {
+            sleep(Duration::from_millis(30));
             interrupt(&child);
-            sleep(Duration::from_millis(4 + round % 3 * 4));
             assert!(begin.elapsed() < Duration::from_mins(1), "round {round}: a step that hangs is waited for");
         }
         let output = child.wait_with_output().unwrap();
@@ -123,7 +126,7 @@ fn check_twice(rounds: u64) {
 
 #[test]
 fn a_second_ctrl_c_ends_a_recording_that_draws() {
-    check_twice(16);
+    check_twice(12);
 }
 
 #[test]

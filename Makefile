@@ -1,7 +1,7 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint needed unit soak docs end-to-end bless recorded calibrate bench bench-scores bench-world bench-agents sheet
+.PHONY: demo test fmt lint needed unit soak fuzz docs end-to-end bless recorded calibrate bench bench-scores bench-world bench-agents sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
@@ -11,27 +11,34 @@ demo:
 test: fmt lint unit docs end-to-end
 
 fmt:
-	cargo fmt --check
+	cargo fmt --all --check
 
 # Once as most people build it, and once with everything: Polars, and the world on MuJoCo's library.
 lint:
 	scripts/get-mujoco.sh
 	cargo clippy --all-targets -- -D warnings
-	cargo clippy --all-targets --all-features -- -D warnings
+	cargo clippy --workspace --all-targets --all-features -- -D warnings
 
 # What the tests need, each script says what it cannot get.
 needed:
 	scripts/get-browser.sh
+	scripts/get-duckdb.sh
 	scripts/get-egl.sh
 	scripts/get-mujoco.sh
 	scripts/get-spark.sh
 
+# The member `fuzz` replays its corpora; chosen together, both use one build of the program.
 unit: needed
-	cargo test --all-features --no-fail-fast
+	cargo test --workspace --all-features --no-fail-fast
 
 ## The campaigns that are too long for CI, with their full numbers of rounds: benches/SOAK.md.
 soak: needed
 	cargo test --all-features --no-fail-fast -- --ignored soak
+
+## Every fuzz target guided by coverage, MINUTES in all; what is found is kept, and the exit code is not 0: benches/FUZZ.md.
+MINUTES = 10
+fuzz:
+	scripts/fuzz.sh $(MINUTES)
 
 docs:
 	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --all-features --quiet

@@ -132,6 +132,7 @@ fn broken_values() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
     let rows = sound().num_rows();
     let seeds = Int64Array::from(vec![3_000_000_000; rows]);
     let pixels = Int32Array::from_iter_values((0..rows).map(|i| if i == 2 { -1 } else { 5 }));
+    let names = StringArray::from(vec!["m".repeat(1025); rows]);
     let experiments = StringArray::from(vec!["E9"; rows]);
     let statuses = StringArray::from_iter_values((0..rows).map(|i| if i == 2 { "fine" } else { "ok" }));
     Ok(vec![
@@ -141,6 +142,7 @@ fn broken_values() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
         text("unknown-action.parquet", "unknown-action", "the action is `jump`", "action", Some("jump"))?,
         text("inconsistent-constant.parquet", "inconsistent-constant", "another `model`", "model", Some("other"))?,
         whole("seed-out-of-range.parquet", "out-of-range", "the seed is 3000000000", "seed", Arc::new(seeds))?,
+        whole("over-budget.parquet", "over-budget", "a `model` of 1025 letters", "model", Arc::new(names))?,
         whole("negative-count.parquet", "negative-count", "`mirror_px` is -1", "mirror_px", Arc::new(pixels))?,
         whole(
             "unknown-experiment.parquet",

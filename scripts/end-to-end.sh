@@ -7,7 +7,7 @@ trap 'rm -rf "$out"' EXIT
 
 # The program that the tests build: `cargo build` alone would compile the large dependencies a second time, with fewer of
 # their features.
-cargo test --quiet --all-features --no-run
+cargo test --quiet --workspace --all-features --no-run
 target=${CARGO_TARGET_DIR:-target}
 mirrorstats() { "$target/debug/mirrorstats" "$@"; }
 # Python packages, fetched once into a folder: the folder, the module that tells whether they are there, the packages.
@@ -40,8 +40,7 @@ mirrorstats definitions check paper
 mirrorstats definitions check extended
 
 echo "end-to-end: the same scores from the SQL lowering on an independent engine"
-packages=$target/python
-fetch "$packages" duckdb duckdb==2.0.0
+packages=$(scripts/get-duckdb.sh)
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper --where "seed <> 2 and TSA = 1"
 PYTHONPATH=$packages python3 scripts/check-sql.py "$target/debug/mirrorstats" fixtures/paper \

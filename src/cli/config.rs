@@ -7,7 +7,6 @@
 
 use std::env;
 use std::fmt;
-use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -16,8 +15,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use toml::de::{DeTable, DeValue};
 
+use crate::base::budget::{self, Limit};
 use crate::base::escape::visible;
-use crate::base::suggest;
+use crate::base::{input, suggest};
 use crate::cli::outcome::Failure;
 use crate::metric::fault::{Fault, Faults, Place, Source};
 
@@ -30,7 +30,7 @@ pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 /// What variables of settings begin with.
 const PREFIX: &str = "MIRRORSTATS_";
 /// The most bytes of a file.
-const MOST_BYTES: u64 = 1 << 20;
+const LARGEST: Limit = Limit::new("bytes of a configuration file", 1 << 20);
 
 /// Where a setting comes from.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
@@ -160,7 +160,7 @@ fn joined(path: &str, name: &str) -> String {
 }
 
 fn of_file(path: &Path, name: &str, choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
-    let text = text_of(path).map_err(|error| {
+    let text = input::text(path, LARGEST).map_err(|error| {
         Failure::input(format!(
             "cannot read the configuration file `{name}`: {error}\n  help: `{FILE_VARIABLE}=` reads none"
         ))
@@ -180,16 +180,6 @@ fn of_file(path: &Path, name: &str, choices: &[Choice<'_>]) -> Result<Vec<Settin
         faults = reader.faults;
     }
     if faults.is_empty() { Ok(reader.found) } else { Err(Failure::Faults(Faults(faults).in_order())) }
-}
-
-fn text_of(path: &Path) -> io::Result<String> {
-    use std::io::Read as _;
-    if !std::fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("expected a file"));
-    }
-    let mut text = String::new();
-    std::fs::File::open(path)?.take(MOST_BYTES + 1).read_to_string(&mut text)?;
-    if text.len() as u64 > MOST_BYTES { Err(io::Error::other("it is longer than 1 MiB")) } else { Ok(text) }
 }
 
 struct FileReader<'a> {
@@ -342,7 +332,7 @@ pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
             let long = spelled(choice.arg.get_long().unwrap_or_default());
             [format!("{PREFIX}{long}"), format!("{PREFIX}{}_{long}", spelled(&choice.command))]
         })
-        .chain([FILE_VARIABLE.to_owned(), ERRORS_VARIABLE.to_owned()])
+        .chain([FILE_VARIABLE, ERRORS_VARIABLE, budget::SETTING].map(str::to_owned))
         .collect();
     let names = env::vars_os().filter_map(|(name, _)| name.into_string().ok());
     let mut unknown: Vec<String> = names.filter(|name| name.starts_with(PREFIX) && !known.contains(name)).collect();

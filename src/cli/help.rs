@@ -11,7 +11,10 @@ use crate::report::tables::fit::wrapped;
 /// The commands by what they are for, in the order of a first use.
 const GROUPS: &[(&str, &[&str])] = &[
     ("Record", &["record", "replay", "filmstrip", "world", "experiments", "plan"]),
-    ("Score and report", &["report", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit"]),
+    (
+        "Score and report",
+        &["report", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit", "verify"],
+    ),
     ("Traces", &["info", "validate", "check", "import", "recover", "renormalize", "schema"]),
     ("Definitions and queries", &["definitions", "query", "sql"]),
     ("This program", &["config", "completions", "man", "help"]),
@@ -117,6 +120,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[("What the data can bear", "stats runs"), ("At every look, while the study runs", "stats runs --sequential")],
     ),
     ("validate", &[("Every rule, every finding", "validate runs")]),
+    ("verify", &[("Whether a report is as it was written", "verify reports/latest")]),
     ("world config", &[("A configuration to begin with", "world config > world.toml")]),
     ("world scene", &[("Where everything stands", "world scene E1")]),
     ("world sheet", &[("Pictures of the first scenes", "world sheet --out sheet.png")]),

@@ -33,7 +33,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
-use crate::base::features;
+use crate::base::{budget, features};
 use commands::Command;
 use outcome::{ErrorFormat, Failure, Outcome};
 
@@ -80,11 +80,16 @@ fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
     let parsed = command.clone().try_get_matches_from(arguments).and_then(|matches| Cli::from_arg_matches(&matches));
     match parsed {
         Ok(cli) if cli.command.needs_no_settings() => cli.command.run(),
-        Ok(cli) => settings.and_then(|_| cli.command.run()),
+        Ok(cli) => settings.and_then(|_| budget_setting()).and_then(|()| cli.command.run()),
         // Help and version arrive here too; clap knows which stream and code each one takes.
         Err(answer) if answer.exit_code() == 0 => answer.print().map(|()| Outcome::Done).map_err(Failure::Output),
         Err(error) => Err(Failure::Usage(Box::new(usage::with_tips(error, &command)))),
     }
+}
+
+/// Refuses a factor of all budgets that is none before anything is read.
+fn budget_setting() -> Result<(), Failure> {
+    budget::setting().map(drop).map_err(Failure::input)
 }
 
 /// The outcome, once all of standard output is out: what is left in its buffer at the end is written without a word

@@ -3,7 +3,7 @@
 //! | code | meaning |
 //! |---|---|
 //! | 0 | done |
-//! | 1 | a check that was asked for did not hold (`validate`, `compare`, `audit`) |
+//! | 1 | a check that was asked for did not hold (`validate`, `compare`, `audit`, `verify`) |
 //! | 2 | bad usage, input or definition |
 //! | 3 | something of the input is lost (`recover`); the rest was saved |
 //! | 130 | interrupted (`record`); what was done stays |

@@ -1,8 +1,6 @@
 //! Answers on standard output, and files that appear whole or not at all.
 //!
-//! Recordings, traces, logs and reports are on the disk when a command ends. What a command computes from them in no time
-//! (scores, rows of a query, pictures) is renamed without waiting for the disk: that wait was 10 to 40 ms a file on an
-//! ext4 disk, where `score` takes 0.2 s for 14 million steps.
+//! Whatever a command has written is on the disk when it ends, and no loss of power leaves half of it.
 
 use std::fmt::Display;
 use std::fs::File;
@@ -73,7 +71,7 @@ pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T
         Failure::Output(error) => unwritable(path, error),
         other => other,
     })?;
-    commit_unsynced(file, path)?;
+    commit(file, path)?;
     Ok(written)
 }
 
@@ -85,12 +83,15 @@ pub fn create(path: &Path) -> Result<NewFile, Failure> {
     NewFile::create(path).map_err(|error| unwritable(path, error))
 }
 
-/// Replaces the file at `path` without waiting for the disk.
+/// Makes a folder and those above it.
 ///
 /// # Errors
-/// When the disk is full or the name cannot be taken; the error names the file.
-pub fn commit_unsynced(file: NewFile, path: &Path) -> Result<(), Failure> {
-    file.commit_unsynced().map_err(|error| unwritable(path, error))
+/// When something else is in its place, or the folder above it is not writable; the error names the folder.
+pub fn make_folder(folder: &Path) -> Result<(), Failure> {
+    replace::make_folder(folder).map_err(|error| {
+        let words = "help: is there a file of that name, and is the folder above it writable?";
+        Failure::Rendered(format!("error: cannot make the folder `{}`: {error}\n  {words}", folder.display()))
+    })
 }
 
 /// Replaces the file at `path`; the new one is on the disk when this returns.
@@ -109,7 +110,8 @@ pub fn check_target<P: AsRef<Path>>(target: &Path, read: impl IntoIterator<Item 
     replace::check_target(target, read, "one that is read").map_err(Failure::input)
 }
 
-fn unwritable(path: &Path, error: io::Error) -> Failure {
+/// That a file cannot be written.
+pub fn unwritable(path: &Path, error: io::Error) -> Failure {
     // The reader of a pipe has seen enough, also where the pipe has a name.
     if error.kind() == io::ErrorKind::BrokenPipe {
         return Failure::Output(error);

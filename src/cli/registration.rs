@@ -1,16 +1,17 @@
 //! A registered plan on its way into a recording: what it promised is held against what is about to be recorded.
 
-use std::fs;
 use std::path::Path;
 
 use super::outcome::Failure;
 use crate::agent::prompt;
+use crate::base::budget::Limit;
+use crate::base::input;
 use crate::report::plan::register::{NamedHash, RegisteredPlan};
 use crate::sim::config::WorldConfig;
 use crate::trace::declared::Registration;
 
 /// The largest plan that is read, bytes.
-const MOST: u64 = 1 << 20;
+const LARGEST: Limit = Limit::new("bytes of a plan", 1 << 20);
 /// The name of the world among the experiments of a plan.
 pub(super) const WORLD: &str = "world";
 
@@ -27,11 +28,8 @@ pub(super) fn prompts() -> Vec<NamedHash> {
 /// A file that cannot be read or is no plan, a plan that was changed, and one that promises other prompts or another world.
 pub(super) fn registration(file: &Path, config: &WorldConfig) -> Result<Registration, Failure> {
     let shown = file.display();
-    let read = || {
-        let bytes = fs::metadata(file)?.len();
-        if bytes > MOST { Err(std::io::Error::other("it is too large for a plan")) } else { fs::read_to_string(file) }
-    };
-    let text = read().map_err(|error| Failure::input(format!("{shown}: cannot read the plan: {error}")))?;
+    let text = input::text(file, LARGEST)
+        .map_err(|error| Failure::input(format!("{shown}: cannot read the plan: {error}")))?;
     let plan: RegisteredPlan = serde_json::from_str(&text).map_err(|error| {
         let help = "`mirrorstats plan ... --register FILE` writes one";
         Failure::input(format!("{shown}: expected a registered plan: {error}\n  help: {help}"))

@@ -1,16 +1,17 @@
 //! Files of experiments, which become known to the process.
 
-use std::fs;
-use std::io::{self, Read as _};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::file;
 use super::table::Entry;
 use super::{Experiment, TooMany, built_in_specs};
+use crate::base::budget::Limit;
+use crate::base::input;
 use crate::metric::fault::{Faults, Place, Source};
 
 /// The most bytes of a file.
-const MOST_BYTES: u64 = 1024 * 1024;
+const LARGEST: Limit = Limit::new("bytes of an experiment file", 1 << 20);
 /// A file of experiments that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages say it")]
@@ -43,7 +44,7 @@ pub struct Loaded {
 /// # Errors
 /// When the file cannot be read, or all of its faults.
 pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
-    let text = text_of(path).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
+    let text = input::text(path, LARGEST).map_err(|source| FileError::Unreadable { path: path.to_owned(), source })?;
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let source = Source { name: path.display().to_string(), text };
     let entries = file::read(source, Some(folder), &built_in_specs())?;
@@ -51,17 +52,4 @@ pub fn load(path: &Path) -> Result<Vec<Loaded>, FileError> {
         .into_iter()
         .map(|Entry { known, name, cubes }| Ok(Loaded { experiment: Experiment::register(known)?, cubes, name }))
         .collect()
-}
-
-fn text_of(path: &Path) -> io::Result<String> {
-    if !fs::metadata(path)?.is_file() {
-        return Err(io::Error::other("expected a file"));
-    }
-    let mut bytes = Vec::new();
-    fs::File::open(path)?.take(MOST_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MOST_BYTES {
-        return Err(io::Error::other(format!("it is longer than {MOST_BYTES} bytes")));
-    }
-    String::from_utf8(bytes)
-        .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, format!("expected UTF-8 text, found {error}")))
 }

@@ -16,15 +16,16 @@
 //! that was stopped is told so by one rule, and where nothing was hit the words of E5 are the paper's.
 
 use std::fs;
-use std::io::Read as _;
 use std::path::{Component, Path};
 
 use minijinja::Environment;
 
+use crate::base::budget::Limit;
 use crate::base::hash;
+use crate::base::input;
 
 /// The most bytes of a template.
-const MOST_BYTES: u64 = 256 * 1024;
+const LARGEST: Limit = Limit::new("bytes of a prompt", 256 * 1024);
 
 /// A template: the name of its file without the ending, and its text.
 pub type Template = (String, String);
@@ -153,14 +154,5 @@ impl Templates {
 
 fn text_of(path: &Path) -> Result<String, String> {
     let unreadable = |error: std::io::Error| format!("cannot read `{}`: {error}", path.display());
-    if !fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(format!("`{}` is no file", path.display()));
-    }
-    let mut text = String::new();
-    let file = fs::File::open(path).map_err(unreadable)?;
-    file.take(MOST_BYTES + 1).read_to_string(&mut text).map_err(unreadable)?;
-    if text.len() as u64 > MOST_BYTES {
-        return Err(format!("`{}` is longer than {MOST_BYTES} bytes", path.display()));
-    }
-    Ok(text)
+    input::text(path, LARGEST).map_err(unreadable)
 }

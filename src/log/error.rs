@@ -3,8 +3,6 @@
 use std::io;
 use std::path::Path;
 
-use crate::base::replace::without_name;
-
 /// Why a log cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum LogError {
@@ -43,7 +41,7 @@ pub enum LogError {
 impl LogError {
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
         let file = path.display().to_string();
-        move |source| Self::Io { doing, file, source: without_name(source) }
+        move |source| Self::Io { doing, file, source }
     }
 
     /// An error of the MCAP library while writing.
@@ -52,6 +50,8 @@ impl LogError {
         move |error| {
             let source = match error {
                 mcap::McapError::Io(source) => source,
+                // The library says of an error of the disk that a record cannot be parsed; its cause has the words.
+                mcap::McapError::Parse(cause) => io::Error::other(cause.root_cause().to_string()),
                 other => io::Error::other(other),
             };
             Self::Io { doing: "write", file, source }

@@ -22,6 +22,9 @@ pub enum EpisodeMessage {
         /// What it was recorded with, which is not known before the first answer; the column of that name.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         fingerprint: Option<String>,
+        /// The hash of its rows; the column of that name. Logs of earlier versions have none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        episode_hash: Option<String>,
     },
 }
 

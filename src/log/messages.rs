@@ -11,8 +11,11 @@ use mcap::Message;
 use mcap::read::ChannelAccumulator;
 use mcap::records::Record;
 
+use super::chunk::{Unpacked, inside};
 use super::error::LogError;
-use super::records::{Piece, Records, inside};
+use super::records::{Piece, Records};
+
+use crate::base::input;
 
 /// The messages of a log up to its end record.
 pub(super) struct Messages<R> {
@@ -20,7 +23,7 @@ pub(super) struct Messages<R> {
     records: Records<R>,
     channels: ChannelAccumulator<'static>,
     /// What is left of the chunk that was read last.
-    chunk: std::vec::IntoIter<Record<'static>>,
+    chunk: Unpacked,
     /// Where that chunk begins.
     at: u64,
     has_ended: bool,
@@ -32,11 +35,11 @@ impl Messages<BufReader<File>> {
     /// # Errors
     /// When the file cannot be opened or read, or does not begin as a log does.
     pub(super) fn open(path: &Path) -> Result<Self, LogError> {
-        let file = File::open(path).map_err(LogError::io("open", path))?;
+        let file = input::open(path).map_err(LogError::io("open", path))?;
         let records = Records::new(BufReader::new(file)).map_err(LogError::io("read", path))?;
         let records = records.ok_or_else(|| LogError::no_log(path))?;
         let channels = ChannelAccumulator::default();
-        Ok(Self { path: path.to_owned(), records, channels, chunk: Vec::new().into_iter(), at: 0, has_ended: false })
+        Ok(Self { path: path.to_owned(), records, channels, chunk: Unpacked::default(), at: 0, has_ended: false })
     }
 }
 
@@ -62,9 +65,9 @@ impl<R: Read + Seek> Messages<R> {
                     format!("the checksum of the data: expected {written:08x}, found {found:08x}")
                 }
                 Some(Piece::Record(record)) => return Ok(Some(record)),
-                Some(Piece::Chunk(at, bytes)) => match inside(&bytes) {
+                Some(Piece::Chunk(at, bytes)) => match inside(&bytes, self.records.budgets()) {
                     Ok(records) => {
-                        (self.chunk, self.at) = (records.into_iter(), at);
+                        (self.chunk, self.at) = (records, at);
                         continue;
                     }
                     Err(fault) => format!("the chunk at byte {at}: {fault}"),

@@ -19,6 +19,7 @@
 //! that was cut off, every episode whose `end` is there is whole.
 
 pub mod assemble;
+mod chunk;
 mod error;
 pub mod message;
 mod messages;

@@ -1,5 +1,6 @@
 //! A log as its messages, one after the other, in memory that does not grow with it.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
@@ -61,6 +62,20 @@ pub fn other_episode(path: &Path, id: &str) -> Result<Option<String>, LogError> 
         }
     }
     Ok(None)
+}
+
+/// The hashes of a log's episodes by their ids, as their ends tell them; logs of earlier versions tell none.
+///
+/// # Errors
+/// When the log cannot be read to its end.
+pub fn episode_hashes(path: &Path) -> Result<BTreeMap<String, String>, LogError> {
+    let mut hashes = BTreeMap::new();
+    for message in LogReader::open(path)? {
+        if let Event::Episode(EpisodeMessage::End { episode_id, episode_hash: Some(hash), .. }) = message?.event {
+            hashes.insert(episode_id, hash);
+        }
+    }
+    Ok(hashes)
 }
 
 impl Iterator for LogReader {

@@ -7,15 +7,15 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 use mcap::MAGIC;
 use mcap::records::{Record, op};
-use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
+use super::chunk::{Budgets, inside};
 use super::parse::parsed;
 
 /// No record of a log is longer, chunks included; a longer one is damage.
 pub(super) const LONGEST: usize = 1 << 30;
 
 /// Of an opcode and a length.
-const FRAME: usize = 9;
+pub(super) const FRAME: usize = 9;
 
 /// The header of a chunk without the name of its compression.
 const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;
@@ -43,6 +43,7 @@ pub(super) struct Records<R> {
     running: crc32fast::Hasher,
     /// Of the section that has ended.
     checksum: u32,
+    budgets: Budgets,
 }
 
 /// An opcode, and the length of what follows.
@@ -70,7 +71,15 @@ impl<R: Read + Seek> Records<R> {
     /// The records behind the first magic bytes; `None` if it does not begin with them.
     pub(super) fn new(mut bytes: R) -> io::Result<Option<Self>> {
         let end = bytes.seek(SeekFrom::End(0))?;
-        let mut records = Self { bytes, at: 0, end, damage: None, running: crc32fast::Hasher::new(), checksum: 0 };
+        let mut records = Self {
+            bytes,
+            at: 0,
+            end,
+            damage: None,
+            running: crc32fast::Hasher::new(),
+            checksum: 0,
+            budgets: Budgets::new(end),
+        };
         let begin = records.read(0, MAGIC.len())?;
         records.running.update(&begin);
         records.at = begin.len() as u64;
@@ -112,6 +121,16 @@ impl<R: Read + Seek> Records<R> {
     /// The checksum of the data behind its end record, that of the index behind the footer.
     pub(super) fn checksum(&self) -> u32 {
         self.checksum
+    }
+
+    /// The size of the log.
+    pub(super) fn bytes(&self) -> u64 {
+        self.end
+    }
+
+    /// How much may be unpacked.
+    pub(super) fn budgets(&self) -> &Budgets {
+        &self.budgets
     }
 
     /// Whether nothing follows but the last magic bytes.
@@ -217,8 +236,12 @@ impl<R: Read + Seek> Records<R> {
         }
         Ok(match frame.opcode {
             op::CHUNK => {
+                // Beyond the budget nothing is looked for any more: the log is cut there.
+                if self.budgets.search(usize::try_from(frame.length).unwrap_or(LONGEST)).is_err() {
+                    return Ok(false);
+                }
                 let whole = self.whole(at, frame)?;
-                inside(&whole).is_ok()
+                inside(&whole, &self.budgets).is_ok()
             }
             op::DATA_END => frame.length == 4,
             _ => false,
@@ -245,58 +268,4 @@ fn decode(at: u64, opcode: u8, whole: &[u8]) -> Result<Piece, String> {
         op::ATTACHMENT => Ok(Piece::Record(Record::Unknown { opcode, data: Vec::new().into() })),
         _ => Ok(Piece::Record(parsed(opcode, body)?.into_owned())),
     }
-}
-
-/// The records in a chunk, all of them or none: none is given before the chunk's checksum holds.
-///
-/// # Errors
-/// When the chunk is damaged, in words.
-pub(super) fn inside(chunk: &[u8]) -> Result<Vec<Record<'static>>, String> {
-    let mut found = Vec::new();
-    let options = LinearReaderOptions::default().with_validate_chunk_crcs(true);
-    unpacked(chunk, options, |record| found.push(record))?;
-    Ok(found)
-}
-
-/// The records in front of a chunk that is cut off or damaged, as far as they can be read: enough to name what is lost,
-/// never enough to be saved.
-pub(super) fn glimpse(chunk: &[u8]) -> Vec<Record<'static>> {
-    let mut found = Vec::new();
-    // That it ends in a fault is known.
-    let _ = unpacked(chunk, LinearReaderOptions::default(), |record| found.push(record));
-    found
-}
-
-/// Gives the schemas, channels and messages of a chunk one after the other.
-///
-/// The library makes room for what a length says, and only then finds that the data ends before it. So a record may be as
-/// long as the chunk says it is when unpacked, and the size of the chunk itself is not asked for at once: of lengths that
-/// contradict each other the smaller one counts.
-fn unpacked(chunk: &[u8], options: LinearReaderOptions, mut give: impl FnMut(Record<'static>)) -> Result<(), String> {
-    let options = options.with_skip_start_magic(true).with_skip_end_magic(true);
-    let mut reader = LinearReader::new_with_options(options.with_record_length_limit(size_unpacked(chunk)));
-    let mut rest = chunk;
-    while let Some(event) = reader.next_event() {
-        match event.map_err(|fault| fault.to_string())? {
-            LinearReadEvent::ReadRequest(wanted) => {
-                let (now, later) = rest.split_at(wanted.min(rest.len()));
-                reader.insert(now.len()).copy_from_slice(now);
-                reader.notify_read(now.len());
-                rest = later;
-            }
-            LinearReadEvent::Record { data, opcode: opcode @ (op::SCHEMA | op::CHANNEL | op::MESSAGE) } => {
-                give(parsed(opcode, data)?.into_owned());
-            }
-            LinearReadEvent::Record { .. } => {}
-        }
-    }
-    Ok(())
-}
-
-/// The size that the header of a chunk gives for what is in it, as far as any chunk may be that large.
-fn size_unpacked(chunk: &[u8]) -> usize {
-    // Behind the frame stand two times of 8 bytes each.
-    let size = chunk.get(FRAME + 16..FRAME + 24).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);
-    // The library holds the header of the chunk against the same limit.
-    size.and_then(|size| usize::try_from(size).ok()).map_or(LONGEST, |size| size.clamp(1 << 16, LONGEST))
 }

@@ -1,11 +1,10 @@
 //! What can be saved of a log that was cut off or damaged.
 //!
-//! Rule: an episode is saved if its `begin`, its `end` and every row between are there; anything else that was begun is
-//! lost, and named. What is behind damage is still looked at. What is saved is what was written: of a chunk whose
+//! Rule: an episode is saved if its `begin`, its `end` and every row between are there, and their hash is that of the `end`;
+//! anything else that was begun is lost, and named. What is behind damage is still looked at. What is saved is what was written: of a chunk whose
 //! checksum does not hold nothing is.
 
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek};
 use std::path::Path;
 
@@ -14,12 +13,16 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde_json::Value;
 
+use super::chunk::{Budgets, glimpse, inside};
 use super::error::LogError;
 use super::message::EpisodeMessage;
 use super::read::{Event, event};
-use super::records::{Piece, Records, glimpse, inside};
+use super::records::{Piece, Records};
 use super::{METADATA, METADATA_KEY, topic};
+use crate::base::budget::{Budget, Limit, SETTING};
+use crate::base::input;
 use crate::trace::episode::{Episode, Step};
+use crate::trace::episode_hash;
 
 /// What was saved of a log, and what was not.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -80,7 +83,7 @@ impl Losses {
 /// # Errors
 /// When the file cannot be read, does not begin as a log, or is whole and of something else than a recording.
 pub fn recover(path: &Path) -> Result<Recovered, LogError> {
-    let file = File::open(path).map_err(LogError::io("open", path))?;
+    let file = input::open(path).map_err(LogError::io("open", path))?;
     recover_from(path, BufReader::new(file))
 }
 
@@ -100,17 +103,46 @@ pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, L
     Ok(salvage.finished())
 }
 
+/// How many rows may be held: what is saved is held whole, and a row in memory is far larger than one of few words in a
+/// chunk. A log in use has some hundred bytes for a row without its frame.
+#[derive(Debug)]
+struct Rows(Budget, Limit);
+
+impl Default for Rows {
+    fn default() -> Self {
+        Self::of(0)
+    }
+}
+
+impl Rows {
+    /// Of a log of so many bytes.
+    fn of(bytes: u64) -> Self {
+        let limit = Limit::new("rows in a log of its size", 200_000 + bytes / 8);
+        Self(Budget::new(limit), limit)
+    }
+
+    fn take(&self) -> bool {
+        self.0.spend(1).is_ok()
+    }
+
+    fn words(&self) -> String {
+        self.1.check(u64::MAX).map_or_else(|exceeded| exceeded.to_string(), |()| String::new())
+    }
+}
+
 /// The episode that is being put together.
 #[derive(Default)]
 struct Salvage {
     channels: BTreeMap<u16, String>,
     open: Option<(Episode, Vec<Step>, Option<String>)>,
+    /// Rows that may still be held.
+    rows: Rows,
     result: Recovered,
 }
 
 impl Salvage {
     fn of(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
-        let mut salvage = Self::default();
+        let mut salvage = Self { rows: Rows::of(records.bytes()), ..Self::default() };
         // A chunk does not repeat the channels of earlier ones, which may be damaged; the summary does.
         let channels = records.of_summary()?;
         salvage.channels.extend(channels.into_iter().map(|channel| (channel.id, channel.topic)));
@@ -124,11 +156,11 @@ impl Salvage {
                     break;
                 }
                 Piece::Record(record) => salvage.record(record),
-                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk),
+                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk, records.budgets()),
                 Piece::Damage(fault) => salvage.result.losses.damage.push(fault),
                 Piece::Cut(fault, tail) => {
                     salvage.close("the log ends before the episode does");
-                    salvage.lose_all(&tail, "the log ends before the episode does");
+                    salvage.lose_all(&tail, records.budgets(), "the log ends before the episode does");
                     salvage.result.losses.cut = Some(fault);
                 }
             }
@@ -181,20 +213,23 @@ impl Salvage {
         self.result.recording = text.and_then(|text| serde_json::from_str(text).ok());
     }
 
-    fn chunk(&mut self, at: u64, chunk: &[u8]) {
-        match inside(chunk) {
+    fn chunk(&mut self, at: u64, chunk: &[u8], budgets: &Budgets) {
+        match inside(chunk, budgets) {
             Err(fault) => {
                 self.result.losses.damaged_chunks += 1;
+                if fault.contains(SETTING) {
+                    self.result.losses.damage.push(format!("the chunk at byte {at} is not unpacked: {fault}"));
+                }
                 self.close(&format!("a chunk with its rows is damaged, at byte {at}: {fault}"));
-                self.lose_all(chunk, &format!("its chunk is damaged, at byte {at}: {fault}"));
+                self.lose_all(chunk, budgets, &format!("its chunk is damaged, at byte {at}: {fault}"));
             }
-            Ok(records) => records.into_iter().for_each(|record| self.record(record)),
+            Ok(records) => records.for_each(|record| self.record(record)),
         }
     }
 
     /// Names the episodes that begin in a chunk which cannot be read to its end, as far as it can.
-    fn lose_all(&mut self, chunk: &[u8], reason: &str) {
-        for record in glimpse(chunk) {
+    fn lose_all(&mut self, chunk: &[u8], budgets: &Budgets, reason: &str) {
+        for record in glimpse(chunk, budgets) {
             match record {
                 Record::Channel(channel) => drop(self.channels.entry(channel.id).or_insert(channel.topic)),
                 Record::Message { header, data } => {
@@ -203,7 +238,9 @@ impl Salvage {
                         (Ok(Event::Episode(EpisodeMessage::Begin(head))), open) => {
                             *open = Some((*head, Vec::new(), None));
                         }
-                        (Ok(Event::Decision(row)), Some((_, rows, _))) => rows.extend(row.into_step()),
+                        (Ok(Event::Decision(row)), Some((_, rows, _))) if self.rows.take() => {
+                            rows.extend(row.into_step());
+                        }
                         _ => {}
                     }
                 }
@@ -229,8 +266,8 @@ impl Salvage {
                 self.close("the next episode begins before its end");
                 self.open = Some((*head, Vec::new(), None));
             }
-            Ok(Event::Episode(EpisodeMessage::End { episode_id, steps, fingerprint })) => {
-                self.end(&episode_id, steps, fingerprint);
+            Ok(Event::Episode(EpisodeMessage::End { episode_id, steps, fingerprint, episode_hash })) => {
+                self.end(&episode_id, steps, (fingerprint, episode_hash));
             }
             Ok(Event::Decision(row)) => {
                 let Some((_, rows, fault)) = &mut self.open else {
@@ -242,7 +279,8 @@ impl Salvage {
                     fault.get_or_insert(format!("expected the row of step {expected}, found that of step {}", row.t));
                 }
                 match row.into_step() {
-                    Ok(step) => rows.push(step),
+                    Ok(step) if self.rows.take() => rows.push(step),
+                    Ok(_) => drop(fault.get_or_insert_with(|| self.rows.words())),
                     Err(error) => drop(fault.get_or_insert(error.to_string())),
                 }
             }
@@ -255,11 +293,13 @@ impl Salvage {
         }
     }
 
-    fn end(&mut self, episode_id: &str, steps: usize, fingerprint: Option<String>) {
+    fn end(&mut self, episode_id: &str, steps: usize, (fingerprint, hash): (Option<String>, Option<String>)) {
         match self.open.take() {
             Some((head, rows, None)) if head.episode_id == episode_id && rows.len() == steps && steps > 0 => {
-                let fingerprint = fingerprint.or_else(|| head.fingerprint.clone());
-                self.result.episodes.push(Episode { steps: rows, fingerprint, ..head });
+                match ended(head, rows, fingerprint, hash) {
+                    Ok(episode) => self.result.episodes.push(episode),
+                    Err((episode, reason)) => self.lose(episode.episode_id, episode.steps.len(), reason),
+                }
             }
             Some((head, rows, fault)) => {
                 let reason = fault.unwrap_or_else(|| format!("its end says {steps} rows of `{episode_id}`"));
@@ -280,4 +320,25 @@ impl Salvage {
     fn lose(&mut self, episode_id: String, rows: usize, reason: String) {
         self.result.losses.episodes.push(LostEpisode { episode_id, rows, reason });
     }
+}
+
+/// The episode of a begin, its rows, and what its end tells of them.
+///
+/// # Errors
+/// The episode, and in words how its rows are not those that the end tells of.
+pub fn ended(
+    head: Episode,
+    steps: Vec<Step>,
+    fingerprint: Option<String>,
+    hash: Option<String>,
+) -> Result<Episode, (Box<Episode>, String)> {
+    let fingerprint = fingerprint.or_else(|| head.fingerprint.clone());
+    let episode = Episode { steps, fingerprint, episode_hash: None, ..head };
+    let Some(stated) = hash else { return Ok(episode) };
+    let found = episode_hash::of(&episode);
+    if found == stated {
+        return Ok(Episode { episode_hash: Some(stated), ..episode });
+    }
+    let reason = format!("its rows are not those that its end tells of: expected the hash {stated}, found {found}");
+    Err((Box::new(episode), reason))
 }

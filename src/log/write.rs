@@ -20,6 +20,7 @@ use super::message::{Decision, EpisodeMessage};
 use super::topic;
 use crate::base::replace::NewFile;
 use crate::trace::episode::Episode;
+use crate::trace::episode_hash;
 
 /// Something that moves, in the frame of the room.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,7 +110,9 @@ impl EpisodeLog {
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
         let mut log = Self { path: path.to_owned(), out, channels, sequence: 0 };
         let channel = log.channels.episode;
-        log.json(channel, time, &EpisodeMessage::Begin(Box::new(head.clone())))?;
+        // What its rows hash to is not known before its end, and stands there.
+        let head = Episode { episode_hash: None, ..head.clone() };
+        log.json(channel, time, &EpisodeMessage::Begin(Box::new(head)))?;
         Ok(log)
     }
 
@@ -143,13 +146,18 @@ impl EpisodeLog {
         self.json(self.channels.decision, time, row)
     }
 
-    /// Ends the log and gives it its name.
+    /// Ends the log of an episode of these rows, tells their hash, and gives the log its name.
     ///
     /// # Errors
     /// Whatever writing gives.
     pub fn end(mut self, time: u64, episode: &Episode) -> Result<(), LogError> {
-        let Episode { episode_id, steps, fingerprint, .. } = episode.clone();
-        let end = EpisodeMessage::End { episode_id, steps: steps.len(), fingerprint };
+        let Episode { episode_id, steps, fingerprint, .. } = episode;
+        let end = EpisodeMessage::End {
+            episode_id: episode_id.clone(),
+            steps: steps.len(),
+            fingerprint: fingerprint.clone(),
+            episode_hash: Some(episode_hash::of(episode)),
+        };
         self.json(self.channels.episode, time, &end)?;
         self.out.finish().map_err(LogError::writing(&self.path))?;
         let failed = |error| LogError::io("write", &self.path)(error);

@@ -23,13 +23,15 @@ use std::sync::Arc;
 use std::{fs, io};
 
 use indexmap::IndexMap;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
 use super::catalog::{Better, StandardError};
 use super::columns::{Column, Level, Type};
 use super::fault::{Fault, Faults, Place, Source};
 use super::keys::Keys;
 use super::origin::Written;
+use crate::base::budget::Limit;
+use crate::base::input;
 use crate::base::ratio::Ratio;
 use crate::base::suggest::nearest;
 
@@ -148,6 +150,14 @@ pub fn read_source(name: String, source: Source, folder: Option<&Path>) -> Resul
     Reading::of(name, DefinitionFile { source, folder: folder.map(Path::to_owned), place: None })
 }
 
+/// Definitions are written by hand, or by a program that spells out a family of metrics.
+const LARGEST: Limit = Limit::new("bytes of a definition file", 1 << 20);
+/// Keys of a file, tables included.
+const MOST_KEYS: Limit = Limit::new("keys in a definition file", 10_000);
+/// Includes are followed each time they are met, for what comes later replaces what came before: files that include two
+/// others each would be read without end.
+const MOST_INCLUDES: Limit = Limit::new("includes, those of included files counted", 256);
+
 /// A definition file's text, and where it is.
 struct DefinitionFile {
     source: Source,
@@ -163,10 +173,15 @@ fn find(name: &str, path: &Path) -> io::Result<DefinitionFile> {
         let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
         return Ok(DefinitionFile { source, folder: None, place: None });
     }
-    let text = String::from_utf8(fs::read(path)?)
-        .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, format!("expected UTF-8 text, found {error}")))?;
+    let text = input::text(path, LARGEST)?;
     let source = Source { name: path.display().to_string(), text };
     Ok(DefinitionFile { source, folder: path.parent().map(Path::to_owned), place: fs::canonicalize(path).ok() })
+}
+
+/// The keys of a table and of the tables in it.
+fn keys(table: &DeTable<'_>) -> u64 {
+    let inside = |value: &DeValue<'_>| value.as_table().map_or(0, keys);
+    table.iter().map(|(_, value)| 1 + inside(value.get_ref())).sum()
 }
 
 struct Reading {
@@ -174,13 +189,22 @@ struct Reading {
     faults: Vec<Fault>,
     /// The files being read, for includes that lead back: their names and places.
     open: Vec<(String, Option<PathBuf>)>,
+    /// Includes that were followed.
+    includes: u64,
+    /// What was said of includes: names of files and places, and nothing of what the files say.
+    of_includes: Vec<String>,
 }
 
 impl Reading {
     /// Reads a file and all that it includes into a document of this name.
     fn of(name: String, file: DefinitionFile) -> Result<Document, FileError> {
-        let mut reading =
-            Self { document: Document { name, ..Document::default() }, faults: Vec::new(), open: Vec::new() };
+        let mut reading = Self {
+            document: Document { name, ..Document::default() },
+            faults: Vec::new(),
+            open: Vec::new(),
+            includes: 0,
+            of_includes: Vec::new(),
+        };
         reading.file(file);
         if reading.faults.is_empty() { Ok(reading.document) } else { Err(Faults(reading.faults).in_order().into()) }
     }
@@ -194,6 +218,10 @@ impl Reading {
             self.faults.push(Fault::new(place, format!("not TOML: {}", error.message())));
         }
         if !is_toml {
+            return;
+        }
+        if let Err(exceeded) = MOST_KEYS.check(keys(table.get_ref())) {
+            self.faults.push(Fault::new(Place { source, span: 0..0 }, exceeded.to_string()));
             return;
         }
         self.open.push((source.name.clone(), file.place));
@@ -216,19 +244,54 @@ impl Reading {
 
     fn include(&mut self, name: &str, place: Place, folder: Option<&Path>) {
         let path = folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
+        self.includes += 1;
+        if let Err(exceeded) = MOST_INCLUDES.check(self.includes) {
+            // Once is enough.
+            if MOST_INCLUDES.check(self.includes - 1).is_ok() {
+                self.of_include(Fault::new(place, exceeded.to_string()));
+            }
+            return;
+        }
         match find(name, &path) {
             Ok(file) if self.is_open(&file) => {
                 let names = self.open.iter().map(|(name, _)| name).chain([&file.source.name]);
                 let chain = names.map(String::as_str).collect::<Vec<_>>().join(" -> ");
-                self.faults.push(Fault::new(place, format!("the include leads back to itself: {chain}")));
+                self.of_include(Fault::new(place, format!("the include leads back to itself: {chain}")));
             }
-            Ok(file) => self.file(file),
+            Ok(file) => self.included(file, place),
             Err(error) => {
                 let help = format!("a path is relative to this file; {}", built_in_help(name));
                 let message = format!("cannot read the definition file `{}`: {error}", path.display());
-                self.faults.push(Fault::new(place, message).help(help));
+                self.of_include(Fault::new(place, message).help(help));
             }
         }
+    }
+
+    /// Reads an included file. What is no definition file may be a secret: of its faults the first is told, and by its
+    /// place alone.
+    fn included(&mut self, file: DefinitionFile, place: Place) {
+        let before = self.faults.len();
+        self.file(file);
+        let Some(first) = self.faults.get(before).cloned() else { return };
+        self.faults.truncate(before);
+        let message = if self.of_includes.contains(&first.message) {
+            first.message
+        } else {
+            let (line, column) = first.line_and_column();
+            let name = &first.place.source.name;
+            format!(
+                "the included file `{name}` is no definition file: it cannot be read from line {line}, column {column} on"
+            )
+        };
+        let help =
+            "expected TOML with the keys of a definition file; `mirrorstats definitions check FILE` shows the line";
+        self.of_include(Fault::new(place, message).help(help));
+    }
+
+    /// A fault that says nothing of what an included file says.
+    fn of_include(&mut self, fault: Fault) {
+        self.of_includes.push(fault.message.clone());
+        self.faults.push(fault);
     }
 
     fn is_open(&self, file: &DefinitionFile) -> bool {

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 
 use super::metadata::{Difference, VERSION_KEY};
 use crate::agent::Lost;
-use crate::base::replace::without_name;
 use crate::log::LogError;
 use crate::trace::error::TraceError;
 
@@ -61,7 +60,7 @@ impl StoreError {
     }
 
     pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
-        move |source| Self::Io { doing, path: path.to_owned(), source: without_name(source) }
+        move |source| Self::Io { doing, path: path.to_owned(), source }
     }
 }
 

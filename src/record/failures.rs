@@ -11,6 +11,7 @@ use std::path::Path;
 use super::error::StoreError;
 use super::plan::{Key, Subject};
 use crate::agent::Lost;
+use crate::base::input;
 use crate::base::replace::NewFile;
 pub use crate::trace::lost::{LostEpisode, list_of};
 
@@ -49,11 +50,16 @@ pub fn update(path: &Path, recorded: &BTreeSet<String>, lost: &[LostEpisode]) ->
 
 /// What is listed. A line that is not of this shape lists nothing.
 fn read(path: &Path) -> Result<Vec<LostEpisode>, StoreError> {
-    match fs::read_to_string(path) {
-        Ok(text) => Ok(text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Vec::new()),
-        Err(error) => Err(StoreError::io("read", path)(error)),
+    let lines = match input::lines(path, crate::trace::lost::LONGEST_LINE) {
+        Ok(lines) => lines,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(StoreError::io("read", path)(error)),
+    };
+    let mut listed = Vec::new();
+    for line in lines {
+        listed.extend(serde_json::from_slice::<LostEpisode>(&line.map_err(StoreError::io("read", path))?).ok());
     }
+    Ok(listed)
 }
 
 fn write(path: &Path, episodes: &[&LostEpisode]) -> io::Result<()> {

@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::StoreError;
 use super::lock::{lock_folder, lock_of};
+use crate::base::replace::{make_folder, sweep};
 
 /// The folder of parts within the folder of a recording.
 const PARTS: &str = ".parts";
@@ -41,7 +42,7 @@ impl FolderLock {
     pub fn stake(folder: &Path) -> Result<Self, StoreError> {
         loop {
             let is_new = !folder.exists();
-            fs::create_dir_all(folder).map_err(StoreError::io("make the folder", folder))?;
+            make_folder(folder).map_err(StoreError::io("make the folder", folder))?;
             match Self::enter(folder, is_new) {
                 Ok(claim) => return Ok(claim),
                 // A process that recorded nothing has removed the folder that was made for it.
@@ -59,7 +60,8 @@ impl FolderLock {
     fn enter(folder: &Path, is_new: bool) -> Result<Self, StoreError> {
         let _lock = lock_folder(folder)?;
         let parts = parts_of(folder);
-        fs::create_dir_all(&parts).map_err(StoreError::io("make the folder", &parts))?;
+        make_folder(&parts).map_err(StoreError::io("make the folder", &parts))?;
+        sweep(folder);
         let path = parts.join(".present");
         let present = File::create(&path).map_err(StoreError::io("make", &path))?;
         if is_alone(&present, &path)? {

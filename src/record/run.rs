@@ -27,6 +27,7 @@ use crate::sim::config::WorldConfig;
 use crate::sim::scene::Scene;
 use crate::sim::world::World;
 use crate::trace::episode::{Action, Episode, Step};
+use crate::trace::episode_hash;
 
 /// What happens while a recording runs; called from its threads.
 pub trait Progress: Sync {
@@ -253,6 +254,7 @@ impl Recording<'_> {
         let start = Instant::now();
         let fingerprint = self.store.fingerprint(key, played.model.as_deref());
         let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };
+        let episode = Episode { episode_hash: Some(episode_hash::of(&episode)), ..episode };
         if let Some(log) = log {
             log.end(&episode).map_err(RecordError::fatal)?;
         }

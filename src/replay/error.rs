@@ -1,5 +1,7 @@
 //! Why an episode cannot be replayed.
 
+use std::path::{Path, PathBuf};
+
 use super::divergence::Divergence;
 use crate::sim::scene::SCENE_VERSION;
 
@@ -36,6 +38,16 @@ pub enum ReplayError {
         _0.t, _0.column, _0.expected, _0.found
     )]
     Diverged(Divergence),
+    #[error(
+        "`{}`, episode `{episode}`: {fault}\n  help: the log is damaged or was changed: restore it, or render the episode from its trace",
+        log.display()
+    )]
+    InLog { log: PathBuf, episode: String, fault: String },
+    #[error(
+        "episode `{episode}`: `{trace}` and `{}` do not belong together: expected rows with the hash {traced}, as in the trace, found {logged}\n  help: name the one that is meant, or move the other one away",
+        log.display()
+    )]
+    Apart { episode: String, trace: String, traced: String, log: PathBuf, logged: String },
     #[error("`{trace}`: {fault}")]
     InTrace { trace: String, fault: Box<Self> },
     /// A trace, a log, the world or the disk refuses.
@@ -44,6 +56,12 @@ pub enum ReplayError {
 }
 
 impl ReplayError {
+    /// A trace and a log whose rows of an episode have other hashes.
+    pub fn apart(episode: &str, (trace, traced): (&str, &str), (log, logged): (&Path, &str)) -> Self {
+        let [episode, trace, traced, logged] = [episode, trace, traced, logged].map(str::to_owned);
+        Self::Apart { episode, trace, traced, log: log.to_owned(), logged }
+    }
+
     /// What a trace, a log, the world or the disk says.
     pub fn other(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
         Self::Other(error.into())

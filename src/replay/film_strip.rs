@@ -10,10 +10,11 @@ use crate::figures::Figure;
 use crate::figures::film_strip::{Still, film_strip};
 use crate::log::message::EpisodeMessage;
 use crate::log::read::{Event, LogReader, png};
+use crate::log::recover::ended;
 use crate::sim::camera::Camera;
 use crate::trace::episode::{Action, Episode, Step};
 use crate::trace::inputs::Input;
-use crate::trace::merge;
+use crate::trace::merge::{self, EpisodeRows};
 use crate::trace::open::TraceSet;
 use crate::trace::schema::RECORDING_KEY;
 
@@ -42,13 +43,14 @@ struct Reel {
 }
 
 impl Strip {
-    /// Draws the episode that one of these logs has, with its frames.
+    /// Draws the episode that one of these logs has, with its frames; `traces` are where it may be, too.
     ///
     /// # Errors
-    /// When a log cannot be read, or a step or its frame is not there.
-    pub fn from_logs(&self, logs: &[PathBuf]) -> Result<Option<Figure>, ReplayError> {
+    /// When a log cannot be read, a trace has another episode of the same id, or a step or its frame is not there.
+    pub fn from_logs(&self, logs: &[PathBuf], traces: &[Input]) -> Result<Option<Figure>, ReplayError> {
         for log in logs {
             if let Some(reel) = self.in_log(log)? {
+                self.check_traces(&reel.episode, log, traces)?;
                 return self.draw(&reel).map(Some);
             }
         }
@@ -89,12 +91,15 @@ impl Strip {
     }
 
     fn in_log(&self, path: &Path) -> Result<Option<Reel>, ReplayError> {
-        let mut head = None;
+        let (mut head, mut end) = (None, None);
         let (mut steps, mut frames) = (Vec::new(), BTreeMap::new());
         for message in LogReader::open(path).map_err(ReplayError::other)? {
             match message.map_err(ReplayError::other)?.event {
                 Event::Episode(EpisodeMessage::Begin(found)) if found.episode_id == self.episode => head = Some(found),
-                Event::Episode(EpisodeMessage::End { .. }) if head.is_some() => break,
+                Event::Episode(EpisodeMessage::End { fingerprint, episode_hash, .. }) if head.is_some() => {
+                    end = Some((fingerprint, episode_hash));
+                    break;
+                }
                 Event::Frame(image) if head.is_some() => {
                     let t = i32::try_from(steps.len() + 1).unwrap_or(i32::MAX);
                     frames.extend(png(&image).map(|png| (t, png)));
@@ -104,7 +109,27 @@ impl Strip {
             }
         }
         // A log without frames tells the story, but shows nothing: the trace renders it again.
-        Ok(head.filter(|_| !frames.is_empty()).map(|head| Reel { episode: Episode { steps, ..*head }, frames }))
+        let Some(head) = head.filter(|_| !frames.is_empty()) else { return Ok(None) };
+        let (fingerprint, hash) = end.unwrap_or_default();
+        match ended(*head, steps, fingerprint, hash) {
+            Ok(episode) => Ok(Some(Reel { episode, frames })),
+            Err((episode, fault)) => {
+                Err(ReplayError::InLog { log: path.to_owned(), episode: episode.episode_id, fault })
+            }
+        }
+    }
+
+    /// Refuses a trace that has other rows of the episode than its log. A trace that cannot be read says nothing.
+    fn check_traces(&self, episode: &Episode, log: &Path, traces: &[Input]) -> Result<(), ReplayError> {
+        let Some(logged) = &episode.episode_hash else { return Ok(()) };
+        for trace in traces {
+            let Ok(rows) = merge::read(&trace.path) else { continue };
+            let found = rows.iter().find(|rows| rows.episode_id == self.episode);
+            if let Some(traced) = found.and_then(EpisodeRows::stated_hash).filter(|traced| traced != logged) {
+                return Err(ReplayError::apart(&self.episode, (&trace.name, &traced), (log, logged)));
+            }
+        }
+        Ok(())
     }
 
     fn in_traces(&self, traces: &[Input]) -> Result<Option<Reel>, ReplayError> {

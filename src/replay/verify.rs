@@ -13,6 +13,7 @@ use super::again::{Recipe, again};
 use super::divergence::Divergence;
 use super::error::ReplayError;
 use super::log::{Log, Seen};
+use crate::base::replace::TemporaryFolder;
 use crate::log::assemble;
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
@@ -103,7 +104,7 @@ impl Recorded {
         let eye = outputs.recount.as_ref().map_or_else(|| self.recipe.eye.clone(), |recount| recount.eye(&self.recipe));
         let draws = outputs.frames.is_some() || outputs.log.is_some();
         let camera = draws.then(|| Camera::new(&self.recipe.config)).transpose().map_err(ReplayError::other)?;
-        let parts = tempfile::tempdir().map_err(ReplayError::other)?;
+        let parts = TemporaryFolder::private("replay").map_err(ReplayError::other)?;
         let mut player = Player { trace: self, outputs, eye: &eye, camera };
         let (mut logs, mut rewritten) = (Vec::new(), Vec::new());
         for rows in &self.rows {

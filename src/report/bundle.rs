@@ -21,7 +21,7 @@ use crate::report::table::Table;
 use crate::report::tables::{csv, latex, markdown};
 use crate::report::value::interval;
 use crate::stats::cell::{Cells, Group};
-use old::MANIFEST;
+pub use old::MANIFEST;
 
 /// What goes into the folder.
 #[derive(Clone, Copy, Debug)]

@@ -3,13 +3,14 @@
 //! An erratum excuses exactly the difference that it states: the published and the computed value must both be as
 //! it says. Those of the paper are built in.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::base::budget::Limit;
+use crate::base::input;
 use crate::report::published::CellLabel;
 
 const PAPER: &str = include_str!("../../assets/errata/paper.toml");
@@ -69,6 +70,9 @@ pub enum ErrataError {
     NoReason { path: PathBuf, experiment: String, model: String, metric: String },
 }
 
+/// A slip takes some hundred bytes.
+const LARGEST: Limit = Limit::new("bytes of errata", 1 << 20);
+
 impl Errata {
     /// The slips of the paper.
     pub fn of_paper() -> Self {
@@ -81,7 +85,7 @@ impl Errata {
     /// For a file that cannot be read or is not of this form, and for an erratum without a reason.
     pub fn read(path: &Path) -> Result<Self, ErrataError> {
         let text =
-            fs::read_to_string(path).map_err(|source| ErrataError::Unreadable { path: path.to_owned(), source })?;
+            input::text(path, LARGEST).map_err(|source| ErrataError::Unreadable { path: path.to_owned(), source })?;
         let errata: Self = toml::from_str(&text)
             .map_err(|source| ErrataError::Malformed { path: path.to_owned(), source: Box::new(source) })?;
         match errata.erratum.iter().find(|erratum| erratum.reason.trim().is_empty()) {

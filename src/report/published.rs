@@ -4,14 +4,15 @@
 //! emphasis is `bold`, `underline` or empty. Columns may stand in any order; further ones are not read.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::budget::Limit;
 use crate::base::escape::visible;
+use crate::base::input;
 use crate::base::number::Decimal;
 use crate::base::suggest::nearest;
 use crate::report::table::Emphasis;
@@ -87,12 +88,16 @@ fn in_place_of(nearest: Option<&str>) -> String {
     nearest.map(|name| format!("; is it the one called `{name}`?")).unwrap_or_default()
 }
 
+/// A line has less than 100 bytes, and a table some hundred lines.
+const LARGEST: Limit = Limit::new("bytes of a published table", 16 << 20);
+
 /// Reads a published table.
 ///
 /// # Errors
 /// For what cannot be read, and at the first line that is not as it must be.
 pub fn read(path: &Path) -> Result<Published, PublishedError> {
-    let bytes = fs::read(path).map_err(|source| PublishedError::Unreadable { path: path.to_owned(), source })?;
+    let bytes =
+        input::bytes(path, LARGEST).map_err(|source| PublishedError::Unreadable { path: path.to_owned(), source })?;
     parse(&bytes).map_err(|(line, fault)| PublishedError::Malformed { path: path.to_owned(), line, fault })
 }
 

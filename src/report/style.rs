@@ -4,7 +4,6 @@
 //! before anything prints. `default` and `paper` are built in; any other name is a file.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -12,7 +11,9 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::base::budget::Limit;
 use crate::base::hash;
+use crate::base::input;
 use crate::base::number::MOST_PLACES;
 use crate::base::suggest::hint;
 use crate::metric::catalog::{Better, Catalog, Kind};
@@ -218,6 +219,9 @@ fn default_undefined() -> String {
     "--".to_owned()
 }
 
+/// A style is written by hand.
+const LARGEST: Limit = Limit::new("bytes of a style", 1 << 20);
+
 impl Style {
     /// The built-in style of that name, or else the style in that file.
     ///
@@ -228,7 +232,7 @@ impl Style {
             return Self::parse(name, text, Path::new(name), true);
         }
         let path = Path::new(name_or_path);
-        let text = match fs::read_to_string(path) {
+        let text = match input::text(path, LARGEST) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
                 let hint = hint(name_or_path, BUILT_IN.map(|(name, _)| name));

@@ -4,6 +4,7 @@ use std::error::Error;
 use std::io;
 
 use super::provenance::ProvenanceError;
+use crate::base::budget::Exceeded;
 use crate::base::replace::TargetIsInput;
 use crate::engine::spark::SparkError;
 use crate::figures::{EncodeError, FigureError};
@@ -28,6 +29,9 @@ use crate::trace::lost::LostListError;
 /// Why a study gives no answer. Each message says what, where, expected, found, and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
+    /// More than the budget allows.
+    #[error(transparent)]
+    Exceeded(#[from] Exceeded),
     /// A URI among files.
     #[error(
         "`{uri}`: expected files of this machine, found a URI, which Spark alone can read\n  \

@@ -1,9 +1,10 @@
 //! What a report was made from: the inputs with their hashes, computed beside the scan.
 
-use std::fs::File;
+use std::io;
+use std::path::Path;
 
 use super::error::StudyError;
-use crate::base::hash;
+use crate::base::{self, hash};
 use crate::report::bundle;
 use crate::trace::inputs::Input;
 
@@ -15,11 +16,19 @@ pub(super) fn hashes(inputs: &[Input]) -> Result<Vec<bundle::Input>, StudyError>
     inputs.iter().map(hash_of).collect()
 }
 
+/// The SHA-256 of a file.
+///
+/// # Errors
+/// Whatever the operating system says.
+pub(super) fn of_file(path: &Path) -> io::Result<String> {
+    hash::of_reader(base::input::open(path)?)
+}
+
 fn hash_of(input: &Input) -> Result<bundle::Input, StudyError> {
     let read = || {
-        let file = File::open(&input.path)?;
+        let file = base::input::open(&input.path)?;
         let bytes = file.metadata()?.len();
-        Ok::<_, std::io::Error>((hash::of_reader(file)?, bytes))
+        Ok::<_, io::Error>((hash::of_reader(file)?, bytes))
     };
     let (sha256, bytes) = read().map_err(|error| StudyError::file(&input.name, error))?;
     Ok(bundle::Input::new(input.name.as_ref(), sha256, bytes))

@@ -1,6 +1,6 @@
 //! What a study is made of: traces, or files of scores in their place. Each input is recognised and opened once.
 
-use std::fs::{File, Metadata};
+use std::fs::Metadata;
 use std::io::{self, Read};
 use std::path::PathBuf;
 use std::time::{Duration, UNIX_EPOCH};
@@ -102,7 +102,7 @@ impl ScoreFile {
             Ok(text @ (Format::Csv | Format::JsonLines)) => scores(text, false),
             Ok(Format::Parquet) | Err(_) => {
                 // What cannot be opened is reported as a trace that cannot.
-                let file = File::open(&input.path).ok()?;
+                let file = crate::base::input::open(&input.path).ok()?;
                 if !format::holds_scores(&file, &inputs::folder_values(&input.path)) {
                     return None;
                 }

@@ -27,6 +27,8 @@ mod results;
 mod scan;
 mod scores;
 mod sensitivity;
+mod size;
+pub mod verify;
 
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -293,7 +295,10 @@ impl Study {
         if !self.question.pool {
             pooled::check(episodes, &by, self.source.traces().ok())?;
         }
-        Ok(group(episodes, &by)?)
+        size::check_comparisons(episodes)?;
+        let cells = group(episodes, &by)?;
+        size::check_cells(&cells)?;
+        Ok(cells)
     }
 
     /// The statistics of the cells: intervals, tests, comparisons.
@@ -331,6 +336,7 @@ impl Study {
         let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;
         let episodes = self.counted(results).results.episodes;
+        size::check_comparisons(&episodes)?;
         let options = Options { design: design_of(&episodes.declared), ..options.clone() };
         Ok(Sequential::of(&episodes, &options)?)
     }

@@ -4,11 +4,13 @@
 //! that changed or is missing is told at once, and no report is made without them.
 
 use std::fmt;
-use std::fs::{self, File};
+use std::fs::{self};
 use std::io;
 use std::path::{Component, Path, PathBuf};
 
+use crate::base::budget::Limit;
 use crate::base::hash;
+use crate::base::input;
 use crate::report::bundle::{self, Manifest};
 use crate::trace::inputs::Input;
 use crate::trace::schema::SCHEMA_VERSION;
@@ -52,8 +54,17 @@ pub struct TraceFault {
     pub path: String,
     /// Its hash in the manifest.
     pub expected: String,
-    /// The hash of the file in its place, and where that is; `None` where there is no such file.
-    pub found: Option<(String, PathBuf)>,
+    /// What is in its place, and where that is; `None` where there is no such file.
+    pub found: Option<(Found, PathBuf)>,
+}
+
+/// What is in the place of a trace.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// A file of this hash.
+    Other(String),
+    /// A file that cannot be read, for this reason.
+    Unreadable(String),
 }
 
 impl fmt::Display for TraceFault {
@@ -61,8 +72,11 @@ impl fmt::Display for TraceFault {
         let Self { path, expected, found } = self;
         match found {
             None => write!(f, "  {path}: missing; expected sha256 {expected}"),
-            Some((hash, at)) => {
+            Some((Found::Other(hash), at)) => {
                 write!(f, "  {path}: changed; expected sha256 {expected}, found {hash} in {}", at.display())
+            }
+            Some((Found::Unreadable(why), at)) => {
+                write!(f, "  {path}: cannot read `{}`: {why}; expected sha256 {expected}", at.display())
             }
         }
     }
@@ -79,13 +93,16 @@ fn lines(faults: &[TraceFault]) -> String {
     lines.join("\n")
 }
 
+/// A trace takes some 200 bytes of it.
+const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
+
 /// The manifest of a report's folder.
 ///
 /// # Errors
 /// A folder without one, one that is not readable, one of a later program.
 pub fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
     let path = report.join("manifest.json");
-    let text = match fs::read_to_string(&path) {
+    let text = match input::text(&path, LARGEST) {
         Ok(text) => text,
         Err(source) => return Err(ProvenanceError::NoManifest { path, source }),
     };
@@ -128,11 +145,11 @@ pub fn traces(manifest: &Manifest, places: &[PathBuf]) -> Result<Vec<Input>, Pro
 fn find(wanted: &bundle::Input, places: &[PathBuf]) -> Result<PathBuf, TraceFault> {
     let mut other = None;
     for path in places.iter().flat_map(|place| candidates(wanted, place)) {
-        let Ok(hash) = File::open(&path).and_then(hash::of_reader) else { continue };
-        if hash == wanted.sha256 {
-            return Ok(path);
+        match input::open(&path).and_then(hash::of_reader) {
+            Ok(hash) if hash == wanted.sha256 => return Ok(path),
+            Ok(hash) => other = other.or(Some((Found::Other(hash), path))),
+            Err(error) => other = other.or(Some((Found::Unreadable(error.to_string()), path))),
         }
-        other = other.or(Some((hash, path)));
     }
     Err(TraceFault { path: wanted.path.clone(), expected: wanted.sha256.clone(), found: other })
 }

@@ -3,7 +3,6 @@
 //! Rule: the new report keeps the filter, the grouping, the style and the choice of metrics of the old one, which stays
 //! as it is. Traces are found by their hashes.
 
-use std::fs::File;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -11,6 +10,7 @@ use super::diff::{Diff, Pair, Scored};
 use super::error::StudyError;
 use super::report::{Report, ReportOptions};
 use super::{LostAs, Question, Study, provenance};
+use crate::base::input;
 use crate::report::bundle::Manifest;
 use crate::report::order::TableOrder;
 use crate::report::style::Style;
@@ -95,7 +95,7 @@ impl RescoreRequest {
     /// The scores of the old report, or why they cannot be had.
     fn scores_before(&self, manifest: &Manifest) -> Result<EpisodeTable, String> {
         let path = self.report.join("episodes.parquet");
-        let file = File::open(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let file = input::open(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let table = format::read_parquet(file, &Partition::default())
             .map_err(|error| format!("{}: {error}", path.display()))?;
         if table.catalog.hash == manifest.definitions.hash {

@@ -1,12 +1,12 @@
 //! Files of scores: read in the place of traces, put together and filtered; and written.
 
-use std::fs::File;
 use std::io::Write;
 use std::num::NonZeroUsize;
 
 use super::Question;
 use super::error::StudyError;
 use super::inputs::ScoreFile;
+use crate::base::input;
 use crate::metric::definitions::Definitions;
 use crate::score::declared_experiments::Declarations;
 use crate::score::format::{self, Format, Partition};
@@ -39,7 +39,7 @@ pub(super) fn read(files: &[ScoreFile], question: &Question) -> Result<EpisodeTa
 
 fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, StudyError> {
     let failed = |error| StudyError::file(&file.input.name, error);
-    let bytes = File::open(&file.input.path).map_err(|error| StudyError::file(&file.input.name, error))?;
+    let bytes = input::open(&file.input.path).map_err(|error| StudyError::file(&file.input.name, error))?;
     let named = || Definitions::load(question.definitions_name(), &score_traces::schema_columns());
     if file.format != Format::Parquet {
         return format::read_text(file.format, &named()?.catalog, bytes).map_err(failed);

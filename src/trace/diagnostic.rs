@@ -7,6 +7,7 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::budget::Exceeded;
 use crate::base::escape::visible;
 
 /// One thing that is wrong with a trace.
@@ -84,10 +85,15 @@ codes! {
         "the footer describes the file", "the file is damaged: restore it from its source";
     /// The footer is good and the data behind it is not.
     CorruptData, Error, "corrupt-data":
-        "the data decodes to what the footer says", "the file is damaged: restore it from its source";
+        "the data decodes to what the footer says, and `episode_hash` is that of the rows",
+        "the file is damaged: restore it from its source";
+    /// Reading the file would take more work than files of its size do.
+    OverBudget, Error, "over-budget":
+        "what comes out of the file is in proportion to its size, its names are short, and its episodes fit into memory",
+        "if you trust the file, the environment variable MIRRORSTATS_BUDGET=10 allows ten times as much of everything";
     /// The footer's metadata of mirrorstats cannot be read.
     InvalidMetadata, Error, "invalid-metadata":
-        "`mirrorstats.schema_version` is a whole number from 1; in `mirrorstats.recording` a `palette` lists colours, and an \
+        "`mirrorstats.schema_version` is a whole number from 1; `mirrorstats.checksums` has one of each column chunk; in `mirrorstats.recording` a `palette` lists colours, and an \
          `experiment` is spelled as in a definition file, in all files alike",
         "correct or remove that key in the footer; a file without it is read as the newest version";
     /// The file was written under a newer schema.
@@ -152,6 +158,10 @@ codes! {
     UnseenColor, Note, "unseen-color":
         "a claimed colour is that of a body or of a selected cube in the inputs",
         "nothing to do where the agent said so: the claim counts as a wrong one";
+    /// The checksums in the footer are those of the file that this one was made from.
+    StaleChecksums, Note, "stale-checksums":
+        "checksums are those of the program that wrote the file",
+        "nothing to do where another program wrote the file again: its bytes are not checked";
     /// A title, an order or a level of an experiment is another in the definitions than in the footer.
     ExperimentOverridden, Note, "experiment-overridden":
         "the footer and the definitions say the same of an experiment",
@@ -213,6 +223,11 @@ impl Finding {
             found: found.into(),
             help: code.help().into(),
         }
+    }
+
+    /// A file that asks for more than its budget.
+    pub(in crate::trace) fn over_budget(file: &str, exceeded: &Exceeded) -> Self {
+        Self::new(Code::OverBudget, file, exceeded.expected(), "more")
     }
 
     /// In this row group.

@@ -9,12 +9,15 @@ use arrow::datatypes::{Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::checksums::Checksums;
+use super::diagnostic::Finding;
 use super::error::TraceError;
 use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
 use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::scan::{EpisodeBatch, Projection};
 use super::schema::{self, Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
+use crate::base::budget::Limit;
 use crate::base::hash;
 
 /// A summary of some traces.
@@ -99,9 +102,14 @@ pub struct FileInfo {
     pub schema_version: Option<String>,
     /// The program that wrote it, if the file names one.
     pub writer: Option<String>,
+    /// Whether it has checksums: `present`, `none`, or `stale` where another program wrote the file again.
+    pub checksums: Checksums,
     /// How it was recorded: JSON, or the text as it is where that is no JSON.
     pub recording: Option<serde_json::Value>,
 }
+
+/// What each model has of the seeds and runs of all: a study of seven models, five experiments and 20,000 runs has 700,000.
+const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
 
 /// Summarises these traces; reads the key columns and `reply_status` of all rows, and every byte for its hash.
 ///
@@ -138,6 +146,11 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let pairs: BTreeSet<SeedRun> = cells.values().flat_map(|pairs| pairs.keys()).copied().collect();
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
+    let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
+    MOST_COVERED.check(asked as u64).map_err(|exceeded| {
+        let file = set.files().first().map_or("", TraceFile::name);
+        TraceError::from(Finding::over_budget(file, &exceeded))
+    })?;
     Ok(Info {
         episodes: summary.episodes,
         steps: summary.steps,
@@ -264,6 +277,7 @@ fn about(file: &TraceFile, episodes: u64) -> Result<FileInfo, TraceError> {
         row_groups: file.row_groups(),
         schema_version: text(VERSION_KEY),
         writer: text(WRITER_KEY),
+        checksums: file.checksums(),
         recording: text(RECORDING_KEY).map(|text| serde_json::from_str(&text).unwrap_or(text.into())),
     })
 }

@@ -13,6 +13,9 @@ use std::path::{Component, Path, PathBuf};
 
 use super::error::TraceError;
 
+use crate::base::budget::Limit;
+use crate::base::input;
+
 /// A file to read, and what it is called in messages and outputs.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Input {
@@ -98,9 +101,11 @@ fn expand(argument: &str) -> Result<Vec<PathBuf>, TraceError> {
     Ok(traces)
 }
 
-fn listed(mut list: impl Read) -> Result<Vec<PathBuf>, TraceError> {
-    let mut text = String::new();
-    list.read_to_string(&mut text)
+/// A hundred thousand names take some 20 MB.
+const LONGEST_LIST: Limit = Limit::new("bytes of a list of traces", 64 << 20);
+
+fn listed(list: impl Read) -> Result<Vec<PathBuf>, TraceError> {
+    let text = input::text_of(list, LONGEST_LIST)
         .map_err(|source| TraceError::Read { what: "the list on standard input".into(), source })?;
     let mut paths = Vec::new();
     for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {

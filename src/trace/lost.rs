@@ -1,7 +1,6 @@
 //! `lost.jsonl` beside the traces: the episodes that failures kept from being recorded, one JSON object per line.
 
 use std::collections::BTreeSet;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +8,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::inputs::Input;
+use crate::base::budget::Limit;
 use crate::base::escape::visible;
+use crate::base::input;
+
+/// An episode is named and the failure told on a line; both are short.
+pub(crate) const LONGEST_LINE: Limit = Limit::new("bytes in a line of a list of lost episodes", 1 << 20);
 
 /// An episode that was lost for want of an answer.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
@@ -72,20 +76,25 @@ pub fn list_of(folder: &Path) -> PathBuf {
 /// # Errors
 /// A list that cannot be read, a line that is no lost episode.
 pub fn read(path: &Path) -> Result<Vec<LostEpisode>, LostListError> {
-    let text = match fs::read_to_string(path) {
+    let failed = |source| LostListError::Io { path: path.to_owned(), source };
+    let lines = match input::lines(path, LONGEST_LINE) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        text => text.map_err(|source| LostListError::Io { path: path.to_owned(), source })?,
+        lines => lines.map_err(failed)?,
     };
-    let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-    lines
-        .map(|(at, line)| {
-            serde_json::from_str(line).map_err(|error| LostListError::Line {
-                path: path.to_owned(),
-                line: at + 1,
-                found: visible(&error.to_string()),
-            })
-        })
-        .collect()
+    let mut found = Vec::new();
+    for (at, line) in lines.enumerate() {
+        let line = line.map_err(failed)?;
+        if line.trim_ascii().is_empty() {
+            continue;
+        }
+        let episode = serde_json::from_slice(&line).map_err(|error| LostListError::Line {
+            path: path.to_owned(),
+            line: at + 1,
+            found: visible(&error.to_string()),
+        });
+        found.push(episode?);
+    }
+    Ok(found)
 }
 
 /// The episodes that are lost beside some traces: those of the lists in their folders, each once.

@@ -12,11 +12,15 @@
 
 pub mod bits;
 pub(crate) mod catch_panic;
+pub mod checksums;
 pub mod declared;
 pub mod declared_experiment;
 pub mod diagnostic;
 pub mod episode;
+pub mod episode_hash;
 pub mod error;
+#[cfg(feature = "fuzz")]
+pub mod fuzz;
 pub mod identification;
 pub mod import;
 pub mod info;
@@ -30,6 +34,8 @@ pub mod schema;
 pub mod validate;
 pub mod write;
 
+pub(crate) use read::flat::FlatRows;
+pub use read::flat::TableFile;
 pub(crate) use read::footer::shape as footer_shape;
 pub use read::{in_order, open, verify};
 pub use schema::{colors, describe};

@@ -17,6 +17,7 @@ use super::read::parallel_scan::{Episodes, Event, pass};
 use super::read::projection::Layout;
 use super::validate::color_set::{Spellings, other_names};
 use super::validate::duplicate_ids::{Prints, hashes};
+use super::validate::episode_hashes;
 use super::validate::rules::Rules;
 
 /// The columns that a scan delivers, and what it checks beyond the schema.
@@ -129,7 +130,10 @@ impl TraceSet {
         let mut spellings = Spellings::new(self.files());
         let mut summary = ScanSummary::default();
         let checked = |episodes: Episodes| {
-            let fault = rules.check(&self.files()[episodes.file], &episodes).into_iter().next();
+            let file = &self.files()[episodes.file];
+            let mut faults = rules.check(file, &episodes);
+            faults.extend(episode_hashes::check(file, &layout, &episodes));
+            let fault = faults.into_iter().min_by_key(|fault| fault.row);
             let last = fault.as_ref().map_or(usize::MAX, |fault| fault.row);
             let ids = hashes(&episodes, last);
             let (count, steps) = (episodes.len(), episodes.columns[0].len());

@@ -2,6 +2,8 @@
 
 mod audit;
 mod battery;
+#[cfg(target_os = "linux")]
+mod budgets;
 mod colors;
 mod config;
 mod declared;

@@ -3,8 +3,12 @@
 
 #![expect(dead_code, reason = "every binary has all of it, and none uses all of it")]
 
+#[cfg(target_os = "linux")]
+pub mod faults;
 pub mod files;
 pub mod need;
+#[cfg(target_os = "linux")]
+pub mod power;
 pub mod program;
 pub mod traces;
 

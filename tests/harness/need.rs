@@ -26,6 +26,14 @@ pub fn spark() -> PathBuf {
     packages
 }
 
+/// Where `scripts/get-duckdb.sh` has put DuckDB, beside what cargo builds.
+pub fn duckdb() -> PathBuf {
+    let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python");
+    let is_there = packages.join("duckdb").is_dir();
+    assert!(is_there, "no DuckDB in {}: scripts/get-duckdb.sh fetches it", packages.display());
+    packages
+}
+
 /// An interpreter of Python.
 pub fn python() -> &'static str {
     let found = Command::new("python3").arg("--version").stdout(Stdio::null()).status();

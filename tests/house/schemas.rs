@@ -27,6 +27,7 @@ use mirrorstats::report::statistics::{Sequential, Statistics};
 use mirrorstats::report::style::Sheet;
 use mirrorstats::score::evidence::Evidence;
 use mirrorstats::stats::diff::Changes;
+use mirrorstats::study::verify::Verification;
 use mirrorstats::trace::describe::SchemaDocument;
 use mirrorstats::trace::info::Info;
 use mirrorstats::trace::validate::Validation;
@@ -72,6 +73,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("step", Name::Step.document()),
         ("trace", json!(SchemaDocument::current())),
         ("validation", json!(schema_for!(Validation))),
+        ("verify", json!(schema_for!(Verification))),
     ];
     #[cfg(feature = "sim")]
     schemas.extend([

@@ -2,6 +2,8 @@
 
 #![cfg(feature = "sim")]
 
+#[cfg(target_os = "linux")]
+mod faults;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod log;

@@ -274,6 +274,61 @@ impl Author {
     }
 }
 
+/// The parts of the steps where `q` holds, by what `p` is: true, false, null.
+#[cfg(feature = "polars")]
+pub const PARTS: [&str; 3] = ["t", "f", "n"];
+
+#[cfg(feature = "polars")]
+impl Author {
+    /// Lets `q` and `p`, conditions of steps, `x`, an integer of steps, and `e`, a condition of the episode; then metrics over
+    /// the steps where `q` holds, named `all_` and the aggregate, and the same over each part, named by it. `norec_p` counts
+    /// the steps where `p` holds by adding up; `holds` is `e` as a metric.
+    fn partition(&mut self) -> Vec<Definition> {
+        let level = self.choose(&[Level::Step, Level::Episode]);
+        let ty = self.choose(&[Type::Bool, Type::Int, Type::Float, Type::Text]);
+        let mut lets = vec![("l".to_owned(), self.of(ty, level, 3))];
+        self.known.push((ty, level, false));
+        for (name, ty, level, depth) in [
+            ("q", Type::Bool, Level::Step, 2),
+            ("p", Type::Bool, Level::Step, 4),
+            ("x", Type::Int, Level::Step, 3),
+            ("e", Type::Bool, Level::Episode, 4),
+        ] {
+            lets.push((name.to_owned(), self.of(ty, level, depth)));
+        }
+        let [q, p, x, e] = [1, 2, 3, 4].map(|at| move || Box::new(Expr::Name(at)));
+        let parts: [(&str, Expr); 4] = [
+            ("all", *q()),
+            (PARTS[0], Expr::And(q(), p())),
+            (PARTS[1], Expr::And(q(), Box::new(Expr::Not(p())))),
+            (PARTS[2], Expr::And(q(), Box::new(Expr::IsNull(p())))),
+        ];
+        let mut metrics = Vec::new();
+        for (part, holds) in parts {
+            let chosen = || Box::new(Expr::Case(None, vec![(holds.clone(), *x())], None));
+            for name in ["count", "any", "first", "last"] {
+                metrics.push((format!("{part}_{name}"), Expr::Aggregate(name, Box::new(holds.clone()))));
+            }
+            for name in ["min", "max", "sum"] {
+                metrics.push((format!("{part}_{name}"), Expr::Aggregate(name, chosen())));
+            }
+        }
+        let added = Expr::Case(None, vec![(*p(), Expr::Int(1))], Some(Box::new(Expr::Int(0))));
+        metrics.push(("norec_p".to_owned(), Expr::Aggregate("sum", Box::new(added))));
+        metrics.push(("count_p".to_owned(), Expr::Aggregate("count", p())));
+        metrics.push(("holds".to_owned(), *e()));
+        let definition = |is_metric| move |(name, value)| Definition { name, is_metric, value, when: None };
+        lets.into_iter().map(definition(false)).chain(metrics.into_iter().map(definition(true))).collect()
+    }
+}
+
+/// Conditions that use these words, and the steps and episodes that they part: see [`PARTS`].
+#[cfg(feature = "polars")]
+pub fn partitions(words: &'static Vocabulary) -> impl Strategy<Value = Vec<Definition>> {
+    vec(any::<u8>(), 0..300)
+        .prop_map(move |bytes| Author { bytes: bytes.into_iter(), words, known: Vec::new() }.partition())
+}
+
 /// Some definitions that use these words.
 pub fn definitions(words: &'static Vocabulary) -> impl Strategy<Value = Vec<Definition>> {
     vec(any::<u8>(), 0..700)

@@ -12,6 +12,8 @@ mod harness;
 mod interpreter;
 mod language;
 mod layouts;
+#[cfg(feature = "polars")]
+mod metamorphic;
 mod one_study;
 mod plain_loop;
 #[cfg(feature = "polars")]

@@ -26,7 +26,6 @@ use std::time::{Duration, Instant};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
-use tempfile::TempDir;
 
 use self::files::Unreadable;
 use self::group::Groups;
@@ -38,11 +37,12 @@ use super::reply::{self, Ending};
 use super::vlm::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
 use crate::base::hash;
+use crate::base::replace::TemporaryFolder;
 
 /// What the shell's exit code says of a command that there is not, or that cannot be run.
 const NO_COMMAND: [i32; 2] = [126, 127];
-/// How the folder of an episode's frames begins: a name that a recording clears away.
-const FRAMES: &str = ".mirrorstats-frames-";
+/// What the temporary folder of an episode's frames is named after.
+const FRAMES: &str = "frames";
 
 /// How a program gets its frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -314,13 +314,12 @@ fn unusable(fault: impl std::fmt::Display) -> Lost {
 
 /// The frames of one episode as files.
 #[derive(Debug)]
-struct Frames(TempDir);
+struct Frames(TemporaryFolder);
 
 impl Frames {
     fn new(scratch: &Path) -> Result<Self, Lost> {
-        let made =
-            std::path::absolute(scratch).and_then(|folder| tempfile::Builder::new().prefix(FRAMES).tempdir_in(folder));
-        made.map(Self).map_err(|fault| unusable(crate::base::replace::without_name(fault)))
+        let made = std::path::absolute(scratch).and_then(|folder| TemporaryFolder::create(&folder, FRAMES));
+        made.map(Self).map_err(unusable)
     }
 
     /// Writes a frame and says where it is.

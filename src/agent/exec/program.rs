@@ -79,8 +79,7 @@ impl Program {
     pub fn start(command: &str, groups: &Arc<Groups>, said: &Arc<Said>) -> Result<Self, Failure> {
         let mut shell = shell(command);
         shell.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).kill_on_drop(true);
-        let mut child = shell.spawn().map_err(Failure::Start)?;
-        let group = Group::of(child.id(), groups);
+        let (mut child, group) = Group::start(&mut shell, groups).map_err(Failure::Start)?;
         let gone = || Failure::Start(io::Error::other("it has no standard streams"));
         let (input, output) = (child.stdin.take().ok_or_else(gone)?, child.stdout.take().ok_or_else(gone)?);
         let listener = tokio::spawn(listen(child.stderr.take().ok_or_else(gone)?, Arc::clone(said)));

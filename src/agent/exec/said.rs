@@ -9,6 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::{fs, io};
 
 use crate::agent::vlm::secrets::Secret;
+use crate::base::replace::{folder_of, make_folder, replace};
 
 /// Bytes of the file of an episode.
 pub const IN_FILE: usize = 256 * 1024;
@@ -88,10 +89,8 @@ impl Kept {
             // What was said the last time is not of this time.
             return fs::remove_file(&self.path);
         }
-        if let Some(folder) = self.path.parent() {
-            fs::create_dir_all(folder)?;
-        }
-        fs::write(&self.path, bytes)
+        make_folder(folder_of(&self.path))?;
+        replace(&self.path, &bytes)
     }
 }
 

@@ -4,17 +4,25 @@
 //! another when its answer is whole; only then does the agent act on it. So a recording that was killed asks for no
 //! answer twice that it had, and a journal kept is a cassette: it plays the episode again without a network.
 //!
-//! A line that was cut off by the end of a process is dropped when the file is opened again: nothing was done with it.
+//! A line that was cut off by the end of a process, or of which a loss of power left zeros, is dropped when the file is
+//! opened again: nothing was done with it. One process at a time writes a journal.
+//!
 //! Nothing here holds a key: answers are written after [`Secrets`](super::secrets) were taken out.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use crate::agent::Status;
+use crate::base::budget::Limit;
+use crate::base::input;
+use crate::base::replace::{folder_of, make_folder, sync_folder};
+
+/// The largest answer that is read from a provider has 4 MiB; as JSON in JSON a byte may take six.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of a journal", 32 << 20);
 
 /// One line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -105,7 +113,7 @@ pub struct Requests {
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
-    /// `None` for a cassette, which is not written to.
+    /// `None` for a cassette, which is not written to, and after a line that could not be written.
     file: Option<File>,
     recorded: BTreeMap<i32, Recorded>,
     requests: Requests,
@@ -119,6 +127,8 @@ pub enum JournalError {
     Io { path: PathBuf, source: io::Error },
     #[error("line {line} of the journal `{}` is damaged: {fault}\n  help: remove the file to ask the model again", path.display())]
     Damaged { path: PathBuf, line: usize, fault: serde_json::Error },
+    #[error("the journal `{}` is being written by another process\n  help: wait for its end, or record into another folder", path.display())]
+    Busy { path: PathBuf },
     #[error("the cassette has no `{}`\n  help: record the episode with its model first, or choose fewer episodes", path.display())]
     Missing { path: PathBuf },
 }
@@ -127,21 +137,22 @@ impl Journal {
     /// Opens the journal of an episode, for going on with it.
     ///
     /// # Errors
-    /// When the file cannot be read or written, or a whole line of it is damaged.
+    /// When the file cannot be read or written, another process writes it, or a whole line of it is damaged.
     pub fn open(path: &Path) -> Result<Self, JournalError> {
         let failed = |source| JournalError::Io { path: path.to_owned(), source };
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(failed)?;
-        }
+        make_folder(folder_of(path)).map_err(failed)?;
         let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
-        let text = fs::read(path).map_err(failed)?;
-        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-        if whole < text.len() {
-            file.set_len(whole as u64).map_err(failed)?;
-            file.flush().map_err(failed)?;
+        // Where the file system has no locks, the lock of the episode is all there is.
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            return Err(JournalError::Busy { path: path.to_owned() });
         }
-        let (recorded, requests) = read(path, &text[..whole])?;
-        Ok(Self { path: path.to_owned(), file: Some(file), recorded, requests })
+        let found = read(path)?;
+        if found.whole < file.metadata().map_err(failed)?.len() {
+            file.set_len(found.whole).map_err(failed)?;
+        }
+        // What a killed process wrote last may not be on the disk yet, and is about to be relied on.
+        file.flush().and_then(|()| file.sync_all()).and_then(|()| sync_folder(folder_of(path))).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), file: Some(file), recorded: found.recorded, requests: found.requests })
     }
 
     /// Opens the journal of an episode as a cassette, for reading alone.
@@ -149,13 +160,13 @@ impl Journal {
     /// # Errors
     /// When there is none, it cannot be read, or a whole line of it is damaged.
     pub fn cassette(path: &Path) -> Result<Self, JournalError> {
-        let text = fs::read(path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound => JournalError::Missing { path: path.to_owned() },
-            _ => JournalError::Io { path: path.to_owned(), source },
+        let found = read(path).map_err(|error| match error {
+            JournalError::Io { source, path } if source.kind() == io::ErrorKind::NotFound => {
+                JournalError::Missing { path }
+            }
+            other => other,
         })?;
-        let whole = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |at| at + 1);
-        let (recorded, requests) = read(path, &text[..whole])?;
-        Ok(Self { path: path.to_owned(), file: None, recorded, requests })
+        Ok(Self { path: path.to_owned(), file: None, recorded: found.recorded, requests: found.requests })
     }
 
     /// What there is of a step.
@@ -173,34 +184,62 @@ impl Journal {
         self.requests
     }
 
-    /// Adds a line and waits until it is on the disk.
+    /// Adds a line and waits until it is on the disk. After a line that could not be written none is added any more: what
+    /// came behind half of it could not be read.
     ///
     /// # Errors
     /// Whatever writing gives; a cassette refuses.
     pub fn append(&mut self, entry: &Entry) -> Result<(), JournalError> {
         let failed = |source| JournalError::Io { path: self.path.clone(), source };
-        let Some(file) = &mut self.file else {
+        let Some(mut file) = self.file.take() else {
             return Err(failed(io::Error::other("a cassette is played, not written")));
         };
         let mut line = serde_json::to_vec(entry).map_err(|fault| failed(fault.into()))?;
         line.push(b'\n');
-        file.write_all(&line).and_then(|()| file.sync_data()).map_err(failed)?;
+        let before = file.metadata().map_err(failed)?.len();
+        if let Err(error) = file.write_all(&line).and_then(|()| file.sync_data()) {
+            // What cannot be taken back is dropped when the file is opened again.
+            let _ = file.set_len(before);
+            return Err(failed(error));
+        }
+        self.file = Some(file);
         note(&mut self.recorded, &mut self.requests, entry);
         Ok(())
     }
 }
 
-fn read(path: &Path, text: &[u8]) -> Result<(BTreeMap<i32, Recorded>, Requests), JournalError> {
-    let (mut recorded, mut requests) = (BTreeMap::new(), Requests::default());
-    for (at, line) in text.split(|byte| *byte == b'\n').enumerate().filter(|(_, line)| !line.is_empty()) {
-        let entry = serde_json::from_slice(line).map_err(|fault| JournalError::Damaged {
+/// What the whole lines of a journal say.
+#[derive(Default)]
+struct Found {
+    recorded: BTreeMap<i32, Recorded>,
+    requests: Requests,
+    /// Their bytes; what follows was cut off.
+    whole: u64,
+}
+
+fn read(path: &Path) -> Result<Found, JournalError> {
+    let failed = |source| JournalError::Io { path: path.to_owned(), source };
+    let mut found = Found::default();
+    let mut lines = input::lines(path, LONGEST_LINE).map_err(failed)?.enumerate().peekable();
+    while let Some((at, line)) = lines.next() {
+        let line = line.map_err(failed)?;
+        let Some(text) = line.strip_suffix(b"\n") else { break };
+        // JSON has no zero byte; a disk has them where it was told of a file's length before its bytes.
+        if text.contains(&0) && lines.peek().is_none() {
+            break;
+        }
+        found.whole += line.len() as u64;
+        if text.is_empty() {
+            continue;
+        }
+        let entry = serde_json::from_slice(text).map_err(|fault| JournalError::Damaged {
             path: path.to_owned(),
             line: at + 1,
             fault,
         })?;
-        note(&mut recorded, &mut requests, &entry);
+        note(&mut found.recorded, &mut found.requests, &entry);
     }
-    Ok((recorded, requests))
+    Ok(found)
 }
 
 fn note(recorded: &mut BTreeMap<i32, Recorded>, requests: &mut Requests, entry: &Entry) {
@@ -215,5 +254,76 @@ fn note(recorded: &mut BTreeMap<i32, Recorded>, requests: &mut Requests, entry: 
             recorded.insert(*t, Recorded::GivenUp { question: question.clone(), status });
         }
         Entry::Failure { .. } => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::{Path, PathBuf};
+
+    use super::{Entry, Journal, JournalError, Recorded};
+
+    fn answer(t: i32) -> Entry {
+        let (question, body) = (format!("question {t}"), format!("answer {t}"));
+        Entry::Answer { t, attempt: 1, question, latency_ms: 1, model: None, body }
+    }
+
+    fn answered(journal: &Journal) -> Vec<String> {
+        let body = |recorded: &Recorded| match recorded {
+            Recorded::Answer { body, .. } => body.clone(),
+            Recorded::GivenUp { .. } => "none".to_owned(),
+        };
+        journal.answers().map(body).collect()
+    }
+
+    fn with_lines(folder: &Path, count: i32) -> PathBuf {
+        let path = folder.join("deep/E1-m-s1-r1.jsonl");
+        let mut journal = Journal::open(&path).unwrap();
+        (1..=count).for_each(|t| journal.append(&answer(t)).unwrap());
+        path
+    }
+
+    #[test]
+    fn what_a_loss_of_power_leaves_of_the_last_line_is_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 2);
+        let whole = fs::read(&path).unwrap();
+        // Half a line, nothing but zeros, and zeros for the first page of a line.
+        for torn in [&b"{\"kind\":\"ans"[..], b"\0\0\0", b"\0\0\0\n", b"\0\0\0\0nswer\"}\n", b"{\"kind\":\0\0\0\n"] {
+            fs::write(&path, [&whole, torn].concat()).unwrap();
+            assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1", "answer 2"]);
+            let mut journal = Journal::open(&path).unwrap();
+            assert_eq!(answered(&journal), ["answer 1", "answer 2"], "{torn:?}");
+            assert_eq!(fs::read(&path).unwrap(), whole);
+            journal.append(&answer(3)).unwrap();
+            assert_eq!(answered(&Journal::cassette(&path).unwrap()).len(), 3);
+        }
+    }
+
+    #[test]
+    fn a_damaged_line_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 3);
+        let text = fs::read_to_string(&path).unwrap();
+        for (damaged, line) in
+            [(text.replacen("\"kind\"", "\"k\\u0000d\"", 1), 1), (text.replace("\"t\":3", "\"t\":x"), 3)]
+        {
+            fs::write(&path, &damaged).unwrap();
+            let error = Journal::open(&path).unwrap_err();
+            assert!(matches!(error, JournalError::Damaged { line: found, .. } if found == line), "{error}");
+            assert_eq!(fs::read_to_string(&path).unwrap(), damaged);
+        }
+    }
+
+    #[test]
+    fn one_writes_at_a_time_and_others_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 1);
+        let first = Journal::open(&path).unwrap();
+        assert!(matches!(Journal::open(&path).unwrap_err(), JournalError::Busy { .. }));
+        assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1"]);
+        drop(first);
+        assert_eq!(answered(&Journal::open(&path).unwrap()), ["answer 1"]);
     }
 }

@@ -4,7 +4,6 @@
 //! tables or by the provider's id; an id that no file knows needs `--base-url` or `--backend`.
 
 use std::collections::BTreeMap;
-use std::fs;
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
@@ -12,6 +11,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::wire_format::{Dialect, Effort};
+use crate::base::budget::Limit;
+use crate::base::input;
 use crate::base::suggest::hint;
 
 const BUILT_IN: &str = include_str!("../../../assets/models.toml");
@@ -186,6 +187,9 @@ impl Choice {
     }
 }
 
+/// A list of models is written by hand.
+const LARGEST: Limit = Limit::new("bytes of a list of models", 1 << 20);
+
 impl Models {
     /// The built-in models, and those of a user's file over them.
     ///
@@ -194,8 +198,8 @@ impl Models {
     pub fn load(file: Option<&Path>) -> Result<Self, ModelsError> {
         let mut models = parse("assets/models.toml", BUILT_IN)?;
         if let Some(path) = file {
-            let text =
-                fs::read_to_string(path).map_err(|source| ModelsError::Unreadable { path: path.to_owned(), source })?;
+            let text = input::text(path, LARGEST)
+                .map_err(|source| ModelsError::Unreadable { path: path.to_owned(), source })?;
             let own = parse(&path.display().to_string(), &text)?;
             models.backend.extend(own.backend);
             models.model.extend(own.model);

@@ -3,12 +3,17 @@
 //! Rule: a temporary file or folder is locked for as long as its process lives, however that ends. Whoever gets the
 //! lock may remove it. Where the file system has no locks, nothing is removed.
 
+use std::collections::BTreeSet;
 use std::ffi::OsStr;
 use std::fs::{self, DirEntry, File};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
-/// How many random characters `tempfile` puts behind a prefix.
-const RANDOM: usize = 6;
+use super::place::PREFIX;
+use super::temporary::RANDOM;
+
+/// The folders that this process has swept. Once is enough, and a folder of a hundred thousand files takes its time.
+static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 /// Locks a temporary file or folder that was just made; `false` if another process has taken it for a leftover and
 /// removed it meanwhile.
@@ -17,21 +22,31 @@ pub(super) fn lock(file: &File, path: &Path) -> bool {
     cfg!(not(unix)) || file.lock().is_err() || is_at(file, path)
 }
 
-/// Removes the files and folders in `folder` that have a name of this prefix and no living owner. What cannot be
-/// removed stays: it is in nobody's way.
-pub(super) fn remove(folder: &Path, prefix: &OsStr) {
+/// Removes the temporary files and folders in `folder` that have no living owner, whatever they were to become; the first
+/// time that this process is about to write into the folder. What cannot be removed stays: it is in nobody's way.
+pub fn sweep(folder: &Path) {
     if cfg!(not(unix)) {
         return;
     }
+    let Ok(place) = folder.canonicalize() else { return };
+    if SWEPT.lock().unwrap_or_else(PoisonError::into_inner).insert(place) {
+        remove(folder);
+    }
+}
+
+fn remove(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
-    for entry in entries.flatten().filter(|entry| has_prefix(&entry.file_name(), prefix)) {
+    for entry in entries.flatten().filter(|entry| is_temporary(&entry.file_name())) {
         remove_unowned(&entry);
     }
 }
 
-fn has_prefix(name: &OsStr, prefix: &OsStr) -> bool {
-    let rest = name.as_encoded_bytes().strip_prefix(prefix.as_encoded_bytes());
-    rest.is_some_and(|rest| rest.len() == RANDOM && rest.iter().all(u8::is_ascii_alphanumeric))
+/// Whether a name is one that [`temporary`](super::temporary) gives.
+fn is_temporary(name: &OsStr) -> bool {
+    let Some(rest) = name.as_encoded_bytes().strip_prefix(PREFIX.as_bytes()) else { return false };
+    rest.split_at_checked(rest.len().saturating_sub(RANDOM)).is_some_and(|(before, random)| {
+        before.ends_with(b".") && random.len() == RANDOM && random.iter().all(u8::is_ascii_alphanumeric)
+    })
 }
 
 fn remove_unowned(entry: &DirEntry) {

@@ -1,28 +1,24 @@
 //! One file replaced by another.
 
-use std::ffi::OsStr;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::NamedTempFile;
-
-use super::error::without_name;
 use super::leftover;
 use super::place::{folder_of, is_stream, prefix_for, sync_folder};
+use super::temporary::TemporaryFile;
 
 /// The new content of a file. It is at its target after [`commit`](Self::commit), and gone if dropped before.
 #[derive(Debug)]
 pub struct NewFile {
-    file: NamedTempFile,
+    file: TemporaryFile,
     target: PathBuf,
     /// Whether the target is to be written into, not to be replaced.
     is_stream: bool,
 }
 
 impl NewFile {
-    /// Begins the new content of `target`, whose folder must exist. What killed processes left of earlier attempts at
-    /// this target is removed.
+    /// Begins the new content of `target`, whose folder must exist. What killed processes left in the folder is removed.
     ///
     /// # Errors
     /// When `target` is a folder, or its folder is not there or not writable. No error names the temporary file.
@@ -40,9 +36,8 @@ impl NewFile {
         }
         let is_stream = is_stream(target);
         let temporary = if is_stream { std::env::temp_dir() } else { scratch.to_owned() };
-        let prefix = prefix_for(target);
-        leftover::remove(&temporary, &prefix);
-        let file = locked_file(&temporary, &prefix).map_err(without_name)?;
+        leftover::sweep(&temporary);
+        let file = TemporaryFile::create(&temporary, &prefix_for(target))?;
         Ok(Self { file, target: target.to_owned(), is_stream })
     }
 
@@ -52,13 +47,13 @@ impl NewFile {
     }
 
     /// The open file.
-    pub fn as_file(&self) -> &File {
-        self.file.as_file()
+    pub const fn as_file(&self) -> &File {
+        self.file.file()
     }
 
     /// The open file.
-    pub fn as_file_mut(&mut self) -> &mut File {
-        self.file.as_file_mut()
+    pub const fn as_file_mut(&mut self) -> &mut File {
+        self.file.file_mut()
     }
 
     /// Replaces the target. Afterwards not even a loss of power brings the old content back.
@@ -70,29 +65,28 @@ impl NewFile {
         if self.is_stream {
             return self.copy_into_target();
         }
-        self.file.as_file().sync_all()?;
-        let target = self.rename()?;
-        sync_folder(folder_of(&target))
+        self.as_file().sync_all()?;
+        self.file.rename(&self.target)?;
+        sync_folder(folder_of(&self.target))
     }
 
-    /// Replaces the target without waiting for the disk: a loss of power within the next seconds may leave an empty
-    /// file. For what is made again in no time.
+    /// As [`commit`](Self::commit), where no file is at the target: one that has come meanwhile stays as it is.
     ///
     /// # Errors
-    /// As [`commit`](Self::commit).
-    pub fn commit_unsynced(self) -> io::Result<()> {
-        if self.is_stream { self.copy_into_target() } else { self.rename().map(drop) }
-    }
-
-    fn rename(self) -> io::Result<PathBuf> {
-        self.file.persist(&self.target).map_err(|error| without_name(error.error))?;
-        Ok(self.target)
+    /// As [`commit`](Self::commit), and [`io::ErrorKind::AlreadyExists`].
+    pub fn commit_new(self) -> io::Result<()> {
+        if self.is_stream {
+            return self.copy_into_target();
+        }
+        self.as_file().sync_all()?;
+        self.file.rename_new(&self.target)?;
+        sync_folder(folder_of(&self.target))
     }
 
     fn copy_into_target(mut self) -> io::Result<()> {
         // A standard stream may be a file that others have written to: what is there stays.
         let mut target = OpenOptions::new().append(true).open(&self.target)?;
-        let content = self.file.as_file_mut();
+        let content = self.file.file_mut();
         content.seek(SeekFrom::Start(0))?;
         io::copy(content, &mut target).map(drop)
     }
@@ -128,22 +122,4 @@ pub fn replace(target: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = NewFile::create(target)?;
     file.write_all(bytes)?;
     file.commit()
-}
-
-/// A temporary file with the permissions of an ordinary new one, locked for as long as it is open.
-fn locked_file(folder: &Path, prefix: &OsStr) -> io::Result<NamedTempFile> {
-    loop {
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(prefix);
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt as _;
-            // The process's umask takes away from these, as with any other file.
-            builder.permissions(fs::Permissions::from_mode(0o666));
-        }
-        let file = builder.tempfile_in(folder)?;
-        if leftover::lock(file.as_file(), file.path()) {
-            return Ok(file);
-        }
-    }
 }

@@ -6,7 +6,7 @@ use std::io;
 use std::path::Path;
 
 /// Every temporary name begins with this; those who look for data pass over names that begin with a dot.
-const PREFIX: &str = ".mirrorstats-";
+pub(super) const PREFIX: &str = ".mirrorstats-";
 /// The longest part of the target's name in a temporary name, bytes: file systems allow 255 in all.
 const LONGEST_NAME: usize = 200;
 
@@ -15,12 +15,33 @@ pub fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
+/// Makes a folder and those above it; each is on the disk when this returns, so that no loss of power takes away a folder
+/// with files that were synchronised.
+///
+/// # Errors
+/// As [`fs::create_dir_all`], and when the disk fails.
+pub fn make_folder(folder: &Path) -> io::Result<()> {
+    if folder.is_dir() {
+        return Ok(());
+    }
+    let above = folder_of(folder);
+    if above != folder {
+        make_folder(above)?;
+    }
+    match fs::create_dir(folder) {
+        // Another process has made it meanwhile.
+        Err(_) if folder.is_dir() => {}
+        made => made?,
+    }
+    sync_folder(above)
+}
+
 /// Waits until the names in a folder are on the disk.
 ///
 /// # Errors
 /// When the disk fails. A folder that cannot be opened for reading, and a file system that synchronises no folders, is
 /// no error.
-pub(super) fn sync_folder(folder: &Path) -> io::Result<()> {
+pub fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(not(unix)) {
         return Ok(());
     }

@@ -3,7 +3,7 @@ use std::io::Write as _;
 use std::path::Path;
 
 use super::place::prefix_for;
-use super::{NewFile, check_target, is_same_file, replace};
+use super::{NewFile, TemporaryFolder, check_target, is_same_file, make_folder, replace};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<String> =
@@ -23,10 +23,21 @@ fn a_target_is_replaced_by_a_commit_alone() {
     assert_eq!(fs::read(&target).unwrap(), b"old");
     replace(&target, b"new").unwrap();
     assert_eq!(fs::read(&target).unwrap(), b"new");
-    let mut unsynced = NewFile::create(&target).unwrap();
-    unsynced.write_all(b"newer").unwrap();
-    unsynced.commit_unsynced().unwrap();
-    assert_eq!(fs::read(&target).unwrap(), b"newer");
+    assert_eq!(names(folder.path()), ["a.txt"]);
+}
+
+#[test]
+fn a_new_target_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("a.txt");
+    let [first, second] = ["first", "second"].map(|text| {
+        let mut file = NewFile::create(&target).unwrap();
+        file.write_all(text.as_bytes()).unwrap();
+        file
+    });
+    first.commit_new().unwrap();
+    assert_eq!(second.commit_new().unwrap_err().kind(), std::io::ErrorKind::AlreadyExists);
+    assert_eq!(fs::read(&target).unwrap(), b"first");
     assert_eq!(names(folder.path()), ["a.txt"]);
 }
 
@@ -57,24 +68,58 @@ fn two_attempts_at_one_target_do_not_disturb_each_other() {
 #[test]
 fn leftovers_of_dead_processes_go_and_all_else_stays() {
     let folder = tempfile::tempdir().unwrap();
-    let [target, other] = ["a.txt", "b.txt"].map(|name| folder.path().join(name));
-    let dead = folder.path().join(".mirrorstats-a.txt.abc123");
-    fs::write(&dead, "half").unwrap();
-    let stay = [".mirrorstats-a.txt.abc12", ".mirrorstats-abc123", ".mirrorstats-b.txt.abc123", "mine.abc123"];
-    for name in stay {
-        fs::write(folder.path().join(name), "").unwrap();
+    let path = |name: &str| folder.path().join(name);
+    // Whatever they were to become.
+    let dead = [".mirrorstats-a.txt.abc123", ".mirrorstats-b.txt.Xyz789", ".mirrorstats-frames.000000"];
+    fs::create_dir(path(dead[2])).unwrap();
+    for name in ["001.png", "002.png"] {
+        fs::write(path(dead[2]).join(name), "").unwrap();
     }
-    let alive = folder.path().join(".mirrorstats-a.txt.abc124");
+    let stay =
+        [".mirrorstats-a.txt.abc12", ".mirrorstats-abc123", ".mirrorstats-unfinished", "mine.abc123", "a.abc123"];
+    for name in dead[..2].iter().chain(&stay) {
+        fs::write(path(name), "half").unwrap();
+    }
+    let (alive, link) = (path(".mirrorstats-a.txt.abc124"), path(".mirrorstats-a.txt.abc125"));
     let owner = File::create(&alive).unwrap();
     owner.lock().unwrap();
-    replace(&target, b"new").unwrap();
-    assert!(!dead.exists());
-    assert!(alive.exists() && stay.iter().all(|name| folder.path().join(name).exists()));
-    drop(owner);
-    replace(&other, b"new").unwrap();
-    assert!(alive.exists(), "it is another target's");
-    replace(&target, b"new").unwrap();
-    assert!(!alive.exists());
+    std::os::unix::fs::symlink("mine.abc123", &link).unwrap();
+    replace(&path("a.txt"), b"new").unwrap();
+    assert!(dead.iter().all(|name| !path(name).exists()));
+    assert!(alive.exists() && link.exists() && stay.iter().all(|name| path(name).exists()));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_folder_is_swept_once_however_many_files_are_written() {
+    let folder = tempfile::tempdir().unwrap();
+    replace(&folder.path().join("a.txt"), b"new").unwrap();
+    let later = folder.path().join(".mirrorstats-a.txt.abc123");
+    fs::write(&later, "half").unwrap();
+    replace(&folder.path().join("b.txt"), b"new").unwrap();
+    assert!(later.exists(), "the next process sweeps it");
+}
+
+#[test]
+fn a_temporary_folder_goes_with_all_that_is_in_it() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = TemporaryFolder::create(home.path(), "frames").unwrap();
+    fs::create_dir(folder.path().join("deep")).unwrap();
+    fs::write(folder.path().join("deep/a"), "").unwrap();
+    assert_eq!(names(home.path()).len(), 1);
+    drop(folder);
+    assert!(names(home.path()).is_empty());
+}
+
+#[test]
+fn a_folder_is_made_with_those_above_it() {
+    let home = tempfile::tempdir().unwrap();
+    let deep = home.path().join("a/b/c");
+    make_folder(&deep).unwrap();
+    make_folder(&deep).unwrap();
+    assert!(deep.is_dir());
+    fs::write(home.path().join("file"), "").unwrap();
+    assert!(make_folder(&home.path().join("file/x")).is_err());
 }
 
 #[test]

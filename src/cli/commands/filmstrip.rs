@@ -58,15 +58,16 @@ impl FilmstripArgs {
         let strip = Strip { episode: self.episode.clone(), steps };
         let (logs, traces) = self.sources()?;
         output::check_target(&self.out, &logs)?;
-        if let Some(figure) = strip.from_logs(&logs)? {
+        let files = if traces.is_empty() { Ok(Vec::new()) } else { inputs::resolve(&traces, io::stdin()) };
+        let files = files.map_err(Failure::input)?;
+        output::check_target(&self.out, files.iter().map(|file| &file.path))?;
+        if let Some(figure) = strip.from_logs(&logs, &files)? {
             return Ok(figure);
         }
-        if !traces.is_empty() {
-            let files = inputs::resolve(&traces, io::stdin()).map_err(Failure::input)?;
-            output::check_target(&self.out, files.iter().map(|file| &file.path))?;
-            if let Some(figure) = strip.from_traces(&files)? {
-                return Ok(figure);
-            }
+        if !files.is_empty()
+            && let Some(figure) = strip.from_traces(&files)?
+        {
+            return Ok(figure);
         }
         Err(Failure::input(format!(
             "no log or trace in {} has the episode `{}`; `mirrorstats info` lists episodes",

@@ -1,14 +1,15 @@
 //! `mirrorstats import`: JSON lines of steps, of whatever harness, as a trace.
 
 use std::fmt;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use crate::base::budget::Limit;
 use crate::base::escape::visible;
+use crate::base::input;
 use crate::base::replace;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
@@ -124,6 +125,9 @@ impl ImportArgs {
     }
 }
 
+/// A colour takes some bytes.
+const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
+
 /// The palette that is typed, or in the file that is named. A text with a comma is no name of a file.
 fn palette(typed: &str) -> Result<Palette, Failure> {
     if typed == "default" {
@@ -131,7 +135,7 @@ fn palette(typed: &str) -> Result<Palette, Failure> {
     }
     let is_file = !typed.contains(',') && (typed.contains(['/', '\\', '.']) || Path::new(typed).is_file());
     let names = if is_file {
-        fs::read_to_string(typed)
+        input::text(Path::new(typed), LARGEST)
             .map_err(|error| Failure::input(format!("--palette {typed}: cannot read it: {error}")))?
     } else {
         typed.to_owned()

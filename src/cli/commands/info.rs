@@ -15,6 +15,7 @@ use crate::cli::terminal;
 use crate::cli::text_table::{aligned_right, counted, listing};
 use crate::report::tables::fit::{fitted, wrapped};
 use crate::score::quality::QualityByCell;
+use crate::trace::checksums::Checksums;
 use crate::trace::info::{Cell, Info, SeedRun, info};
 
 /// Summarise traces: episodes, steps, models, experiments, coverage, files
@@ -136,7 +137,8 @@ fn pairs(pairs: &[SeedRun]) -> String {
 }
 
 fn files(info: &Info) -> Table {
-    let mut table = listing(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "writer"]);
+    let mut table =
+        listing(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "checksums", "writer"]);
     for file in &info.files {
         table.add_row([
             visible(&file.name),
@@ -146,6 +148,11 @@ fn files(info: &Info) -> Table {
             file.bytes.to_string(),
             file.sha256.chars().take(12).collect(),
             visible(file.schema_version.as_deref().unwrap_or("not named")),
+            match file.checksums {
+                Checksums::None => "none".to_owned(),
+                Checksums::Stale => "stale".to_owned(),
+                Checksums::Present => "present".to_owned(),
+            },
             visible(file.writer.as_deref().unwrap_or("not named")),
         ]);
     }

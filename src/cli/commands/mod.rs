@@ -30,6 +30,7 @@ pub mod sensitivity;
 pub mod sql;
 pub mod stats;
 pub mod validate;
+pub mod verify;
 #[cfg(feature = "sim")]
 pub mod world;
 
@@ -51,6 +52,7 @@ pub enum Command {
     Plan(plan::PlanArgs),
     Diff(diff::DiffArgs),
     Rescore(rescore::RescoreArgs),
+    Verify(verify::VerifyArgs),
     Validate(validate::ValidateCommand),
     Check(check::CheckArgs),
     Info(info::InfoCommand),
@@ -97,6 +99,7 @@ impl Command {
             Self::Plan(args) => args.run(),
             Self::Diff(args) => args.run(),
             Self::Rescore(args) => args.run(),
+            Self::Verify(args) => args.run(),
             Self::Validate(command) => command.run(),
             Self::Check(args) => args.run(),
             Self::Info(command) => command.run(),

@@ -1,6 +1,6 @@
 //! `plan`: how many episodes a study needs, or what its episodes can show.
 
-use std::io::Write as _;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::base::ratio::Ratio;
@@ -129,7 +129,13 @@ impl PlanArgs {
         let definitions = NamedHash { name: catalog.name, sha256: catalog.hash };
         let (experiments, prompts) = self.recorded()?;
         let registered = RegisteredPlan::new(plan.clone(), definitions, experiments, prompts);
-        output::write_file(file, registered.to_json().as_bytes())
+        let mut new = output::create(file)?;
+        let written = new.write_all(registered.to_json().as_bytes()).and_then(|()| new.commit_new());
+        written.map_err(|error| match error.kind() {
+            // Another process has registered one meanwhile.
+            io::ErrorKind::AlreadyExists => Failure::input(UsageError::Registered { file: file.display().to_string() }),
+            _ => output::unwritable(file, error),
+        })
     }
 
     /// The hashes of what will be recorded: the world and the prompts.

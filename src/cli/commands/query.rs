@@ -69,8 +69,9 @@ impl QueryArgs {
 #[cfg(feature = "polars")]
 mod rows {
     use std::fs::File;
-    use std::io::{self, BufWriter, Write as _};
+    use std::io::{self, BufWriter, Write};
     use std::path::Path;
+    use std::sync::{Arc, Mutex, PoisonError};
 
     use polars::prelude::LazyFrame;
 
@@ -178,9 +179,56 @@ mod rows {
     /// Replaces a file by one of these rows.
     fn write_file(frame: LazyFrame, format: Format, path: &Path) -> Result<(), Failure> {
         let file = output::create(path)?;
-        let out: File = file.as_file().try_clone().map_err(Failure::Output)?;
-        write(frame, format, BufWriter::new(out)).map_err(failed)?;
-        output::commit_unsynced(file, path)
+        let out = file.as_file().try_clone().map_err(|error| output::unwritable(path, error))?;
+        let out = SharedFile::new(out);
+        let written = write(frame, format, out.clone());
+        // Polars drops its writers without a word about what they had not written yet.
+        out.finish().map_err(|error| output::unwritable(path, error))?;
+        written.map_err(failed)?;
+        output::commit(file, path)
+    }
+
+    /// A file that is written by whoever has a copy of this, and that keeps the first error.
+    #[derive(Clone)]
+    struct SharedFile(Arc<Mutex<Shared>>);
+
+    struct Shared {
+        out: BufWriter<File>,
+        fault: Option<io::Error>,
+    }
+
+    impl SharedFile {
+        fn new(file: File) -> Self {
+            Self(Arc::new(Mutex::new(Shared { out: BufWriter::new(file), fault: None })))
+        }
+
+        /// Writes what is left.
+        ///
+        /// # Errors
+        /// The first error there was.
+        fn finish(&self) -> io::Result<()> {
+            let mut shared = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            shared.fault.take().map_or_else(|| shared.out.flush(), Err)
+        }
+
+        fn with<T>(&self, work: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>) -> io::Result<T> {
+            let mut shared = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            work(&mut shared.out).map_err(|error| {
+                let kind = error.kind();
+                shared.fault.get_or_insert(error);
+                kind.into()
+            })
+        }
+    }
+
+    impl Write for SharedFile {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            self.with(|out| out.write(bytes))
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            self.with(Write::flush)
+        }
     }
 
     /// The rows for people: names, types, rows, how many there are.

@@ -183,7 +183,7 @@ impl RecordArgs {
         // What is whole is put together whatever ended the recording.
         let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
         bar.clear();
-        let tally = outcome.map_err(|broken| Failure::input(broken.to_string()))?;
+        let tally = outcome.map_err(Failure::input)?;
         assembled.map_err(Failure::input)?;
         let missing: BTreeSet<Key> = todo.iter().copied().collect();
         let found: Vec<Key> = planned.iter().copied().filter(|key| !missing.contains(key)).collect();
@@ -312,8 +312,21 @@ fn stop_at_interrupt(stop: &'static AtomicBool, player: Arc<dyn Player>) -> Resu
     ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {
             player.abandon();
-            std::process::exit(130);
+            leave(130);
         }
     })
     .map_err(|error| Failure::input(format!("cannot listen for Ctrl-C: {error}")))
+}
+
+/// Ends the process at once, without the exit handlers of libraries: those of the renderer would take apart what other
+/// threads are drawing with. What is lost is temporary, and swept by the next recording.
+#[cfg(unix)]
+fn leave(code: i32) -> ! {
+    signal_hook::low_level::exit(code)
+}
+
+/// Ends the process at once.
+#[cfg(not(unix))]
+fn leave(code: i32) -> ! {
+    std::process::exit(code)
 }

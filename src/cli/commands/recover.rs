@@ -1,6 +1,6 @@
 //! `mirrorstats recover`: a trace out of a log, also of a cut one.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -24,7 +24,7 @@ use crate::trace::write::OptionalColumns;
 /// Make a trace of a log, also of one that was cut off or damaged
 ///
 /// Every episode whose end is in the log is in the trace, which is checked against every rule. A trace that is there is
-/// replaced if it is one of the same recording and the log has all its episodes. Exits with 3 if anything of the log is
+/// replaced if it is one of the same recording and the log has all its episodes with the same rows. Exits with 3 if anything of the log is
 /// lost, be it the index at its end.
 #[derive(Clone, Debug, clap::Args)]
 pub struct RecoverArgs {
@@ -78,7 +78,8 @@ impl RecoverArgs {
         Ok(if answer.losses.is_any() { Outcome::Lossy } else { Outcome::Done })
     }
 
-    /// Refuses to write over a trace of another recording, or one with an episode that the log does not have.
+    /// Refuses to write over a trace of another recording, or one with an episode that the log does not have, or has with
+    /// other rows.
     fn check_target(&self, rows: &[EpisodeRows], recording: Option<&Value>) -> Result<(), Failure> {
         // A file that cannot be read as a trace is what a recovery is there to replace.
         let (Ok(file), Ok(there)) = (TraceFile::open(&self.target()), merge::read(&self.out)) else { return Ok(()) };
@@ -96,6 +97,17 @@ impl RecoverArgs {
             return Err(Failure::input(format!(
                 "`{out}` is a trace of another recording than the log\n  help: {help}"
             )));
+        }
+        let hashes: BTreeMap<_, _> = rows.iter().map(|episode| (&episode.episode_id, episode.stated_hash())).collect();
+        for episode in &there {
+            let logged = hashes.get(&episode.episode_id).cloned().flatten();
+            if let Some((traced, logged)) = episode.stated_hash().zip(logged).filter(|(a, b)| a != b) {
+                let (out, log, id) = (self.out.display(), self.log.display(), &episode.episode_id);
+                return Err(Failure::input(format!(
+                    "`{out}` and `{log}` do not belong together: expected rows of the episode `{id}` with the hash {traced}, \
+                     as in the trace, found {logged}\n  help: {help}"
+                )));
+            }
         }
         Ok(())
     }

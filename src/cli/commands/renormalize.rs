@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
@@ -140,10 +139,7 @@ impl RenormalizeArgs {
                 return Err(refused(input, "another folder for the new trace", "the trace itself"));
             }
         }
-        fs::create_dir_all(folder).map_err(|error| {
-            let words = "help: is there a file of that name, and is the folder above it writable?";
-            Failure::Rendered(format!("error: cannot make the folder `{}`: {error}\n  {words}", folder.display()))
-        })?;
+        output::make_folder(folder)?;
         Ok(Some(places))
     }
 

@@ -1,7 +1,6 @@
 //! `mirrorstats replay`: a trace's episodes again, held against what was recorded.
 
 use std::fmt;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -9,7 +8,7 @@ use crate::base::replace::{self, is_same_file};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
-use crate::log::read::other_episode;
+use crate::log::read::{episode_hashes, other_episode};
 use crate::replay::again::MOST_RAYS;
 use crate::replay::divergence::Divergence;
 use crate::replay::error::ReplayError;
@@ -102,7 +101,24 @@ impl ReplayArgs {
                 output::check_target(&frame_path(folder, &rows.episode_id, t), traces.iter().map(|trace| &trace.path))?;
             }
         }
-        self.check_log()
+        self.check_log()?;
+        self.check_hashes(traces)
+    }
+
+    /// That a log which is there is none of other rows than the traces have.
+    fn check_hashes(&self, traces: &[Recorded]) -> Result<(), Failure> {
+        // What cannot be read as a log is there to be replaced.
+        let Some((log, logged)) = self.mcap.as_ref().and_then(|log| Some((log, episode_hashes(log).ok()?))) else {
+            return Ok(());
+        };
+        for (trace, rows) in traces.iter().flat_map(|trace| trace.rows.iter().map(move |rows| (trace, rows))) {
+            let hashes = rows.stated_hash().zip(logged.get(&rows.episode_id));
+            if let Some((traced, logged)) = hashes.filter(|(traced, logged)| traced != *logged) {
+                let name = trace.path.display().to_string();
+                return Err(ReplayError::apart(&rows.episode_id, (&name, &traced), (log, logged)).into());
+            }
+        }
+        Ok(())
     }
 
     /// That a log which is there holds no episode that this replay leaves out.
@@ -134,9 +150,7 @@ impl From<ReplayError> for Failure {
 
 /// Writes the frame of a step.
 fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
-    let folder = replace::folder_of(path);
-    fs::create_dir_all(folder)
-        .map_err(|error| Failure::input(format!("cannot make the folder `{}`: {error}", folder.display())))?;
+    output::make_folder(replace::folder_of(path))?;
     output::write_file(path, png)
 }
 

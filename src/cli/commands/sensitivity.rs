@@ -1,6 +1,5 @@
 //! `sensitivity`: how every cell moves with the threshold of mirror evidence, and where a conclusion changes.
 
-use std::fs;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
@@ -81,9 +80,7 @@ fn figure(out: &Path, format: FigureFormat) -> PathBuf {
 }
 
 fn write(out: &Path, report: &SensitivityReport) -> Result<(), Failure> {
-    let folder = out.join("figures");
-    fs::create_dir_all(&folder)
-        .map_err(|error| Failure::Rendered(format!("error: cannot make the folder `{}`: {error}", folder.display())))?;
+    output::make_folder(&out.join("figures"))?;
     let found = &report.found;
     let tables = [("csv", found.csv()), ("md", found.markdown()), ("tex", found.latex())];
     for (ending, text) in tables {

@@ -89,10 +89,12 @@ impl WorldArgs {
             #[cfg(feature = "raster")]
             WorldVerb::Sheet(args) => {
                 let config = configured(args.config.as_ref())?;
+                let target = args.out.join("sheet.png");
+                output::check_target(&target, &args.config)?;
                 let experiments = experiments::asked(&args.experiment, &config)?;
                 let png = contact_sheet::png(&config, &experiments, args.seed).map_err(Failure::input)?;
-                std::fs::create_dir_all(&args.out)?;
-                output::write_file(&args.out.join("sheet.png"), &png)?;
+                output::make_folder(&args.out)?;
+                output::write_file(&target, &png)?;
             }
         }
         Ok(Outcome::Done)

@@ -1,6 +1,7 @@
 //! Runs a frame on the streaming engine, and says what went wrong in the words of this program.
 
 use std::io;
+use std::thread;
 
 use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsError as Inner};
 use polars::sql::SQLContext;
@@ -63,6 +64,22 @@ impl From<Inner> for PolarsError {
 /// What Polars says of the statement.
 pub(super) fn plan(context: &mut SQLContext, statement: &str) -> Result<LazyFrame, PolarsError> {
     Ok(contained_on_all_threads(|| context.execute(statement)).map_err(PolarsError::Failed)??)
+}
+
+/// The stack on which Polars plans: it recurses over the statement, one frame for each of its constructs. Of the memory that
+/// is set aside as much is used as the statement needs.
+const STACK: usize = 256 << 20;
+
+/// What `run` gives, on a stack for statements as deep as definitions may be.
+///
+/// # Errors
+/// As `run`; no thread, or a panic on it.
+pub(super) fn on_deep_stack<R: Send>(run: impl FnOnce() -> Result<R, PolarsError> + Send) -> Result<R, PolarsError> {
+    thread::scope(|scope| {
+        let thread = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);
+        let thread = thread.map_err(|error| PolarsError::Failed(format!("no thread for it: {error}")))?;
+        thread.join().unwrap_or_else(|_| Err(PolarsError::Failed("it ended in a panic".into())))
+    })
 }
 
 /// The rows of a frame.

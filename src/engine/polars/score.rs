@@ -96,10 +96,12 @@ fn user_of(definitions: &Definitions, node: NodeId) -> String {
 }
 
 fn answer(steps: &LazyFrame, statement: &str) -> Result<DataFrame, PolarsError> {
-    let mut context = SQLContext::new();
-    context.register("steps", steps.clone());
-    let frame = run::plan(&mut context, statement)?;
-    run::collect(frame)
+    run::on_deep_stack(|| {
+        let mut context = SQLContext::new();
+        context.register("steps", steps.clone());
+        let frame = run::plan(&mut context, statement)?;
+        run::collect(frame)
+    })
 }
 
 fn keys(rows: &DataFrame) -> Result<Vec<EpisodeKey>, PolarsError> {

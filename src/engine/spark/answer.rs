@@ -1,7 +1,5 @@
 //! What the driver answers, and the table that it brings.
 
-use std::fs::File;
-use std::io::{BufRead as _, BufReader};
 use std::path::Path;
 
 use serde::Deserialize;
@@ -9,6 +7,8 @@ use serde_json::Value;
 
 use super::cause::Failed;
 use super::{Job, SparkError, cause, check, request, source};
+use crate::base::budget::Limit;
+use crate::base::input;
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeKey, EpisodeTable, Header};
 use crate::trace::colors;
@@ -95,10 +95,12 @@ fn finding(fault: Fault, job: Job<'_>) -> Option<Finding> {
     })
 }
 
+/// An episode has names, labels and some numbers.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of an answer", 64 << 20);
+
 /// Reads the table that the driver has written: one line per episode, an array of keys, metrics, labels.
 pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkError> {
     let fault = |words: String| SparkError::Answer { words };
-    let file = File::open(path).map_err(|error| fault(error.to_string()))?;
     let outputs = &job.definitions.plan.outputs;
     let header = Header {
         catalog: job.definitions.catalog.clone(),
@@ -106,10 +108,11 @@ pub(super) fn table(path: &Path, job: Job<'_>) -> Result<EpisodeTable, SparkErro
         metrics: outputs.iter().map(|output| output.name.clone()).collect(),
     };
     let mut builder = TableBuilder::new(header);
-    for line in BufReader::new(file).lines() {
+    for line in input::lines(path, LONGEST_LINE).map_err(|error| fault(error.to_string()))? {
         let line = line.map_err(|error| fault(error.to_string()))?;
-        let row: Vec<Value> = serde_json::from_str(&line).map_err(|error| fault(error.to_string()))?;
-        append(&mut builder, row).ok_or_else(|| fault(format!("an episode that is none: {line}")))?;
+        let row: Vec<Value> = serde_json::from_slice(&line).map_err(|error| fault(error.to_string()))?;
+        append(&mut builder, row)
+            .ok_or_else(|| fault(format!("an episode that is none: {}", String::from_utf8_lossy(&line).trim_end())))?;
     }
     Ok(builder.finish())
 }

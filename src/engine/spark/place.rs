@@ -3,22 +3,16 @@
 use std::fs;
 use std::path::PathBuf;
 
-use tempfile::TempDir;
-
 use super::SparkError;
-use crate::base::replace;
+use crate::base::replace::TemporaryFolder;
 
 /// The private folder of one submission.
-pub(super) struct Place(TempDir);
+pub(super) struct Place(TemporaryFolder);
 
 impl Place {
     pub(super) fn new() -> Result<Self, SparkError> {
-        let mut folder = tempfile::Builder::new();
-        folder.prefix("mirrorstats-spark-");
         // The request may hold secrets.
-        #[cfg(unix)]
-        folder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700));
-        let made = folder.tempdir().map_err(replace::without_name);
+        let made = TemporaryFolder::private("spark");
         made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
     }
 

@@ -12,6 +12,7 @@ use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal};
 use super::{Binder, Bound, DEEPEST, State};
 use crate::base::suggest::nearest;
 use crate::metric::columns::{Level, Type};
+use crate::metric::fault::MOST;
 
 /// One expression being bound: the binder, and the text that faults point into.
 pub(super) struct Scope<'b, 'a> {
@@ -140,6 +141,10 @@ impl Scope<'_, '_> {
         let known = document.lets.keys().chain(document.metrics.keys()).map(String::as_str);
         let known = known.chain(self.binder.columns.names()).chain(["t"]);
         let is_quoted = self.written.text[expr.span.clone()].starts_with('"');
+        if self.binder.faults.len() >= MOST {
+            // Looking for a name that is like it costs as much as there are names.
+            return None;
+        }
         let help = match (functions::find(&name.to_lowercase()), nearest(name, known)) {
             _ if is_quoted => format!("double quotes are for names; a text takes single ones: '{name}'"),
             (Some(entry), _) => format!("functions take parentheses: {}", entry.usage),

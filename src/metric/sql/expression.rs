@@ -15,6 +15,16 @@ const INFINITY: &str = "CAST('inf' AS DOUBLE)";
 const NAN: &str = "CAST('NaN' AS DOUBLE)";
 
 impl Layout<'_> {
+    /// The text of a node, empty once all that may be written is.
+    fn counted(&self, text: impl FnOnce() -> String) -> String {
+        if !self.spend(1) {
+            return String::new();
+        }
+        let text = text();
+        // What is not written to its end is not repeated in what contains it.
+        if self.spend(text.len()) { text } else { String::new() }
+    }
+
     fn name(&self, name: &str) -> String {
         self.dialect.quoted(name)
     }
@@ -97,6 +107,10 @@ impl Layout<'_> {
 
     /// A node of numbers or text.
     pub(super) fn value(&self, id: NodeId) -> String {
+        self.counted(|| self.value_of(id))
+    }
+
+    fn value_of(&self, id: NodeId) -> String {
         let node = self.plan.node(id);
         if let Some(column) = self.read(id) {
             return column;
@@ -155,6 +169,10 @@ impl Layout<'_> {
 
     /// A truth value as 0, 1 or null.
     pub(super) fn truth_as_int(&self, id: NodeId) -> String {
+        self.counted(|| self.truth_as_int_of(id))
+    }
+
+    fn truth_as_int_of(&self, id: NodeId) -> String {
         match &self.plan.node(id).op {
             _ if self.shared.contains(&id) => self.int_of_truth(id),
             _ if self.is_aggregate(id) || self.list(id).is_some() => self.value(id),
@@ -177,6 +195,9 @@ impl Layout<'_> {
 
     /// Whether a truth value is surely there.
     fn is_never_null(&self, id: NodeId) -> bool {
+        if !self.spend(1) {
+            return false;
+        }
         match &self.plan.node(id).op {
             Op::IsNull(_) | Op::IsTrue(_) | Op::IsFalse(_) | Op::Distinct(..) | Op::Aggregate(..) => true,
             Op::Constant(constant) => *constant != Constant::Null,
@@ -188,6 +209,10 @@ impl Layout<'_> {
 
     /// A node of truth values, as a condition.
     pub(super) fn truth(&self, id: NodeId) -> String {
+        self.counted(|| self.truth_of(id))
+    }
+
+    fn truth_of(&self, id: NodeId) -> String {
         let node = self.plan.node(id);
         if self.shared.contains(&id) {
             return format!("s.{}", self.step_column(id));

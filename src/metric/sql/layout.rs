@@ -1,10 +1,13 @@
 //! What is computed where: in which pass over the steps, as which column, and what is written out once for all its users.
 
+use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 use super::Dialect;
 use super::dialect::is_plain;
 use super::one_pass::Windowed;
+use crate::base::budget::Limit;
 use crate::metric::columns::{Level, Type};
 use crate::metric::plan::{Aggregate, NodeId, Op, Plan};
 
@@ -24,7 +27,13 @@ pub(super) struct Layout<'p> {
     lists: BTreeMap<NodeId, Windowed>,
     /// The values per step that several others need: columns of a table of steps.
     pub(super) shared: BTreeSet<NodeId>,
+    /// Bytes that were written of nodes, those of nodes in other nodes counted each time.
+    written: Rc<Cell<usize>>,
 }
+
+/// A node that others read is written out for each of them, so that what is written may double with every definition.
+/// The longest statement, each of its bytes within some five nodes.
+const MOST_WRITTEN: Limit = Limit::new("bytes written of a statement", 20 << 20);
 
 impl<'p> Layout<'p> {
     pub(super) fn new(
@@ -37,7 +46,15 @@ impl<'p> Layout<'p> {
         let lists = if dialect.functions().is_some() { lists(plan, &needed, windowed) } else { BTreeMap::new() };
         let conditions = lists.values().map(|list| list.condition);
         let needed = plan.needed_by(roots.iter().copied().chain(conditions));
-        let mut layout = Self { plan, dialect, needed, passes: BTreeMap::new(), lists, shared: BTreeSet::new() };
+        let mut layout = Self {
+            plan,
+            dialect,
+            needed,
+            passes: BTreeMap::new(),
+            lists,
+            shared: BTreeSet::new(),
+            written: Rc::default(),
+        };
         for id in layout.needed.clone() {
             layout.passes.insert(id, layout.find_pass(id));
         }
@@ -74,6 +91,17 @@ impl<'p> Layout<'p> {
                 && users.get(id).is_some_and(|&count| count > 1)
         };
         self.needed.iter().copied().filter(is_shared).collect()
+    }
+
+    /// Counts what is written; `false` once that is too much.
+    pub(super) fn spend(&self, bytes: usize) -> bool {
+        self.written.set(self.written.get().saturating_add(bytes));
+        self.is_within_budget()
+    }
+
+    /// Whether all that was asked for was written.
+    pub(super) fn is_within_budget(&self) -> bool {
+        MOST_WRITTEN.check(self.written.get() as u64).is_ok()
     }
 
     /// The same without a table of steps: every value is written out where it is read.

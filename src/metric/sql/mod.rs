@@ -39,6 +39,8 @@ use self::one_pass::OnePass;
 use self::statement::Statement;
 use super::plan::{NodeId, Op, Plan};
 
+use crate::base::budget::SETTING;
+
 /// A plan that a dialect cannot say.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LoweringError {
@@ -61,10 +63,12 @@ pub enum LoweringError {
         name: String,
     },
     /// Too long a statement.
-    #[error("the statement exceeds {limit} bytes; choose fewer metrics with --metrics")]
+    #[error(
+        "the statement exceeds {limit} bytes; choose fewer metrics with --metrics, or raise the limit: {SETTING}=10 in the environment"
+    )]
     Length {
         /// The longest statement written.
-        limit: usize,
+        limit: u64,
     },
 }
 

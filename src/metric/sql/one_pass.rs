@@ -15,7 +15,7 @@
 //! Here p, q, x and c read one step or the constants of the episode, and a and b are landmarks. A null bound makes the
 //! left side null or false, and the right side too.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use crate::metric::columns::{Level, Type};
 use crate::metric::plan::{Aggregate, Builder, Comparison, Constant, Node, NodeId, Op, Plan};
@@ -45,6 +45,7 @@ impl OnePass {
             per_step: HashMap::new(),
             within: HashMap::new(),
             windowed: BTreeMap::new(),
+            looked_up: HashMap::new(),
         };
         for node in plan.nodes() {
             let new = rewriter.node(node);
@@ -73,6 +74,8 @@ struct Rewriter<'p> {
     /// Landmarks in windows, and whether there is one.
     within: HashMap<NodeId, NodeId>,
     windowed: BTreeMap<NodeId, Windowed>,
+    /// Values at moments that were rewritten.
+    looked_up: HashMap<(NodeId, NodeId), NodeId>,
 }
 
 impl Rewriter<'_> {
@@ -158,7 +161,12 @@ impl Rewriter<'_> {
     /// A condition as one on single steps and windows; `None` without windows, or with anything else.
     fn split(&mut self, condition: NodeId) -> Option<Windowed> {
         let (mut open, mut windows, mut own) = (vec![condition], Vec::new(), self.truth(true));
+        let mut seen = HashSet::new();
         while let Some(part) = open.pop() {
+            // What is said twice says nothing more.
+            if !seen.insert(part) {
+                continue;
+            }
             match self.op(part) {
                 _ if self.is_local(part) => own = self.both(own, part, Level::Step),
                 Op::And(x, y) => open.extend([*y, *x]),
@@ -205,6 +213,15 @@ impl Rewriter<'_> {
     }
 
     fn at(&mut self, x: NodeId, moment: NodeId, ty: Type) -> NodeId {
+        if let Some(known) = self.looked_up.get(&(x, moment)) {
+            return *known;
+        }
+        let id = self.at_anew(x, moment, ty);
+        self.looked_up.insert((x, moment), id);
+        id
+    }
+
+    fn at_anew(&mut self, x: NodeId, moment: NodeId, ty: Type) -> NodeId {
         let op = match self.op(moment).clone() {
             _ if !self.is_local(x) => Op::At(x, moment),
             Op::Case { branches, otherwise } => Op::Case {

@@ -5,12 +5,13 @@ use std::fmt::Write as _;
 
 use super::LoweringError;
 use super::layout::{KEYS, Layout};
+use crate::base::budget::Limit;
 use crate::metric::catalog::Kind;
 use crate::metric::columns::{Level, Type};
 use crate::metric::plan::{NodeId, Op};
 
 /// The longest statement that is written, in bytes.
-const LONGEST: usize = 4 * 1024 * 1024;
+const LONGEST: Limit = Limit::new("bytes of a statement", 4 << 20);
 
 /// A statement as far as it is written.
 pub(super) struct Statement<'l, 'p> {
@@ -24,6 +25,8 @@ pub(super) struct Statement<'l, 'p> {
 struct Reads {
     columns: BTreeSet<String>,
     shared: BTreeSet<NodeId>,
+    /// The nodes that were gone through.
+    seen: BTreeSet<NodeId>,
 }
 
 impl<'l, 'p> Statement<'l, 'p> {
@@ -134,7 +137,8 @@ impl<'l, 'p> Statement<'l, 'p> {
     }
 
     fn check_length(&self) -> Result<(), LoweringError> {
-        if self.text.len() > LONGEST { Err(LoweringError::Length { limit: LONGEST }) } else { Ok(()) }
+        let fits = self.layout.is_within_budget() && LONGEST.check(self.text.len() as u64).is_ok();
+        if fits { Ok(()) } else { Err(LoweringError::Length { limit: LONGEST.most() }) }
     }
 }
 
@@ -142,6 +146,9 @@ impl Layout<'_> {
     /// What a value reads of its step.
     fn reads(&self, id: NodeId, reads: &mut Reads) {
         let node = self.plan.node(id);
+        if !reads.seen.insert(id) {
+            return;
+        }
         match &node.op {
             _ if node.level != Level::Step => {}
             _ if self.shared.contains(&id) => drop(reads.shared.insert(id)),

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::figures::FigureName;
 
 /// The name of the manifest, which is the last file to be there.
-pub(super) const MANIFEST: &str = "manifest.json";
+pub const MANIFEST: &str = "manifest.json";
 
 /// As much of a manifest as is needed; a manifest of other versions may have more.
 #[derive(Deserialize)]

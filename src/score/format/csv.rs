@@ -3,6 +3,7 @@
 use std::io::{Read, Write};
 
 use super::FormatError;
+use crate::base::budget::Limit;
 use crate::metric::catalog::Catalog;
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeTable, Header, KeyRef};
@@ -59,6 +60,9 @@ fn line_fault(error: &csv::Error) -> FormatError {
     FormatError::Line { line, reason: error.to_string() }
 }
 
+/// Keys, labels and metrics.
+const MOST_COLUMNS: Limit = Limit::new("columns in a file of scores", 2000);
+
 /// A table out of rows of cells; `None` and empty cells are nulls.
 pub(super) fn assemble(
     catalog: &Catalog,
@@ -66,6 +70,7 @@ pub(super) fn assemble(
     rows: Vec<Vec<Option<String>>>,
     first_line: usize,
 ) -> Result<EpisodeTable, FormatError> {
+    MOST_COLUMNS.check(header.len() as u64).map_err(std::io::Error::from)?;
     let names: Vec<&str> = header.iter().map(String::as_str).collect();
     check_unique(&names)?;
     let mut positions = [0; 5];

@@ -1,10 +1,12 @@
 //! The episode table as JSON lines: one object per episode, keys in the order of the columns.
 
-use std::io::{BufRead as _, BufReader, Read, Write};
+use std::io::{BufReader, Read, Write};
 
 use serde_json::{Map, Value};
 
 use super::{FormatError, csv};
+use crate::base::budget::Limit;
+use crate::base::input::Lines;
 use crate::metric::catalog::Catalog;
 use crate::score::table::EpisodeTable;
 
@@ -29,12 +31,15 @@ pub(super) fn write(table: &EpisodeTable, mut out: impl Write) -> Result<(), For
     Ok(out.flush()?)
 }
 
+/// An episode has names, labels and some numbers.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of scores", 16 << 20);
+
 pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
     let mut header: Vec<String> = Vec::new();
     let mut rows = Vec::new();
-    for (at, line) in BufReader::new(input).lines().enumerate() {
+    for (at, line) in Lines::new(BufReader::new(input), LONGEST_LINE).enumerate() {
         let fault = |reason: String| FormatError::Line { line: at + 1, reason };
-        let object: Map<String, Value> = serde_json::from_str(&line?).map_err(|error| fault(error.to_string()))?;
+        let object: Map<String, Value> = serde_json::from_slice(&line?).map_err(|error| fault(error.to_string()))?;
         if at == 0 {
             header = object.keys().cloned().collect();
         }

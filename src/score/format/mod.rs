@@ -15,10 +15,10 @@ use std::collections::HashSet;
 use std::io::{self, Read, Write};
 
 use ::parquet::errors::ParquetError;
-use ::parquet::file::reader::ChunkReader;
 
 use super::table::EpisodeTable;
 use crate::metric::catalog::{Catalog, Kind};
+use crate::trace::TableFile;
 
 pub use self::parquet::{
     DECLARED_KEY, DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores,
@@ -63,6 +63,9 @@ pub enum FormatError {
     /// The Parquet library's own words.
     #[error("not a readable Parquet file of scores: {0}")]
     Parquet(#[from] ::parquet::errors::ParquetError),
+    /// Bytes that contradict the file's own checksums.
+    #[error("the file is damaged: {0}; restore it from its source, or score the traces again")]
+    Damaged(String),
     /// A column that is missing or has another type.
     #[error("column `{column}`: expected {expected}, found {found}; scores are written by `mirrorstats score`")]
     Column {
@@ -163,7 +166,7 @@ pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<
 ///
 /// # Errors
 /// A file that is not Parquet, or not one of scores; scores that its definitions cannot have given.
-pub fn read_parquet(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+pub fn read_parquet(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     checked(parquet::read(input, partition)?)
 }
 

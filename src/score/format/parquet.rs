@@ -8,7 +8,7 @@ use arrow::array::{Array, ArrayRef, AsArray as _, Int32Array, Int64Array, Record
 use arrow::compute::cast;
 use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
 use parquet::arrow::ArrowWriter;
-use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
 use parquet::errors::ParquetError;
@@ -25,9 +25,10 @@ use crate::metric::catalog::Catalog;
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use crate::trace::catch_panic::contained;
+use crate::trace::checksums::{self, CREATED_BY, Held};
 use crate::trace::declared::Declared;
-use crate::trace::footer_shape;
 use crate::trace::schema::COLUMNS;
+use crate::trace::{FlatRows, TableFile, footer_shape};
 
 /// The footer key that tells scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -94,7 +95,7 @@ pub struct Encoder<'a> {
 
 /// Takes what was encoded, in the order of the jobs.
 pub struct Writer<W: Write + Send> {
-    file: SerializedFileWriter<W>,
+    file: SerializedFileWriter<Held<W>>,
     columns: usize,
     /// The columns so far of the row group under way.
     group: Vec<ArrowColumnChunk>,
@@ -107,7 +108,8 @@ pub struct Writer<W: Write + Send> {
 pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder<'_>, Writer<W>), FormatError> {
     let header = table.header();
     let schema = Arc::new(schema(&header));
-    let parquet = ArrowWriter::try_new(out, Arc::clone(&schema), Some(properties(&header, &table.declared)?))?;
+    let properties = properties(&header, &table.declared)?;
+    let parquet = ArrowWriter::try_new(Held::new(out), Arc::clone(&schema), Some(properties))?;
     let (file, factory) = parquet.into_serialized_writer()?;
     let writer = Writer { file, columns: schema.fields().len(), group: Vec::new() };
     let groups = (0..table.len().div_ceil(ROW_GROUP_ROWS)).map(|_| Mutex::default()).collect();
@@ -208,6 +210,7 @@ impl<W: Write + Send> Writer<W> {
             let mut group = self.file.next_row_group()?;
             self.group.drain(..).try_for_each(|column| column.append_to_row_group(&mut group))?;
             group.close()?;
+            checksums::pass_on(&mut self.file)?;
         }
         Ok(())
     }
@@ -217,7 +220,7 @@ impl<W: Write + Send> Writer<W> {
     /// # Errors
     /// Whatever writing gives.
     pub fn finish(self) -> Result<(), FormatError> {
-        self.file.close()?;
+        checksums::finish(self.file)?;
         Ok(())
     }
 }
@@ -237,6 +240,7 @@ fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, 
         metadata.push(pair(DECLARED_KEY, &text));
     }
     let mut properties = WriterProperties::builder()
+        .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         // Who reads scores reads all of them.
         .set_statistics_enabled(EnabledStatistics::None)
@@ -259,32 +263,37 @@ fn schema(header: &Header) -> Schema {
     Schema::new(keys.chain(labels).chain(metrics).collect::<Vec<_>>())
 }
 
-pub(super) fn read(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+pub(super) fn read(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
     contained(|| decode(input, partition))
         .unwrap_or_else(|panic| Err(FormatError::Parquet(ParquetError::General(panic))))
 }
 
-fn decode(input: impl ChunkReader + 'static, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+fn decode(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+    footer_shape::check_file(&input).map_err(ParquetError::General)?;
+    if let Some(metadata) = metadata(&input) {
+        checksums::verify_file(&input, &metadata).map_err(FormatError::Damaged)?;
+    }
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-    let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(input, options)?;
-    let catalog = match (footer::value(builder.metadata().file_metadata(), DEFINITIONS_KEY), partition.definitions) {
+    let about = ArrowReaderMetadata::load(&input, options)?;
+    let rows = FlatRows::new(input, Arc::clone(about.metadata())).map_err(ParquetError::General)?;
+    let catalog = match (footer::value(about.metadata().file_metadata(), DEFINITIONS_KEY), partition.definitions) {
         (Some(text), _) => serde_json::from_str(&text).map_err(|error| FormatError::Definitions(error.to_string()))?,
         (None, Some(named)) => named.clone(),
         (None, None) => return Err(FormatError::Definitions(format!("there is no `{DEFINITIONS_KEY}`"))),
     };
     // Scores of other programs declare nothing.
-    let declared = match footer::value(builder.metadata().file_metadata(), DECLARED_KEY) {
+    let declared = match footer::value(about.metadata().file_metadata(), DECLARED_KEY) {
         Some(text) => serde_json::from_str(&text).map_err(|error| FormatError::Declared(error.to_string()))?,
         None => Declared::default(),
     };
-    let names: Vec<&str> = builder.schema().fields().iter().map(|field| field.name().as_str()).collect();
+    let names: Vec<&str> = about.schema().fields().iter().map(|field| field.name().as_str()).collect();
     check_unique(&names)?;
     // A part without rows has its columns all the same.
-    let none = partition.complete(&RecordBatch::new_empty(builder.schema().clone()), &catalog)?;
+    let none = partition.complete(&RecordBatch::new_empty(about.schema().clone()), &catalog)?;
     let mut table = TableBuilder::new(header_of(&none, catalog));
     append(&mut table, &none)?;
-    for batch in builder.build()? {
-        let batch = batch.map_err(|error| FormatError::Parquet(error.into()))?;
+    for batch in rows {
+        let batch = batch.map_err(|error| FormatError::Parquet(ParquetError::General(error)))?;
         let batch = partition.complete(&batch, &table.header().catalog)?;
         append(&mut table, &batch)?;
     }
@@ -413,7 +422,9 @@ mod tests {
         let rows: Vec<i64> = groups.row_groups().iter().map(RowGroupMetaData::num_rows).collect();
         assert_eq!(rows, [ROW_GROUP_ROWS, GATHERED_ROWS + 5].map(|rows| i64::try_from(rows).unwrap()));
         let partition = Partition { folders: &[], definitions: None };
-        assert_eq!(read(bytes, &partition).unwrap(), table());
+        let mut file = tempfile::tempfile().unwrap();
+        file.write_all(&bytes).unwrap();
+        assert_eq!(read(file, &partition).unwrap(), table());
     }
 
     /// Takes so many bytes.

@@ -7,7 +7,6 @@
 mod limits;
 mod overlay;
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -15,7 +14,9 @@ use std::sync::LazyLock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::base::budget::Limit;
 use crate::base::hash;
+use crate::base::input;
 use crate::experiment::Experiment;
 use crate::experiment::spec::{Cubes, Others};
 
@@ -243,6 +244,9 @@ impl Default for WorldConfig {
     }
 }
 
+/// A world is written by hand.
+const LARGEST: Limit = Limit::new("bytes of a world", 1 << 20);
+
 impl WorldConfig {
     /// The text of the default, with what each key means.
     pub const fn default_text() -> &'static str {
@@ -255,7 +259,7 @@ impl WorldConfig {
     /// When the file cannot be read, or says something that it may not.
     pub fn load(path: &Path) -> Result<Self, ConfigError> {
         let text =
-            fs::read_to_string(path).map_err(|source| ConfigError::Unreadable { path: path.to_owned(), source })?;
+            input::text(path, LARGEST).map_err(|source| ConfigError::Unreadable { path: path.to_owned(), source })?;
         Self::from_toml(&text).map_err(|fault| ConfigError::Faulty { path: path.to_owned(), fault })
     }
 

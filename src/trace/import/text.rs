@@ -4,13 +4,15 @@
 //! blank lines hold no step and are passed over; blank lines count. A line may end with `\n` or `\r\n`.
 
 use std::fs::File;
-use std::io::{self, BufRead as _, BufReader, Read, Seek as _, SeekFrom};
+use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
 use std::path::Path;
 use std::sync::Arc;
 
 use super::error::ImportError;
 use super::fault::Place;
+use crate::base::budget::Limit;
 use crate::base::hash;
+use crate::base::input;
 use crate::trace::inputs::Input;
 
 /// Lines of steps, and what they are called in messages.
@@ -36,6 +38,12 @@ pub(super) struct Line {
     pub(super) ended: bool,
 }
 
+/// A step with all that was replied; the longest reply of a model has some hundred thousand bytes.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
+
+/// What is piped in is kept on the disk meanwhile.
+const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);
+
 const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
 
 impl Text {
@@ -46,11 +54,11 @@ impl Text {
     pub fn open(path: &Path) -> Result<Self, ImportError> {
         let name = Input::new(path).name;
         let failed = || ImportError::read(&name);
-        let file = File::open(path).map_err(failed())?;
-        let about = file.metadata().map_err(failed())?;
-        if about.is_dir() {
+        if path.is_dir() {
             return Err(failed()(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder; name the files in it")));
         }
+        let file = input::open_text(path).map_err(failed())?;
+        let about = file.metadata().map_err(failed())?;
         if about.is_file() { Ok(Self::of_file(&name, file)) } else { Self::spool(&name, file) }
     }
 
@@ -58,9 +66,11 @@ impl Text {
     ///
     /// # Errors
     /// When it cannot be read, or there is no space where temporary files are.
-    pub fn spool(name: &str, mut stream: impl Read) -> Result<Self, ImportError> {
+    pub fn spool(name: &str, stream: impl Read) -> Result<Self, ImportError> {
         let mut file = tempfile::tempfile().map_err(ImportError::read(name))?;
-        io::copy(&mut stream, &mut file).map_err(ImportError::read(name))?;
+        let copied = io::copy(&mut stream.take(LARGEST_STREAM.most().saturating_add(1)), &mut file);
+        let checked = copied.and_then(|bytes| LARGEST_STREAM.check(bytes).map_err(Into::into));
+        checked.map_err(ImportError::read(name))?;
         Ok(Self::of_file(name, file))
     }
 
@@ -130,9 +140,8 @@ impl Text {
     }
 
     fn read_line(&mut self) -> Result<Vec<u8>, ImportError> {
-        let mut bytes = Vec::new();
-        let read = self.reader.read_until(b'\n', &mut bytes).map_err(ImportError::read(&self.name))?;
-        self.offset += read as u64;
+        let bytes = input::line(&mut self.reader, LONGEST_LINE).map_err(ImportError::read(&self.name))?;
+        self.offset += bytes.len() as u64;
         Ok(bytes)
     }
 }

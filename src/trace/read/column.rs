@@ -55,6 +55,12 @@ impl Column {
         }
     }
 
+    /// How the values behind the rows are held.
+    pub(in crate::trace) fn data_type(&self) -> &DataType {
+        let (Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. })) = self;
+        values.data_type()
+    }
+
     /// `length` rows from row `start`; nothing is copied.
     pub(in crate::trace) fn slice(&self, start: usize, length: usize) -> Self {
         match self {

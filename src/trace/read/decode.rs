@@ -12,11 +12,12 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader, RowSelection, RowSelector};
 use parquet::basic::Type as Physical;
 
+use super::budget::{INFLATED_PER_BYTE, check_names};
 use super::column::{Column, Runs, all_within};
 use super::footer::{plain, rows_of};
-use super::open::{TraceFile, text_type};
+use super::open::{Readable, TraceFile, text_type};
 use super::pages::{self, Cursor, FaultSlot, Form, Place, Store, Unsupported};
-use super::projection::{EPISODE_ID, Layout, T};
+use super::projection::{EPISODE_ID, Layout, LayoutColumn, T};
 use crate::trace::catch_panic::contained;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::schema::Kind;
@@ -24,8 +25,9 @@ use crate::trace::schema::Kind;
 /// Rows that are decoded at a time: the columns of so many stay in a core's cache.
 const BATCH_ROWS: usize = 32 * 1024;
 
-/// Bytes of one column's texts that are decoded at a time, about: an array holds 2 GiB, and texts are not all as long.
-const BATCH_TEXT: u64 = 256 << 20;
+/// Bytes of one column's texts that are decoded at a time, about: the decoder makes room for them several
+/// times, and texts are not all as long.
+const BATCH_TEXT: u64 = 64 << 20;
 
 /// Some rows of one row group: a column for each of the layout, in its order.
 #[derive(Clone, Debug)]
@@ -69,7 +71,7 @@ pub(in crate::trace) struct Ids {
 pub(in crate::trace) struct RowGroup<'a> {
     file: &'a TraceFile,
     layout: &'a Layout,
-    footer: Arc<ArrowReaderMetadata>,
+    readable: Arc<Readable>,
     index: usize,
     /// The ids of the episodes, if they are known already.
     ids: Option<Ids>,
@@ -132,17 +134,18 @@ impl<'a> RowGroup<'a> {
         ids: Option<Ids>,
     ) -> Result<Self, Box<Finding>> {
         let store = store(file)?;
-        let footer = file.footer()?;
+        let readable = file.footer()?;
         let roots = (0..layout.columns.len()).filter_map(|at| root(file, layout, at));
-        let text = roots.filter_map(|root| text_bytes(&footer, root, row_group)).max().unwrap_or(0);
+        let text = roots.filter_map(|root| text_bytes(&readable.footer, root, row_group)).max().unwrap_or(0);
         let at_a_time = rows_at_a_time(file.row_group_rows(row_group), text);
         let sources = Vec::new();
-        let mut rows = Self { file, layout, footer, index: row_group, ids, sources, first: 0, at_a_time, over: false };
+        let mut rows =
+            Self { file, layout, readable, index: row_group, ids, sources, first: 0, at_a_time, over: false };
         for at in 0..layout.columns.len() {
             let source = match root(file, layout, at) {
                 None => Source::Absent,
                 Some(_) if at == EPISODE_ID && rows.ids.is_some() => Source::Ahead,
-                Some(root) => match contained(|| cursor(&rows.footer, &store, root, row_group, form(layout, at))) {
+                Some(root) => match contained(|| cursor(&rows.readable, &store, root, row_group, form(layout, at))) {
                     Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
                     Ok(Err(Unsupported)) | Err(_) => rows.library(at, root)?,
                 },
@@ -173,7 +176,8 @@ impl<'a> RowGroup<'a> {
         // Whole episodes where it is known where they end.
         let most = self.at_a_time.min(left);
         let count = self.ids.as_ref().filter(|_| left > 0).map_or(most, |ids| ids.runs.until(self.first, most));
-        let columns = (0..self.sources.len()).map(|at| self.column(at, count));
+        let columns =
+            (0..self.sources.len()).map(|at| self.column(at, count).and_then(|column| self.within(at, column)));
         let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
         if count == 0 {
             return Ok(None);
@@ -185,6 +189,20 @@ impl<'a> RowGroup<'a> {
         let rows = Rows { columns, row_group: self.index, first: self.first, whole };
         self.first += count;
         Ok(Some(rows))
+    }
+
+    /// A column, if its texts are within the budgets.
+    fn within(&self, at: usize, column: Column) -> Result<Column, Box<Finding>> {
+        let LayoutColumn { name, kind, known, .. } = &self.layout.columns[at];
+        if *kind != Kind::String {
+            return Ok(column);
+        }
+        let names = if known.is_some_and(|known| known.constant) { check_names(&column) } else { Ok(()) };
+        let place = (self.index, root(self.file, self.layout, at).unwrap_or(usize::MAX));
+        let checked = names.and_then(|()| self.file.expansion().rows(place, self.first, &column));
+        let over =
+            |exceeded| Finding::over_budget(self.file.name(), &exceeded).in_row_group(self.index).in_column(name);
+        checked.map(|()| column).map_err(|exceeded| Box::new(over(exceeded)))
     }
 
     /// The next `count` rows of a column. At the end, where that is none, there must be none.
@@ -279,13 +297,15 @@ impl<'a> RowGroup<'a> {
         first: usize,
         slot: &FaultSlot,
     ) -> parquet::errors::Result<ParquetRecordBatchReader> {
-        let rows = rows_of(self.footer.metadata().row_group(self.index));
-        let (metadata, slot) = (Arc::clone(self.footer.metadata()), Arc::clone(slot));
-        let library = pages::Library { store, metadata, row_groups: vec![self.index], slot };
+        let Readable { footer, chunks } = &*self.readable;
+        let rows = rows_of(footer.metadata().row_group(self.index));
+        let (metadata, checksums, slot) = (Arc::clone(footer.metadata()), chunks.clone(), Arc::clone(slot));
+        let library =
+            pages::Library { store, metadata, checksums, row_groups: vec![self.index], slot, writes_out: false };
         let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
         let selection = (first > 0).then(|| RowSelection::from(rest));
-        let column = ProjectionMask::roots(self.footer.parquet_schema(), [root]);
-        library.reader(column, Some(self.footer.schema().fields()), rows.clamp(1, self.at_a_time), selection)
+        let column = ProjectionMask::roots(footer.parquet_schema(), [root]);
+        library.reader(column, Some(footer.schema().fields()), rows.clamp(1, self.at_a_time), selection)
     }
 }
 
@@ -305,13 +325,14 @@ impl Iterator for RowGroup<'_> {
 /// The ids of the episodes of a row group, if its pages are such that they can be had without the other columns.
 pub(in crate::trace) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
     let root = root(file, layout, EPISODE_ID)?;
-    let (store, footer) = (store(file).ok()?, file.footer().ok()?);
-    let read = || cursor(&footer, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
-    contained(read).ok()?.ok()
+    let (store, readable) = (store(file).ok()?, file.footer().ok()?);
+    let read = || cursor(&readable, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
+    // Who reads them with the other columns says what is wrong with them.
+    contained(read).ok()?.ok().filter(|ids| check_names(ids).is_ok())
 }
 
 fn store(file: &TraceFile) -> Result<Store, Box<Finding>> {
-    file.reader().map(Store::File).map_err(|error| {
+    file.store().map_err(|error| {
         Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
     })
 }
@@ -327,14 +348,15 @@ fn form(layout: &Layout, at: usize) -> Form {
 }
 
 fn cursor(
-    footer: &ArrowReaderMetadata,
+    readable: &Readable,
     store: &Store,
     root: usize,
     row_group: usize,
     form: Form,
 ) -> Result<Cursor, Unsupported> {
+    let Readable { footer, chunks } = readable;
     let leaf = leaf(footer, root).ok_or(Unsupported)?;
-    let place = Place { metadata: footer.metadata(), row_group, column: leaf };
+    let place = Place { metadata: footer.metadata(), checksums: chunks, row_group, column: leaf };
     Cursor::open(store, place, footer.schema().field(root).data_type(), form)
 }
 
@@ -347,7 +369,9 @@ fn leaf(footer: &ArrowReaderMetadata, root: usize) -> Option<usize> {
 fn text_bytes(footer: &ArrowReaderMetadata, root: usize, row_group: usize) -> Option<u64> {
     let column = footer.metadata().row_group(row_group).columns().get(leaf(footer, root)?)?;
     let written_out = column.unencoded_byte_array_data_bytes().unwrap_or_default();
-    let bytes = u64::try_from(column.uncompressed_size().max(written_out)).unwrap_or_default();
+    // What the file says may be too little. Of what is stored no more than this is inflated.
+    let most = column.compressed_size().saturating_mul(INFLATED_PER_BYTE.cast_signed());
+    let bytes = u64::try_from(column.uncompressed_size().max(written_out).max(most)).unwrap_or_default();
     (column.column_type() == Physical::BYTE_ARRAY).then_some(bytes)
 }
 
@@ -374,17 +398,18 @@ pub(in crate::trace) fn held_as(kind: Kind) -> DataType {
 }
 
 /// Why a decoded column is not taken.
-enum Refused {
+pub(in crate::trace) enum Refused {
     Unreadable(String),
     TooLarge { row: usize, value: u64 },
 }
 
-fn normal_column(column: &ArrayRef, kind: Kind) -> Result<ArrayRef, Refused> {
+pub(in crate::trace) fn normal_column(column: &ArrayRef, kind: Kind) -> Result<ArrayRef, Refused> {
     let held = held_as(kind);
     match column.data_type() {
         same if *same == held => {
             if kind == Kind::String {
                 check_keys(column)?;
+                check_texts(column)?;
             }
             Ok(Arc::clone(column))
         }
@@ -413,6 +438,25 @@ fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
     if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
 }
 
+/// Every text is UTF-8. The Parquet library looks at all texts of a delta-encoded page at once, and takes a character of
+/// which one text has the first bytes and the next text the rest.
+fn check_texts(column: &ArrayRef) -> Result<(), Refused> {
+    let texts = column.as_any_dictionary().values().as_string::<i32>();
+    let (bytes, offsets) = (texts.value_data(), texts.value_offsets());
+    let begins = |offset: &i32| {
+        let next = usize::try_from(*offset).ok().and_then(|at| bytes.get(at..))?.first();
+        // A byte that goes on with a character begins none.
+        Some(next.is_none_or(|byte| byte & 0xc0 != 0x80))
+    };
+    let (first, last) = (offsets.first().copied().unwrap_or(0), offsets.last().copied().unwrap_or(0));
+    let range = usize::try_from(first).ok().zip(usize::try_from(last).ok());
+    let is_text = range.and_then(|(first, last)| std::str::from_utf8(bytes.get(first..last)?).ok()).is_some();
+    if is_text && offsets.iter().all(|offset| begins(offset) == Some(true)) {
+        return Ok(());
+    }
+    Err(Refused::Unreadable("texts that are not UTF-8".into()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::{BATCH_ROWS, BATCH_TEXT, rows_at_a_time};
@@ -423,7 +467,7 @@ mod tests {
             (0, 0, BATCH_ROWS),
             (100_000, 0, BATCH_ROWS),
             (100_000, 100_000 * 100, BATCH_ROWS),
-            (100_000, 100_000 << 16, 4096),
+            (100_000, 100_000 << 16, 1024),
             (10, 10 * BATCH_TEXT, 1),
             (10, u64::MAX, 1),
         ] {

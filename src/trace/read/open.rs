@@ -3,6 +3,7 @@
 //! No row is read here. A file is held by its name and what it is made of, never by an open handle, so that any number of
 //! files can be open at once.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -15,11 +16,15 @@ use parquet::basic::ConvertedType;
 use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 
+use super::budget::{Expansion, MOST_COLUMNS};
 use super::footer::bounds;
-use super::footer::{Extent, footer, plain, rows_of};
+use super::footer::{Extent, Footer, footer, plain, rows_of};
+use super::pages::Store;
 use crate::base::escape::visible;
+use crate::base::input;
 use crate::base::suggest::nearest;
 use crate::trace::catch_panic::contained;
+use crate::trace::checksums::{Checksums, ChunkChecksums};
 use crate::trace::declared_experiment::{self, DeclaredExperiment};
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::error::TraceError;
@@ -46,8 +51,19 @@ pub struct TraceFile {
     pairs: Vec<KeyValue>,
     colors: Declared,
     experiments: Vec<DeclaredExperiment>,
+    checksums: Checksums,
     /// What a reader needs, while somebody reads: footers of many row groups are large.
-    footer: Mutex<Weak<ArrowReaderMetadata>>,
+    footer: Mutex<Weak<Readable>>,
+    /// What was made of its bytes.
+    expansion: Arc<Expansion>,
+}
+
+/// What a reader of a file needs.
+#[derive(Debug)]
+pub(in crate::trace) struct Readable {
+    /// The footer; strings are read as dictionaries.
+    pub(in crate::trace) footer: ArrowReaderMetadata,
+    pub(in crate::trace) chunks: ChunkChecksums,
 }
 
 /// A column of one file.
@@ -147,7 +163,8 @@ impl TraceFile {
     /// # Errors
     /// Everything that is wrong with it; never empty.
     pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
-        let (bytes, metadata) = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
+        let opened = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
+        let Footer { bytes, metadata, checksums, .. } = opened;
         let version = version_of(&input.name, &metadata).map_err(|finding| vec![*finding])?;
         let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
         let mut findings = check_columns(&input.name, &columns, version);
@@ -156,14 +173,17 @@ impl TraceFile {
             return Err(findings);
         }
         let rows = metadata.row_groups().iter().map(rows_of).collect();
-        let pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        let mut pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        // They are verified, long, and of no other file.
+        pairs.retain(|pair| pair.key != schema::CHECKSUMS_KEY);
         let recording = value(&pairs, schema::RECORDING_KEY);
         let colors = Declared::of(&input.name, recording).map_err(|f| vec![*f])?;
         let experiments = declared_experiment::of_recording(&input.name, recording).map_err(|f| vec![*f])?;
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
         let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
-        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, experiments, footer })
+        let expansion = Arc::new(Expansion::new(bytes));
+        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, experiments, checksums, footer, expansion })
     }
 
     /// The name in messages and outputs.
@@ -176,7 +196,17 @@ impl TraceFile {
     /// # Errors
     /// Whatever the operating system says.
     pub fn reader(&self) -> io::Result<File> {
-        File::open(&self.path)
+        input::open(&self.path)
+    }
+
+    /// The file as its pages are read.
+    pub(in crate::trace) fn store(&self) -> io::Result<Store> {
+        self.reader().map(|file| Store::new(file, Arc::clone(&self.expansion)))
+    }
+
+    /// What was made of its bytes so far.
+    pub(in crate::trace) fn expansion(&self) -> &Expansion {
+        &self.expansion
     }
 
     /// Where it is, for an engine that reads files by itself.
@@ -223,7 +253,12 @@ impl TraceFile {
         self.rows[row_group]
     }
 
-    /// The footer's key-value metadata.
+    /// Whether it has checksums.
+    pub fn checksums(&self) -> Checksums {
+        self.checksums
+    }
+
+    /// The footer's key-value metadata, without its checksums.
     pub(in crate::trace) fn pairs(&self) -> &[KeyValue] {
         &self.pairs
     }
@@ -249,26 +284,27 @@ impl TraceFile {
     }
 
     /// What a reader needs; strings are read as dictionaries. Read again unless somebody holds it.
-    pub(in crate::trace) fn footer(&self) -> Result<Arc<ArrowReaderMetadata>, Box<Finding>> {
+    pub(in crate::trace) fn footer(&self) -> Result<Arc<Readable>, Box<Finding>> {
         let mut held = self.footer.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(footer) = held.upgrade() {
             return Ok(footer);
         }
-        let metadata = self.footer_again(Extent::Pages)?;
+        let Footer { metadata, chunks, .. } = self.footer_again(Extent::Pages)?;
         let corrupt = |error| Box::new(Finding::new(Code::CorruptFooter, &self.name, "a readable schema", error));
-        let footer = Arc::new(readable(metadata, &self.columns).map_err(corrupt)?);
+        let footer = readable(metadata, &self.columns).map_err(corrupt)?;
+        let footer = Arc::new(Readable { footer, chunks });
         *held = Arc::downgrade(&footer);
         Ok(footer)
     }
 
     /// The footer once more.
-    pub(in crate::trace) fn footer_again(&self, extent: Extent) -> Result<ParquetMetaData, Box<Finding>> {
+    pub(in crate::trace) fn footer_again(&self, extent: Extent) -> Result<Footer, Box<Finding>> {
         let input = Input { name: self.name.clone(), ..Input::new(&self.path) };
-        let (bytes, metadata) = footer(&input, extent)?;
-        let columns = columns_of(&self.name, metadata.file_metadata().schema_descr()).ok();
-        let has_rows = metadata.row_groups().iter().map(rows_of).eq(self.rows.iter().copied());
-        if bytes == self.bytes && has_rows && columns.as_ref() == Some(&self.columns) {
-            return Ok(metadata);
+        let again = footer(&input, extent)?;
+        let columns = columns_of(&self.name, again.metadata.file_metadata().schema_descr()).ok();
+        let has_rows = again.metadata.row_groups().iter().map(rows_of).eq(self.rows.iter().copied());
+        if again.bytes == self.bytes && has_rows && columns.as_ref() == Some(&self.columns) {
+            return Ok(again);
         }
         let expected = "the file as it was when it was opened";
         Err(Box::new(Finding::new(Code::Unreadable, &self.name, expected, "another one in its place")))
@@ -300,7 +336,7 @@ fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding
 }
 
 /// The columns of the file, or that it has none that can be made out.
-fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
+pub(in crate::trace) fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
     let corrupt = |found| vec![Finding::new(Code::CorruptFooter, file, "a schema of known types", found)];
     let fields = contained(|| parquet_to_arrow_schema(descriptor, None))
         .map_err(corrupt)?
@@ -338,9 +374,14 @@ fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
 }
 
 fn check_columns(file: &str, columns: &[FileColumn], version: u32) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    for (i, column) in columns.iter().enumerate() {
-        if columns[..i].iter().filter(|before| before.name == column.name).count() == 1 {
+    if let Err(exceeded) = MOST_COLUMNS.check(columns.len() as u64) {
+        return vec![Finding::over_budget(file, &exceeded)];
+    }
+    let (mut findings, mut counts) = (Vec::new(), HashMap::new());
+    for column in columns {
+        let count = counts.entry(column.name.as_str()).or_insert(0);
+        *count += 1;
+        if *count == 2 {
             let finding = Finding::new(Code::RepeatedColumn, file, "one column of that name", "more than one");
             findings.push(finding.in_column(&column.name));
         }
@@ -369,7 +410,10 @@ fn check_columns(file: &str, columns: &[FileColumn], version: u32) -> Vec<Findin
 }
 
 /// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
-fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
+pub(in crate::trace) fn readable(
+    metadata: ParquetMetaData,
+    columns: &[FileColumn],
+) -> Result<ArrowReaderMetadata, String> {
     let make = || {
         let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
         let fields = plain_schema.fields().iter().zip(columns).map(|(field, column)| match column.kind {

@@ -13,12 +13,12 @@ use std::thread;
 
 use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Int32Type;
-use parquet::arrow::arrow_reader::ArrowReaderMetadata;
 
+use super::budget::LONGEST_EPISODE;
 use super::column::Column;
 use super::decode::{Ids, RowGroup, Rows};
 use super::episode_index::Ahead;
-use super::open::TraceFile;
+use super::open::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout};
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::error::TraceError;
@@ -195,7 +195,12 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
     fn split(&mut self, row_group: RowGroup<'_>) -> Result<(), Abandoned> {
         for rows in row_group {
             match rows {
-                Ok(rows) => self.add(&rows)?,
+                Ok(rows) => {
+                    self.add(&rows)?;
+                    if let Some(finding) = too_long(self.file, &self.open) {
+                        return self.send(Part::Fault(finding));
+                    }
+                }
                 Err(finding) => return self.send(Part::Fault(finding)),
             }
         }
@@ -273,7 +278,7 @@ struct Started<T> {
     job: Job,
     parts: Receiver<Part<T>>,
     /// Held, so that a file's footer is read once for all its row groups.
-    _footer: Option<Arc<ArrowReaderMetadata>>,
+    _footer: Option<Arc<Readable>>,
 }
 
 /// Puts the parts of the row groups together again, on the receiving thread.
@@ -329,7 +334,7 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
                     self.close()?;
                 }
                 self.open.extend(rows);
-                Ok(())
+                too_long(&self.files[self.file], &self.open).map_or(Ok(()), |finding| self.fail(finding))
             }
             Part::Whole(result) => {
                 self.close()?;
@@ -361,6 +366,14 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
             Err(why) => self.fail(unjoined(&self.files[self.file], &open, why)),
         }
     }
+}
+
+/// An episode that goes on for longer than it may.
+fn too_long(file: &TraceFile, open: &[Rows]) -> Option<Box<Finding>> {
+    let steps: usize = open.iter().map(Rows::len).sum();
+    let exceeded = LONGEST_EPISODE.check(steps as u64).err()?;
+    let finding = Finding::over_budget(file.name(), &exceeded).in_row_group(open.first()?.row_group);
+    Some(Box::new(finding))
 }
 
 /// One episode of these rows.

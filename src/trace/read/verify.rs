@@ -4,7 +4,7 @@ use std::io;
 
 use super::footer::plain;
 use super::open::{TraceFile, TraceSet};
-use super::pages::{FaultSlot, Place, Store, damaged, verify};
+use super::pages::{FaultSlot, Place, damaged, verify};
 use crate::trace::catch_panic::contained;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::error::TraceError;
@@ -14,20 +14,22 @@ use crate::trace::error::TraceError;
 /// # Errors
 /// The first page that contradicts its checksum or the footer, by file, row group and column.
 pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {
-    set.files().iter().try_for_each(|file| verify_file(file).map_err(|finding| TraceError::from(*finding)))
+    set.files().iter().try_for_each(|file| verify_columns(file, |_| true).map_err(|finding| TraceError::from(*finding)))
 }
 
-fn verify_file(file: &TraceFile) -> Result<(), Box<Finding>> {
-    let footer = file.footer()?;
+/// The same for the columns of one file whose names are wanted.
+pub(in crate::trace) fn verify_columns(file: &TraceFile, is_wanted: impl Fn(&str) -> bool) -> Result<(), Box<Finding>> {
+    let readable = file.footer()?;
     let unreadable = |error: io::Error| {
         Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
     };
-    let store = Store::File(file.reader().map_err(unreadable)?);
-    let metadata = footer.metadata();
+    let store = file.store().map_err(unreadable)?;
+    let (metadata, checksums) = (readable.footer.metadata(), &readable.chunks);
     for (row_group, group) in metadata.row_groups().iter().enumerate() {
-        for column in 0..group.num_columns() {
+        let wanted = |column: &usize| is_wanted(&group.column(*column).column_path().parts()[0]);
+        for column in (0..group.num_columns()).filter(wanted) {
             let slot = FaultSlot::default();
-            let walked = contained(|| verify(&store, Place { metadata, row_group, column }, &slot));
+            let walked = contained(|| verify(&store, Place { metadata, checksums, row_group, column }, &slot));
             if let Err(error) = walked.and_then(|walked| walked.map_err(|error| plain(&error))) {
                 return Err(Box::new(damaged(file.name(), &slot, &error).in_row_group(row_group)));
             }

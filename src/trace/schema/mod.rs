@@ -125,7 +125,17 @@ pub const COLUMNS: &[Column] = &[
     )
     .since(2),
     constant!(participant, String, "The code of the person who played, where one did; no personal data.").since(2),
-    constant!(episode_hash, String, "SHA-256 of the rows of the episode; the same in its log.").since(2),
+    constant!(
+        episode_hash,
+        String,
+        "The hash of the rows of the episode, the same in its log. SHA-256 of lines, each closed by a line feed. First \
+         `mirrorstats.episode 1`. Then, for each column of the schema that has a value in the episode, by name, without `t` \
+         and `episode_hash`: `column NAME`, and a line for each run of equal values, `COUNT VALUE`. A value is `null`, \
+         `true` or `false`, a decimal integer, a float as the 16 lower-case hexadecimal digits of its 64 bits (IEEE 754), or \
+         a text as the number of its bytes in UTF-8, a colon, and the text. `self_color` counts as null in rows with an \
+         `identification`, from which `renormalize` derives it."
+    )
+    .since(2),
     constant!(start_distance, Int32, "Manhattan distance from the hand to its target at the start (reaching tasks).")
         .unit("mm")
         .since(2),
@@ -258,8 +268,11 @@ pub const METADATA: &[MetadataKey] = &[
     },
     MetadataKey {
         key: CHECKSUMS_KEY,
-        doc: "CRC-32C of each column chunk over its raw bytes, page headers included, and of schema, offsets and the \
-              other footer keys: a JSON object. Verified where it is there.",
+        doc: "CRC-32 of each column chunk over its raw bytes, page headers included, and of all behind the chunks, a JSON \
+              object: `algorithm`; `created_by`, that of the footer to which they apply, as programs that write a file \
+              again carry the key along; `chunks`, a list per row group of a checksum per column; `footer`, that of the \
+              bytes from the end of the last chunk to the end of the footer, its own eight digits as zeros. Verified \
+              where it applies.",
     },
 ];
 

@@ -1,9 +1,11 @@
 //! Checks traces against every rule of the schema and reports all that is wrong, not only the first fault.
 //!
-//! A damaged file does not keep the others from being checked. Columns that the schema does not know are not read.
+//! A damaged file does not keep the others from being checked. Columns that the schema does not know are not decoded; their
+//! pages and checksums are checked like all others.
 
 pub(in crate::trace) mod color_set;
 pub(in crate::trace) mod duplicate_ids;
+pub(in crate::trace) mod episode_hashes;
 pub(in crate::trace) mod rules;
 
 use std::num::NonZeroUsize;
@@ -12,14 +14,16 @@ use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::checksums::Checksums;
 use super::diagnostic::{Code, Finding, Severity};
 use super::error::TraceError;
 use super::inputs::Input;
 use super::read::open::{TraceFile, TraceSet};
 use super::read::parallel_scan::{Episodes, Event, pass};
 use super::read::projection::Layout;
+use super::read::verify::verify_columns;
 use super::replies::{REPLY_STATUS, ReplyCounts};
-use super::schema::COLUMNS;
+use super::schema::{self, COLUMNS};
 use color_set::{Tally, sightings};
 use duplicate_ids::{Ids, Start, starts};
 use rules::{Located, Rules};
@@ -125,12 +129,28 @@ pub fn validate(
             }
         }
     })?;
+    for (file, place) in set.files().iter().zip(&places) {
+        if report.files[*place].complete
+            && let Err(finding) = verify_columns(file, |name| schema::column(name).is_none())
+        {
+            report.files[*place].complete = false;
+            found[*place].push(*finding);
+        }
+        found[*place].extend(stale(file));
+    }
     for ((found, input), replies) in found.iter_mut().zip(inputs).zip(replies) {
         // A status that the schema does not know is a finding already.
         found.extend(unreadable(&input.name, &replies.of_known_statuses()));
     }
     report.findings = found.into_iter().flatten().collect();
     Ok(report)
+}
+
+/// A note for a file whose checksums are another file's.
+fn stale(file: &TraceFile) -> Option<Finding> {
+    let expected = format!("a footer whose `created_by` is that of its `{}`", schema::CHECKSUMS_KEY);
+    let found = "another program's: the checksums are not looked at";
+    (file.checksums() == Checksums::Stale).then(|| Finding::new(Code::StaleChecksums, file.name(), expected, found))
 }
 
 /// These experiments, and those that the files declare.
@@ -175,6 +195,7 @@ fn check_rows(
     let work = |episodes: Episodes| {
         let mut found = rules.check(&set.files()[episodes.file], &episodes);
         found.extend(split(&name(episodes.file), &episodes));
+        found.extend(episode_hashes::check(&set.files()[episodes.file], &layout, &episodes));
         let checked = Checked {
             findings: Vec::new(),
             episodes: episodes.len() as u64,

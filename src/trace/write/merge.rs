@@ -2,28 +2,31 @@
 //!
 //! Rule: the same episodes in the same order give the same bytes, whatever files they came from.
 
-use std::fs::File;
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
-use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch, StringArray};
 use arrow::compute::{cast, concat_batches};
-use arrow::datatypes::{DataType, Int64Type, SchemaRef};
+use arrow::datatypes::{DataType, Int64Type, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
-use parquet::file::metadata::ParquetMetaData;
 
 use super::decode_episode::{self, NotAnEpisode};
+use crate::base::input;
 use crate::base::replace::{self, NewFile};
 use crate::trace::catch_panic::contained;
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::episode::Episode;
+use crate::trace::episode_hash::{self, EPISODE_HASH};
 use crate::trace::error::TraceError;
 use crate::trace::inputs::Input;
+use crate::trace::read::budget::Expansion;
 use crate::trace::read::footer::bounds;
-use crate::trace::read::footer::{Extent, footer, plain};
+use crate::trace::read::footer::{Extent, Footer, footer, plain};
 use crate::trace::read::open::is_nested;
 use crate::trace::read::pages::{FaultSlot, Library, Store, damaged};
-use crate::trace::write::row_groups::{Gathered, RowGroups};
+use crate::trace::schema::{self, COLUMNS};
+use crate::trace::write::row_groups::{Gathered, RowGroups, field};
 use crate::trace::write::{self, OptionalColumns};
 
 /// Rows that are decoded at a time.
@@ -71,7 +74,33 @@ impl EpisodeRows {
             }
         }
         let rows = RecordBatch::try_new(schema, arrays).map_err(|error| unreadable(&self.episode_id, error.into()))?;
-        Ok(Self { rows, ..self.clone() })
+        let changed = Self { rows, ..self.clone() };
+        if self.rows.column_by_name(EPISODE_HASH).is_some() { changed.hashed() } else { Ok(changed) }
+    }
+
+    /// The hash that the rows carry; `None` where they carry none.
+    pub fn stated_hash(&self) -> Option<String> {
+        let hashes = cast(self.rows.column_by_name(EPISODE_HASH)?, &DataType::Utf8).ok()?;
+        let first = hashes.as_string::<i32>().iter().next().flatten();
+        first.map(str::to_owned)
+    }
+
+    /// The same rows with the hash that they have, in the column's place among those of the schema.
+    fn hashed(&self) -> Result<Self, TraceError> {
+        let hash = episode_hash::of(&self.episode().map_err(|fault| unreadable(&self.episode_id, fault.into()))?);
+        let about = schema::column(EPISODE_HASH).expect("the schema has the column");
+        let hash: ArrayRef = Arc::new(StringArray::from(vec![hash; self.len()]));
+        let (mut fields, mut arrays) = (self.rows.schema().fields().to_vec(), self.rows.columns().to_vec());
+        let rank = |name: &str| COLUMNS.iter().position(|column| column.name == name);
+        let place = fields.iter().position(|field| rank(field.name()) >= rank(EPISODE_HASH)).unwrap_or(fields.len());
+        if fields.get(place).is_some_and(|field| field.name() == EPISODE_HASH) {
+            fields.remove(place);
+            arrays.remove(place);
+        }
+        fields.insert(place, Arc::new(field(about)));
+        arrays.insert(place, hash);
+        let rows = RecordBatch::try_new(Arc::new(Schema::new(fields)), arrays);
+        Ok(Self { rows: rows.map_err(|error| unreadable(&self.episode_id, error.into()))?, ..self.clone() })
     }
 
     /// Whether there is no step, which no episode of a file has.
@@ -87,16 +116,16 @@ impl EpisodeRows {
 pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     let name = path.display().to_string();
     let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
-    let file = File::open(path).map_err(|error| unreadable(&name, error.into()))?;
-    let (bytes, metadata) = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
-    match bounds::fault(&name, bytes, &metadata) {
+    let file = input::open(path).map_err(|error| unreadable(&name, error.into()))?;
+    let footer = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
+    match bounds::fault(&name, footer.bytes, &footer.metadata) {
         // Whoever puts traces together takes one without rows as it is.
         Some(fault) if fault.code != Code::NoEpisodes => Err(damaged(fault)),
-        _ => decode(&name, file, metadata),
+        _ => decode(&name, Store::new(file, Arc::new(Expansion::new(footer.bytes))), footer),
     }
 }
 
-fn decode(name: &str, file: File, metadata: ParquetMetaData) -> Result<Vec<EpisodeRows>, TraceError> {
+fn decode(name: &str, store: Store, Footer { metadata, chunks, .. }: Footer) -> Result<Vec<EpisodeRows>, TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
     let columns = metadata.file_metadata().schema_descr().columns();
     if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
@@ -105,8 +134,8 @@ fn decode(name: &str, file: File, metadata: ParquetMetaData) -> Result<Vec<Episo
     contained(|| {
         let row_groups = (0..metadata.num_row_groups()).collect();
         let slot = FaultSlot::default();
-        let library =
-            Library { store: Store::File(file), metadata: Arc::new(metadata), row_groups, slot: Arc::clone(&slot) };
+        let (metadata, kept) = (Arc::new(metadata), Arc::clone(&slot));
+        let library = Library { store, metadata, checksums: chunks, row_groups, slot: kept, writes_out: true };
         let damaged = |error: String| failed(damaged(name, &slot, &error).to_string().into());
         let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, None);
         let batches = reader.map_err(|error| damaged(plain(&error)))?.collect::<Result<Vec<_>, _>>();
@@ -189,14 +218,24 @@ pub fn write_in(
         file: path.display().to_string(),
         source,
     };
+    let episodes = alike(episodes)?;
     let Some(first) = episodes.first() else { return Err(failed("there is no episode to write".into())) };
     let schema = first.rows.schema();
     if let Some(other) = episodes.iter().find(|episode| !same_columns(&schema, &episode.rows.schema())) {
         return Err(failed(format!("`{}` has other columns than `{}`", other.episode_id, first.episode_id).into()));
     }
     let file = NewFile::create_in(scratch, path).map_err(|error| failed(error.into()))?;
-    let file = encode(file, &schema, recording, episodes).map_err(|error| failed(error.into()))?;
+    let file = encode(file, &schema, recording, &episodes).map_err(|error| failed(error.into()))?;
     file.commit().map_err(|error| failed(error.into()))
+}
+
+/// Episodes of earlier versions, which had no hash, get it where others have it.
+fn alike(episodes: &[EpisodeRows]) -> Result<Cow<'_, [EpisodeRows]>, TraceError> {
+    let has_hash = |episode: &EpisodeRows| episode.rows.column_by_name(EPISODE_HASH).is_some();
+    if episodes.iter().all(has_hash) || !episodes.iter().any(has_hash) {
+        return Ok(Cow::Borrowed(episodes));
+    }
+    episodes.iter().map(|episode| if has_hash(episode) { Ok(episode.clone()) } else { episode.hashed() }).collect()
 }
 
 fn same_columns(a: &SchemaRef, b: &SchemaRef) -> bool {

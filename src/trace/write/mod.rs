@@ -1,7 +1,8 @@
 //! Writes traces: whole episodes into row groups, and a file that appears whole or not at all.
 //!
 //! Rule: what this writer makes passes `validate` without a note, and the same episodes give the same bytes. A palette that
-//! the recording declares holds for what is written, too.
+//! the recording declares holds for what is written, too. An `episode_hash` is made here, whatever an episode
+//! that has one says.
 //! The optional columns of a file are declared when it is created, so that memory stays flat; a value for a
 //! column that was not declared is refused, never dropped.
 
@@ -14,10 +15,12 @@ use std::collections::HashSet;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use arrow::datatypes::SchemaRef;
 use parquet::errors::ParquetError;
 
 use self::row_groups::{Gathered, RowGroups};
 use super::episode::Episode;
+use super::episode_hash::{self, EPISODE_HASH};
 use super::error::TraceError;
 use super::schema::colors::palette::{Declared, Palette};
 use super::schema::rules::{Known, Requirement, Rule, rules_of};
@@ -39,16 +42,8 @@ pub struct TraceMetadata {
 pub struct OptionalColumns(Vec<&'static Column>);
 
 /// Columns that no recording of the five experiments gives.
-const OF_OTHER_TASKS: [&str; 8] = [
-    "participant",
-    "episode_hash",
-    "start_distance",
-    "shown_color",
-    "mark_color",
-    "mark_report",
-    "mirror_mark_px",
-    "target_distance",
-];
+const OF_OTHER_TASKS: [&str; 7] =
+    ["participant", "start_distance", "shown_color", "mark_color", "mark_report", "mirror_mark_px", "target_distance"];
 
 impl OptionalColumns {
     /// No optional column.
@@ -101,6 +96,9 @@ impl OptionalColumns {
     }
 }
 
+/// What starts the file of a trace.
+type Make<W> = fn(W, &SchemaRef, Option<&serde_json::Value>) -> parquet::errors::Result<RowGroups<W>>;
+
 /// Encodes episodes as a trace into anything that bytes can be written to.
 pub struct TraceEncoder<W: Write + Send> {
     file: RowGroups<W>,
@@ -117,11 +115,23 @@ impl<W: Write + Send> TraceEncoder<W> {
     /// # Errors
     /// For a `palette` of the recording that is no list of colours, and whatever writing gives.
     pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        Self::with(RowGroups::new, out, metadata)
+    }
+
+    /// Starts a trace without checksums: the bytes that versions before them gave.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn without_checksums(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        Self::with(RowGroups::without_checksums, out, metadata)
+    }
+
+    fn with(make: Make<W>, out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let recording = metadata.recording.as_ref().map(ToString::to_string);
         let palette = Declared::of("stream", recording.as_deref()).map_err(|finding| *finding)?.palette;
         let (columns, undeclared) = metadata.columns.split();
         let gathered = Gathered::of_columns(columns.iter().copied());
-        let file = RowGroups::new(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
+        let file = make(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
         Ok(Self { file, columns, gathered, undeclared, palette, seen: HashSet::new() })
     }
 
@@ -156,10 +166,13 @@ fn shows_another_color(panes: &serde_json::Value) -> bool {
     colors.into_iter().any(|color| color != "own")
 }
 
-/// Adds the rows of an episode.
+/// Adds the rows of an episode, with the hash that they have where the episode is to have one.
 fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episode) {
     for (column, values) in columns.iter().zip(&mut gathered.columns) {
+        let is_hash = column.name == EPISODE_HASH && episode.episode_hash.is_some();
+        let hash = is_hash.then(|| episode_hash::of(episode));
         for value in column.of_steps(episode) {
+            let value = hash.as_deref().map(Value::Text).or(value);
             values.push(value).expect("a field gives values of its column's type");
         }
     }

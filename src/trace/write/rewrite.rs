@@ -18,11 +18,13 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{SchemaDescriptor, Type, TypePtr};
 
 use crate::trace::catch_panic::contained;
+use crate::trace::checksums::{self, CREATED_BY, Held};
 use crate::trace::error::TraceError;
 use crate::trace::read::decode::RowGroup;
 use crate::trace::read::footer::Extent;
 use crate::trace::read::open::{TraceFile, TraceSet};
 use crate::trace::read::projection::{Layout, T};
+use crate::trace::read::verify::verify_pages;
 use crate::trace::schema::RECORDING_KEY;
 
 /// What a text is made anew from: the episode's id, the timestep, the text to look at, and the text as it is.
@@ -32,7 +34,7 @@ pub(in crate::trace) type Before<'a> = (&'a str, i64, Option<&'a str>, Option<&'
 /// column `source`, and with this recording.
 ///
 /// # Errors
-/// A column that is not there or no text, data that does not decode, whatever writing gives.
+/// A column that is not there or no text, data that does not decode or contradicts its checksum, whatever writing gives.
 pub(in crate::trace) fn rewrite<W: Write + Send>(
     set: &TraceSet,
     [source, target]: [&str; 2],
@@ -42,10 +44,12 @@ pub(in crate::trace) fn rewrite<W: Write + Send>(
 ) -> Result<W, TraceError> {
     let layout = Layout::new(set, [source, target], [])?;
     let [file] = set.files() else { return Err(unwritable("the trace", "there is not exactly one".into())) };
+    // What is copied gets new checksums, which must not stand for damaged bytes.
+    verify_pages(set)?;
     let failed = |error: ParquetError| unwritable(file.name(), error.into());
-    let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?;
+    let metadata = file.footer_again(Extent::Whole).map_err(|finding| TraceError::from(*finding))?.metadata;
     let schema = with_text(metadata.file_metadata().schema_descr(), target).map_err(failed)?;
-    let mut writer = SerializedFileWriter::new(out, schema, properties(file, recording)).map_err(failed)?;
+    let mut writer = SerializedFileWriter::new(Held::new(out), schema, properties(file, recording)).map_err(failed)?;
     let input = file.reader().map_err(|source| TraceError::Read { what: file.name().to_owned(), source })?;
     for row_group in 0..file.row_groups() {
         let texts = texts(file, &layout, [source, target], row_group, &mut change)?;
@@ -53,8 +57,9 @@ pub(in crate::trace) fn rewrite<W: Write + Send>(
         let mut group = writer.next_row_group().map_err(failed)?;
         copy(&mut group, chunks, &input, target, &texts).map_err(failed)?;
         group.close().map_err(failed)?;
+        checksums::pass_on(&mut writer).map_err(failed)?;
     }
-    writer.into_inner().map_err(failed)
+    checksums::finish(writer).map_err(failed)
 }
 
 /// The new texts of a row group.
@@ -143,6 +148,7 @@ fn properties(file: &TraceFile, recording: &serde_json::Value) -> WriterProperti
     }
     let properties = WriterProperties::builder()
         .set_key_value_metadata(Some(pairs))
+        .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         // Chunks that are copied have no page index here, and a file has one for all columns or for none.
         .set_statistics_enabled(EnabledStatistics::Chunk)

@@ -1,4 +1,6 @@
 //! Rows on their way into the row groups of a file: gathered column by column, an episode never in two row groups.
+//!
+//! Rule: every trace gets its checksums here or in `rewrite`, but for those that are to be the bytes of an earlier version.
 
 use std::io::Write;
 use std::sync::Arc;
@@ -12,8 +14,9 @@ use parquet::arrow::arrow_writer::ArrowWriterOptions;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::Result;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
+use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 
+use crate::trace::checksums::{self, CREATED_BY, Held};
 use crate::trace::schema::{self, Column, Kind, Stored, Value};
 
 /// Rows after which a row group is closed, at the next end of an episode.
@@ -23,7 +26,8 @@ const GATHERED_ROWS: usize = 8 * 1024;
 
 /// A file that is being written.
 pub(in crate::trace) struct RowGroups<W: Write + Send> {
-    parquet: ArrowWriter<W>,
+    parquet: ArrowWriter<Held<W>>,
+    has_checksums: bool,
     /// Rows of the row group under way.
     rows: usize,
 }
@@ -48,10 +52,24 @@ pub(in crate::trace) enum Values {
 impl<W: Write + Send> RowGroups<W> {
     /// Starts a file of these columns.
     pub(in crate::trace) fn new(out: W, layout: &SchemaRef, recording: Option<&serde_json::Value>) -> Result<Self> {
+        let properties = properties(layout, recording).set_created_by(CREATED_BY.to_owned()).build();
+        Self::with(properties, out, layout, true)
+    }
+
+    /// The same without checksums.
+    pub(in crate::trace) fn without_checksums(
+        out: W,
+        layout: &SchemaRef,
+        recording: Option<&serde_json::Value>,
+    ) -> Result<Self> {
+        Self::with(properties(layout, recording).build(), out, layout, false)
+    }
+
+    fn with(properties: WriterProperties, out: W, layout: &SchemaRef, has_checksums: bool) -> Result<Self> {
         // Parquet's own logical types say all of it; an embedded Arrow schema would only pin one library's view.
-        let options =
-            ArrowWriterOptions::new().with_properties(properties(layout, recording)).with_skip_arrow_metadata(true);
-        Ok(Self { parquet: ArrowWriter::try_new_with_options(out, Arc::clone(layout), options)?, rows: 0 })
+        let options = ArrowWriterOptions::new().with_properties(properties).with_skip_arrow_metadata(true);
+        let parquet = ArrowWriter::try_new_with_options(Held::new(out), Arc::clone(layout), options)?;
+        Ok(Self { parquet, has_checksums, rows: 0 })
     }
 
     /// Says that an episode ends with what is gathered; it is encoded where it is much.
@@ -66,6 +84,9 @@ impl<W: Write + Send> RowGroups<W> {
         self.rows += rows.num_rows();
         if self.rows >= ROW_GROUP_ROWS {
             self.parquet.flush()?;
+            self.parquet.sync()?;
+            let closed = self.parquet.flushed_row_groups()[self.parquet.inner().row_groups()..].to_vec();
+            self.parquet.inner_mut().pass_on(&closed)?;
             self.rows = 0;
         }
         Ok(())
@@ -76,7 +97,11 @@ impl<W: Write + Send> RowGroups<W> {
         if let Some(mut gathered) = gathered.filter(|gathered| gathered.rows > 0) {
             self.parquet.write(&gathered.take()?)?;
         }
-        self.parquet.into_inner()
+        if self.has_checksums {
+            checksums::finish(self.parquet.into_serialized_writer()?.0)
+        } else {
+            self.parquet.into_inner()?.release()
+        }
     }
 }
 
@@ -86,7 +111,7 @@ fn version(layout: &Schema) -> u32 {
     known.map(|column| column.since).max().unwrap_or(1)
 }
 
-fn properties(layout: &Schema, recording: Option<&serde_json::Value>) -> WriterProperties {
+fn properties(layout: &Schema, recording: Option<&serde_json::Value>) -> WriterPropertiesBuilder {
     let pair = |key: &str, value: String| KeyValue::new(key.to_owned(), value);
     let mut pairs = vec![
         pair(schema::VERSION_KEY, version(layout).to_string()),
@@ -98,7 +123,6 @@ fn properties(layout: &Schema, recording: Option<&serde_json::Value>) -> WriterP
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         // Row groups end where an episode does, never at a number of rows.
         .set_max_row_group_row_count(None)
-        .build()
 }
 
 impl Gathered {

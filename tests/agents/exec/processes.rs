@@ -1,12 +1,12 @@
 //! Programs as processes: one an episode, and none of them is there afterwards.
 
 use std::fs;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::recordings::{Bench, outcome, three_steps};
-use crate::harness::program::{interrupt, wait_for};
+use crate::harness::program::{interrupt, stderr, succeeds, wait_for};
 
 /// Waits until a file has so many lines, and gives them.
 fn lines(bench: &Bench, name: &str, count: usize) -> Vec<String> {
@@ -92,6 +92,47 @@ fn ctrl_c_ends_programs_with_the_steps_under_way_and_twice_at_once() {
     }
     let ends: Vec<_> = bench.heard().into_iter().filter(|line| line["kind"] == "end").collect();
     assert_eq!((ends.len(), &ends[0]["reason"]), (1, &"stopped".into()));
+}
+
+/// Recordings that are interrupted again and again while their renderer draws: the second time ends each at once, with the
+/// code of an interruption, and without what the exit handlers of a renderer in use have to say.
+fn check_twice(rounds: u64) {
+    let bench = Bench::new();
+    // Programs are there before the first frame is drawn, and never answer.
+    fs::write(bench.path("program.sh"), "echo $$ >> ids; sleep 600").unwrap();
+    for round in 0..rounds {
+        let _ = fs::remove_file(bench.path("ids"));
+        let mut command = bench.record(&["--runs", "4", "--threads", "1", "--in-flight", "4"]);
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        lines(&bench, "ids", 1);
+        sleep(Duration::from_millis(round % 10 * 4));
+        let pause = ["0.003", "0.006", "0.009", "0.012"][usize::try_from(round % 4).unwrap()];
+        let twice = ["-c", "kill -INT $0; sleep $1; kill -INT $0", &child.id().to_string(), pause];
+        succeeds(Command::new("sh").args(twice));
+        // Two that come in one moment are one to the system.
+        let begin = Instant::now();
+        while child.try_wait().unwrap().is_none() {
+            sleep(Duration::from_millis(30));
+            interrupt(&child);
+            assert!(begin.elapsed() < Duration::from_mins(1), "round {round}: a step that hangs is waited for");
+        }
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(130), "round {round}: {}: {}", output.status, stderr(&output));
+        let ids: Vec<String> = fs::read_to_string(bench.path("ids")).unwrap().lines().map(str::to_owned).collect();
+        assert!(are_gone(&ids), "round {round}");
+        let _ = fs::remove_dir_all(bench.path("runs"));
+    }
+}
+
+#[test]
+fn a_second_ctrl_c_ends_a_recording_that_draws() {
+    check_twice(12);
+}
+
+#[test]
+#[ignore = "soak: 200 recordings, interrupted twice each"]
+fn soak_a_second_ctrl_c_ends_a_recording_that_draws() {
+    check_twice(200);
 }
 
 #[test]

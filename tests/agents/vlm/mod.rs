@@ -7,6 +7,8 @@ mod keys;
 mod killed;
 mod languages;
 mod memory;
+#[cfg(target_os = "linux")]
+mod power;
 mod reach;
 mod recordings;
 mod refusals;

@@ -2,6 +2,7 @@
 
 mod cuts;
 mod damage;
+mod hashes;
 mod lengths;
 mod logs;
 mod whole;

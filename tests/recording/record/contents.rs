@@ -31,7 +31,6 @@ fn rows_follow_from_one_another() {
     let left_out: Vec<&str> = COLUMNS.iter().map(|column| column.name).filter(|name| !known.contains(name)).collect();
     let expected = [
         "participant",
-        "episode_hash",
         "start_distance",
         "shown_color",
         "reply_repair",

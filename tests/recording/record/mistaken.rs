@@ -133,9 +133,9 @@ fn files_that_are_no_experiments() {
 
     let unreadable = |expected: &str| refused(folder, &["cannot read the experiment file `mine.toml`", expected]);
     fs::write(&place, format!("{HEAD}mirror = [{}]\n", "{},".repeat(1_000_000))).unwrap();
-    unreadable("longer than 1048576 bytes");
+    unreadable("at most 1048576 bytes of an experiment file");
     fs::write(&place, b"[experiment.mine]\ntitle = \"\xff\xfe\"\n").unwrap();
-    unreadable("expected UTF-8 text");
+    unreadable("expected text in UTF-8, found the byte 0xff");
     fs::remove_file(&place).unwrap();
     unreadable("No such file");
     fs::create_dir(&place).unwrap();

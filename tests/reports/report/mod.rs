@@ -5,3 +5,4 @@ mod compare;
 mod published;
 mod styles;
 mod tables;
+mod verify;

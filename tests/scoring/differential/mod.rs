@@ -1,6 +1,6 @@
 //! Two engines that share no code: the kernels, and the SQL lowering on Polars. They must agree on every integer of
 //! every episode, or refuse alike.
 
-mod property;
-mod trace;
-mod words;
+pub mod property;
+pub mod trace;
+pub mod words;

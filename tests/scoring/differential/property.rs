@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 
 use mirrorstats::engine::polars::run::PolarsError;
 use mirrorstats::engine::polars::score;
-use mirrorstats::metric::columns::{Column, Level, Type};
+use mirrorstats::metric::columns::{Column, Columns, Level, Type};
 use mirrorstats::metric::definitions::Definitions;
 use mirrorstats::metric::sql::{self, Dialect};
 use mirrorstats::score::error::EngineError;
@@ -55,8 +55,8 @@ fn polars(traces: &TraceSet, definitions: &Definitions) -> Result<Answer, String
     }
 }
 
-/// The definitions over these traces; a column that no file has is null all the same.
-fn load(traces: &TraceSet, text: &str) -> Definitions {
+/// The columns of these traces; one that no file has is null all the same.
+pub fn columns(traces: &TraceSet) -> Columns {
     // Any column is compared with any text.
     let mut columns = score_traces::trace_columns(traces).with_values::<String>([]);
     for (name, ty) in [
@@ -68,7 +68,12 @@ fn load(traces: &TraceSet, text: &str) -> Definitions {
     ] {
         columns.set_own(name, Column { ty, level: Level::Step });
     }
-    Definitions::from_toml("random", text, &columns).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
+    columns
+}
+
+/// The definitions over these traces.
+pub fn load(traces: &TraceSet, text: &str) -> Definitions {
+    Definitions::from_toml("random", text, &columns(traces)).unwrap_or_else(|faults| panic!("{faults}\n{text}"))
 }
 
 /// Whether both engines come to the same, all metrics at once; metric by metric where they refuse.

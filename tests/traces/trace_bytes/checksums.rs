@@ -24,7 +24,7 @@ fn fixture(name: &str) -> Vec<u8> {
 }
 
 /// The episode table of a file as CSV, if it can be read.
-fn scores(path: &Path) -> Result<Vec<u8>, String> {
+pub(super) fn scores(path: &Path) -> Result<Vec<u8>, String> {
     let traces = TraceSet::open(&[Input::new(path)]).map_err(|error| error.to_string())?;
     let definitions = score_traces::definitions(&traces, &Request::of("paper")).map_err(|error| error.to_string())?;
     let table =
@@ -45,7 +45,7 @@ fn verified(path: &Path) -> Result<(), Box<Finding>> {
 }
 
 /// Numbers in an order of their own, the same ones at every run.
-fn draws(count: usize, below: usize) -> impl Iterator<Item = usize> {
+pub(super) fn draws(count: usize, below: usize) -> impl Iterator<Item = usize> {
     let mut state = 0x2545_f491_4f6c_dd1d_u64;
     (0..count).map(move |_| {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -21,11 +21,14 @@ use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, Write
 use crate::harness::traces::{self, reader};
 
 mod checksums;
+mod flips;
 #[cfg(unix)]
 mod hostile;
 mod levels;
 mod oracle;
+mod own_checksums;
 mod pages;
+mod texts;
 
 fn episodes() -> Vec<Episode> {
     let step = |t: usize| Step {
@@ -41,10 +44,17 @@ fn episodes() -> Vec<Episode> {
 }
 
 fn trace() -> Vec<u8> {
-    let columns = OptionalColumns::used_by(&episodes());
-    let mut encoder = TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns }).unwrap();
-    for episode in episodes() {
-        encoder.write(&episode).unwrap();
+    trace_of(&episodes())
+}
+
+fn trace_of(episodes: &[Episode]) -> Vec<u8> {
+    let columns = OptionalColumns::used_by(episodes);
+    encoded(TraceEncoder::new(Vec::new(), &TraceMetadata { recording: None, columns }).unwrap(), episodes)
+}
+
+fn encoded(mut encoder: TraceEncoder<Vec<u8>>, episodes: &[Episode]) -> Vec<u8> {
+    for episode in episodes {
+        encoder.write(episode).unwrap();
     }
     encoder.finish().unwrap()
 }
@@ -68,8 +78,12 @@ fn foreign(folder: &Path) -> Vec<u8> {
 
 /// The same rows with these properties, every column of which may be null.
 fn stored(folder: &Path, properties: WriterPropertiesBuilder) -> Vec<u8> {
+    stored_as(folder, &trace(), properties)
+}
+
+fn stored_as(folder: &Path, trace: &[u8], properties: WriterPropertiesBuilder) -> Vec<u8> {
     let path = folder.join("whole.parquet");
-    fs::write(&path, trace()).unwrap();
+    fs::write(&path, trace).unwrap();
     let reader = reader(&path);
     let fields = reader.schema().fields().iter().map(|field| field.as_ref().clone().with_nullable(true));
     let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));

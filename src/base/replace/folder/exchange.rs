@@ -13,11 +13,11 @@ use super::super::place::{folder_of, sync_folder};
 use super::platform;
 use super::stage::{FolderFiles, Stage, old_files, step};
 
-/// Replaces the files of the existing folder `out`.
+/// Replaces the files of the existing folder `out`. The result within tells whether their names are on the disk.
 ///
 /// # Errors
 /// When that is impossible; nothing has changed then.
-pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<()> {
+pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<io::Result<()>> {
     check(out)?;
     let stage = Stage::beside(out)?;
     stage.write(files, out).map_err(|error| error.source)?;
@@ -30,12 +30,16 @@ pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<()> {
     step();
     platform::exchange(stage.path(), out)?;
     // From here on the new files are there, and errors are no reason to replace them again.
-    let _ = sync_folder(folder_of(out));
+    let synced = sync_folder(folder_of(out));
     step();
     // Whatever others put into the old folder in the meantime.
     let _ = link_others(stage.path(), out, files);
     step();
-    Ok(())
+    if synced.is_err() {
+        // After a loss of power the old folder may have its name again, and must have its files then.
+        stage.keep();
+    }
+    Ok(synced)
 }
 
 /// That the folder can be exchanged.

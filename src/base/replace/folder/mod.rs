@@ -14,7 +14,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::leftover;
-use super::place::{folder_of, prefix_for, sync_folder};
+use super::place::{folder_of, make_folder, sync_folder};
 pub use stage::{FolderError, FolderFiles};
 use stage::{Stage, step};
 
@@ -28,8 +28,8 @@ pub fn replace_folder(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
     // Without the slash at the end of `link/`, which would lead through the link.
     let out: &Path = &out.components().collect::<PathBuf>();
     let parent = folder_of(out);
-    fs::create_dir_all(parent).map_err(FolderError::at(parent))?;
-    leftover::remove(parent, &prefix_for(out));
+    make_folder(parent).map_err(FolderError::at(parent))?;
+    leftover::sweep(parent);
     if !out.exists() {
         match create(out, files) {
             Err(error) if is_taken(&error.source) => {}
@@ -37,9 +37,9 @@ pub fn replace_folder(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderE
         }
     }
     check_room(out, files)?;
-    leftover::remove(out, &prefix_for(files.index));
+    leftover::sweep(out);
     match exchange::replace(out, files) {
-        Ok(()) => Ok(()),
+        Ok(synced) => synced.map_err(FolderError::at(out)),
         // Whatever was in the way, nothing has changed yet; if it is in the way of this too, its error is the one to tell.
         Err(_) => in_place::replace(out, files),
     }

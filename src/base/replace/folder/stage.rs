@@ -5,11 +5,8 @@ use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Component, Path, PathBuf};
 
-use tempfile::TempDir;
-
-use super::super::error::without_name;
-use super::super::leftover;
 use super::super::place::{folder_of, prefix_for, sync_folder};
+use super::super::temporary::TemporaryFolder;
 
 /// A file in a folder without an index that lists what the next attempt replaces or removes.
 pub(super) const NOTE: &str = ".mirrorstats-unfinished";
@@ -37,15 +34,12 @@ pub struct FolderError {
 impl FolderError {
     pub(super) fn at(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
-        move |source| Self { path, source: without_name(source) }
+        move |source| Self { path, source }
     }
 }
 
-/// A temporary folder, locked for as long as it is open and removed when dropped.
-pub(super) struct Stage {
-    folder: TempDir,
-    _lock: Option<File>,
-}
+/// A temporary folder that new files are written into.
+pub(super) struct Stage(TemporaryFolder);
 
 impl Stage {
     /// One that may take the place of `out`.
@@ -55,32 +49,17 @@ impl Stage {
 
     /// One in `parent`, named after `target`.
     pub(super) fn create(parent: &Path, target: &Path) -> io::Result<Self> {
-        loop {
-            let mut builder = tempfile::Builder::new();
-            let prefix = prefix_for(target);
-            builder.prefix(&prefix);
-            #[cfg(unix)]
-            {
-                use std::os::unix::fs::PermissionsExt as _;
-                // The process's umask takes away from these, as with any other folder.
-                builder.permissions(fs::Permissions::from_mode(0o777));
-            }
-            step();
-            let folder = builder.tempdir_in(parent)?;
-            let lock = File::open(folder.path()).ok();
-            if lock.as_ref().is_none_or(|lock| leftover::lock(lock, folder.path())) {
-                return Ok(Self { folder, _lock: lock });
-            }
-        }
+        step();
+        TemporaryFolder::with_mode(parent, &prefix_for(target), 0o777).map(Self)
     }
 
     pub(super) fn path(&self) -> &Path {
-        self.folder.path()
+        self.0.path()
     }
 
     /// Leaves the folder where it is.
     pub(super) fn keep(self) {
-        let _ = self.folder.keep();
+        self.0.keep();
     }
 
     /// Writes the new files, on the disk when this returns; `out` is for errors.

@@ -1,9 +1,11 @@
 //! What a footer says about rows and bytes, checked before any page is read: counts add up, columns lie within the file
 //! and apart from each other, and rows are no more than their bytes can hold.
 
-use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
+use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 
+use crate::trace::checksums::range;
 use crate::trace::diagnostic::{Code, Finding};
+use crate::trace::read::budget::most_rows;
 
 /// The most rows for which a byte of a row group, of all columns together, is enough. Each episode has an id of its own
 /// and each of its steps another `t`; the densest traces in use have about one row in a byte.
@@ -25,6 +27,9 @@ pub(in crate::trace) fn fault(file: &str, bytes: u64, metadata: &ParquetMetaData
     ranges.sort_unstable();
     if ranges.windows(2).any(|pair| pair[0].1 > pair[1].0) {
         return Some(Finding::new(Code::CorruptFooter, file, "columns that lie apart", "two in the same bytes"));
+    }
+    if let Err(exceeded) = most_rows(bytes).check(declared.cast_unsigned()) {
+        return Some(Finding::over_budget(file, &exceeded));
     }
     (declared == 0).then(|| Finding::new(Code::NoEpisodes, file, "at least one episode", "no row"))
 }
@@ -71,11 +76,4 @@ fn group_fault(file: &str, bytes: u64, group: &RowGroupMetaData, ranges: &mut Ve
         return Some(Finding::new(Code::CorruptFooter, file, expected, rows.to_string()));
     }
     None
-}
-
-/// The bytes of a column of a row group: from the first to before the last.
-fn range(chunk: &ColumnChunkMetaData) -> Option<(u64, u64)> {
-    let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
-    let (start, length) = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok())?;
-    start.checked_add(length).map(|end| (start, end))
 }

@@ -11,9 +11,12 @@ use parquet::file::metadata::{
     ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy, RowGroupMetaData,
 };
 
+use crate::base::input;
 use crate::trace::catch_panic::contained;
+use crate::trace::checksums::{self, Checksums, ChunkChecksums, Fault};
 use crate::trace::diagnostic::{Code, Finding};
 use crate::trace::inputs::Input;
+use crate::trace::schema::CHECKSUMS_KEY;
 
 const MAGIC: [u8; 4] = *b"PAR1";
 const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
@@ -41,11 +44,20 @@ impl Extent {
     }
 }
 
-/// The file's size and decoded footer.
-pub(in crate::trace) fn footer(input: &Input, extent: Extent) -> Result<(u64, ParquetMetaData), Box<Finding>> {
+/// The footer of a file.
+pub(in crate::trace) struct Footer {
+    /// The size of the file.
+    pub(in crate::trace) bytes: u64,
+    pub(in crate::trace) metadata: ParquetMetaData,
+    pub(in crate::trace) checksums: Checksums,
+    pub(in crate::trace) chunks: ChunkChecksums,
+}
+
+/// A file's decoded footer, which keeps its own checksum where it has one.
+pub(in crate::trace) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Finding>> {
     let finding = |code, expected: &str, found: String| Box::new(Finding::new(code, &input.name, expected, found));
     let unreadable = |error: io::Error| finding(Code::Unreadable, "a file that can be read", error.to_string());
-    let mut file = File::open(&input.path).map_err(unreadable)?;
+    let mut file = input::open(&input.path).map_err(unreadable)?;
     let about = file.metadata().map_err(unreadable)?;
     if about.is_dir() {
         return Err(finding(Code::NotParquet, "a Parquet file", "a folder".into()));
@@ -69,11 +81,38 @@ pub(in crate::trace) fn footer(input: &Input, extent: Extent) -> Result<(u64, Pa
     }
     shape::check_file(&file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
     let reader = || ParquetMetaDataReader::new().with_metadata_options(Some(extent.options()));
-    match contained(|| reader().parse_and_finish(&file)) {
-        Ok(Ok(metadata)) => Ok((bytes, metadata)),
-        Ok(Err(error)) => Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
-        Err(panic) => Err(finding(Code::CorruptFooter, "a readable footer", panic)),
-    }
+    let metadata = match contained(|| reader().parse_and_finish(&file)) {
+        Ok(Ok(metadata)) => metadata,
+        Ok(Err(error)) => return Err(finding(Code::CorruptFooter, "a readable footer", plain(&error))),
+        Err(panic) => return Err(finding(Code::CorruptFooter, "a readable footer", panic)),
+    };
+    let (checksums, chunks) = verified(input, &file, &metadata)?;
+    Ok(Footer { bytes, metadata, checksums, chunks })
+}
+
+/// The checksums of a file, that of the footer verified.
+fn verified(
+    input: &Input,
+    file: &File,
+    metadata: &ParquetMetaData,
+) -> Result<(Checksums, ChunkChecksums), Box<Finding>> {
+    let Some((start, footer)) = shape::bytes(file) else { return Ok(<_>::default()) };
+    checksums::of_file(file, (start, &footer), metadata).map_err(|fault| {
+        let finding = |code, expected: String, found| Box::new(Finding::new(code, &input.name, expected, found));
+        match fault {
+            Fault::Malformed(found) => {
+                let expected = format!("`{CHECKSUMS_KEY}` to hold a CRC-32 of each column chunk and of the footer");
+                let help =
+                    "the file is damaged: restore it from its source; where a program changed that key, remove it";
+                Box::new(finding(Code::InvalidMetadata, expected, found).with_help(help))
+            }
+            Fault::Footer(expected, found) => {
+                let expected = format!("a footer with the CRC-32 {expected:08x}");
+                finding(Code::CorruptFooter, expected, format!("{found:08x}"))
+            }
+            Fault::Unreadable(why) => finding(Code::Unreadable, "a file that can be read".to_owned(), why),
+        }
+    })
 }
 
 fn magic(file: &mut File, at: SeekFrom) -> io::Result<Option<[u8; 4]>> {

@@ -5,6 +5,7 @@
 //!
 //! Source: the Parquet format's `parquet.thrift`.
 
+use bytes::Bytes;
 use parquet::file::reader::ChunkReader;
 
 use crate::trace::read::thrift::{Compact, Fault, Wire};
@@ -95,12 +96,15 @@ const KEY_VALUE: Shape = &[TEXT, TEXT];
 /// Whether the footer of a file keeps within its bytes, before the Parquet library follows it; else what it is. Where there
 /// is none, the library has the better words.
 pub(crate) fn check_file(file: &impl ChunkReader) -> Result<(), String> {
-    let footer = || {
-        let end = file.len().checked_sub(8)?;
-        let length = u32::from_le_bytes(*file.get_bytes(end, 4).ok()?.first_chunk()?);
-        file.get_bytes(end.checked_sub(length.into())?, usize::try_from(length).ok()?).ok()
-    };
-    footer().map_or(Ok(()), |footer| check(&footer).map_err(|fault| fault.to_string()))
+    bytes(file).map_or(Ok(()), |(_, footer)| check(&footer).map_err(|fault| fault.to_string()))
+}
+
+/// Where the footer of a file starts, and its bytes without its length; `None` where there is none.
+pub(crate) fn bytes(file: &impl ChunkReader) -> Option<(u64, Bytes)> {
+    let end = file.len().checked_sub(8)?;
+    let length = u32::from_le_bytes(*file.get_bytes(end, 4).ok()?.first_chunk()?);
+    let start = end.checked_sub(length.into())?;
+    file.get_bytes(start, usize::try_from(length).ok()?).ok().map(|bytes| (start, bytes))
 }
 
 /// Whether some bytes are the structure of a footer, within their bounds.

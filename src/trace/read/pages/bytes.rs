@@ -2,10 +2,13 @@
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::sync::Arc;
 
 use bytes::Bytes;
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 
+use crate::trace::checksums::{self, ChunkChecksums};
+use crate::trace::read::budget::Expansion;
 use crate::trace::read::footer::rows_of;
 
 /// One column of one row group of a file.
@@ -13,6 +16,7 @@ use crate::trace::read::footer::rows_of;
 pub(in crate::trace) struct Place<'a> {
     /// The file's footer.
     pub(in crate::trace) metadata: &'a ParquetMetaData,
+    pub(in crate::trace) checksums: &'a ChunkChecksums,
     pub(in crate::trace) row_group: usize,
     /// The column, counted among the leaves of the schema.
     pub(in crate::trace) column: usize,
@@ -21,6 +25,11 @@ pub(in crate::trace) struct Place<'a> {
 impl<'a> Place<'a> {
     pub(super) fn chunk(self) -> &'a ColumnChunkMetaData {
         self.metadata.row_group(self.row_group).column(self.column)
+    }
+
+    /// The CRC-32 of the chunk's bytes, where the file has checksums.
+    pub(super) fn checksum(self) -> Option<u32> {
+        self.checksums.of(self.row_group, self.column)
     }
 
     pub(super) fn rows(self) -> usize {
@@ -32,18 +41,44 @@ impl<'a> Place<'a> {
 const LARGEST: u64 = 8 << 20;
 
 /// A file, or part of one in memory, addressed as the file is.
-pub(in crate::trace) enum Store {
+pub(in crate::trace) struct Store {
+    held: Held,
+    expansion: Arc<Expansion>,
+}
+
+enum Held {
     File(File),
     Memory { start: u64, bytes: Bytes },
 }
 
 impl Store {
+    /// A file, and what was made of it so far.
+    pub(in crate::trace) fn new(file: File, expansion: Arc<Expansion>) -> Self {
+        Self { held: Held::File(file), expansion }
+    }
+
+    /// Bytes that start at a place of a file, of which nothing was made so far; a fuzz target gives any.
+    #[cfg(feature = "fuzz")]
+    pub(in crate::trace) fn of_memory(start: u64, bytes: Bytes) -> Self {
+        let expansion = Arc::new(Expansion::new(bytes.len() as u64));
+        Self { held: Held::Memory { start, bytes }, expansion }
+    }
+
+    /// What was made of the file so far.
+    pub(super) fn expansion(&self) -> &Arc<Expansion> {
+        &self.expansion
+    }
+
+    fn of(&self, held: Held) -> Self {
+        Self { held, expansion: Arc::clone(&self.expansion) }
+    }
+
     /// The same, to be read by somebody else. Handles of one file share their position: one thread may have them.
     pub(in crate::trace) fn again(&self) -> io::Result<Self> {
-        Ok(match self {
-            Self::File(file) => Self::File(file.try_clone()?),
-            Self::Memory { start, bytes } => Self::Memory { start: *start, bytes: bytes.clone() },
-        })
+        Ok(self.of(match &self.held {
+            Held::File(file) => Held::File(file.try_clone()?),
+            Held::Memory { start, bytes } => Held::Memory { start: *start, bytes: bytes.clone() },
+        }))
     }
 
     /// A range of bytes, held in memory if it is small.
@@ -52,20 +87,32 @@ impl Store {
             return self.again();
         }
         let most = usize::try_from(length).unwrap_or(usize::MAX);
-        Ok(Self::Memory { start, bytes: self.read(start, most)? })
+        Ok(self.of(Held::Memory { start, bytes: self.read(start, most)? }))
+    }
+
+    /// The CRC-32 of `length` bytes from `start` on, or of fewer where the end comes before.
+    pub(super) fn sum(&self, start: u64, length: u64) -> io::Result<u32> {
+        match &self.held {
+            Held::File(file) => {
+                checksums::sum(file, start, length).map_err(|fault| io::Error::other(fault.to_string()))
+            }
+            Held::Memory { .. } => {
+                self.read(start, usize::try_from(length).unwrap_or(usize::MAX)).map(|bytes| crc32fast::hash(&bytes))
+            }
+        }
     }
 
     /// `length` bytes from `start` on, or fewer where the end comes before.
     pub(super) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
-        match self {
-            Self::File(file) => {
+        match &self.held {
+            Held::File(file) => {
                 let mut file = file;
                 let mut bytes = Vec::new();
                 file.seek(SeekFrom::Start(start))?;
                 file.take(length as u64).read_to_end(&mut bytes)?;
                 Ok(bytes.into())
             }
-            Self::Memory { start: first, bytes } => {
+            Held::Memory { start: first, bytes } => {
                 let from = start.checked_sub(*first).and_then(|from| usize::try_from(from).ok());
                 let from = from.map_or(bytes.len(), |from| from.min(bytes.len()));
                 Ok(bytes.slice(from..from.saturating_add(length).min(bytes.len())))

@@ -9,6 +9,7 @@ use parquet::basic::{Encoding, Type as Physical};
 use parquet::column::page::Page;
 use parquet::schema::types::ColumnDescriptor;
 
+use super::delta;
 use super::error::Unsupported;
 use super::header::width;
 use super::rle::{Hybrid, Span, prefixed};
@@ -21,6 +22,56 @@ pub(super) struct Contents {
     optional: bool,
     /// How many values the dictionary has.
     keys: Option<usize>,
+    texts: Texts,
+}
+
+/// What the texts of pages take when they are written out: keys into a dictionary that are not left as keys, and texts
+/// that are stored as what differs from the one before.
+struct Texts {
+    /// The lengths of the dictionary's, where they may be long.
+    lengths: Vec<u32>,
+    /// Whether keys are written out; the library does that to those before a page without keys, too.
+    writes_out: bool,
+    /// Bytes behind keys that were not written out so far.
+    behind_keys: u64,
+    /// Bytes that the page under way adds.
+    added: u64,
+}
+
+/// The texts of a smaller dictionary are not counted: they are short.
+const SMALL_DICTIONARY: usize = 64 << 10;
+
+impl Texts {
+    fn of_dictionary(&mut self, mut values: &[u8]) {
+        if values.len() <= SMALL_DICTIONARY {
+            return;
+        }
+        // They are known to be there.
+        while let Some((length, rest)) = values.split_first_chunk() {
+            let length = u32::from_le_bytes(*length);
+            self.lengths.push(length);
+            values = rest.get(length as usize..).unwrap_or_default();
+        }
+    }
+
+    fn key(&mut self, key: u32, count: usize) {
+        if let Some(length) = self.lengths.get(key as usize) {
+            self.behind_keys = self.behind_keys.saturating_add(u64::from(*length).saturating_mul(count as u64));
+        }
+    }
+
+    /// A page without keys.
+    fn other_page(&mut self) {
+        self.writes_out = true;
+    }
+
+    /// What is written out with this page.
+    fn take(&mut self) -> u64 {
+        if self.writes_out {
+            self.added = self.added.saturating_add(std::mem::take(&mut self.behind_keys));
+        }
+        std::mem::take(&mut self.added)
+    }
 }
 
 /// What is wrong with a page: expected and found.
@@ -33,19 +84,34 @@ struct Declared {
 }
 
 impl Contents {
-    pub(super) fn new(column: &ColumnDescriptor) -> Self {
+    pub(super) fn new(column: &ColumnDescriptor, writes_out: bool) -> Self {
         let declared = usize::try_from(column.type_length()).unwrap_or_default();
         let physical = column.physical_type();
-        Self { physical, width: width(physical, declared), optional: column.max_def_level() > 0, keys: None }
+        Self {
+            physical,
+            width: width(physical, declared),
+            optional: column.max_def_level() > 0,
+            keys: None,
+            texts: Texts { lengths: Vec::new(), writes_out, behind_keys: 0, added: 0 },
+        }
     }
 
-    /// Checks the next page.
-    pub(super) fn check(&mut self, page: &Page) -> Result<(), Fault> {
+    /// Checks the next page: the bytes that its texts take when they are written out, beyond its own.
+    pub(super) fn check(&mut self, page: &Page) -> Result<u64, Fault> {
+        self.check_page(page)?;
+        Ok(self.texts.take())
+    }
+
+    fn check_page(&mut self, page: &Page) -> Result<(), Fault> {
         match page {
             Page::DictionaryPage { buf, num_values, .. } => {
                 let count = *num_values as usize;
                 self.keys = Some(count);
-                self.plain(buf, count)
+                self.plain(buf, count)?;
+                if self.physical == Physical::BYTE_ARRAY {
+                    self.texts.of_dictionary(buf);
+                }
+                Ok(())
             }
             Page::DataPage { buf, num_values, encoding, def_level_encoding, .. } => {
                 let declared = Declared { rows: *num_values as usize, nulls: None };
@@ -79,7 +145,7 @@ impl Contents {
     }
 
     fn data(
-        &self,
+        &mut self,
         declared: &Declared,
         stored: Option<Bytes>,
         values: &Bytes,
@@ -95,6 +161,9 @@ impl Contents {
         {
             return Err(("as many nulls as its header says", format!("{}, not {nulls}", declared.rows - count)));
         }
+        if !matches!(encoding, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) {
+            self.texts.other_page();
+        }
         match (encoding, self.physical) {
             (Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY, _) => self.dictionary(values, count),
             (Encoding::PLAIN, _) => self.plain(values, count),
@@ -103,15 +172,19 @@ impl Contents {
                 sound.map(drop).map_err(|Unsupported| ("a truth value for each row", "runs of another length".into()))
             }
             (Encoding::BYTE_STREAM_SPLIT, _) => fixed(values, count, self.width),
-            (Encoding::DELTA_BINARY_PACKED | Encoding::DELTA_LENGTH_BYTE_ARRAY | Encoding::DELTA_BYTE_ARRAY, _) => {
-                delta(values, count)
+            (Encoding::DELTA_BYTE_ARRAY, _) => {
+                delta(values, count)?;
+                let shared = delta::sum(values).map_err(|Unsupported| ("lengths from 0", "others".to_owned()))?;
+                self.texts.added = self.texts.added.saturating_add(shared);
+                Ok(())
             }
+            (Encoding::DELTA_BINARY_PACKED | Encoding::DELTA_LENGTH_BYTE_ARRAY, _) => delta(values, count),
             _ => Ok(()),
         }
     }
 
     /// Keys of so many values.
-    fn dictionary(&self, values: &Bytes, count: usize) -> Result<(), Fault> {
+    fn dictionary(&mut self, values: &Bytes, count: usize) -> Result<(), Fault> {
         let fault = |found: &str| ("keys within the dictionary, one for each value", found.to_owned());
         let keys = self.keys.ok_or_else(|| fault("no dictionary"))?;
         if values.is_empty() && count == 0 {
@@ -120,10 +193,16 @@ impl Contents {
         let width = *values.first().ok_or_else(|| fault("none"))?;
         let mut hybrid =
             Hybrid::new(values.slice(1..), width, count).map_err(|Unsupported| fault("keys of over 32 bits"))?;
-        let mut within = true;
+        let (mut within, texts) = (true, &mut self.texts);
         each_span(&mut hybrid, count, |span| match span {
-            Span::Same { value, .. } => within &= (value as usize) < keys,
-            Span::Packed(packed) => packed.each(|key| within &= (key as usize) < keys),
+            Span::Same { value, count } => {
+                within &= (value as usize) < keys;
+                texts.key(value, count);
+            }
+            Span::Packed(packed) => packed.each(|key| {
+                within &= (key as usize) < keys;
+                texts.key(key, 1);
+            }),
         })
         .map_err(|Unsupported| fault("runs of another length"))?;
         if within { Ok(()) } else { Err(fault("a key beyond it")) }
@@ -188,12 +267,10 @@ fn texts(mut values: &[u8], count: usize) -> Result<(), Unsupported> {
 
 /// The number of values that a delta encoding declares: the third number, behind the sizes of its blocks.
 fn delta(values: &[u8], count: usize) -> Result<(), Fault> {
-    let (mut at, mut declared) = (0, 0);
-    for _ in 0..3 {
-        let (number, next) = super::rle::varint(values, at)
-            .map_err(|Unsupported| ("the number of its values", "the end of the page".to_owned()))?;
-        (declared, at) = (number, next);
-    }
+    let opening = delta::Opening::read(values).map_err(|Unsupported| {
+        ("the number of its values", "the end of the page, or blocks that are none".to_owned())
+    })?;
+    let declared = opening.count;
     let fault = || ("as many values as its levels say", format!("{declared}, not {count}"));
     if declared == count as u64 { Ok(()) } else { Err(fault()) }
 }

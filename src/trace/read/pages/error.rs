@@ -1,5 +1,6 @@
 //! Why pages are not decoded: the short cut does not take them, or they are damaged.
 
+use std::fmt;
 use std::sync::{Arc, OnceLock};
 
 use crate::trace::diagnostic::{Code, Finding};
@@ -7,16 +8,34 @@ use crate::trace::diagnostic::{Code, Finding};
 /// Pages that the short cut does not take.
 pub(in crate::trace) struct Unsupported;
 
-/// What is wrong with a page.
+/// What is wrong with a page, or with the chunk of pages.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("the page at byte {offset}: expected {expected}, found {found}")]
+#[error("{part}: expected {expected}, found {found}")]
 pub(in crate::trace) struct PageFault {
+    pub(in crate::trace) code: Code,
     pub(in crate::trace) row_group: usize,
     pub(in crate::trace) column: String,
-    /// Where in the file the page starts, with its header.
-    pub(in crate::trace) offset: u64,
+    pub(in crate::trace) part: Part,
     pub(in crate::trace) expected: String,
     pub(in crate::trace) found: String,
+}
+
+/// The bytes that something is wrong with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(in crate::trace) enum Part {
+    /// The page that starts here, with its header.
+    Page(u64),
+    /// All pages of the column in the row group: from the first byte to before the last.
+    Chunk(u64, u64),
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Page(offset) => write!(f, "the page at byte {offset}"),
+            Self::Chunk(start, end) => write!(f, "the pages at bytes {start} to {end}"),
+        }
+    }
 }
 
 /// Where the first fault of a column is left for whoever asked for its pages.
@@ -24,9 +43,9 @@ pub(in crate::trace) type FaultSlot = Arc<OnceLock<PageFault>>;
 
 /// The finding about a column that could not be decoded: the fault of its page, or else what the decoder said.
 pub(in crate::trace) fn damaged(file: &str, slot: &FaultSlot, error: &str) -> Finding {
-    if let Some(PageFault { row_group, column, offset, expected, found }) = slot.get() {
-        let expected = format!("{expected} in the page at byte {offset}");
-        Finding::new(Code::CorruptData, file, expected, found).in_row_group(*row_group).in_column(column)
+    if let Some(PageFault { code, row_group, column, part, expected, found }) = slot.get() {
+        let expected = format!("{expected} in {part}");
+        Finding::new(*code, file, expected, found).in_row_group(*row_group).in_column(column)
     } else {
         let found = error.split_whitespace().collect::<Vec<_>>().join(" ");
         Finding::new(Code::CorruptData, file, "data that decodes", found)

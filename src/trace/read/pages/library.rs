@@ -13,6 +13,7 @@ use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 use super::bytes::{Place, Store};
 use super::error::FaultSlot;
 use super::reader::Pages;
+use crate::trace::checksums::ChunkChecksums;
 use crate::trace::read::footer::rows_of;
 
 /// Some row groups of a file, to be read by the library.
@@ -21,10 +22,13 @@ pub(in crate::trace) struct Library {
     pub(in crate::trace) store: Store,
     /// Its footer.
     pub(in crate::trace) metadata: Arc<ParquetMetaData>,
+    pub(in crate::trace) checksums: ChunkChecksums,
     /// The row groups, in this order.
     pub(in crate::trace) row_groups: Vec<usize>,
     /// Where the first fault of a page is left.
     pub(in crate::trace) slot: FaultSlot,
+    /// Whether texts are asked for row by row, not as keys into a dictionary.
+    pub(in crate::trace) writes_out: bool,
 }
 
 impl Library {
@@ -49,8 +53,10 @@ impl RowGroups for Library {
 
     fn column_chunks(&self, column: usize) -> Result<Box<dyn PageIterator>> {
         let store = self.store.again().map_err(|error| ParquetError::External(Box::new(error)))?;
-        let (metadata, slot) = (Arc::clone(&self.metadata), Arc::clone(&self.slot));
-        Ok(Box::new(Chunks { store, metadata, column, row_groups: self.row_groups.clone().into_iter(), slot }))
+        let (metadata, checksums) = (Arc::clone(&self.metadata), self.checksums.clone());
+        let (row_groups, slot) = (self.row_groups.clone().into_iter(), Arc::clone(&self.slot));
+        let writes_out = self.writes_out;
+        Ok(Box::new(Chunks { store, metadata, checksums, column, row_groups, slot, writes_out }))
     }
 
     fn row_groups(&self) -> Box<dyn Iterator<Item = &RowGroupMetaData> + '_> {
@@ -66,17 +72,20 @@ impl RowGroups for Library {
 struct Chunks {
     store: Store,
     metadata: Arc<ParquetMetaData>,
+    checksums: ChunkChecksums,
     column: usize,
     row_groups: vec::IntoIter<usize>,
     slot: FaultSlot,
+    writes_out: bool,
 }
 
 impl Iterator for Chunks {
     type Item = Result<Box<dyn PageReader>>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let place = Place { metadata: &self.metadata, row_group: self.row_groups.next()?, column: self.column };
-        let pages = Pages::checked(&self.store, place, Arc::clone(&self.slot));
+        let (metadata, checksums) = (&*self.metadata, &self.checksums);
+        let place = Place { metadata, checksums, row_group: self.row_groups.next()?, column: self.column };
+        let pages = Pages::checked(&self.store, place, Arc::clone(&self.slot), self.writes_out);
         Some(pages.map(|pages| Box::new(pages) as _))
     }
 }

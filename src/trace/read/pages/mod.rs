@@ -11,6 +11,7 @@
 mod bytes;
 mod contents;
 mod cursor;
+mod delta;
 mod dictionary;
 mod error;
 mod header;
@@ -22,7 +23,7 @@ mod verified;
 
 use std::sync::Arc;
 
-use parquet::errors::{ParquetError, Result};
+use parquet::errors::Result;
 
 pub(in crate::trace) use bytes::{Place, Store};
 pub(in crate::trace) use cursor::{Cursor, Form};
@@ -33,6 +34,5 @@ use verified::Verified;
 
 /// Reads all pages of a column, checks their headers and checksums, and decodes none.
 pub(in crate::trace) fn verify(store: &Store, place: Place<'_>, slot: &FaultSlot) -> Result<()> {
-    let stored = Verified::new(store, place, Arc::clone(slot));
-    stored.map_err(|error| ParquetError::External(Box::new(error)))?.walk()
+    Verified::new(store, place, Arc::clone(slot))?.walk()
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use parquet::column::page::{Page, PageMetadata, PageReader};
-use parquet::errors::{ParquetError, Result};
+use parquet::errors::Result;
 use parquet::file::serialized_reader::SerializedPageReader;
 
 use super::bytes::{Place, Store};
@@ -24,17 +24,16 @@ pub(super) struct Pages {
 impl Pages {
     /// The pages of a column, for a decoder that checks what they hold.
     pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
-        let stored = Verified::new(store, place, slot).map_err(|error| ParquetError::External(Box::new(error)))?;
-        let stored = Arc::new(stored);
+        let stored = Arc::new(Verified::new(store, place, slot)?);
         let inner = SerializedPageReader::new(Arc::clone(&stored), place.chunk(), place.rows(), None)?;
         Ok(Self { stored, inner, next: None, contents: None })
     }
 
     /// The same for a decoder that does not check what they hold.
-    pub(super) fn checked(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
+    pub(super) fn checked(store: &Store, place: Place<'_>, slot: FaultSlot, writes_out: bool) -> Result<Self> {
         let about = place.chunk().column_descr();
         let flat = about.max_rep_level() == 0 && about.max_def_level() <= 1;
-        let contents = flat.then(|| Contents::new(about));
+        let contents = flat.then(|| Contents::new(about, writes_out));
         Ok(Self { contents, ..Self::new(store, place, slot)? })
     }
 
@@ -42,8 +41,9 @@ impl Pages {
         let Some(page) = self.inner.get_next_page()? else {
             return self.stored.finish().map(|()| None);
         };
-        if let Some(Err((expected, found))) = self.contents.as_mut().map(|contents| contents.check(&page)) {
-            return Err(self.stored.fault(self.stored.offset(), expected, found));
+        match self.contents.as_mut().map_or(Ok(0), |contents| contents.check(&page)) {
+            Ok(bytes) => self.stored.texts(bytes)?,
+            Err((expected, found)) => return Err(self.stored.fault(self.stored.offset(), expected, found)),
         }
         Ok(Some(page))
     }

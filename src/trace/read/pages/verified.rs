@@ -1,7 +1,8 @@
 //! The stored pages of one column of one row group, verified while they are read.
 //!
 //! Rule: whoever decodes a page of a trace gets its bytes from here, so that no header that contradicts the footer, and
-//! no page that contradicts its checksum, is decoded by anyone.
+//! no page or chunk of pages that contradicts its checksum, is decoded by anyone. A chunk is summed before its first page is
+//! given, as who reads it may stop before its end; one that is too large to be held is read twice for that.
 
 use std::fmt;
 use std::io;
@@ -13,8 +14,10 @@ use parquet::errors::{ParquetError, Result};
 use parquet::file::reader::{ChunkReader, Length};
 
 use super::bytes::{Place, Store};
-use super::error::{FaultSlot, PageFault};
+use super::error::{FaultSlot, PageFault, Part};
 use super::header::{About, Header, Kind};
+use crate::base::budget::Exceeded;
+use crate::trace::diagnostic::Code;
 use crate::trace::read::thrift;
 
 /// How much of a file is read to find a header in; most are shorter than 100 bytes.
@@ -25,7 +28,8 @@ const LONGEST_HEADER: usize = 16 << 20;
 /// The pages of a column as they are stored.
 pub(super) struct Verified {
     store: Store,
-    row_group: usize,
+    /// The row group and the column.
+    place: (usize, usize),
     column: String,
     start: u64,
     end: u64,
@@ -48,7 +52,7 @@ struct Progress {
 
 impl Verified {
     /// The pages of a column of a row group.
-    pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> io::Result<Self> {
+    pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
         let column = place.chunk();
         let (start, length) = column.byte_range();
         let described = column.column_descr();
@@ -60,9 +64,10 @@ impl Verified {
             rows: place.rows(),
         };
         let flat = described.max_rep_level() == 0 && described.path().parts().len() == 1;
-        Ok(Self {
-            store: store.part(start, length)?,
-            row_group: place.row_group,
+        let unreadable = |error: io::Error| ParquetError::External(Box::new(error));
+        let pages = Self {
+            store: store.part(start, length).map_err(unreadable)?,
+            place: (place.row_group, place.column),
             column: column.column_path().string(),
             start,
             end: start.saturating_add(length),
@@ -70,7 +75,16 @@ impl Verified {
             flat,
             progress: Mutex::default(),
             slot,
-        })
+        };
+        let declared = place.checksum();
+        let sums = declared.map(|declared| pages.store.sum(start, length).map(|found| (declared, found)));
+        match sums.transpose().map_err(unreadable)? {
+            Some((declared, found)) if declared != found => {
+                let expected = format!("bytes with the CRC-32 {declared:08x}");
+                Err(pages.fault_of(Part::Chunk(start, pages.end), expected, format!("{found:08x}")))
+            }
+            _ => Ok(pages),
+        }
     }
 
     /// Reads all pages, and decodes none.
@@ -101,10 +115,29 @@ impl Verified {
 
     /// The error of a page at `offset`, kept for whoever asked for the column.
     pub(super) fn fault(&self, offset: u64, expected: impl Into<String>, found: impl fmt::Display) -> ParquetError {
-        let (row_group, column) = (self.row_group, self.column.clone());
-        let fault = PageFault { row_group, column, offset, expected: expected.into(), found: found.to_string() };
+        self.keep(Code::CorruptData, Part::Page(offset), expected.into(), found.to_string())
+    }
+
+    /// The error of a page that asks for more than the budget of its file.
+    pub(super) fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
+        self.keep(Code::OverBudget, Part::Page(offset), exceeded.expected(), "more".to_owned())
+    }
+
+    fn fault_of(&self, part: Part, expected: String, found: String) -> ParquetError {
+        self.keep(Code::CorruptData, part, expected, found)
+    }
+
+    fn keep(&self, code: Code, part: Part, expected: String, found: String) -> ParquetError {
+        let (row_group, column) = (self.place.0, self.column.clone());
+        let fault = PageFault { code, row_group, column, part, expected, found };
         let _ = self.slot.set(fault.clone());
         ParquetError::External(Box::new(fault))
+    }
+
+    /// The texts of a page take so many bytes when they are written out.
+    pub(super) fn texts(&self, bytes: u64) -> Result<()> {
+        let offset = self.offset();
+        self.store.expansion().texts(self.place, offset, bytes).map_err(|exceeded| self.over(offset, &exceeded))
     }
 
     /// The page that starts at `offset`: the bytes of its header, and what they say.
@@ -124,6 +157,10 @@ impl Verified {
         {
             return Err(self.fault(offset, expected, found));
         }
+        self.store
+            .expansion()
+            .page(self.place, offset, header.whole)
+            .map_err(|exceeded| self.over(offset, &exceeded))?;
         progress.pages += 1;
         if matches!(header.kind, Kind::Data | Kind::DataV2) {
             progress.values += header.values;

@@ -1,0 +1,58 @@
+//! Definitions, from their text to values and to every dialect of SQL.
+
+use std::num::NonZeroUsize;
+use std::sync::LazyLock;
+
+use mirrorstats::metric::columns::Columns;
+use mirrorstats::metric::definitions::Definitions;
+use mirrorstats::metric::sql::{self, Dialect};
+use mirrorstats::score::score_traces;
+
+use crate::depth::reached;
+use crate::episodes;
+
+static COLUMNS: LazyLock<Columns> = LazyLock::new(|| score_traces::trace_columns(episodes::open()));
+
+/// A definition file: refused, or its catalog gives the same definitions again, every dialect can say it or says why not,
+/// and a metric that is computed alone has the values that it has among all.
+pub fn target(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    // Files of other places are not part of an input.
+    if text.contains("include") {
+        return;
+    }
+    let definitions = match Definitions::from_toml("fuzzed", text, &COLUMNS) {
+        Ok(definitions) => definitions,
+        Err(error) => {
+            assert!(!error.to_string().is_empty());
+            return;
+        }
+    };
+    reached("bound");
+    for dialect in [Dialect::Portable, Dialect::Spark, Dialect::Duckdb, Dialect::Polars] {
+        let first = sql::lower(&definitions.plan, dialect);
+        assert_eq!(first, sql::lower(&definitions.plan, dialect), "two statements of one plan");
+    }
+    for output in &definitions.plan.outputs {
+        assert!(definitions.explain(&output.name).is_some(), "{} is not explained", output.name);
+    }
+    let restored = Definitions::of_catalog(&definitions.catalog, &COLUMNS).expect("a catalog is its definitions");
+    assert_eq!(restored.catalog, definitions.catalog);
+    values(&definitions, &restored);
+}
+
+fn values(definitions: &Definitions, restored: &Definitions) {
+    let score = |definitions: &Definitions| score_traces::score(episodes::open(), definitions, &[], NonZeroUsize::MIN);
+    let Ok(all) = score(definitions) else {
+        assert!(score(restored).is_err(), "definitions that were restored give values where the others give none");
+        return;
+    };
+    reached("values");
+    assert_eq!(score(restored).expect("the same definitions").metrics, all.metrics);
+    for metric in all.metrics.iter().take(6) {
+        let mut one = definitions.clone();
+        one.select(std::slice::from_ref(&metric.name)).expect("a metric of these");
+        let alone = score(&one).expect("a part of what was computed");
+        assert_eq!(&alone.metrics[0], metric, "alone, and among all");
+    }
+}

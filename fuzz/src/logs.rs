@@ -1,0 +1,65 @@
+//! Logs that are cut or damaged, and logs that are put together.
+
+use std::io::Cursor;
+use std::num::NonZeroUsize;
+use std::path::Path;
+
+use mirrorstats::log::assemble;
+use mirrorstats::log::recover::{Recovered, recover_from};
+use mirrorstats::trace::diagnostic::Severity;
+use mirrorstats::trace::inputs::Input;
+use mirrorstats::trace::merge;
+use mirrorstats::trace::validate::validate;
+use mirrorstats::trace::write::OptionalColumns;
+use serde_json::json;
+
+use crate::depth::reached;
+use crate::scratch;
+
+fn recovered(data: &[u8]) -> Option<Recovered> {
+    recover_from(Path::new("log.mcap"), Cursor::new(data)).ok()
+}
+
+/// The bytes as a log: what is saved of it makes a trace that keeps every rule, or `recover` says which rule is broken.
+pub fn recover(data: &[u8]) {
+    let Some(found) = recovered(data) else { return };
+    reached("log");
+    assert_eq!(recovered(data).as_ref(), Some(&found), "saved twice, and not the same");
+    let columns = found.recording.as_ref().map_or_else(OptionalColumns::all, OptionalColumns::recorded);
+    let rows = found.episodes.iter().map(|episode| merge::rows(episode, &columns));
+    let Ok(rows) = rows.collect::<Result<Vec<_>, _>>() else { return };
+    let steps: usize = found.episodes.iter().map(|episode| episode.steps.len()).sum();
+    assert_eq!(rows.iter().map(merge::EpisodeRows::len).sum::<usize>(), steps);
+    let out = scratch::path("recovered.parquet");
+    if rows.is_empty() || merge::write(&out, found.recording.as_ref(), &rows).is_err() {
+        return;
+    }
+    let report = validate(&[Input::new(&out)], None, NonZeroUsize::MIN).expect("threads can be started");
+    reached("trace");
+    let broken: Vec<_> = report.findings.iter().filter(|finding| finding.severity == Severity::Error).collect();
+    if broken.is_empty() {
+        assert_eq!(report.files[0].steps, steps as u64);
+    }
+    if !found.losses.is_any() {
+        assert!(found.recording.is_some(), "a log without its recording lost nothing");
+    }
+}
+
+/// The bytes as one of the logs of a folder: refused, or in the log of all, of which nothing is lost then that was not lost
+/// before, as an episode whose rows are not those of its hash.
+pub fn assembled(data: &[u8]) {
+    let (part, out) = (scratch::file("part.mcap", data), scratch::path("whole.mcap"));
+    let _ = std::fs::remove_file(&out);
+    let before = recovered(data);
+    let lost_before = before.as_ref().is_some_and(|found| found.losses.is_any());
+    let place = before.and_then(|found| found.episodes.first().map(assemble::place)).unwrap_or_default();
+    if assemble::write(&out, &[(place, part)], &json!({ "kind": "recording" })).is_err() {
+        assert!(!out.exists(), "a refused log leaves a file");
+        return;
+    }
+    reached("whole");
+    let bytes = std::fs::read(&out).expect("a log that was written");
+    if let Some(whole) = recovered(&bytes) {
+        assert!(lost_before || !whole.losses.is_any(), "of what was put together is lost: {:?}", whole.losses);
+    }
+}

@@ -1,0 +1,155 @@
+//! The page decoder held against the Parquet library on the same bytes: both refuse, or both give the same rows, or the
+//! program is stricter for a reason of [`stricter::Reason`].
+//!
+//! Besides: what the short cut gives is what the checked path gives, to the row at which it gives up; and a column that is
+//! read has headers and checksums that hold.
+
+mod codec;
+pub mod mutate;
+mod reference;
+mod shape;
+pub mod stricter;
+mod thrift;
+
+use std::sync::LazyLock;
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, new_empty_array};
+use arrow::compute::{cast, concat};
+use arrow::datatypes::{DataType, Float64Type, Int64Type};
+use mirrorstats::trace::fuzz::{OneColumn, Refusal};
+
+use crate::depth::reached;
+use crate::quiet;
+use mutate::{Mutant, START, mutant};
+use stricter::{Depth, Reason};
+
+/// The columns that mutants are made of.
+static BASES: LazyLock<Vec<shape::Base>> = LazyLock::new(shape::all);
+
+/// What became of a mutant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// Both read the same rows.
+    Agreed,
+    /// Both refuse.
+    Refused(Depth),
+    /// The program refuses what the library reads.
+    Stricter(Reason),
+}
+
+/// How many columns there are to start from.
+pub fn bases() -> usize {
+    BASES.len()
+}
+
+/// The target.
+pub fn target(data: &[u8]) {
+    reached(match outcome(data) {
+        Outcome::Agreed => "rows",
+        Outcome::Stricter(_) => "stricter",
+        Outcome::Refused(Depth::Header) => "header",
+        Outcome::Refused(Depth::Body) => "body",
+        Outcome::Refused(Depth::Levels) => "levels",
+        Outcome::Refused(Depth::Values) => "values",
+    });
+}
+
+/// What becomes of the mutant that these bytes stand for.
+///
+/// # Panics
+/// On a disagreement.
+pub fn outcome(data: &[u8]) -> Outcome {
+    let mutant = mutant(&BASES, data);
+    let ours = ours(&mutant);
+    let theirs = reference::read(&mutant);
+    match (ours, theirs) {
+        (Ok(ours), Ok(theirs)) => {
+            let theirs = joined(&theirs, ours.data_type());
+            assert!(same(&ours, &theirs), "ours {}, the library's {}", shown(&ours), shown(&theirs));
+            Outcome::Agreed
+        }
+        (Ok(ours), Err(error)) => panic!("the library refuses what is read: {error}; read: {}", shown(&ours)),
+        (Err(refusal), Err(_)) => Outcome::Refused(depth(&refusal)),
+        (Err(refusal), Ok(theirs)) => {
+            let known = refusal.expected.as_deref().and_then(stricter::of).and_then(|(reason, _)| reason);
+            let read = || theirs.iter().map(shown).collect::<String>();
+            Outcome::Stricter(
+                known.unwrap_or_else(|| panic!("no listed reason: {refusal:?}; the library reads {}", read())),
+            )
+        }
+    }
+}
+
+/// An array for people; what the library lets through need not be one that can be printed.
+fn shown(array: &ArrayRef) -> String {
+    quiet::contained(|| format!("{array:?}"))
+        .unwrap_or_else(|panic| format!("an array that cannot be printed: {panic}"))
+}
+
+fn depth(refusal: &Refusal) -> Depth {
+    match &refusal.expected {
+        None => Depth::Body,
+        Some(expected) => stricter::of(expected).unwrap_or_else(|| panic!("words that are not listed: {expected}")).1,
+    }
+}
+
+/// What the program reads; its paths must agree.
+fn ours(mutant: &Mutant) -> Result<ArrayRef, Refusal> {
+    let column = OneColumn::new(mutant.metadata.clone(), START, mutant.bytes.clone())?;
+    let checked = column.checked(0, mutant.at_once);
+    let whole = checked.map(|rows| {
+        let first = rows.first().map_or(DataType::Null, |rows| plain(rows.data_type()));
+        joined(&rows, &first)
+    });
+    for runs in [false, true] {
+        let (cut, is_whole) = column.short_cut(runs, mutant.at_once).expect("the short cut does not panic");
+        let count: usize = cut.iter().map(arrow::array::Array::len).sum();
+        match &whole {
+            Ok(whole) if whole.data_type() == &DataType::Null => assert_eq!(count, 0),
+            Ok(whole) => {
+                let begin = joined(&cut, whole.data_type());
+                assert!(same(&begin, &whole.slice(0, count)), "the short cut {begin:?}, the checked path {whole:?}");
+                if !is_whole && count > 0 && !runs {
+                    let rest = column.checked(count, mutant.at_once).expect("a part of what is read");
+                    let rest = joined(&rest, whole.data_type());
+                    assert!(same(&rest, &whole.slice(count, whole.len() - count)), "from row {count} on: {rest:?}");
+                }
+            }
+            Err(refusal) => assert!(!is_whole, "the short cut reads what is refused: {refusal:?}"),
+        }
+    }
+    if whole.is_ok() {
+        column.verified().expect("what is read has headers and checksums that hold");
+    }
+    whole
+}
+
+/// The type in which columns are compared.
+fn plain(ty: &DataType) -> DataType {
+    match ty {
+        DataType::Dictionary(_, of) => of.as_ref().clone(),
+        other => other.clone(),
+    }
+}
+
+fn joined(rows: &[ArrayRef], ty: &DataType) -> ArrayRef {
+    if *ty == DataType::Null {
+        return new_empty_array(ty);
+    }
+    let rows: Vec<ArrayRef> = rows.iter().map(|rows| cast(rows, ty).expect("a type of the same kind")).collect();
+    let rows: Vec<_> = rows.iter().map(AsRef::as_ref).collect();
+    if rows.is_empty() { new_empty_array(ty) } else { concat(&rows).expect("arrays of one type") }
+}
+
+/// Whether rows are the same, floats to the bit.
+fn same(ours: &ArrayRef, theirs: &ArrayRef) -> bool {
+    match ours.data_type() {
+        DataType::Float64 => {
+            let (ours, theirs) = (ours.as_primitive::<Float64Type>(), theirs.as_primitive::<Float64Type>());
+            ours.len() == theirs.len()
+                && ours.iter().zip(theirs).all(|(ours, theirs)| ours.map(f64::to_bits) == theirs.map(f64::to_bits))
+        }
+        DataType::Int64 => ours.as_primitive::<Int64Type>() == theirs.as_primitive::<Int64Type>(),
+        _ => ours == theirs,
+    }
+}

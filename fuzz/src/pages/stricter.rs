@@ -1,0 +1,96 @@
+//! Why a page is refused that the Parquet library would read.
+//!
+//! Rule: a refusal that the library does not share has one of these reasons, or the target fails.
+
+/// A reason, as what was expected and not found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Reason {
+    /// The library skips fields of a page header that it does not know, takes one that is there twice, or the header of
+    /// another kind of page beside its own. A header with two meanings has none: a checksum does not cover it.
+    HeaderOfOneMeaning,
+    /// The header says another size than the codec can make of the stored bytes, or of bytes that are not compressed another
+    /// one than they have. The library believes it where the decoder does not come to the end.
+    SizeOfPage,
+    /// Pages of more values than the row group has rows. The library stops reading at the last row.
+    RowsOfRowGroup,
+    /// A page of version 2 says how many rows it has; in a flat column that is as many as it has values. The library does
+    /// not compare them.
+    RowsOfPage,
+    /// Nulls in a page of a column that has none, or more of them than values. The library does not look.
+    NullsOfHeader,
+    /// Levels that are longer than their page.
+    LengthOfLevels,
+    /// A dictionary behind a page of values. The library takes the last one.
+    DictionaryFirst,
+    /// A dictionary that has other bytes than its number of values takes. The library reads as many as it is asked for.
+    DictionarySize,
+    /// A page that goes on behind the end of its column. The library reads the next column's bytes.
+    EndOfColumn,
+    /// Definition levels other than 0 and 1, runs of them that end before or behind the rows, levels in a column without
+    /// nulls that are not 0. The library takes whatever is not the highest level for null and does not look behind the rows.
+    Levels,
+    /// Keys behind the last row, or of a run that goes on behind it. The library does not look there.
+    Keys,
+    /// Bytes behind the last value of a page, or runs of truth values behind it. The library does not look there.
+    ValuesOfPage,
+    /// A page of no values in a delta encoding has the encoding's own header, which says that there are none. The library does
+    /// not look for it where it needs no value.
+    HeaderOfDelta,
+    /// Integers without a sign beyond the largest one of 64 bits with a sign: metrics cannot say them.
+    LargeInteger,
+}
+
+/// How far a mutant came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Depth {
+    /// Refused by its header or its checksum.
+    Header,
+    /// Refused by the codec, or by the library on the way to the levels.
+    Body,
+    /// The levels were looked at, and refused.
+    Levels,
+    /// The values were looked at, and refused.
+    Values,
+}
+
+/// What the program says it expected, its numbers left out; the reason that it is; how far the mutant came.
+const EXPECTED: [(&str, Reason, Depth); 22] = [
+    ("a page header", Reason::HeaderOfOneMeaning, Depth::Header),
+    ("a page header that has one meaning", Reason::HeaderOfOneMeaning, Depth::Header),
+    ("a size that # bytes can hold", Reason::SizeOfPage, Depth::Header),
+    ("at most # values", Reason::RowsOfRowGroup, Depth::Header),
+    ("pages of # values", Reason::RowsOfRowGroup, Depth::Header),
+    ("# rows", Reason::RowsOfPage, Depth::Header),
+    ("no more nulls than there can be", Reason::NullsOfHeader, Depth::Header),
+    ("as many nulls as its header says", Reason::NullsOfHeader, Depth::Levels),
+    ("levels of at most # bytes", Reason::LengthOfLevels, Depth::Header),
+    ("a dictionary before all other pages", Reason::DictionaryFirst, Depth::Header),
+    ("keys for # bytes of values", Reason::DictionarySize, Depth::Header),
+    ("a page of at most # bytes", Reason::EndOfColumn, Depth::Header),
+    ("a page of # bytes", Reason::EndOfColumn, Depth::Header),
+    ("a definition level of # or # for each row, and no other level", Reason::Levels, Depth::Levels),
+    ("keys within the dictionary, one for each value", Reason::Keys, Depth::Values),
+    ("a truth value for each row", Reason::ValuesOfPage, Depth::Values),
+    ("a bit for each value", Reason::ValuesOfPage, Depth::Values),
+    ("texts as long as their lengths say", Reason::ValuesOfPage, Depth::Values),
+    ("as many bytes as its values take", Reason::ValuesOfPage, Depth::Values),
+    ("as many values as its levels say", Reason::ValuesOfPage, Depth::Values),
+    ("the number of its values", Reason::HeaderOfDelta, Depth::Values),
+    ("a number up to #", Reason::LargeInteger, Depth::Values),
+];
+
+/// What a refusal of the program is; `None` for words that are not listed, and no reason for what the library refuses, too.
+pub fn of(expected: &str) -> Option<(Option<Reason>, Depth)> {
+    if expected.starts_with("bytes with the CRC-32 ") {
+        return Some((None, Depth::Header));
+    }
+    let mut words = String::new();
+    for char in expected.chars() {
+        match char {
+            '0'..='9' if words.ends_with('#') => {}
+            '0'..='9' => words.push('#'),
+            _ => words.push(char),
+        }
+    }
+    EXPECTED.iter().find(|(known, ..)| *known == words).map(|(_, reason, depth)| (Some(*reason), *depth))
+}

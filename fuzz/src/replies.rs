@@ -1,0 +1,90 @@
+//! What providers and programs answer, and the journals that keep it.
+
+use std::fs;
+
+use mirrorstats::agent::Status;
+use mirrorstats::agent::reply::{self, Ending};
+use mirrorstats::agent::vlm::journal::{Entry, Journal, Recorded};
+use mirrorstats::agent::vlm::wire_format::Dialect;
+use mirrorstats::experiment::Experiment;
+
+use crate::depth::reached;
+use crate::scratch;
+
+const DIALECTS: [Dialect; 4] =
+    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+
+/// The text of a reply, as a program or a model gives it.
+fn text(raw: &str, ending: Ending) {
+    for experiment in [Experiment::E1, Experiment::E5] {
+        let keys = experiment.reply.as_slice();
+        let reading = reply::read(raw, keys, ending);
+        assert_eq!(reading, reply::read(raw, keys, ending));
+        let is_read = matches!(reading.status, Status::Ok | Status::Repaired);
+        assert_eq!(is_read, reading.fault.is_none() && reading.action.is_some() && ending == Ending::Whole);
+        assert_eq!(reading.status == Status::Repaired, !reading.repairs.is_empty());
+        if is_read {
+            reached("decision");
+        } else {
+            assert!(reading.selected_cube.is_none() && reading.self_color.is_none(), "{reading:?}");
+        }
+    }
+}
+
+/// The body of a provider's answer, the first byte choosing the provider; for some the text of a reply itself.
+pub fn target(data: &[u8]) {
+    let Some((first, data)) = data.split_first() else { return };
+    let Ok(body) = std::str::from_utf8(data) else { return };
+    let Some(dialect) = DIALECTS.get(usize::from(first % 6)) else {
+        text(body, Ending::Whole);
+        return;
+    };
+    if let Ok(Some(answer)) = dialect.read(body) {
+        reached("answer");
+        assert_eq!(dialect.read(body).ok().flatten(), Some(answer.clone()));
+        text(&answer.text, answer.ending);
+    }
+}
+
+fn all(journal: &Journal) -> Vec<Recorded> {
+    journal.answers().cloned().collect()
+}
+
+/// A journal that a process left: refused, or it goes on, and plays what it had and what was added.
+pub fn journal(data: &[u8]) {
+    let path = scratch::file("journal.jsonl", data);
+    let cassette = Journal::cassette(&path).map(|cassette| all(&cassette));
+    let Ok(mut journal) = Journal::open(&path) else {
+        assert!(cassette.is_err(), "a cassette plays a journal that is refused");
+        return;
+    };
+    reached("opened");
+    assert_eq!(all(&journal), cassette.expect("a journal is a cassette"));
+    let entry = Entry::Answer {
+        t: 7,
+        attempt: 1,
+        question: "q".into(),
+        latency_ms: 3,
+        model: None,
+        body: "{\"é\": \"\\ud800\n\"}".into(),
+    };
+    journal.append(&entry).expect("a folder for temporary files");
+    let (after, again) = (all(&journal), Journal::cassette(&path).expect("a journal that was written"));
+    assert_eq!((all(&again), again.requests()), (after, journal.requests()));
+}
+
+/// A cassette: what it plays is read as replies are.
+pub fn cassette(data: &[u8]) {
+    let path = scratch::file("cassette.jsonl", data);
+    let Ok(cassette) = Journal::cassette(&path) else { return };
+    assert!(fs::read(&path).is_ok_and(|bytes| bytes == data), "a cassette is not written to");
+    reached("played");
+    for recorded in cassette.answers() {
+        let Recorded::Answer { body, .. } = recorded else { continue };
+        for dialect in DIALECTS {
+            if let Ok(Some(answer)) = dialect.read(body) {
+                text(&answer.text, answer.ending);
+            }
+        }
+    }
+}

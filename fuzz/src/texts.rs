@@ -1,0 +1,125 @@
+//! The text files that a user or an older run may hand over: what parses prints, and parses again to the same.
+
+use std::fs;
+use std::io;
+use std::sync::LazyLock;
+
+use mirrorstats::experiment::file;
+use mirrorstats::experiment::spec::Spec;
+use mirrorstats::metric::catalog::Catalog;
+use mirrorstats::metric::definitions::Definitions;
+use mirrorstats::metric::fault::Source;
+use mirrorstats::report::bundle::{Manifest, check_old};
+use mirrorstats::report::plan::register::RegisteredPlan;
+use mirrorstats::report::style::Style;
+use mirrorstats::score::format::{self, Format, Partition};
+use mirrorstats::score::score_traces;
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::trace::lost;
+
+use crate::depth::reached;
+use crate::{episodes, scratch};
+
+static PAPER: LazyLock<Catalog> = LazyLock::new(|| {
+    let columns = score_traces::trace_columns(episodes::open());
+    Definitions::load("paper", &columns).expect("definitions that are built in").catalog
+});
+
+/// `manifest.json`, as `rescore` reads it and as a new report reads it of an older one.
+pub fn manifest(data: &[u8]) {
+    let folder = scratch::path("report");
+    fs::create_dir_all(&folder).expect("a folder for temporary files");
+    fs::write(folder.join("manifest.json"), data).expect("a folder for temporary files");
+    let _ = check_old(&folder, &[]);
+    let Ok(manifest) = serde_json::from_slice::<Manifest>(data) else { return };
+    reached("parsed");
+    let again: Manifest = serde_json::from_str(&manifest.json()).expect("a manifest that was printed");
+    assert_eq!((&again, again.json()), (&manifest, manifest.json()));
+    let columns = score_traces::trace_columns(episodes::open());
+    if let Ok(definitions) = Definitions::of_catalog(&manifest.definitions, &columns) {
+        reached("definitions");
+        assert_eq!(definitions.catalog.hash, manifest.definitions.hash);
+    }
+}
+
+/// A style file.
+pub fn style(data: &[u8]) {
+    let path = scratch::file("style.toml", data);
+    let Ok(style) = Style::load(path.to_str().expect("a path in UTF-8")) else { return };
+    reached("parsed");
+    let _ = style.check_against(&PAPER);
+    assert!(style.sheet.table.contains_key("main"));
+    for table in style.sheet.table.values() {
+        assert!(style.sheet.print_of(table).decimals.rate <= 9);
+        assert!(!table.columns.is_empty());
+    }
+}
+
+/// A file over the world's configuration: what it makes of it is a whole file that says the same.
+pub fn world(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let Ok(config) = WorldConfig::from_toml(text) else { return };
+    reached("parsed");
+    let printed = toml::to_string(&config).expect("numbers and texts");
+    let again = WorldConfig::from_toml(&printed).unwrap_or_else(|fault| panic!("{fault}\n{printed}"));
+    assert_eq!((again.hash(), &again), (config.hash(), &config));
+}
+
+/// A file of experiments: those that it has are declared in traces, and read from there as they were.
+pub fn experiments(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let source = Source { name: "fuzzed.toml".into(), text: text.to_owned() };
+    let entries = match file::read(source, None, &[]) {
+        Ok(entries) => entries,
+        Err(faults) => {
+            assert!(!faults.to_string().is_empty());
+            return;
+        }
+    };
+    reached("parsed");
+    assert!(!entries.is_empty());
+    for entry in entries {
+        let printed = serde_json::to_string(&entry.known.spec).expect("numbers, texts and lists");
+        let again: Spec = serde_json::from_str(&printed).unwrap_or_else(|error| panic!("{error}: {printed}"));
+        assert_eq!(again, entry.known.spec);
+    }
+}
+
+/// A registered plan.
+pub fn plan(data: &[u8]) {
+    let Ok(plan) = serde_json::from_slice::<RegisteredPlan>(data) else { return };
+    reached("parsed");
+    let again: RegisteredPlan = serde_json::from_str(&plan.to_json()).expect("a plan that was printed");
+    assert_eq!((again.to_json(), again.is_unchanged()), (plan.to_json(), plan.is_unchanged()));
+}
+
+/// `lost.jsonl`.
+pub fn lost_episodes(data: &[u8]) {
+    let Ok(lost) = lost::read(&scratch::file("lost.jsonl", data)) else { return };
+    reached("parsed");
+    let lines: Vec<String> = lost.iter().map(|lost| serde_json::to_string(lost).expect("texts and integers")).collect();
+    let again = lost::read(&scratch::file("lost-again.jsonl", lines.join("\n").as_bytes()));
+    assert_eq!(again.expect("a list that was printed"), lost);
+}
+
+/// Scores, the first byte choosing the format: what is read is written and read again.
+pub fn scores(data: &[u8]) {
+    let Some((first, data)) = data.split_first() else { return };
+    let format = [Format::Csv, Format::JsonLines, Format::Parquet][usize::from(first % 3)];
+    let read = |bytes: &[u8]| match format {
+        Format::Parquet => {
+            let file = std::fs::File::open(scratch::file("scores.parquet", bytes)).expect("a file that was written");
+            format::read_parquet(file, &Partition::default())
+        }
+        _ => format::read_text(format, &PAPER, io::Cursor::new(bytes.to_vec())),
+    };
+    let Ok(table) = read(data) else { return };
+    reached("parsed");
+    let mut written = Vec::new();
+    format::write(&table, format, &mut written).expect("memory takes any bytes");
+    let again = read(&written).expect("scores that were written");
+    let mut twice = Vec::new();
+    format::write(&again, format, &mut twice).expect("memory takes any bytes");
+    assert_eq!(again, table);
+    assert!(twice == written, "scores that are written twice are not the same");
+}

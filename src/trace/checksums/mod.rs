@@ -1,0 +1,80 @@
+//! The checksums in the footer of a file: one per column chunk, and one of all that lies behind the chunks.
+//!
+//! The footer's own covers the bytes from the end of the last chunk to the end of the footer, page indexes included, with
+//! its own eight digits taken as zeros: schema, offsets, statistics and every key.
+//!
+//! Rule: checksums hold for the file of the program that wrote them. Other programs carry the key along when they write a
+//! file again, so they count only where the footer's `created_by` is the one that they name; damage to either of the two
+//! names leaves the data as it is.
+
+mod read;
+mod write;
+
+use parquet::file::metadata::ColumnChunkMetaData;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+pub use read::Checksums;
+pub(crate) use read::verify_file;
+pub(in crate::trace) use read::{ChunkChecksums, Fault, of_file, sum};
+pub(crate) use write::{Held, finish, pass_on};
+
+use crate::trace::schema::CHECKSUMS_KEY as KEY;
+
+/// What footers name as the program that wrote the file.
+pub(crate) const CREATED_BY: &str = concat!("mirrorstats version ", env!("CARGO_PKG_VERSION"));
+
+/// The only algorithm so far.
+const ALGORITHM: &str = "CRC-32";
+
+/// Where the first chunk of a file may start: behind the magic number.
+const FIRST: u64 = 4;
+
+/// What stands under the key, as JSON.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stated {
+    algorithm: String,
+    /// Of the footer that the checksums belong to.
+    created_by: String,
+    /// A list per row group, a checksum per leaf column of the schema.
+    chunks: Vec<Vec<Checksum>>,
+    /// The last of all, so that its digits lie at a known place.
+    footer: Checksum,
+}
+
+/// A CRC-32, eight lower-case hexadecimal digits as JSON.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Checksum(u32);
+
+impl Serialize for Checksum {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("{:08x}", self.0))
+    }
+}
+
+impl<'de> Deserialize<'de> for Checksum {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let is_hexadecimal = text.len() == 8 && text.bytes().all(|digit| matches!(digit, b'0'..=b'9' | b'a'..=b'f'));
+        let number = is_hexadecimal.then(|| u32::from_str_radix(&text, 16).ok()).flatten();
+        number.map(Self).ok_or_else(|| de::Error::custom("a checksum is eight lower-case hexadecimal digits"))
+    }
+}
+
+impl Stated {
+    fn json(&self) -> String {
+        serde_json::to_string(self).expect("texts and lists of them are JSON")
+    }
+}
+
+/// Where the digits of the footer's own checksum lie in the JSON of this length: before a quote and a brace.
+fn digits(length: usize) -> std::ops::Range<usize> {
+    length - 10..length - 2
+}
+
+/// The bytes of a column chunk: from the first to before the last.
+pub(in crate::trace) fn range(chunk: &ColumnChunkMetaData) -> Option<(u64, u64)> {
+    let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
+    let (start, length) = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok())?;
+    start.checked_add(length).map(|end| (start, end))
+}

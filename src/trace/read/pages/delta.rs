@@ -1,0 +1,119 @@
+//! How long texts are that are stored as what differs from the one before: a few bytes may stand for a long text each.
+//!
+//! Source: the Parquet format's "Delta Strings" and "Delta Encoding".
+
+use super::error::Unsupported;
+use super::rle::varint;
+
+/// More small blocks in a block than any writer makes; the Parquet library makes room for them before it has any.
+const MOST_SMALL_BLOCKS: u64 = 1024;
+
+/// What a delta encoding of integers says before its blocks: values in a block, small blocks in a block, values at all,
+/// and where the first value stands.
+pub(super) struct Opening {
+    block: u64,
+    small_blocks: u64,
+    pub(super) count: u64,
+    at: usize,
+}
+
+impl Opening {
+    pub(super) fn read(data: &[u8]) -> Result<Self, Unsupported> {
+        let (block, at) = varint(data, 0)?;
+        let (small_blocks, at) = varint(data, at)?;
+        let (count, at) = varint(data, at)?;
+        let sound = (1..=MOST_SMALL_BLOCKS).contains(&small_blocks) && block > 0 && block.is_multiple_of(small_blocks);
+        if sound { Ok(Self { block, small_blocks, count, at }) } else { Err(Unsupported) }
+    }
+}
+
+/// The sum of the integers in a delta encoding, none of them below zero.
+pub(super) fn sum(data: &[u8]) -> Result<u64, Unsupported> {
+    let Opening { block, small_blocks, count, at } = Opening::read(data)?;
+    let (first, mut at) = zigzag(data, at)?;
+    if count == 0 {
+        return Ok(0);
+    }
+    let mut sum = Sum { value: first, total: u64::try_from(first).map_err(|_| Unsupported)? };
+    let small_block = block / small_blocks;
+    let mut left = count - 1;
+    while left > 0 {
+        let (least, next) = zigzag(data, at)?;
+        let widths =
+            data.get(next..).and_then(|rest| rest.get(..usize::try_from(small_blocks).ok()?)).ok_or(Unsupported)?;
+        at = next + widths.len();
+        for width in widths.iter().map(|width| u64::from(*width)) {
+            if left == 0 {
+                break;
+            }
+            let values = small_block.min(left);
+            let packed = data.get(at..).ok_or(Unsupported)?;
+            for value in 0..values {
+                sum.add(least.wrapping_add(bits(packed, value * width, width)?.cast_signed()))?;
+            }
+            left -= values;
+            at = at.saturating_add(usize::try_from(small_block.saturating_mul(width) / 8).map_err(|_| Unsupported)?);
+        }
+    }
+    Ok(sum.total)
+}
+
+struct Sum {
+    value: i64,
+    total: u64,
+}
+
+impl Sum {
+    fn add(&mut self, delta: i64) -> Result<(), Unsupported> {
+        self.value = self.value.wrapping_add(delta);
+        let value = u64::try_from(self.value).map_err(|_| Unsupported)?;
+        self.total = self.total.saturating_add(value);
+        Ok(())
+    }
+}
+
+/// A number of so many bits, from a bit on.
+fn bits(packed: &[u8], from: u64, width: u64) -> Result<u64, Unsupported> {
+    if width == 0 {
+        return Ok(0);
+    }
+    if width > 64 {
+        return Err(Unsupported);
+    }
+    let (byte, shift) = (usize::try_from(from / 8).map_err(|_| Unsupported)?, from % 8);
+    let bytes = packed.get(byte..).filter(|rest| rest.len() as u64 * 8 >= shift + width).ok_or(Unsupported)?;
+    let mut whole = [0; 16];
+    let held = bytes.len().min(16);
+    whole[..held].copy_from_slice(&bytes[..held]);
+    let number = u128::from_le_bytes(whole) >> shift & ((1 << width) - 1);
+    u64::try_from(number).map_err(|_| Unsupported)
+}
+
+fn zigzag(data: &[u8], at: usize) -> Result<(i64, usize), Unsupported> {
+    let (number, at) = varint(data, at)?;
+    Ok(((number >> 1).cast_signed() ^ -(number & 1).cast_signed(), at))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Opening, sum};
+
+    #[test]
+    fn lengths_are_summed() {
+        // Blocks of 128 in 4; 5 values: 7, and deltas of -2 -2 -2 9 from a least of -2, of 4 bits: 0 0 0 11.
+        let data = [&[0x80, 1, 4, 5, 14, 3, 4, 0, 0, 0][..], &[0x00, 0xb0], &[0; 14]].concat();
+        assert_eq!(sum(&data).ok(), Some(7 + 5 + 3 + 1 + 10));
+        assert!(sum(&data[..11]).is_err(), "cut");
+        // All the same, a thousand million of them, in no bits at all.
+        let same = [0x80, 1, 4, 0x80, 0x94, 0xeb, 0xdc, 3, 14, 0, 0, 0, 0, 0];
+        assert_eq!(Opening::read(&same).ok().map(|opening| opening.count), Some(1_000_000_000));
+    }
+
+    #[test]
+    fn what_is_no_length_is_refused() {
+        // Below zero; no small blocks; more of them than there are.
+        for data in [&[0x80, 1, 4, 1, 13][..], &[0x80, 1, 0, 1, 14], &[0x80, 0x80, 0x80, 1, 0x80, 0x80, 8, 1, 14]] {
+            assert!(sum(data).is_err(), "{data:?}");
+        }
+    }
+}

@@ -1,0 +1,141 @@
+//! The power fails while a model is asked: no answer that was journaled is paid for twice, and the recording ends as one
+//! that nothing has interrupted.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::process::Stdio;
+
+use mirrorstats::agent::vlm::journal::Entry;
+use mirrorstats::agent::vlm::wire_format::Dialect;
+use mirrorstats::base::hash;
+
+use super::recordings::{Folder, counting};
+use super::server::{Request, Server, whole};
+use crate::harness::faults::{Call, Draws, calls, rounds, watched};
+use crate::harness::power::{Disk, Unsynced};
+use crate::harness::program::{stderr, succeeds};
+use crate::harness::traces;
+
+const WORDS: &str = "--out deep/runs --seeds 1 --runs 2 --threads 1 --in-flight 1";
+const STEPS: u32 = 3;
+
+/// A server whose answers depend on the request alone, so that every recording gets the same.
+fn server() -> Server {
+    Server::start(|_, request: &Request| whole(Dialect::OpenaiCompatible, &counting(request, STEPS, 0)))
+}
+
+/// What tells requests apart: the words as journals hash them, and the frame.
+type Question = (String, String);
+/// The file of a journal, and a step.
+type Answer = (String, i32);
+
+fn question(request: &Request) -> Question {
+    let (before, image) = request.body.split_once("data:image/png;base64,").unwrap();
+    let (frame, after) = image.split_once('"').unwrap();
+    (hash::of_bytes(format!("{before}data:image/png;base64,\"{after}").as_bytes()), hash::of_bytes(frame.as_bytes()))
+}
+
+/// The answers of journals that were synchronised within these calls: the file and the step of each.
+fn promised(all: &[Call]) -> BTreeSet<Answer> {
+    let (mut names, mut written, mut kept) = (Vec::new(), Vec::new(), BTreeSet::new());
+    for call in all {
+        match call {
+            Call::Create(path, number) if path.extension().is_some_and(|ending| ending == "jsonl") => {
+                names.push((*number, path.file_name().unwrap().to_str().unwrap().to_owned()));
+            }
+            Call::Write(number, _, bytes) => {
+                let name = names.iter().rev().find(|(known, _)| known == number);
+                if let (Some((_, name)), Ok(Entry::Answer { t, .. })) = (name, serde_json::from_slice(bytes)) {
+                    written.push((*number, (name.clone(), t)));
+                }
+            }
+            Call::Sync(number) => {
+                kept.extend(written.extract_if(.., |(of, _)| of == number).map(|(_, answer)| answer));
+            }
+            _ => {}
+        }
+    }
+    kept
+}
+
+struct Uninterrupted {
+    folder: Folder,
+    calls: Vec<Call>,
+    rows: Vec<Vec<Option<String>>>,
+    /// The requests in their order, and the answer that each got: the journal's file and the step.
+    requests: Vec<(Question, Answer)>,
+}
+
+fn rows(folder: &Folder) -> Vec<Vec<Option<String>>> {
+    let trace = folder.path().join("deep/runs/E1-own.parquet");
+    ["episode_id", "action", "summary", "reply_status"].map(|column| traces::texts(&trace, column)).to_vec()
+}
+
+impl Uninterrupted {
+    fn new() -> Self {
+        let (folder, server, log) = (Folder::new(), server(), tempfile::tempdir().unwrap());
+        let log = log.path().join("log");
+        succeeds(watched(&mut folder.record(&server, "own", WORDS), folder.path(), &log));
+        let calls = calls(&log);
+        let answers: Vec<Answer> = in_order(&calls);
+        let asked: Vec<Question> = server.requests().iter().map(question).collect();
+        assert_eq!((asked.len(), answers.len()), (2 * STEPS as usize, 2 * STEPS as usize));
+        Self { rows: rows(&folder), folder, calls, requests: asked.into_iter().zip(answers).collect() }
+    }
+
+    /// The power fails after so many calls.
+    fn check(&self, count: usize, unsynced: Unsynced) {
+        let told = format!("after {count} of {} calls, unsynced {unsynced:?}", self.calls.len());
+        let (folder, server) = (Folder::new(), server());
+        let calls = &self.calls[..count];
+        Disk::after(calls).restore(unsynced, &self.folder.path().canonicalize().unwrap(), folder.path());
+        let output = folder.record(&server, "own", WORDS).stdin(Stdio::null()).output().unwrap();
+        assert!(output.status.success(), "{told}: {}", stderr(&output));
+        assert_eq!(rows(&folder), self.rows, "{told}");
+        let mut names: Vec<_> =
+            fs::read_dir(folder.path().join("deep/runs")).unwrap().map(|e| e.unwrap().file_name()).collect();
+        names.sort();
+        assert_eq!(names, ["E1-own.parquet", "journal"], "{told}");
+        let promised = promised(calls);
+        for request in server.requests() {
+            let (_, answer) = self.requests.iter().find(|(known, _)| *known == question(&request)).unwrap();
+            assert!(!promised.contains(answer), "{told}: {answer:?} was paid for again");
+        }
+    }
+}
+
+/// The answers in the order of their coming.
+fn in_order(all: &[Call]) -> Vec<Answer> {
+    let mut answers = Vec::new();
+    for end in 1..=all.len() {
+        if let Call::Sync(_) = all[end - 1] {
+            let known: BTreeSet<_> = answers.iter().cloned().collect();
+            answers.extend(promised(&all[..end]).into_iter().filter(|answer| !known.contains(answer)));
+        }
+    }
+    answers
+}
+
+fn check(most: usize) {
+    let whole = Uninterrupted::new();
+    let mut draws = Draws::new(17);
+    let changes: Vec<usize> =
+        (1..=whole.calls.len()).filter(|at| !matches!(whole.calls[at - 1], Call::Open(_))).collect();
+    println!("{} calls that change something", changes.len());
+    for round in 0..most {
+        let count = changes[draws.below(changes.len())];
+        let unsynced = [Unsynced::Gone, Unsynced::Names, Unsynced::Some(round as u64)][round % 3];
+        whole.check(count, unsynced);
+    }
+}
+
+#[test]
+fn no_answer_is_paid_for_twice_after_a_loss_of_power() {
+    check(12);
+}
+
+#[test]
+#[ignore = "soak: ROUNDS losses of power, 300 if nothing is said"]
+fn soak_no_answer_is_paid_for_twice_after_a_loss_of_power() {
+    check(rounds("ROUNDS", 300));
+}

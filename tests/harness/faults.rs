@@ -1,0 +1,160 @@
+//! Faults of the file system, and what it would hold after a loss of power: `faults.c` as a library that is loaded into the
+//! program.
+
+use std::fmt;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+/// `No space left on device`.
+pub const ENOSPC: i32 = 28;
+/// `Input/output error`.
+pub const EIO: i32 = 5;
+/// `Too many open files`.
+pub const EMFILE: i32 = 24;
+/// `Permission denied`.
+pub const EACCES: i32 = 13;
+
+/// The call that fails.
+#[derive(Clone, Copy, Debug)]
+pub struct Fault {
+    /// `open`, `write`, `fsync`, `rename`, `unlink`, `mkdir`, `truncate`, `link`, or `*` for any that changes something.
+    pub kind: &'static str,
+    /// Which one of its kind, from 1.
+    pub at: usize,
+    /// What it fails with; 0 ends the process instead.
+    pub error: i32,
+    /// Whether all later calls of the kind fail too.
+    pub stays: bool,
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}:{}{}", self.kind, self.at, self.error, if self.stays { ":on" } else { "" })
+    }
+}
+
+impl Fault {
+    /// What the system says of it.
+    pub fn words(&self) -> String {
+        let words = io::Error::from_raw_os_error(self.error).to_string();
+        words.split(" (os error").next().unwrap_or_default().to_owned()
+    }
+}
+
+/// One call of the program on a path below the folder that is watched.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Call {
+    /// A file or folder was opened, or was to be.
+    Open(PathBuf),
+    /// Opening made the file, which is known by its number from here on.
+    Create(PathBuf, usize),
+    Truncate(usize, usize),
+    Write(usize, usize, Vec<u8>),
+    Sync(usize),
+    SyncFolder(PathBuf),
+    Rename(PathBuf, PathBuf),
+    Unlink(PathBuf),
+    MakeFolder(PathBuf),
+    Link(PathBuf, PathBuf),
+    /// The call that failed: its kind and path.
+    Failed(String, PathBuf),
+}
+
+impl Call {
+    fn read(line: &str) -> Self {
+        let mut fields = line.split('\t');
+        let kind = fields.next().unwrap_or_default();
+        let mut text = || fields.next().unwrap_or_else(|| panic!("`{line}` is cut off"));
+        let number = |text: &str| text.parse().unwrap_or_else(|_| panic!("`{line:.200}` has no number"));
+        match kind {
+            "open" => Self::Open(text().into()),
+            "create" => Self::Create(text().into(), number(text())),
+            "truncate" => Self::Truncate(number(text()), number(text())),
+            "write" => Self::Write(number(text()), number(text()), from_hex(text())),
+            "sync" => Self::Sync(number(text())),
+            "sync_folder" => Self::SyncFolder(text().into()),
+            "rename" => Self::Rename(text().into(), text().into()),
+            "unlink" => Self::Unlink(text().into()),
+            "mkdir" => Self::MakeFolder(text().into()),
+            "link" => Self::Link(text().into(), text().into()),
+            "fault" => Self::Failed(text().to_owned(), text().into()),
+            other => panic!("`{other}` is no call"),
+        }
+    }
+
+    /// By what name a [`Fault`] fails such a call; `None` for what is told of another one.
+    pub fn kind(&self) -> Option<&'static str> {
+        match self {
+            Self::Open(_) => Some("open"),
+            Self::Write(..) => Some("write"),
+            Self::Sync(_) | Self::SyncFolder(_) => Some("fsync"),
+            Self::Rename(..) => Some("rename"),
+            Self::Unlink(_) => Some("unlink"),
+            Self::MakeFolder(_) => Some("mkdir"),
+            Self::Link(..) => Some("link"),
+            Self::Create(..) | Self::Truncate(..) | Self::Failed(..) => None,
+        }
+    }
+}
+
+fn from_hex(text: &str) -> Vec<u8> {
+    (0..text.len()).step_by(2).map(|at| u8::from_str_radix(&text[at..at + 2], 16).unwrap()).collect()
+}
+
+/// The library, compiled once a run.
+fn library() -> &'static Path {
+    static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
+    LIBRARY.get_or_init(|| {
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/harness/faults.c");
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
+        let (made, named) = (folder.join(format!("faults-{}.so", std::process::id())), folder.join("faults.so"));
+        let mut compiler = Command::new("cc");
+        compiler.args(["-shared", "-fPIC", "-O1", "-Wall", "-Wextra", "-Werror", "-o"]).arg(&made).arg(source);
+        let output = compiler.arg("-ldl").output().unwrap_or_else(|error| panic!("cc, which Rust links with: {error}"));
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        // Other test programs do the same at the same time.
+        fs::rename(made, &named).unwrap();
+        named
+    })
+}
+
+/// Has the calls of a command below `root` noted in the file `log`, which must not be below it.
+pub fn watched<'a>(command: &'a mut Command, root: &Path, log: &Path) -> &'a mut Command {
+    // What the linker adds to it is for the tests themselves.
+    command.env("LD_PRELOAD", library()).env("MIRRORSTATS_FAULT_LOG", log);
+    command.env("MIRRORSTATS_FAULT_ROOT", root.canonicalize().unwrap())
+}
+
+/// As [`watched`], with a fault.
+pub fn failing<'a>(command: &'a mut Command, root: &Path, log: &Path, fault: Fault) -> &'a mut Command {
+    watched(command, root, log).env("MIRRORSTATS_FAULT", fault.to_string())
+}
+
+/// The calls in a log.
+pub fn calls(log: &Path) -> Vec<Call> {
+    fs::read_to_string(log).unwrap_or_default().lines().map(Call::read).collect()
+}
+
+/// Numbers that look random, the same for a seed.
+pub struct Draws(u64);
+
+impl Draws {
+    pub fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x2545_f491_4f6c_dd1d)
+    }
+
+    /// A number below `end`.
+    pub fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 33) as usize) % end.max(1)
+    }
+}
+
+/// A number from the environment, for campaigns of another length.
+pub fn rounds(name: &str, usual: usize) -> usize {
+    std::env::var(name)
+        .map_or(usual, |text| text.parse().unwrap_or_else(|_| panic!("{name}: expected a number, found `{text}`")))
+}

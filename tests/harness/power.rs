@@ -1,0 +1,184 @@
+//! A folder after a loss of power: what was not synchronised is gone, in part or altogether.
+//!
+//! Bytes of a file are kept by synchronising the file, names in a folder by synchronising the folder. What has happened
+//! since may have reached the disk or not, each name and each write for itself.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::faults::{Call, Draws};
+
+/// What is kept of that which was not synchronised.
+#[derive(Clone, Copy, Debug)]
+pub enum Unsynced {
+    /// Nothing.
+    Gone,
+    /// All names, and no bytes: files that were renamed too early are empty.
+    Names,
+    /// As dice decide; of the last write of a file a part, or zeros in place of its bytes.
+    Some(u64),
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Node {
+    Folder,
+    /// A file by its number here, which none has twice.
+    File(usize),
+}
+
+#[derive(Clone, Debug)]
+enum Change {
+    Cut(usize),
+    Write(usize, Vec<u8>),
+}
+
+#[derive(Clone, Debug, Default)]
+struct Content {
+    synced: Vec<u8>,
+    since: Vec<Change>,
+}
+
+impl Change {
+    fn apply(&self, bytes: &mut Vec<u8>) {
+        match self {
+            Self::Cut(length) => bytes.resize(*length, 0),
+            Self::Write(at, new) => {
+                bytes.resize(bytes.len().max(at + new.len()), 0);
+                bytes[*at..at + new.len()].copy_from_slice(new);
+            }
+        }
+    }
+}
+
+/// What a name is to become; `None` for nothing.
+type Named = (PathBuf, Option<Node>);
+
+/// What is on a disk, and what is on its way there.
+#[derive(Debug, Default)]
+pub struct Disk {
+    files: Vec<Content>,
+    /// Which of them has a number of the system now.
+    numbers: BTreeMap<usize, usize>,
+    /// The names as the program sees them.
+    names: BTreeMap<PathBuf, Node>,
+    kept: BTreeMap<PathBuf, Node>,
+    /// Changes of names that are not kept yet; those of one folder that belong together are one.
+    since: Vec<Vec<Named>>,
+}
+
+impl Disk {
+    /// After these calls in a folder that was empty.
+    pub fn after(calls: &[Call]) -> Self {
+        let mut disk = Self::default();
+        for call in calls {
+            disk.call(call);
+        }
+        disk
+    }
+
+    fn call(&mut self, call: &Call) {
+        match call {
+            Call::Open(_) | Call::Failed(..) => {}
+            Call::Create(path, number) => {
+                self.files.push(Content::default());
+                self.numbers.insert(*number, self.files.len() - 1);
+                self.name(vec![(path.clone(), Some(Node::File(self.files.len() - 1)))]);
+            }
+            Call::Truncate(number, length) => self.change(*number, Change::Cut(*length)),
+            Call::Write(number, at, bytes) => self.change(*number, Change::Write(*at, bytes.clone())),
+            Call::Sync(number) => {
+                let Content { synced, since } = &mut self.files[self.numbers[number]];
+                since.drain(..).for_each(|change| change.apply(synced));
+            }
+            Call::SyncFolder(folder) => self.sync(folder),
+            Call::Rename(from, to) => {
+                let node = self.names.get(from).cloned().unwrap_or_else(|| panic!("{} has no name", from.display()));
+                assert!(node != Node::Folder, "folders are not renamed here");
+                if from.parent() == to.parent() {
+                    self.name(vec![(from.clone(), None), (to.clone(), Some(node))]);
+                } else {
+                    self.name(vec![(to.clone(), Some(node))]);
+                    self.name(vec![(from.clone(), None)]);
+                }
+            }
+            Call::Unlink(path) => self.name(vec![(path.clone(), None)]),
+            Call::MakeFolder(path) => self.name(vec![(path.clone(), Some(Node::Folder))]),
+            Call::Link(from, to) => self.name(vec![(to.clone(), Some(self.names[from].clone()))]),
+        }
+    }
+
+    fn change(&mut self, number: usize, change: Change) {
+        self.files[self.numbers[&number]].since.push(change);
+    }
+
+    fn name(&mut self, change: Vec<Named>) {
+        apply(&mut self.names, &change);
+        self.since.push(change);
+    }
+
+    fn sync(&mut self, folder: &Path) {
+        let (synced, since): (Vec<_>, Vec<_>) =
+            std::mem::take(&mut self.since).into_iter().partition(|change| change[0].0.parent() == Some(folder));
+        for change in &synced {
+            apply(&mut self.kept, change);
+        }
+        self.since = since;
+    }
+
+    /// Writes what the disk has after a loss of power into the folder `to`, for the folder `from` of the calls.
+    pub fn restore(&self, unsynced: Unsynced, from: &Path, to: &Path) {
+        let mut draws = Draws::new(if let Unsynced::Some(seed) = unsynced { seed } else { 0 });
+        let mut names = self.kept.clone();
+        for change in &self.since {
+            let is_kept = match unsynced {
+                Unsynced::Gone => false,
+                Unsynced::Names => true,
+                Unsynced::Some(_) => draws.below(2) == 0,
+            };
+            if is_kept {
+                apply(&mut names, change);
+            }
+        }
+        let mut folders = BTreeSet::from([from.to_owned()]);
+        // In the order of paths folders come before what is in them.
+        for (path, node) in names {
+            let (Some(above), Ok(inside)) = (path.parent(), path.strip_prefix(from)) else { continue };
+            if !folders.contains(above) {
+                continue;
+            }
+            match node {
+                Node::Folder => {
+                    fs::create_dir(to.join(inside)).unwrap();
+                    folders.insert(path);
+                }
+                Node::File(at) => fs::write(to.join(inside), self.files[at].after(unsynced, &mut draws)).unwrap(),
+            }
+        }
+    }
+}
+
+impl Content {
+    fn after(&self, unsynced: Unsynced, draws: &mut Draws) -> Vec<u8> {
+        let mut bytes = self.synced.clone();
+        if let Unsynced::Some(_) = unsynced {
+            let count = draws.below(self.since.len() + 1);
+            self.since[..count].iter().for_each(|change| change.apply(&mut bytes));
+            if let Some(Change::Write(at, new)) = self.since.get(count) {
+                let length = draws.below(new.len() + 1);
+                let part = if draws.below(3) == 0 { vec![0; length] } else { new[..length].to_vec() };
+                Change::Write(*at, part).apply(&mut bytes);
+            }
+        }
+        bytes
+    }
+}
+
+fn apply(names: &mut BTreeMap<PathBuf, Node>, change: &[Named]) {
+    for (path, node) in change {
+        match node {
+            Some(node) => names.insert(path.clone(), node.clone()),
+            None => names.remove(path),
+        };
+    }
+}

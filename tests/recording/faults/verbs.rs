@@ -1,0 +1,211 @@
+//! Every call to the file system fails once, in every verb that writes: afterwards an output is the old one or the new one,
+//! byte for byte, and an error names the file and the cause.
+//!
+//! An exit code of 0 stands for the complete new output: then the call was one that did not matter, such as the removal of
+//! a temporary file, which the next run sweeps, or a look for leftovers.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use std::sync::Mutex;
+
+use tempfile::TempDir;
+
+use super::{Round, all_at_once, check_all, check_words, copy, faults, leftovers, sample};
+use crate::harness::faults::{Call, Fault, calls, failing, watched};
+use crate::harness::files::{Contents, contents, write_small_world};
+use crate::harness::program::{run, stderr, typed};
+
+/// A verb that writes.
+struct Verb {
+    words: &'static str,
+    /// What makes the outputs that are to be replaced; nothing if there are none.
+    before: &'static str,
+    /// Files, or folders whose files are replaced together.
+    outputs: &'static [&'static str],
+}
+
+const fn verb(before: &'static str, words: &'static str, outputs: &'static [&'static str]) -> Verb {
+    Verb { words, before, outputs }
+}
+
+/// The verbs, and what they write. `world sheet` and `replay --frames`, which draw for long, write as `figure` does.
+const VERBS: &[Verb] = &[
+    verb("score b.parquet -o s.csv", "score in -o s.csv", &["s.csv"]),
+    verb("score b.parquet -o s.parquet", "score in -o s.parquet", &["s.parquet"]),
+    verb("", "score in -o s.jsonl", &["s.jsonl"]),
+    verb("report b.parquet --no-figures --out rep", "report in --no-figures --out rep", &["rep"]),
+    verb("", "report in --no-figures --out new/deep/rep", &["new/deep/rep"]),
+    verb("report b.parquet --no-figures --out link", "report in --no-figures --out link", &["link"]),
+    verb("report b.parquet --no-figures --out r2", "rescore r1 --definitions extended --out r2", &["r2"]),
+    verb("import b.jsonl -o i.parquet", "import a.jsonl -o i.parquet", &["i.parquet"]),
+    verb(
+        "renormalize b.parquet --out norm",
+        "renormalize a.parquet b.parquet --out norm",
+        &["norm/a.parquet", "norm/b.parquet"],
+    ),
+    verb("score b.parquet -o rec.parquet", "recover a.mcap -o rec.parquet", &["rec.parquet"]),
+    verb("figure spider b.parquet -o f.svg", "figure spider a.parquet -o f.svg", &["f.svg"]),
+    verb("", "plan --episodes 21 --register p.json", &["p.json"]),
+    verb(
+        "sensitivity b.parquet --out sens",
+        "sensitivity a.parquet --out sens",
+        &["sens/sensitivity.csv", "sens/sensitivity.md", "sens/sensitivity.tex", "sens/figures/sensitivity.svg"],
+    ),
+    verb(
+        "replay b.parquet --recompute-visibility -o v.parquet",
+        "replay a.parquet --recompute-visibility -o v.parquet",
+        &["v.parquet"],
+    ),
+    #[cfg(feature = "polars")]
+    verb("query SELECT*FROM(steps) b.parquet -o q.csv", "query SELECT*FROM(steps) a.parquet -o q.csv", &["q.csv"]),
+    #[cfg(feature = "polars")]
+    verb("", "query SELECT*FROM(steps) a.parquet -o q.parquet", &["q.parquet"]),
+];
+
+/// The folder that every run has a copy of: two recordings, one of them with a list of lost episodes, and what else verbs
+/// read.
+fn prepared() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path();
+    write_small_world(path, "episode.steps = 20\n");
+    for (name, agent, runs) in [("a", "random", 2), ("b", "frozen", 1)] {
+        typed(path, &format!("record --config small.toml --agent {agent} --experiment E1 --seeds 1 --no-frames --threads 1 --runs {runs} --out {name}"))
+            .output()
+            .unwrap();
+        for ending in ["parquet", "mcap"] {
+            fs::copy(path.join(name).join(format!("E1-{agent}.{ending}")), path.join(format!("{name}.{ending}")))
+                .unwrap();
+        }
+        fs::remove_dir_all(path.join(name)).unwrap();
+        let step = |t: u32| {
+            format!(
+                r#"{{"episode_id":"{name}","model":"m","experiment":"E1","seed":1,"run":1,"body_color":"red","t":{t},"action":"turn_left","self_color":null,"selected_cube":"none","mirror_visible":false}}"#
+            )
+        };
+        fs::write(path.join(format!("{name}.jsonl")), format!("{}\n{}\n", step(1), step(2))).unwrap();
+    }
+    fs::create_dir(path.join("in")).unwrap();
+    fs::copy(path.join("a.parquet"), path.join("in/a.parquet")).unwrap();
+    let lost = r#"{"episode_id":"E1/random/s1/r3","model":"random","experiment":"E1","seed":1,"run":3,"step":2,"status":"timeout","reason":"slow"}"#;
+    fs::write(path.join("in/lost.jsonl"), format!("{lost}\n")).unwrap();
+    run(path, &["report", "a.parquet", "--no-figures", "--out", "r1"]).done();
+    fs::create_dir(path.join("there")).unwrap();
+    std::os::unix::fs::symlink("there", path.join("link")).unwrap();
+    folder
+}
+
+/// What an output holds: of a file the bytes, of a folder those of all its files.
+fn held(home: &Path, output: &str) -> Option<Contents> {
+    let path = home.join(output);
+    if path.is_file() {
+        return Some(Contents::from([(String::new(), fs::read(path).unwrap())]));
+    }
+    let mut files = path.is_dir().then(|| contents(&path))?;
+    // What is being made, or waits to be swept.
+    files.retain(|name, _| !name.split('/').any(|part| part.starts_with(".mirrorstats-")));
+    Some(files)
+}
+
+fn all_held(home: &Path, verb: &Verb) -> Vec<Option<Contents>> {
+    verb.outputs.iter().map(|output| held(home, output)).collect()
+}
+
+/// A verb in its folder, as it is before.
+struct Case<'a> {
+    verb: &'a Verb,
+    home: TempDir,
+    old: Vec<Option<Contents>>,
+    new: Vec<Option<Contents>>,
+    calls: Vec<Call>,
+}
+
+impl<'a> Case<'a> {
+    fn new(prepared: &Path, verb: &'a Verb) -> Self {
+        let home = tempfile::tempdir().unwrap();
+        copy(prepared, home.path());
+        if !verb.before.is_empty() {
+            let output = command(home.path(), verb.before).output().unwrap();
+            assert!(output.status.success(), "{}: {}", verb.before, stderr(&output));
+        }
+        let old = all_held(home.path(), verb);
+        let round = Round::new(home.path());
+        let log = round.log();
+        let output = watched(&mut command(&round.home(), verb.words), &round.home(), &log).output().unwrap();
+        assert!(output.status.success(), "{}: {}", verb.words, stderr(&output));
+        let new = all_held(&round.home(), verb);
+        assert!(new.iter().all(Option::is_some) && new != old, "{} writes what it is said to", verb.words);
+        assert_eq!(leftovers(&round.home()), Vec::<String>::new());
+        Self { verb, home, old, new, calls: calls(&log) }
+    }
+
+    /// Runs the verb with a fault, and judges what is there afterwards.
+    fn check(&self, fault: Fault) {
+        let round = Round::new(self.home.path());
+        let (home, log) = (round.home(), round.log());
+        let output = failing(&mut command(&home, self.verb.words), &home, &log, fault).output().unwrap();
+        let told = || format!("{} with {fault}: {:?}\n{}", self.verb.words, output.status, stderr(&output));
+        let found = all_held(&home, self.verb);
+        for (at, found) in found.iter().enumerate() {
+            let is_without_index = self.verb.outputs[at] == "link"
+                && !found.as_ref().is_some_and(|files| files.contains_key("manifest.json"));
+            assert!(
+                *found == self.old[at] || *found == self.new[at] || is_without_index,
+                "{}: {} is neither the old one nor the new one",
+                told(),
+                self.verb.outputs[at]
+            );
+        }
+        if fault.error != 0 {
+            check_words(&output, fault, found == self.new, &calls(&log), self.verb.outputs)
+                .unwrap_or_else(|words| panic!("{}: {words}", told()));
+        }
+        if found != self.new && found != self.old || !leftovers(&home).is_empty() {
+            let again = command(&home, self.verb.words).output().unwrap();
+            // A plan that is registered is not registered again.
+            let is_registered =
+                self.verb.words.starts_with("plan") && stderr(&again).contains("a registered plan is not replaced");
+            assert!(again.status.success() || is_registered, "{}: again: {}", told(), stderr(&again));
+            assert!(all_held(&home, self.verb) == self.new, "{}: again", told());
+            // A plan that is there is all that is looked at.
+            assert!(is_registered || leftovers(&home).is_empty(), "{}: again: {:?}", told(), leftovers(&home));
+        }
+    }
+}
+
+fn command(home: &Path, words: &str) -> Command {
+    let mut command = typed(home, words);
+    // One thread makes the same calls each time.
+    if ["score", "report", "rescore", "sensitivity", "renormalize"].contains(&words.split(' ').next().unwrap()) {
+        command.args(["--threads", "1"]);
+    }
+    command
+}
+
+/// Runs this many faults, spread over all there are; all of them if there are fewer.
+fn check(most: usize) {
+    let prepared = prepared();
+    let cases = Mutex::new(Vec::new());
+    all_at_once(VERBS, |verb| {
+        let case = Case::new(prepared.path(), verb);
+        cases.lock().unwrap().push(case);
+    });
+    let mut cases = cases.into_inner().unwrap();
+    cases.sort_by_key(|case| case.verb.words);
+    let mut rounds: Vec<(&Case<'_>, Fault)> =
+        cases.iter().flat_map(|case| faults(&case.calls).into_iter().map(move |fault| (case, fault))).collect();
+    println!("{} faults in {} verbs", rounds.len(), cases.len());
+    sample(&mut rounds, most);
+    check_all(&rounds, |(case, fault)| case.check(*fault));
+}
+
+#[test]
+fn outputs_are_old_or_new_whatever_call_fails() {
+    check(830);
+}
+
+#[test]
+#[ignore = "soak: every call of every verb with every error"]
+fn soak_outputs_are_old_or_new_whatever_call_fails() {
+    check(usize::MAX);
+}

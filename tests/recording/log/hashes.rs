@@ -1,0 +1,144 @@
+//! The hash of an episode, in its trace and at its end in the log: what does not belong together is told apart.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+
+use arrow::array::{ArrayRef, Int32Array};
+use mirrorstats::log::read::episode_hashes;
+use mirrorstats::trace::episode::Episode;
+use mirrorstats::trace::episode_hash;
+use mirrorstats::trace::merge::{self, EpisodeRows};
+use mirrorstats::trace::schema;
+use mirrorstats::trace::write::OptionalColumns;
+use serde_json::Value;
+
+use super::logs::{Desk, RECORDING, SHORT, ids, json, recovered};
+use crate::harness::files::{fixture, write_small_world};
+use crate::harness::program::{run, succeeds, typed};
+use crate::harness::traces::{recording, rows};
+
+/// The log with another value in the first decision that has it, its checksums right: what a program may write that
+/// knows of no hash.
+fn edited(key: &str, value: &Value) -> Vec<u8> {
+    let mut out = mcap::Writer::new(Cursor::new(Vec::new())).unwrap();
+    let summary = mcap::Summary::read(&RECORDING.log).unwrap().unwrap();
+    for index in &summary.metadata_indexes {
+        out.write_metadata(&mcap::read::metadata(&RECORDING.log, index).unwrap()).unwrap();
+    }
+    let mut is_open = true;
+    for message in mcap::MessageStream::new(&RECORDING.log).unwrap() {
+        let mut message = message.unwrap();
+        if is_open && message.channel.topic == "/decision" {
+            let mut row: Value = serde_json::from_slice(&message.data).unwrap();
+            assert_ne!(row[key], *value);
+            row[key] = value.clone();
+            message.data = serde_json::to_vec(&row).unwrap().into();
+            is_open = false;
+        }
+        out.write(&message).unwrap();
+    }
+    out.finish().unwrap();
+    out.into_inner().into_inner()
+}
+
+/// The trace at `path` with another count in its first episode, which then has another hash.
+fn alter(path: &Path) {
+    let mut episodes = merge::read(path).unwrap();
+    let values: ArrayRef = std::sync::Arc::new(Int32Array::from(vec![123_456; episodes[0].len()]));
+    episodes[0] = episodes[0].with_columns(&[("mirror_px", values)]).unwrap();
+    merge::write(path, Some(&recording(path)), &episodes).unwrap();
+}
+
+#[test]
+fn it_is_the_same_in_both_and_that_of_the_rows() {
+    let desk = Desk::new();
+    fs::write(desk.trace(), &RECORDING.trace).unwrap();
+    fs::write(desk.trace().with_extension("mcap"), &RECORDING.log).unwrap();
+    let logged = episode_hashes(&desk.trace().with_extension("mcap")).unwrap();
+    let traced = merge::read(&desk.trace()).unwrap();
+    assert_eq!((logged.len(), traced.len()), (3, 3));
+    for rows in traced {
+        let hash = episode_hash::of(&rows.episode().unwrap());
+        assert_eq!((rows.stated_hash().as_ref(), logged.get(&rows.episode_id)), (Some(&hash), Some(&hash)));
+    }
+}
+
+#[test]
+fn an_episode_with_other_rows_than_its_end_tells_of_is_lost() {
+    let desk = Desk::new();
+    let all = RECORDING.ended(RECORDING.log.len());
+    let edited = edited("mirror_px", &123_456.into());
+    assert_eq!(ids(&recovered(&edited)), all[1..]);
+    let output = desk.recover(&edited, &["--json"]);
+    assert_eq!(output.status.code(), Some(3));
+    let lost = json(&output)["losses"]["episodes"][0].clone();
+    assert_eq!(lost["episode_id"], all[0]);
+    let reason = lost["reason"].as_str().unwrap();
+    assert!(reason.starts_with("its rows are not those that its end tells of: expected the hash "), "{reason}");
+    assert_eq!(desk.validated(), all[1..]);
+}
+
+#[test]
+fn a_trace_with_other_rows_than_the_log_is_not_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    write_small_world(folder.path(), SHORT);
+    fs::write(path("log.mcap"), &RECORDING.log).unwrap();
+    fs::write(path("trace.parquet"), &RECORDING.trace).unwrap();
+    alter(&path("trace.parquet"));
+    run(folder.path(), &["validate", "trace.parquet"]).done();
+    let before = fs::read(path("trace.parquet")).unwrap();
+    let said = run(folder.path(), &["recover", "log.mcap", "-o", "trace.parquet"]).refused();
+    assert!(said.contains("do not belong together") && said.contains("E1/random/s1/r1"), "{said}");
+    assert!(fs::read(path("trace.parquet")).unwrap() == before);
+}
+
+#[test]
+fn a_log_with_other_rows_than_the_trace_is_not_replaced_by_its_replay() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("log.mcap"), &RECORDING.log).unwrap();
+    fs::write(path("trace.parquet"), &RECORDING.trace).unwrap();
+    alter(&path("trace.parquet"));
+    let said = run(folder.path(), &["replay", "trace.parquet", "--mcap", "log.mcap"]).refused();
+    assert!(said.contains("do not belong together") && said.contains("`trace.parquet` and `log.mcap`"), "{said}");
+    assert!(fs::read(path("log.mcap")).unwrap() == RECORDING.log);
+}
+
+#[test]
+fn a_film_strip_of_a_log_and_a_trace_that_do_not_belong_together_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = folder.path().join("E1-guesser.parquet");
+    fs::copy(fixture("recorded/E1-guesser.mcap"), folder.path().join("E1-guesser.mcap")).unwrap();
+    fs::copy(fixture("recorded/E1-guesser.parquet"), &trace).unwrap();
+    let strip = |out: &str| run(folder.path(), &["filmstrip", "E1/guesser/s1/r1", ".", "--out", out]);
+    strip("whole.svg").done();
+    alter(&trace);
+    let said = strip("parted.svg").refused();
+    assert!(said.contains("do not belong together") && said.contains("E1-guesser.mcap"), "{said}");
+    assert!(!folder.path().join("parted.svg").exists());
+}
+
+/// What is recorded beside rows of a version that had no hash gets the same columns.
+#[test]
+fn a_recording_that_was_begun_without_hashes_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    write_small_world(folder.path(), SHORT);
+    let words = "record --config small.toml --agent random --experiment E1 --seeds 1 --no-log";
+    let record = |more: &str| succeeds(&mut typed(folder.path(), &format!("{words} {more}")));
+    record("--runs 2 --out whole");
+    record("--runs 1 --out runs");
+    let trace = folder.path().join("runs/E1-random.parquet");
+    let begun = merge::read(&trace).unwrap();
+    let stored = rows(&trace).schema();
+    let optional: Vec<&str> = stored.fields().iter().map(|field| field.name().as_str()).collect();
+    let is_kept = |name: &&str| *name != "episode_hash" && !schema::column(name).unwrap().required;
+    let columns = OptionalColumns::named(&optional.into_iter().filter(is_kept).collect::<Vec<_>>()).unwrap();
+    let without = |rows: &EpisodeRows| Episode { episode_hash: None, ..rows.episode().unwrap() };
+    let old: Vec<_> = begun.iter().map(|rows| merge::rows(&without(rows), &columns).unwrap()).collect();
+    merge::write(&trace, Some(&recording(&trace)), &old).unwrap();
+    assert!(merge::read(&trace).unwrap()[0].stated_hash().is_none());
+    record("--runs 2 --out runs");
+    assert!(fs::read(&trace).unwrap() == fs::read(folder.path().join("whole/E1-random.parquet")).unwrap());
+}

@@ -1,0 +1,172 @@
+//! Cases as each engine answers them: many of them in one process where it is another program.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs;
+use std::num::NonZeroUsize;
+use std::path::Path;
+use std::process::Command;
+
+use mirrorstats::engine::polars::score as polars;
+use mirrorstats::metric::columns::{Columns, Type};
+use mirrorstats::metric::definitions::Definitions;
+use mirrorstats::metric::sql::{self, Dialect};
+use mirrorstats::score::score_traces;
+use mirrorstats::score::table::EpisodeTable;
+use mirrorstats::trace::open::TraceSet;
+use serde_json::{Value, json};
+
+use crate::differential::property::{columns, load};
+use crate::differential::trace::{Sheet, open};
+use crate::harness::need;
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Engine {
+    Native,
+    Polars,
+    Duckdb,
+    Spark,
+}
+
+/// Traces, definitions, and conditions of episodes under which they are asked for once more.
+#[derive(Debug)]
+pub struct Case {
+    pub text: String,
+    pub sheets: Vec<Sheet>,
+    pub filters: Vec<&'static str>,
+}
+
+/// The metrics by name, and a row of them for each episode.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rows {
+    pub names: Vec<String>,
+    pub values: BTreeMap<String, Vec<Option<i64>>>,
+}
+
+/// Without a filter, then under each; a refusal in words.
+pub type Answers = Vec<Result<Rows, String>>;
+
+impl Rows {
+    pub fn place(&self, name: &str) -> usize {
+        self.names.iter().position(|known| known == name).unwrap()
+    }
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "definitions:\n{}\ntraces:\n{:#?}", self.text, self.sheets)
+    }
+}
+
+/// The answers if none of them is a refusal.
+pub fn rows(answers: &Answers) -> Option<Vec<Rows>> {
+    answers.iter().map(|answer| answer.as_ref().ok().cloned()).collect()
+}
+
+/// What an engine answers to each case.
+pub fn answers(engine: Engine, cases: &[Case]) -> Vec<Answers> {
+    let folder = tempfile::tempdir().unwrap();
+    let prepared: Vec<Prepared> =
+        cases.iter().enumerate().map(|(at, case)| Prepared::of(folder.path(), at, case)).collect();
+    match engine {
+        Engine::Native => each(&prepared, |traces, definitions| {
+            score_traces::score(traces, definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())
+        }),
+        Engine::Polars => each(&prepared, |traces, definitions| {
+            polars::score(traces, definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())
+        }),
+        Engine::Duckdb => outside("duckdb", &need::duckdb(), Dialect::Duckdb, folder.path(), &prepared),
+        Engine::Spark => outside("spark", &need::spark(), Dialect::Spark, folder.path(), &prepared),
+    }
+}
+
+/// A case whose traces are written.
+struct Prepared {
+    folder: String,
+    traces: TraceSet,
+    columns: Columns,
+    definitions: Vec<Definitions>,
+}
+
+impl Prepared {
+    fn of(folder: &Path, at: usize, case: &Case) -> Self {
+        let folder = folder.join(at.to_string());
+        fs::create_dir(&folder).unwrap();
+        let traces = open(&folder, &case.sheets);
+        let columns = columns(&traces);
+        let whole = load(&traces, &case.text);
+        let filtered = case.filters.iter().map(|filter| {
+            whole.clone().filtered("filter", filter, &columns).unwrap_or_else(|faults| panic!("{faults}\n{case}"))
+        });
+        let definitions = std::iter::once(whole.clone()).chain(filtered).collect();
+        Self { folder: folder.to_str().unwrap().to_owned(), traces, columns, definitions }
+    }
+}
+
+fn each(cases: &[Prepared], score: impl Fn(&TraceSet, &Definitions) -> Result<EpisodeTable, String>) -> Vec<Answers> {
+    let one = |case: &Prepared| {
+        let answer = |definitions| score(&case.traces, definitions).map(|table| of_table(&table));
+        case.definitions.iter().map(answer).collect()
+    };
+    cases.iter().map(one).collect()
+}
+
+fn of_table(table: &EpisodeTable) -> Rows {
+    let names = table.metrics.iter().map(|metric| metric.name.clone()).collect();
+    let row = |row: usize| table.metrics.iter().map(|metric| metric.get(row)).collect();
+    let values = table.keys.iter().enumerate().map(|(at, key)| (key.episode_id.to_owned(), row(at)));
+    Rows { names, values: values.collect() }
+}
+
+/// All statements of all cases in one process.
+fn outside(engine: &str, packages: &Path, dialect: Dialect, folder: &Path, cases: &[Prepared]) -> Vec<Answers> {
+    let request: Vec<Value> = cases.iter().map(|case| request(case, dialect)).collect();
+    let file = folder.join("request.json");
+    fs::write(&file, json!(request).to_string()).unwrap();
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scoring/metamorphic/outside.py");
+    let mut command = Command::new(need::python());
+    let output =
+        command.arg(script).arg(engine).arg(&file).env("PYTHONPATH", packages).current_dir(folder).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let answers: Vec<Vec<Value>> = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answers.len(), cases.len());
+    let of_case = |(answers, case): (Vec<Value>, &Prepared)| {
+        let names = case.definitions[0].plan.outputs.iter().map(|output| output.name.clone());
+        let names: Vec<String> = names.collect();
+        answers.into_iter().map(|answer| of_json(&names, &answer)).collect()
+    };
+    answers.into_iter().zip(cases).map(of_case).collect()
+}
+
+fn request(case: &Prepared, dialect: Dialect) -> Value {
+    let kind = |ty| match ty {
+        Type::Bool => "bool",
+        Type::Int => "int",
+        Type::Float => "float",
+        Type::Text => "string",
+    };
+    let typed = |name: &str| case.columns.get(name).map(|column| (name.to_owned(), kind(column.ty)));
+    let mut columns: BTreeMap<String, &str> = case.columns.names().filter_map(typed).collect();
+    for (name, kind) in [("t", "int"), ("episode_id", "string")] {
+        columns.insert(name.to_owned(), kind);
+    }
+    let statements = case.definitions.iter().map(|definitions| sql::lower(&definitions.plan, dialect).unwrap());
+    let statements: Vec<String> = statements.collect();
+    json!({ "folder": case.folder, "columns": columns, "statements": statements })
+}
+
+/// Rows of an episode's five keys and its metrics; an error is a text.
+fn of_json(names: &[String], answer: &Value) -> Result<Rows, String> {
+    let rows = answer.as_array().ok_or_else(|| answer.to_string())?;
+    let values = rows.iter().map(|row| {
+        let row = row.as_array().unwrap();
+        assert_eq!(row.len(), names.len() + 5);
+        let value = |value: &Value| value.as_i64().or_else(|| value.as_bool().map(i64::from));
+        let values = row[5..].iter().map(|found| {
+            assert!(found.is_null() || value(found).is_some(), "{found} is no value");
+            value(found)
+        });
+        (row[0].as_str().unwrap().to_owned(), values.collect())
+    });
+    Ok(Rows { names: names.to_vec(), values: values.collect() })
+}

@@ -18,15 +18,13 @@ use toml::de::{DeTable, DeValue};
 use crate::base::budget::{self, Limit};
 use crate::base::escape::visible;
 use crate::base::{input, suggest};
-use crate::cli::outcome::Failure;
+use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
 use crate::metric::fault::{Fault, Faults, Place, Source};
 
 /// The file's name.
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file, or none if it is empty.
 pub const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
-/// Which form errors have, which is decided before anything is parsed.
-pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 /// What variables of settings begin with.
 const PREFIX: &str = "MIRRORSTATS_";
 /// The most bytes of a file.

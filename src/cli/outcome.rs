@@ -17,10 +17,11 @@ use std::process::ExitCode;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::config::ERRORS_VARIABLE;
 use crate::base::escape::visible_lines;
 use crate::metric::fault::{FaultRecord, Faults};
 
+/// Which form errors have, where no option says it: decided before anything is parsed.
+pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
 /// The exit code for bad usage, input or definitions.
 const BAD_INPUT: u8 = 2;
 

@@ -33,6 +33,12 @@ impl Limit {
         Self { what, most: floor.saturating_add(factor.saturating_mul(bytes)) }
     }
 
+    /// `factor` more for each of the `bytes` that lie beyond the first `from`.
+    #[must_use]
+    pub const fn and_beyond(self, from: u64, factor: u64, bytes: u64) -> Self {
+        Self::in_proportion(self.what, self.most, factor, bytes.saturating_sub(from))
+    }
+
     /// How many that are, [`SETTING`] counted.
     pub fn most(&self) -> u64 {
         self.most.saturating_mul(factor())
@@ -135,6 +141,8 @@ mod tests {
     fn a_limit_holds_exactly() {
         let limit = Limit::in_proportion("bytes", 10, 3, 2);
         assert!(limit.check(16).is_ok());
+        assert_eq!(limit.and_beyond(2, 5, 2), limit);
+        assert_eq!(limit.and_beyond(2, 5, 4).most(), 16 + 10);
         let told = limit.check(17).unwrap_err().to_string();
         assert!(told.contains("at most 16 bytes") && told.contains("MIRRORSTATS_BUDGET"), "{told}");
         let budget = Budget::new(limit);

@@ -28,8 +28,15 @@ pub(in crate::trace) fn most_rows(bytes: u64) -> Limit {
     Limit::in_proportion("rows in a file of its size", 8_000_000, 16, bytes)
 }
 
-/// What comes out of a stored byte, of a file that is not small.
+/// What comes out of a stored byte, of the first [`SMALL`] bytes.
 pub(in crate::trace) const INFLATED_PER_BYTE: u64 = 96;
+
+/// Up to here a file is bounded as a whole, beyond it by what its pages can hold.
+const SMALL: u64 = 1 << 20;
+
+/// What comes out of each byte beyond [`SMALL`]: columns that hardly change and are written plainly, by writers without
+/// dictionaries, come near the most that deflate can do, 1032.
+const INFLATED_PER_BYTE_BEYOND: u64 = 1024;
 
 /// Texts of which all rows together cannot be much are not counted.
 const UNCOUNTED: usize = 64 << 10;
@@ -53,14 +60,12 @@ enum Kind {
 impl Expansion {
     /// Nothing yet of a file of so many bytes.
     pub(in crate::trace) fn new(bytes: u64) -> Self {
-        let inflated =
-            Limit::in_proportion("bytes inflated from a file of its size", 64 << 20, INFLATED_PER_BYTE, bytes);
-        let written_out = Limit::in_proportion(
-            "bytes of texts in the rows of a file of its size",
-            64 << 20,
-            INFLATED_PER_BYTE,
-            bytes,
-        );
+        let of = |what| {
+            Limit::in_proportion(what, 64 << 20, INFLATED_PER_BYTE, bytes.min(SMALL))
+                .and_beyond(SMALL, INFLATED_PER_BYTE_BEYOND, bytes)
+        };
+        let inflated = of("bytes inflated from a file of its size");
+        let written_out = of("bytes of texts in the rows of a file of its size");
         Self { inflated: Budget::new(inflated), written_out: Budget::new(written_out), read: Mutex::default() }
     }
 
@@ -144,6 +149,14 @@ mod tests {
         assert!(expansion.page((0, 0), 4, half).is_ok() && expansion.page((0, 0), 4, half).is_ok());
         assert!(expansion.page((0, 1), 4, half).is_ok());
         assert!(expansion.page((1, 0), 4, 1).is_err());
+    }
+
+    #[test]
+    fn a_large_file_may_hold_columns_that_hardly_change() {
+        let large = 10 << 20;
+        assert!(Expansion::new(large).page((0, 0), 4, 1000 * (9 << 20)).is_ok());
+        assert!(Expansion::new(large).page((0, 0), 4, 1100 * (9 << 20)).is_err());
+        assert!(Expansion::new(1 << 20).page((0, 0), 4, (64 + 97) << 20).is_err());
     }
 
     #[test]

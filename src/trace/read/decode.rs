@@ -369,7 +369,8 @@ fn leaf(footer: &ArrowReaderMetadata, root: usize) -> Option<usize> {
 fn text_bytes(footer: &ArrowReaderMetadata, root: usize, row_group: usize) -> Option<u64> {
     let column = footer.metadata().row_group(row_group).columns().get(leaf(footer, root)?)?;
     let written_out = column.unencoded_byte_array_data_bytes().unwrap_or_default();
-    // What the file says may be too little. Of what is stored no more than this is inflated.
+    // What the file says may be too little. Of the first MiB no more than this is inflated, and memory is promised for small
+    // files alone.
     let most = column.compressed_size().saturating_mul(INFLATED_PER_BYTE.cast_signed());
     let bytes = u64::try_from(column.uncompressed_size().max(written_out).max(most)).unwrap_or_default();
     (column.column_type() == Physical::BYTE_ARRAY).then_some(bytes)

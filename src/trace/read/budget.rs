@@ -61,8 +61,11 @@ impl Expansion {
     /// Nothing yet of a file of so many bytes.
     pub(in crate::trace) fn new(bytes: u64) -> Self {
         let of = |what| {
-            Limit::in_proportion(what, 64 << 20, INFLATED_PER_BYTE, bytes.min(SMALL))
-                .and_beyond(SMALL, INFLATED_PER_BYTE_BEYOND, bytes)
+            Limit::in_proportion(what, 64 << 20, INFLATED_PER_BYTE, bytes.min(SMALL)).and_beyond(
+                SMALL,
+                INFLATED_PER_BYTE_BEYOND,
+                bytes,
+            )
         };
         let inflated = of("bytes inflated from a file of its size");
         let written_out = of("bytes of texts in the rows of a file of its size");

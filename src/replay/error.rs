@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::divergence::Divergence;
+use crate::base::budget::Exceeded;
 use crate::sim::scene::SCENE_VERSION;
 
 /// Why a trace cannot be replayed.
@@ -31,6 +32,8 @@ pub enum ReplayError {
     NoFrame { episode: String, t: i32 },
     #[error("the frame of step {0} is no PNG")]
     NotPng(i32),
+    #[error("the frame of step {0}: {1}")]
+    Frame(i32, Exceeded),
     #[error("`{episode}` has steps 1 to {last}, found {t}")]
     NoStep { episode: String, last: i32, t: i32 },
     #[error(

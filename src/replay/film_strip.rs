@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use super::again::{Recipe, again};
 use super::error::ReplayError;
 use super::moments::{chosen, moments};
+use crate::base::budget::Limit;
 use crate::figures::Figure;
 use crate::figures::film_strip::{Still, film_strip};
 use crate::log::message::EpisodeMessage;
@@ -17,6 +18,9 @@ use crate::trace::inputs::Input;
 use crate::trace::merge::{self, EpisodeRows};
 use crate::trace::open::TraceSet;
 use crate::trace::schema::RECORDING_KEY;
+
+/// The pixels of a frame: 2048 x 2048, each four bytes once it is drawn, from a file that may have few.
+const LARGEST_FRAME: Limit = Limit::new("pixels in a frame", 1 << 22);
 
 /// The strip that is asked for.
 #[derive(Clone, Debug)]
@@ -168,6 +172,7 @@ fn still(t: i32, step: &Step, png: &[u8], moments: Vec<&'static str>) -> Result<
     // Width and height stand at fixed places behind the signature.
     let pixels = |at: usize| png.get(at..at + 4).and_then(|bytes| Some(u32::from_be_bytes(bytes.try_into().ok()?)));
     let (Some(width), Some(height)) = (pixels(16), pixels(20)) else { return Err(ReplayError::NotPng(t)) };
+    LARGEST_FRAME.check(u64::from(width) * u64::from(height)).map_err(|exceeded| ReplayError::Frame(t, exceeded))?;
     let action = step.action.map_or("no action", Action::name).replace('_', " ");
     let action = match step.selected_cube.as_deref() {
         Some(cube) if cube != "none" => format!("{action}, takes {cube}"),
@@ -175,4 +180,23 @@ fn still(t: i32, step: &Step, png: &[u8], moments: Vec<&'static str>) -> Result<
     };
     let claim = step.self_color.as_ref().map_or("no claim".to_owned(), |color| format!("claims {color}"));
     Ok(Still { t, png: png.to_vec(), size: (width, height), action, claim, visible: step.mirror_visible, moments })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::still;
+    use crate::trace::episode::Step;
+
+    #[test]
+    fn a_frame_is_refused_before_its_pixels_are_made() {
+        let png = |width: u32, height: u32| {
+            let start = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".iter().copied();
+            start.chain(width.to_be_bytes()).chain(height.to_be_bytes()).collect::<Vec<_>>()
+        };
+        assert!(still(1, &Step::default(), &png(2048, 2048), Vec::new()).is_ok());
+        for (width, height) in [(60_000, 60_000), (2049, 2048), (u32::MAX, u32::MAX)] {
+            let told = still(7, &Step::default(), &png(width, height), Vec::new()).unwrap_err().to_string();
+            assert!(told.contains("step 7") && told.contains("4194304 pixels in a frame"), "{told}");
+        }
+    }
 }

@@ -14,7 +14,7 @@ use sqlparser::tokenizer::Span;
 
 use crate::base::suggest::nearest;
 use crate::metric::fault::{Fault, Faults, Place, Source};
-use crate::metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened};
+use crate::metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened, with_stack};
 
 /// A table that a query may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -63,6 +63,10 @@ const QUERY: Grammar = Grammar { noun: "query", one: "a query", longest: 64 * 10
 /// # Errors
 /// Everything that is wrong with it, each with its place.
 pub fn check(text: &str) -> Result<Checked, Faults> {
+    with_stack(text, || checked(text))
+}
+
+fn checked(text: &str) -> Result<Checked, Faults> {
     let source = Arc::new(Source { name: "query".to_owned(), text: text.to_owned() });
     let statement = parse(text).map_err(|fault| {
         let place = Place { source: Arc::clone(&source), span: fault.span };

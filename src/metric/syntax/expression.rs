@@ -5,7 +5,7 @@ use sqlparser::keywords::Keyword;
 use sqlparser::tokenizer::{Token, TokenWithSpan};
 
 use super::Expr;
-use super::grammar::{Grammar, SyntaxFault, byte_of, bytes_of};
+use super::grammar::{Grammar, SyntaxFault, byte_of, bytes_of, with_stack};
 use super::reader::Reader;
 use crate::metric::functions;
 
@@ -26,8 +26,10 @@ const QUANTIFIER_NAMES: [&str; 3] = ["any", "all", "some"];
 /// # Errors
 /// The first fault of the grammar, or every construct that the calculus does not have.
 pub fn parse(text: &str) -> Result<Expr, Vec<SyntaxFault>> {
-    let parsed = parse_sql(text).map_err(|fault| vec![fault])?;
-    Reader::new(text).expression(&parsed)
+    with_stack(text, || {
+        let parsed = parse_sql(text).map_err(|fault| vec![fault])?;
+        Reader::new(text).expression(&parsed)
+    })
 }
 
 fn parse_sql(text: &str) -> Result<ast::Expr, SyntaxFault> {

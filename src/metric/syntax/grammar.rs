@@ -8,6 +8,12 @@ use sqlparser::dialect::GenericDialect;
 use sqlparser::parser::{Parser, ParserError};
 use sqlparser::tokenizer::{Location, Span, Token, TokenWithSpan, Tokenizer};
 
+/// Texts below this many bytes make no tree that is too deep for any thread.
+const SHALLOW: usize = 1024;
+
+/// The stack for a tree that is as deep as the longest text can make it, in bytes; only what is used of it is memory.
+const STACK: usize = 128 << 20;
+
 /// What is wrong with a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SyntaxFault {
@@ -83,6 +89,12 @@ impl Grammar {
         let words = words.replace("EOF", &format!("the end of the {}", self.noun));
         SyntaxFault { message: format!("not {}: {}", self.one, lowercase_first(&words)), span, help }
     }
+}
+
+/// Does work on the parser's tree of a text, on a stack that is large enough for it: the tree of `a + b + c` is as deep as
+/// the chain is long, and the parser's own functions walk it by recursion.
+pub fn with_stack<T>(text: &str, work: impl FnOnce() -> T) -> T {
+    if text.len() < SHALLOW { work() } else { stacker::grow(STACK, work) }
 }
 
 /// `Expected: x, found: y at Line: 1, Column: 2` -> the words and the location.

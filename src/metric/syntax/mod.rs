@@ -219,4 +219,13 @@ mod tests {
             assert!(parse(&text).is_err());
         }
     }
+
+    #[test]
+    fn a_chain_needs_no_stack_of_the_caller() {
+        for chain in [vec!["a"; 1999].join("+"), format!("count({})", vec!["a > 1"; 990].join(" and "))] {
+            let parsed = std::thread::Builder::new().stack_size(256 << 10).spawn(move || parse(&chain)).unwrap();
+            let faults = parsed.join().unwrap().unwrap_err();
+            assert_eq!(faults[0].message, "the expression is nested too deeply");
+        }
+    }
 }

@@ -103,14 +103,26 @@ fn narrowed(columns: &[Column], width: usize) -> Vec<(Column, usize)> {
 pub fn wrapped(text: &str, width: usize, indent: usize) -> Vec<String> {
     let words = text.trim_start_matches(' ');
     let mut lines = vec![" ".repeat(text.len() - words.len())];
+    // The columns of the last line, and whether a word stands in it.
+    let (mut taken, mut begun) = (text.len() - words.len(), false);
     for word in words.split(' ') {
+        let columns = word.width();
         match lines.last_mut() {
-            Some(line) if line.trim_start().is_empty() => line.push_str(word),
-            Some(line) if line.width() + 1 + word.width() <= width => {
+            Some(line) if !begun => {
+                line.push_str(word);
+                taken += columns;
+                begun = !word.is_empty();
+            }
+            Some(line) if taken + 1 + columns <= width => {
                 line.push(' ');
                 line.push_str(word);
+                taken += 1 + columns;
             }
-            _ => lines.push(" ".repeat(indent) + word),
+            _ => {
+                lines.push(" ".repeat(indent) + word);
+                taken = indent + columns;
+                begun = !word.is_empty();
+            }
         }
     }
     lines

@@ -28,6 +28,11 @@ pub(in crate::trace) fn most_rows(bytes: u64) -> Limit {
     Limit::in_proportion("rows in a file of its size", 8_000_000, 16, bytes)
 }
 
+/// The episodes of a file of so many bytes: of each some hundred bytes are held.
+fn most_episodes(bytes: u64) -> Limit {
+    Limit::in_proportion("episodes in a file of its size", 1_000_000, 1, bytes)
+}
+
 /// What comes out of a stored byte, of the first [`SMALL`] bytes.
 pub(in crate::trace) const INFLATED_PER_BYTE: u64 = 96;
 
@@ -46,6 +51,7 @@ const UNCOUNTED: usize = 64 << 10;
 pub(in crate::trace) struct Expansion {
     inflated: Budget,
     written_out: Budget,
+    episodes: Budget,
     /// How far each column chunk was read: bytes of the file, and rows.
     read: Mutex<HashMap<(Kind, usize, usize), u64>>,
 }
@@ -55,6 +61,7 @@ enum Kind {
     Page,
     PageTexts,
     Rows,
+    Episodes,
 }
 
 impl Expansion {
@@ -69,7 +76,12 @@ impl Expansion {
         };
         let inflated = of("bytes inflated from a file of its size");
         let written_out = of("bytes of texts in the rows of a file of its size");
-        Self { inflated: Budget::new(inflated), written_out: Budget::new(written_out), read: Mutex::default() }
+        Self {
+            inflated: Budget::new(inflated),
+            written_out: Budget::new(written_out),
+            episodes: Budget::new(most_episodes(bytes)),
+            read: Mutex::default(),
+        }
     }
 
     /// A page of `bytes` that starts at `offset` of the file, in a column of a row group.
@@ -89,6 +101,11 @@ impl Expansion {
             return Ok(());
         }
         self.written_out.spend(bytes)
+    }
+
+    /// Whole episodes of a row group, of which the last row is before `end`.
+    pub(in crate::trace) fn episodes(&self, row_group: usize, end: u64, count: usize) -> Result<(), Exceeded> {
+        if self.is_new(Kind::Episodes, (row_group, 0), end) { self.episodes.spend(count as u64) } else { Ok(()) }
     }
 
     /// Whether a place lies behind all that was read of a column chunk; then it is the last.
@@ -160,6 +177,13 @@ mod tests {
         assert!(Expansion::new(large).page((0, 0), 4, 1000 * (9 << 20)).is_ok());
         assert!(Expansion::new(large).page((0, 0), 4, 1100 * (9 << 20)).is_err());
         assert!(Expansion::new(1 << 20).page((0, 0), 4, (64 + 97) << 20).is_err());
+    }
+
+    #[test]
+    fn episodes_are_counted_once_whatever_scans_them() {
+        let expansion = Expansion::new(0);
+        assert!(expansion.episodes(0, 600_000, 600_000).is_ok() && expansion.episodes(0, 600_000, 600_000).is_ok());
+        assert!(expansion.episodes(1, 400_000, 400_000).is_ok() && expansion.episodes(1, 400_001, 1).is_err());
     }
 
     #[test]

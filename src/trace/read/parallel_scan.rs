@@ -265,6 +265,9 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
     }
 
     fn send_whole(&self, episodes: Episodes) -> Result<(), Abandoned> {
+        if let Some(finding) = too_many(self.file, &episodes) {
+            return self.send(Part::Fault(finding));
+        }
         self.send(Part::Whole((self.work)(episodes)))
     }
 
@@ -374,6 +377,14 @@ fn too_long(file: &TraceFile, open: &[Rows]) -> Option<Box<Finding>> {
     let exceeded = LONGEST_EPISODE.check(steps as u64).err()?;
     let finding = Finding::over_budget(file.name(), &exceeded).in_row_group(open.first()?.row_group);
     Some(Box::new(finding))
+}
+
+/// More episodes than the file may have.
+fn too_many(file: &TraceFile, episodes: &Episodes) -> Option<Box<Finding>> {
+    let (piece, rows) = (episodes.pieces.last()?, *episodes.offsets.last()?);
+    let end = (piece.row + rows - piece.at) as u64;
+    let exceeded = file.expansion().episodes(piece.row_group, end, episodes.offsets.len() - 1).err()?;
+    Some(Box::new(Finding::over_budget(file.name(), &exceeded).in_row_group(piece.row_group)))
 }
 
 /// One episode of these rows.

@@ -64,7 +64,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("What a line may hold", "schema step"),
         ],
     ),
-    ("info", &[("What is there, and what is missing", "info runs")]),
+    (
+        "info",
+        &[("What is there, and what is missing", "info runs"), ("Every episode by its id", "info runs --episodes")],
+    ),
     ("man", &[("Manual pages, a file per command", "man ~/.local/share/man/man1")]),
     (
         "plan",

@@ -135,10 +135,11 @@ pub fn built_in(name: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// When a file cannot be read, or all faults of its TOML.
-pub fn read(name_or_path: &str) -> Result<Document, FileError> {
-    let file = find(name_or_path, Path::new(name_or_path))
-        .map_err(|source| FileError::Unreadable { path: name_or_path.to_owned(), source })?;
-    let name = Path::new(name_or_path).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+pub fn read(name_or_path: impl AsRef<Path>) -> Result<Document, FileError> {
+    let name_or_path = name_or_path.as_ref();
+    let file = find(name_or_path.to_str(), name_or_path)
+        .map_err(|source| FileError::Unreadable { path: name_or_path.display().to_string(), source })?;
+    let name = name_or_path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     Reading::of(name, file)
 }
 
@@ -168,8 +169,8 @@ struct DefinitionFile {
 }
 
 /// The built-in file of this name, or the one at this path.
-fn find(name: &str, path: &Path) -> io::Result<DefinitionFile> {
-    if let Some(text) = built_in(name) {
+fn find(name: Option<&str>, path: &Path) -> io::Result<DefinitionFile> {
+    if let Some((name, text)) = name.and_then(|name| Some((name, built_in(name)?))) {
         let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
         return Ok(DefinitionFile { source, folder: None, place: None });
     }
@@ -252,7 +253,7 @@ impl Reading {
             }
             return;
         }
-        match find(name, &path) {
+        match find(Some(name), &path) {
             Ok(file) if self.is_open(&file) => {
                 let names = self.open.iter().map(|(name, _)| name).chain([&file.source.name]);
                 let chain = names.map(String::as_str).collect::<Vec<_>>().join(" -> ");

@@ -227,20 +227,21 @@ impl Style {
     ///
     /// # Errors
     /// For a name that is neither, and for a file that is no style.
-    pub fn load(name_or_path: &str) -> Result<Self, StyleError> {
-        if let Some((name, text)) = BUILT_IN.into_iter().find(|(name, _)| *name == name_or_path) {
+    pub fn load(name_or_path: impl AsRef<Path>) -> Result<Self, StyleError> {
+        let path = name_or_path.as_ref();
+        if let Some((name, text)) = BUILT_IN.into_iter().find(|(name, _)| path == Path::new(name)) {
             return Self::parse(name, text, Path::new(name), true);
         }
-        let path = Path::new(name_or_path);
         let text = match input::text(path, LARGEST) {
             Ok(text) => text,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let hint = hint(name_or_path, BUILT_IN.map(|(name, _)| name));
-                return Err(StyleError::Unknown { name: name_or_path.to_owned(), hint });
+                let name = path.display().to_string();
+                let hint = hint(&name, BUILT_IN.map(|(name, _)| name));
+                return Err(StyleError::Unknown { name, hint });
             }
             Err(source) => return Err(StyleError::Unreadable { path: path.to_owned(), source }),
         };
-        let name = path.file_stem().map_or_else(|| name_or_path.into(), |stem| stem.to_string_lossy());
+        let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy();
         Self::parse(&name, &text, path, false)
     }
 

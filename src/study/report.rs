@@ -30,14 +30,14 @@ pub const MOST_LISTED: usize = 20_000;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportOptions {
     /// `default`, `paper`, or the path of a style file.
-    pub style: String,
+    pub style: PathBuf,
     /// Whether figures and `report.html` are in it.
     pub figures: bool,
 }
 
 impl Default for ReportOptions {
     fn default() -> Self {
-        Self { style: "default".to_owned(), figures: true }
+        Self { style: PathBuf::from("default"), figures: true }
     }
 }
 

@@ -19,6 +19,8 @@ mod hostile;
 mod options;
 #[cfg(target_os = "linux")]
 mod outputs;
+#[cfg(target_os = "linux")]
+mod paths;
 mod plan;
 mod quality;
 mod refusals;

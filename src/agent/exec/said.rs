@@ -133,12 +133,8 @@ mod tests {
     fn last_words_keep_their_lines() {
         let said = Said::default();
         said.add(b"Traceback (most recent call last):\r\n  File \"agent.py\", line 4, in f\n\n\tg()\nValueError: 12\n");
-        let expected = [
-            "Traceback (most recent call last):",
-            "  File \"agent.py\", line 4, in f",
-            "    g()",
-            "ValueError: 12",
-        ];
+        let expected =
+            ["Traceback (most recent call last):", "  File \"agent.py\", line 4, in f", "    g()", "ValueError: 12"];
         assert_eq!(said.last_words(&[]).unwrap(), expected.map(|line| format!("    {line}")).join("\n"));
         // A line that is longer than a message has its end there.
         said.add(&vec![b'x'; 2 * IN_MESSAGE]);

@@ -31,7 +31,7 @@ pub struct ReportArgs {
     pub out: PathBuf,
     /// How tables look: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
-    pub style: String,
+    pub style: PathBuf,
     /// How episodes are grouped into cells.
     #[command(flatten)]
     pub grouping: GroupingArgs,

@@ -88,10 +88,12 @@ fn a_line_that_came_where_the_reply_belongs_is_what_is_blamed() {
     assert_eq!(code, Some(1), "{said}");
     let lost = &found["lost"][0];
     let reason = lost["reason"].as_str().unwrap();
-    assert!(reason.starts_with("step 1: the program wrote `loading the model` where its reply was expected"), "{reason}");
+    assert!(
+        reason.starts_with("step 1: the program wrote `loading the model` where its reply was expected"),
+        "{reason}"
+    );
     assert!(reason.contains("its reply would have come after it: `{\"view-description\""), "{reason}");
     assert_eq!(lost["step"], 1);
-    assert!(!said.contains("next: mirrorstats report"), "there is nothing to report: {said}");
 }
 
 #[test]

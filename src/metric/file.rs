@@ -23,12 +23,11 @@ use std::sync::Arc;
 use std::{fs, io};
 
 use indexmap::IndexMap;
-use toml::de::{DeTable, DeValue};
 
 use super::catalog::{Better, StandardError};
 use super::columns::{Column, Level, Type};
 use super::fault::{Fault, Faults, Place, Source};
-use super::keys::Keys;
+use super::keys::{Keys, key_count, parse_toml};
 use super::origin::Written;
 use crate::base::budget::Limit;
 use crate::base::input;
@@ -179,12 +178,6 @@ fn find(name: Option<&str>, path: &Path) -> io::Result<DefinitionFile> {
     Ok(DefinitionFile { source, folder: path.parent().map(Path::to_owned), place: fs::canonicalize(path).ok() })
 }
 
-/// The keys of a table and of the tables in it.
-fn keys(table: &DeTable<'_>) -> u64 {
-    let inside = |value: &DeValue<'_>| value.as_table().map_or(0, keys);
-    table.iter().map(|(_, value)| 1 + inside(value.get_ref())).sum()
-}
-
 struct Reading {
     document: Document,
     faults: Vec<Fault>,
@@ -212,16 +205,12 @@ impl Reading {
 
     fn file(&mut self, file: DefinitionFile) {
         let source = Arc::new(file.source);
-        let (table, errors) = DeTable::parse_recoverable(&source.text);
-        let is_toml = errors.is_empty();
-        for error in errors {
-            let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
-            self.faults.push(Fault::new(place, format!("not TOML: {}", error.message())));
-        }
-        if !is_toml {
+        let (table, faults) = parse_toml(&source);
+        if !faults.is_empty() {
+            self.faults.extend(faults);
             return;
         }
-        if let Err(exceeded) = MOST_KEYS.check(keys(table.get_ref())) {
+        if let Err(exceeded) = MOST_KEYS.check(key_count(table.get_ref())) {
             self.faults.push(Fault::new(Place { source, span: 0..0 }, exceeded.to_string()));
             return;
         }

@@ -28,6 +28,7 @@ mod refusals;
 mod reports;
 mod scores;
 mod sensitivity;
+mod styles;
 mod widths;
 
 use harness::files::{contents, fixture};

@@ -52,7 +52,7 @@ impl AuditArgs {
         let tables = self.tables.iter().map(|path| table(path)).collect::<Result<Vec<_>, _>>()?;
         let definitions = Definitions::load(&self.definitions, &schema_columns()).map_err(StudyError::from)?;
         let implied = implied(&definitions.plan, self.steps, has_value);
-        let style = Style::load(&self.style).map_err(Failure::input)?;
+        let style = Style::load(&self.style).map_err(StudyError::from)?;
         style.check_against(&definitions.catalog).map_err(Failure::input)?;
         let roundings = if self.rounding.is_empty() { Rounding::ALL.to_vec() } else { self.rounding };
         let terms = Terms {

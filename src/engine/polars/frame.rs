@@ -7,7 +7,6 @@ use polars::prelude::{
 };
 
 use super::run::PolarsError;
-use crate::base::input;
 use crate::score::score_traces::ScoreError;
 use crate::trace::open::{TraceFile, TraceSet};
 use crate::trace::schema::{self, Kind, Stored};
@@ -83,8 +82,8 @@ fn scan(file: &TraceFile, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsEr
         Some(_) => LazyFrame::scan_parquet(PlRefPath::try_from_path(&path)?, options)?,
         // Polars takes paths as text; what has no such path is opened here.
         None => {
-            let file = input::open(&path).map_err(gone)?;
-            LazyFrame::scan_parquet_sources(ScanSources::Files([file].into()), options)?
+            let opened = file.reader().map_err(gone)?;
+            LazyFrame::scan_parquet_sources(ScanSources::Files([opened].into()), options)?
         }
     };
     Ok(frame.select(columns.iter().map(|column| column.of(file)).collect::<Vec<_>>()))

@@ -125,7 +125,7 @@
 //! use mirrorstats::{DiffRequest, Side, diff};
 //!
 //! # fn main() -> Result<(), mirrorstats::StudyError> {
-//! let traces = mirrorstats::resolve(&["fixtures/paper".to_owned()], std::io::empty())?;
+//! let traces = mirrorstats::resolve(&["fixtures/paper".into()], std::io::empty())?;
 //! let (old, new) = (Side::of("paper")?, Side::of("extended")?);
 //! let found = diff(&old, &new, &traces, &DiffRequest::default())?;
 //! assert!(found.changes.flips.is_empty(), "the extended definitions add metrics and change none");

@@ -161,6 +161,8 @@ pub struct Lost {
     pub status: Option<Status>,
     /// What failed, without any key.
     pub cause: String,
+    /// The step that went wrong, where it is an earlier one than that at which it was noticed.
+    pub step: Option<i32>,
     /// Nothing failed: a limit of what may be spent is reached, and the episode waits for a higher one.
     pub by_limit: bool,
 }
@@ -168,17 +170,17 @@ pub struct Lost {
 impl Lost {
     /// Lost to something other than a reply.
     pub fn because(cause: impl Into<String>) -> Self {
-        Self { status: None, cause: cause.into(), by_limit: false }
+        Self { status: None, cause: cause.into(), step: None, by_limit: false }
     }
 
     /// Lost to the failure of a reply, which counts as this status.
     pub fn counted_as(status: Status, cause: impl Into<String>) -> Self {
-        Self { status: Some(status), cause: cause.into(), by_limit: false }
+        Self { status: Some(status), cause: cause.into(), step: None, by_limit: false }
     }
 
     /// Stopped by a limit that whoever records has set.
     pub fn by_limit(cause: impl Into<String>) -> Self {
-        Self { status: None, cause: cause.into(), by_limit: true }
+        Self { status: None, cause: cause.into(), step: None, by_limit: true }
     }
 }
 

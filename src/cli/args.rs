@@ -1,7 +1,8 @@
 //! What was typed, where several verbs share it.
 
+use std::ffi::OsString;
 use std::num::{NonZeroU32, NonZeroUsize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::engine::spark::setting::Setting;
 
@@ -10,7 +11,7 @@ use crate::engine::spark::setting::Setting;
 pub struct TraceArgs {
     /// Trace files, folders of them, quoted globs, or `-` for a list of files on standard input
     #[arg(required = true, value_name = "TRACES")]
-    pub traces: Vec<String>,
+    pub traces: Vec<OsString>,
     /// How many threads to use.
     #[command(flatten)]
     pub threads: ThreadArgs,
@@ -36,7 +37,7 @@ impl ThreadArgs {
 pub struct ScoringArgs {
     /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
     #[arg(long, value_name = "NAME|FILE")]
-    pub definitions: Option<String>,
+    pub definitions: Option<PathBuf>,
     /// Only these metrics, separated by commas [default: all of the definitions]
     #[arg(long, value_name = "METRICS", value_delimiter = ',')]
     pub metrics: Option<Vec<String>>,
@@ -47,8 +48,8 @@ pub struct ScoringArgs {
 
 impl ScoringArgs {
     /// The definition file asked for, or the paper's.
-    pub fn definitions_name(&self) -> &str {
-        self.definitions.as_deref().unwrap_or("paper")
+    pub fn definitions_name(&self) -> &Path {
+        self.definitions.as_deref().unwrap_or(Path::new("paper"))
     }
 }
 

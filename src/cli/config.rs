@@ -20,6 +20,7 @@ use crate::base::escape::visible;
 use crate::base::{input, suggest};
 use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
 use crate::metric::fault::{Fault, Faults, Place, Source};
+use crate::metric::keys::parse_toml;
 
 /// The file's name.
 const FILE: &str = "mirrorstats.toml";
@@ -164,14 +165,7 @@ fn of_file(path: &Path, name: &str, choices: &[Choice<'_>]) -> Result<Vec<Settin
         ))
     })?;
     let source = Arc::new(Source { name: name.to_owned(), text });
-    let (table, errors) = DeTable::parse_recoverable(&source.text);
-    let mut faults: Vec<Fault> = errors
-        .into_iter()
-        .map(|error| {
-            let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
-            Fault::new(place, format!("not TOML: {}", error.message()))
-        })
-        .collect();
+    let (table, mut faults) = parse_toml(&source);
     let mut reader = FileReader { source: &source, choices, faults: Vec::new(), found: Vec::new() };
     if faults.is_empty() {
         reader.table(table.get_ref(), "");

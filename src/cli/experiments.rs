@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+#[cfg(feature = "sim")]
+use clap::builder::{OsStringValueParser, TypedValueParser};
+
 use super::outcome::Failure;
 use crate::experiment::load::{self, FileError, Loaded};
 #[cfg(feature = "sim")]
@@ -11,6 +14,12 @@ use crate::{
     record::plan::{Experiments, Named},
     sim::{config::WorldConfig, placement},
 };
+
+/// Reads experiments as they are typed; the name of a file may have any bytes.
+#[cfg(feature = "sim")]
+pub fn parser() -> impl TypedValueParser<Value = Experiments> {
+    OsStringValueParser::new().try_map(|typed| Experiments::of(&typed))
+}
 
 /// The experiments of a file.
 ///

@@ -16,7 +16,7 @@ const GROUPS: &[(&str, &[&str])] = &[
         &["report", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit", "verify"],
     ),
     ("Traces", &["info", "validate", "check", "import", "recover", "renormalize", "schema"]),
-    ("Definitions and queries", &["definitions", "query", "sql"]),
+    ("Definitions and queries", &["definitions", "style", "query", "sql"]),
     ("This program", &["config", "completions", "man", "help"]),
 ];
 
@@ -64,7 +64,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("What a line may hold", "schema step"),
         ],
     ),
-    ("info", &[("What is there, and what is missing", "info runs")]),
+    (
+        "info",
+        &[("What is there, and what is missing", "info runs"), ("Every episode by its id", "info runs --episodes")],
+    ),
     ("man", &[("Manual pages, a file per command", "man ~/.local/share/man/man1")]),
     (
         "plan",
@@ -119,6 +122,8 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "stats",
         &[("What the data can bear", "stats runs"), ("At every look, while the study runs", "stats runs --sequential")],
     ),
+    ("style check", &[("Every fault of a file, underlined", "style check mine.toml")]),
+    ("style show", &[("A file to begin with", "style show paper > mine.toml")]),
     ("validate", &[("Every rule, every finding", "validate runs")]),
     ("verify", &[("Whether a report is as it was written", "verify reports/latest")]),
     ("world config", &[("A configuration to begin with", "world config > world.toml")]),

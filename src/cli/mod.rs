@@ -33,6 +33,7 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
+use crate::base::escape::visible;
 use crate::base::{budget, features};
 use commands::Command;
 use outcome::{ErrorFormat, Failure, Outcome};
@@ -77,7 +78,16 @@ fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
         Ok(settings) => settings.apply(command),
         Err(_) => command,
     };
-    let parsed = command.clone().try_get_matches_from(arguments).and_then(|matches| Cli::from_arg_matches(&matches));
+    let parse = |arguments: Vec<OsString>| {
+        let matches = command.clone().try_get_matches_from(arguments)?;
+        Cli::from_arg_matches(&matches)
+    };
+    let spelled: Vec<OsString> = arguments.iter().map(|typed| visible(&typed.to_string_lossy()).into()).collect();
+    let parsed = match parse(arguments) {
+        // A message repeats what was typed, which must not act on the terminal.
+        Err(error) if error.exit_code() != 0 => Err(parse(spelled).err().unwrap_or(error)),
+        parsed => parsed,
+    };
     match parsed {
         Ok(cli) if cli.command.needs_no_settings() => cli.command.run(),
         Ok(cli) => settings.and_then(|_| budget_setting()).and_then(|()| cli.command.run()),

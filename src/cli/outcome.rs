@@ -116,7 +116,7 @@ pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> ExitC
 fn say(failure: &Failure, format: ErrorFormat) {
     // With standard error closed there is nobody left to tell.
     let _ = match (failure, format) {
-        (Failure::Usage(error), ErrorFormat::Text) => error.print(),
+        (Failure::Usage(error), ErrorFormat::Text) if colored() => write!(io::stderr(), "{}", error.render().ansi()),
         (failure, ErrorFormat::Text) => writeln!(io::stderr(), "{}", words(failure, colored()).trim_end()),
         (failure, ErrorFormat::Json) => {
             let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
@@ -130,7 +130,7 @@ fn say(failure: &Failure, format: ErrorFormat) {
 
 fn words(failure: &Failure, colored: bool) -> String {
     let mut text = match failure {
-        Failure::Usage(error) => error.to_string(),
+        Failure::Usage(error) => visible_lines(&error.to_string()),
         Failure::Faults(faults) => faults.render(colored),
         Failure::Rendered(text) => visible_lines(text),
         other => visible_lines(&format!("error: {other}")),

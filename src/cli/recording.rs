@@ -272,6 +272,7 @@ pub(super) fn say(
     }
     match stopped(answer) {
         Some(words) => writeln!(out, "{words}")?,
+        None if answer.recorded + answer.found + answer.elsewhere == 0 => {}
         None => writeln!(out, "next: mirrorstats report {}", visible(&folder.display().to_string()))?,
     }
     Ok(())

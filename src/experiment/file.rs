@@ -3,12 +3,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use toml::de::DeTable;
-
 use super::spec::Spec;
 use super::table::{self, Beside, Entry};
 use crate::metric::fault::{Fault, Faults, Place, Source};
-use crate::metric::keys::Keys;
+use crate::metric::keys::{Keys, parse_toml};
 
 /// The most experiments of a file.
 const MOST_EXPERIMENTS: usize = 64;
@@ -32,14 +30,7 @@ fn with_help(fault: Fault) -> Fault {
 
 fn entries(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Vec<Entry>, Faults> {
     let source = Arc::new(source);
-    let (table, errors) = DeTable::parse_recoverable(&source.text);
-    let mut faults: Vec<Fault> = errors
-        .into_iter()
-        .map(|error| {
-            let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
-            Fault::new(place, format!("not TOML: {}", error.message()))
-        })
-        .collect();
+    let (table, mut faults) = parse_toml(&source);
     if !faults.is_empty() {
         return Err(Faults(faults).in_order());
     }

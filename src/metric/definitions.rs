@@ -1,5 +1,7 @@
 //! A definition file, checked: its catalog for readers, its plan for the kernels.
 
+use std::path::Path;
+
 use indexmap::IndexMap;
 
 use super::bind::{self, Binding};
@@ -30,8 +32,8 @@ impl Definitions {
     ///
     /// # Errors
     /// When a file cannot be read, or every fault of the definitions at once.
-    pub fn load(name_or_path: &str, columns: &Columns) -> Result<Self, FileError> {
-        Ok(Self::check(file::read(name_or_path)?, columns, None)?)
+    pub fn load(name_or_path: impl AsRef<Path>, columns: &Columns) -> Result<Self, FileError> {
+        Ok(Self::check(file::read(name_or_path.as_ref())?, columns, None)?)
     }
 
     /// Checks definitions given as text, for tests and for other programs.

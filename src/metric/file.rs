@@ -23,12 +23,11 @@ use std::sync::Arc;
 use std::{fs, io};
 
 use indexmap::IndexMap;
-use toml::de::{DeTable, DeValue};
 
 use super::catalog::{Better, StandardError};
 use super::columns::{Column, Level, Type};
 use super::fault::{Fault, Faults, Place, Source};
-use super::keys::Keys;
+use super::keys::{Keys, key_count, parse_toml};
 use super::origin::Written;
 use crate::base::budget::Limit;
 use crate::base::input;
@@ -135,10 +134,11 @@ pub fn built_in(name: &str) -> Option<&'static str> {
 ///
 /// # Errors
 /// When a file cannot be read, or all faults of its TOML.
-pub fn read(name_or_path: &str) -> Result<Document, FileError> {
-    let file = find(name_or_path, Path::new(name_or_path))
-        .map_err(|source| FileError::Unreadable { path: name_or_path.to_owned(), source })?;
-    let name = Path::new(name_or_path).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+pub fn read(name_or_path: impl AsRef<Path>) -> Result<Document, FileError> {
+    let name_or_path = name_or_path.as_ref();
+    let file = find(name_or_path.to_str(), name_or_path)
+        .map_err(|source| FileError::Unreadable { path: name_or_path.display().to_string(), source })?;
+    let name = name_or_path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
     Reading::of(name, file)
 }
 
@@ -168,20 +168,14 @@ struct DefinitionFile {
 }
 
 /// The built-in file of this name, or the one at this path.
-fn find(name: &str, path: &Path) -> io::Result<DefinitionFile> {
-    if let Some(text) = built_in(name) {
+fn find(name: Option<&str>, path: &Path) -> io::Result<DefinitionFile> {
+    if let Some((name, text)) = name.and_then(|name| Some((name, built_in(name)?))) {
         let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
         return Ok(DefinitionFile { source, folder: None, place: None });
     }
     let text = input::text(path, LARGEST)?;
     let source = Source { name: path.display().to_string(), text };
     Ok(DefinitionFile { source, folder: path.parent().map(Path::to_owned), place: fs::canonicalize(path).ok() })
-}
-
-/// The keys of a table and of the tables in it.
-fn keys(table: &DeTable<'_>) -> u64 {
-    let inside = |value: &DeValue<'_>| value.as_table().map_or(0, keys);
-    table.iter().map(|(_, value)| 1 + inside(value.get_ref())).sum()
 }
 
 struct Reading {
@@ -211,16 +205,12 @@ impl Reading {
 
     fn file(&mut self, file: DefinitionFile) {
         let source = Arc::new(file.source);
-        let (table, errors) = DeTable::parse_recoverable(&source.text);
-        let is_toml = errors.is_empty();
-        for error in errors {
-            let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
-            self.faults.push(Fault::new(place, format!("not TOML: {}", error.message())));
-        }
-        if !is_toml {
+        let (table, faults) = parse_toml(&source);
+        if !faults.is_empty() {
+            self.faults.extend(faults);
             return;
         }
-        if let Err(exceeded) = MOST_KEYS.check(keys(table.get_ref())) {
+        if let Err(exceeded) = MOST_KEYS.check(key_count(table.get_ref())) {
             self.faults.push(Fault::new(Place { source, span: 0..0 }, exceeded.to_string()));
             return;
         }
@@ -252,7 +242,7 @@ impl Reading {
             }
             return;
         }
-        match find(name, &path) {
+        match find(Some(name), &path) {
             Ok(file) if self.is_open(&file) => {
                 let names = self.open.iter().map(|(name, _)| name).chain([&file.source.name]);
                 let chain = names.map(String::as_str).collect::<Vec<_>>().join(" -> ");

@@ -13,6 +13,22 @@ use crate::base::suggest::nearest;
 
 type Value<'a> = toml::Spanned<DeValue<'a>>;
 
+/// A text as TOML, and every fault of it; with faults the table is what could be read.
+pub(crate) fn parse_toml(source: &Arc<Source>) -> (toml::Spanned<DeTable<'_>>, Vec<Fault>) {
+    let (table, errors) = DeTable::parse_recoverable(&source.text);
+    let fault = |error: toml::de::Error| {
+        let place = Place { source: source.clone(), span: error.span().unwrap_or(0..0) };
+        Fault::new(place, format!("not TOML: {}", error.message()))
+    };
+    (table, errors.into_iter().map(fault).collect())
+}
+
+/// How many keys a table and the tables in it have.
+pub(crate) fn key_count(table: &DeTable<'_>) -> u64 {
+    let inside = |value: &DeValue<'_>| value.as_table().map_or(0, key_count);
+    table.iter().map(|(_, value)| 1 + inside(value.get_ref())).sum()
+}
+
 /// A table whose keys are taken one by one; what is left at the end is unknown.
 pub(crate) struct Keys<'a> {
     source: &'a Arc<Source>,
@@ -287,7 +303,7 @@ impl<'a> Keys<'a> {
 
 fn describe(what: &str) -> String {
     match what {
-        "column" | "metric" | "mirror" | "mark" => format!("a {what}"),
+        "column" | "metric" | "mirror" | "mark" | "table" => format!("a {what}"),
         "experiment" => format!("an {what}"),
         other => other.to_owned(),
     }

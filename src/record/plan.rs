@@ -1,6 +1,7 @@
 //! Which episodes a recording has.
 
 use std::collections::BTreeSet;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -167,14 +168,47 @@ pub enum Named {
     File(PathBuf),
 }
 
+impl Experiments {
+    /// As typed, where the name of a file may have any bytes.
+    ///
+    /// # Errors
+    /// What is neither an experiment nor the name of such a file.
+    #[cfg(unix)]
+    pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
+        use std::os::unix::ffi::OsStrExt as _;
+        let mut found = BTreeSet::new();
+        for part in typed.as_bytes().split(|byte| *byte == b',').map(OsStr::from_bytes) {
+            match part.to_str() {
+                Some(text) => found.extend(text.parse::<Self>()?.0),
+                None if is_file(part) => found.extend([Named::File(part.into())]),
+                None => return Err(NotAPlan { expected: EXPECTED, found: part.to_string_lossy().into_owned() }),
+            }
+        }
+        Ok(Self(found.into_iter().collect()))
+    }
+
+    /// As typed.
+    ///
+    /// # Errors
+    /// What is neither an experiment nor the name of such a file.
+    #[cfg(not(unix))]
+    pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
+        typed.to_string_lossy().parse()
+    }
+}
+
+const EXPECTED: &str = "experiments such as E1, E1..E5, E1,E3 or mine.toml";
+
+fn is_file(name: impl AsRef<Path>) -> bool {
+    name.as_ref().extension().is_some_and(|ending| ending == "toml")
+}
+
 impl FromStr for Experiments {
     type Err = NotAPlan;
 
     fn from_str(text: &str) -> Result<Self, NotAPlan> {
-        let fault =
-            || NotAPlan { expected: "experiments such as E1, E1..E5, E1,E3 or mine.toml", found: text.to_owned() };
+        let fault = || NotAPlan { expected: EXPECTED, found: text.to_owned() };
         let experiment = |name: &str| Experiment::parse(name.trim()).map_err(|_| fault());
-        let is_file = |name: &str| Path::new(name).extension().is_some_and(|ending| ending == "toml");
         let mut found = BTreeSet::new();
         for part in text.split(',') {
             match part.split_once("..") {

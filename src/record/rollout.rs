@@ -126,7 +126,8 @@ pub async fn play(
         let start = Instant::now();
         let visibility = world.visibility();
         stage.shares.visibility(start);
-        let reply = agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: Some(t), lost })?;
+        let reply =
+            agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: lost.step.or(Some(t)), lost })?;
         let action = reply.action;
         if let Some(answering) = &reply.model {
             let first = model.get_or_insert_with(|| answering.clone());

@@ -23,7 +23,11 @@ pub fn tables(cells: &Cells, style: &Style) -> Result<Vec<Table>, StyleError> {
     Ok(sheets.iter().map(|(name, sheet)| Layout::new(cells, style, sheet).table(name, sheet)).collect())
 }
 
-/// The style's tables with the columns that are there, `main` first, then the metrics left over.
+/// The most metrics of definitions beyond the paper's that stand in `main`, whose columns have to fit a page.
+const MOST_IN_MAIN: usize = 6;
+
+/// The style's tables with the columns that are there, `main` first. Metrics that the style names nowhere stand in `main` too
+/// if the style is a built-in one, which knows no others, and they are few; else in a table after it.
 fn sheets(cells: &Cells, style: &Style) -> Vec<(String, TableSheet)> {
     let exists = |metric: &String| cells.metrics.contains(metric) && cells.catalog.metric.contains_key(metric);
     let present = |sheet: &TableSheet| TableSheet {
@@ -37,8 +41,10 @@ fn sheets(cells: &Cells, style: &Style) -> Vec<(String, TableSheet)> {
     let left_over: Vec<String> = cells.metrics.iter().filter(|m| exists(m) && !is_named(m)).cloned().collect();
     if let Some((_, main)) = sheets.first_mut().filter(|(_, main)| main.columns.is_empty()) {
         main.columns = cells.metrics.iter().filter(|metric| exists(metric)).cloned().collect();
+    } else if style.is_built_in() && left_over.len() <= MOST_IN_MAIN {
+        sheets.iter_mut().take(1).for_each(|(_, main)| main.columns.extend(left_over.iter().cloned()));
     } else if !left_over.is_empty() {
-        sheets.push((OTHER_TABLE.to_owned(), other(left_over)));
+        sheets.insert(1, (OTHER_TABLE.to_owned(), other(left_over)));
     }
     sheets.retain(|(name, sheet)| name == MAIN_TABLE || !sheet.columns.is_empty());
     sheets

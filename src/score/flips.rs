@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn one_scan_gives_both_tables_and_what_decided_each_difference() {
         let root = env!("CARGO_MANIFEST_DIR");
-        let inputs = inputs::resolve(&[format!("{root}/fixtures/paper")], std::io::empty()).unwrap();
+        let inputs = inputs::resolve(&[format!("{root}/fixtures/paper").into()], std::io::empty()).unwrap();
         let traces = TraceSet::open(&inputs).unwrap();
         let inclusive = format!("{root}/examples/definitions/inclusive.toml");
         let [old, new] = ["paper", &inclusive].map(|name| definitions(&traces, &Request::of(name)).unwrap());

@@ -1,6 +1,7 @@
 //! From traces to the episode table: the columns that the plan needs, one scan, one sorted table.
 
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 
 use arrow::array::RecordBatch;
 use arrow::compute::filter_record_batch;
@@ -30,7 +31,7 @@ use crate::trace::schema::{self, COLUMNS, Kind};
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Request {
     /// A built-in definition file by name, or any other by path.
-    pub definitions: String,
+    pub definitions: PathBuf,
     /// The metrics wanted, by name; all if absent.
     pub metrics: Option<Vec<String>>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
@@ -39,8 +40,8 @@ pub struct Request {
 
 impl Request {
     /// All metrics of a definition file, over all episodes.
-    pub fn of(definitions: &str) -> Self {
-        Self { definitions: definitions.to_owned(), metrics: None, condition: None }
+    pub fn of(definitions: impl Into<PathBuf>) -> Self {
+        Self { definitions: definitions.into(), metrics: None, condition: None }
     }
 }
 
@@ -469,7 +470,7 @@ mod tests {
     #[test]
     fn one_scan_gives_what_several_give() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper").to_owned();
-        let traces = TraceSet::open(&inputs::resolve(&[folder], std::io::empty()).unwrap()).unwrap();
+        let traces = TraceSet::open(&inputs::resolve(&[folder.into()], std::io::empty()).unwrap()).unwrap();
         let condition = Some("seed = 1".to_owned());
         let seed = definitions(&traces, &Request { condition, ..Request::of("paper") }).unwrap();
         let metrics = Some(vec!["TSA".to_owned(), "MGD".to_owned()]);

@@ -1,5 +1,6 @@
 //! What computes the scores: the native kernels, or the SQL lowering on another engine. The results are the same.
 
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
@@ -95,8 +96,8 @@ impl SparkJob {
 ///
 /// # Errors
 /// Files of this machine and URIs at once.
-pub(crate) fn are_uris(arguments: &[String]) -> Result<bool, StudyError> {
-    match arguments.iter().filter(|argument| is_uri(argument)).count() {
+pub(crate) fn are_uris(arguments: &[OsString]) -> Result<bool, StudyError> {
+    match arguments.iter().filter(|argument| argument.to_str().is_some_and(is_uri)).count() {
         0 => Ok(false),
         all if all == arguments.len() => Ok(true),
         _ => Err(StudyError::FilesAndUris),

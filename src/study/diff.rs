@@ -4,9 +4,10 @@
 //! Rule: only metrics that both sides have are scored, so that a side may have others that these traces do not bear.
 
 use std::collections::BTreeMap;
+use std::ffi::OsStr;
 use std::io;
 use std::num::NonZeroUsize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::error::StudyError;
 use super::inputs::{ScoreFile, Source, Stamp};
@@ -28,7 +29,7 @@ use crate::trace::open::TraceSet;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Side {
     /// Definitions by name or path.
-    Definitions(String),
+    Definitions(PathBuf),
     /// Files of scores, the parts of one table.
     Scores(Vec<ScoreFile>),
 }
@@ -43,7 +44,7 @@ pub struct DiffRequest {
     /// The columns that cells are grouped by.
     pub by: Vec<String>,
     /// The definitions of scores that do not carry them; the default ones if absent.
-    pub definitions_of_scores: Option<String>,
+    pub definitions_of_scores: Option<PathBuf>,
     /// How many threads to use.
     pub threads: NonZeroUsize,
 }
@@ -118,23 +119,23 @@ impl Side {
     ///
     /// # Errors
     /// A folder or a Parquet file that holds no scores.
-    pub fn of(argument: &str) -> Result<Self, StudyError> {
-        let path = Path::new(argument);
+    pub fn of(argument: impl AsRef<Path>) -> Result<Self, StudyError> {
+        let path = argument.as_ref();
         let inside = path.join("episodes.parquet");
         let inputs = if inside.is_file() {
             vec![Input::new(inside)]
         } else if path.is_dir() {
             // A folder of parts, as a cluster writes them, is one table.
-            inputs::resolve(&[argument.to_owned()], io::empty())?
+            inputs::resolve(&[path.as_os_str().to_owned()], io::empty())?
         } else {
-            vec![Input::new(argument)]
+            vec![Input::new(path)]
         };
         match ScoreFile::all(&inputs)? {
             Some(scores) => Ok(Self::Scores(scores)),
-            None if path.is_dir() || (argument.ends_with(".parquet") && path.exists()) => {
-                Err(StudyError::NoSide { argument: argument.to_owned() })
+            None if path.is_dir() || (path.extension() == Some(OsStr::new("parquet")) && path.exists()) => {
+                Err(StudyError::NoSide { argument: path.display().to_string() })
             }
-            None => Ok(Self::Definitions(argument.to_owned())),
+            None => Ok(Self::Definitions(path.to_owned())),
         }
     }
 
@@ -192,7 +193,7 @@ impl Side {
     ) -> Result<Option<Definitions>, StudyError> {
         match (self, traces) {
             (Self::Scores(_), _) => Ok(None),
-            (Self::Definitions(name), None) => Err(StudyError::NoTraces { name: name.clone() }),
+            (Self::Definitions(name), None) => Err(StudyError::NoTraces { name: name.display().to_string() }),
             (Self::Definitions(_), Some(traces)) => {
                 let question = Question { metrics: Some(common.to_vec()), ..self.question(request) };
                 question.bind(traces).map(Some)

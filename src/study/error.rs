@@ -314,6 +314,7 @@ impl StudyError {
         match self {
             Self::Filter(faults) | Self::Select(SelectError::Condition(faults)) => Some(faults),
             Self::Definitions(error) => faults_of_file(error),
+            Self::Style(StyleError::Faults(faults)) => Some(faults),
             Self::Score(error) | Self::Evidence(EvidenceError::Score(error)) => faults_of_scoring(error),
             #[cfg(feature = "polars")]
             Self::Polars(crate::engine::polars::run::PolarsError::Score(error)) => faults_of_scoring(error),

@@ -1,6 +1,8 @@
 //! What traces declare of their experiments beside what the definitions say: the definitions count, and the difference is
 //! told. What the definitions do not know must be declared alike.
 
+use std::path::Path;
+
 use super::error::StudyError;
 use crate::base::escape::visible;
 use crate::metric::catalog::{Catalog, Experiment};
@@ -17,7 +19,7 @@ use crate::trace::open::{TraceFile, TraceSet};
 ///
 /// # Errors
 /// Every fault of the definitions.
-pub fn experiment_findings(definitions: &str, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
+pub fn experiment_findings(definitions: &Path, inputs: &[Input]) -> Result<Vec<Finding>, StudyError> {
     let catalog = Definitions::load(definitions, &schema_columns())?.catalog;
     let traces = TraceSet::of(inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect());
     let mut found: Vec<Finding> = traces.files().iter().flat_map(|file| notes(file, &catalog)).collect();

@@ -1,5 +1,6 @@
 //! What a study is made of: traces, or files of scores in their place. Each input is recognised and opened once.
 
+use std::ffi::OsString;
 use std::fs::Metadata;
 use std::io::{self, Read};
 use std::path::PathBuf;
@@ -35,9 +36,9 @@ pub struct ScoreFile {
 ///
 /// # Errors
 /// An argument that names no file; a URI, which Spark alone can read; a list that cannot be read.
-pub fn resolve(arguments: &[String], list: impl Read) -> Result<Vec<Input>, StudyError> {
-    match arguments.iter().find(|argument| is_uri(argument)) {
-        Some(uri) => Err(StudyError::Uri { uri: uri.clone() }),
+pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, StudyError> {
+    match arguments.iter().filter_map(|argument| argument.to_str()).find(|argument| is_uri(argument)) {
+        Some(uri) => Err(StudyError::Uri { uri: uri.to_owned() }),
         None => Ok(inputs::resolve(arguments, list)?),
     }
 }

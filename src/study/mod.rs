@@ -30,6 +30,7 @@ mod sensitivity;
 mod size;
 pub mod verify;
 
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -93,7 +94,7 @@ pub struct Study {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Question {
     /// Definitions by name or path; the default ones, or those that scores carry, if absent.
-    pub definitions: Option<String>,
+    pub definitions: Option<PathBuf>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub filter: Option<String>,
     /// The metrics wanted, by name; all if absent.
@@ -109,8 +110,8 @@ pub struct Question {
 
 impl Question {
     /// The definition file asked for, or the default one.
-    pub(crate) fn definitions_name(&self) -> &str {
-        self.definitions.as_deref().unwrap_or(DEFAULT_DEFINITIONS)
+    pub(crate) fn definitions_name(&self) -> &Path {
+        self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
     }
 
     /// The columns among those to group by that a score does not have by itself.
@@ -164,7 +165,7 @@ impl Question {
 ///
 /// # Errors
 /// Every fault of the definitions.
-pub fn known_experiments(definitions: &str) -> Result<Option<Vec<String>>, StudyError> {
+pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
     let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
     Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
 }
@@ -174,8 +175,8 @@ impl Study {
     ///
     /// # Errors
     /// An argument that names no file, the first fault of a footer, traces and scores mixed.
-    pub fn open<T: Into<String>>(arguments: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
-        let arguments: Vec<String> = arguments.into_iter().map(Into::into).collect();
+    pub fn open<T: Into<OsString>>(arguments: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
+        let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
         Self::of(resolve(&arguments, std::io::empty())?)
     }
 
@@ -194,8 +195,8 @@ impl Study {
     ///
     /// # Errors
     /// A file that cannot be read; every fault in it.
-    pub fn definitions(mut self, name: &str) -> Result<Self, StudyError> {
-        self.question.definitions = Some(name.to_owned());
+    pub fn definitions(mut self, name: impl Into<PathBuf>) -> Result<Self, StudyError> {
+        self.question.definitions = Some(name.into());
         self.checked()
     }
 
@@ -345,7 +346,7 @@ impl Study {
     ///
     /// # Errors
     /// As [`Study::score`]; inputs that lack what the figure needs.
-    pub fn figure(&self, name: FigureName, style: &str) -> Result<Figure, StudyError> {
+    pub fn figure(&self, name: FigureName, style: impl AsRef<Path>) -> Result<Figure, StudyError> {
         let style = Style::load(style)?;
         let results = self.scan(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
         self.check_filter(results.episodes.len())?;
@@ -374,7 +375,7 @@ impl Study {
     pub fn compare(
         &self,
         published: &Path,
-        style: &str,
+        style: impl AsRef<Path>,
         table: Option<&str>,
         errata: &Errata,
     ) -> Result<Comparison, StudyError> {
@@ -387,7 +388,7 @@ impl Study {
 
     /// The files that an answer is made from: inputs, definitions and, where there is one, a style. An output that is one of
     /// them would replace what it is made from. Names of built-in definitions and styles are in it too.
-    pub fn files_read(&self, style: Option<&str>) -> Vec<PathBuf> {
+    pub fn files_read(&self, style: Option<&Path>) -> Vec<PathBuf> {
         let named = self.question.definitions.as_deref().into_iter().chain(style).map(PathBuf::from);
         self.inputs.iter().map(|input| input.path.clone()).chain(named).collect()
     }

@@ -14,7 +14,7 @@ use crate::report::html::{self, Figure, Page};
 use crate::report::layout;
 use crate::report::quality::{self, QualityTable};
 use crate::report::statistics::{Options, Statistics};
-use crate::report::style::{MAIN_TABLE, Style};
+use crate::report::style::{MAIN_TABLE, OTHER_TABLE, Style};
 use crate::report::table::Table;
 use crate::report::tables::markdown;
 use crate::score::format::Format;
@@ -30,14 +30,14 @@ pub const MOST_LISTED: usize = 20_000;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ReportOptions {
     /// `default`, `paper`, or the path of a style file.
-    pub style: String,
+    pub style: PathBuf,
     /// Whether figures and `report.html` are in it.
     pub figures: bool,
 }
 
 impl Default for ReportOptions {
     fn default() -> Self {
-        Self { style: "default".to_owned(), figures: true }
+        Self { style: PathBuf::from("default"), figures: true }
     }
 }
 
@@ -164,6 +164,11 @@ impl Report {
     /// The table that is shown first.
     pub fn main_table(&self) -> Option<&Table> {
         self.tables.iter().find(|table| table.name == MAIN_TABLE).or(self.tables.first())
+    }
+
+    /// The metrics that the style names nowhere, where there are too many of them for the main table.
+    pub fn other_table(&self) -> Option<&Table> {
+        self.tables.iter().find(|table| table.name == OTHER_TABLE)
     }
 
     /// A table as Markdown; `None` where the style has no table of this name.

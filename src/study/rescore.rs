@@ -23,13 +23,13 @@ pub struct RescoreRequest {
     /// The folder of the report.
     pub report: PathBuf,
     /// The definitions to score under, by name or path.
-    pub definitions: String,
+    pub definitions: PathBuf,
     /// Folders or files where the traces are; the current folder, the report's folder and those above it if empty.
     pub places: Vec<PathBuf>,
     /// The folder that the new report is for.
     pub out: PathBuf,
     /// Another style than the report's.
-    pub style: Option<String>,
+    pub style: Option<PathBuf>,
     /// Other metrics than the report's.
     pub metrics: Option<Vec<String>>,
     /// How many threads to use.
@@ -80,13 +80,13 @@ impl RescoreRequest {
     }
 
     /// The name or path of the style, which must be the report's own unless another is asked for.
-    fn style(&self, manifest: &Manifest) -> Result<String, StudyError> {
+    fn style(&self, manifest: &Manifest) -> Result<PathBuf, StudyError> {
         if let Some(style) = &self.style {
             return Ok(style.clone());
         }
         let (name, expected) = (manifest.style.name.clone(), manifest.style.sha256.clone());
         match Style::load(&name) {
-            Ok(style) if style.hash == expected => Ok(name),
+            Ok(style) if style.hash == expected => Ok(name.into()),
             Ok(style) => Err(StudyError::StyleChanged { name, expected, found: style.hash }),
             Err(_) => Err(StudyError::StyleGone { name, expected }),
         }

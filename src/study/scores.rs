@@ -2,6 +2,7 @@
 
 use std::io::Write;
 use std::num::NonZeroUsize;
+use std::path::Path;
 
 use super::Question;
 use super::error::StudyError;
@@ -55,7 +56,7 @@ fn read_one(file: &ScoreFile, question: &Question) -> Result<EpisodeTable, Study
 }
 
 /// Scores keep the definitions that they were computed with: others cannot be asked of them.
-fn under(name: &str, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTable, StudyError> {
+fn under(name: &Path, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTable, StudyError> {
     let wanted = Definitions::load(name, &score_traces::schema_columns())?.catalog;
     if wanted.hash == table.catalog.hash {
         return Ok(table);
@@ -63,7 +64,7 @@ fn under(name: &str, file: &ScoreFile, table: EpisodeTable) -> Result<EpisodeTab
     let short = |hash: &str| hash.get(..12).unwrap_or_default().to_owned();
     Err(StudyError::OtherDefinitions {
         file: file.input.name.clone(),
-        wanted: name.to_owned(),
+        wanted: name.display().to_string(),
         wanted_hash: short(&wanted.hash),
         found: table.catalog.name.clone(),
         found_hash: short(&table.catalog.hash),

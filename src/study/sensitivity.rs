@@ -230,7 +230,7 @@ fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions,
     let replaced = as_is.with_condition_let(EVIDENCE, &shown, &format!("{PIXELS} >= {px}"), columns);
     let mut definitions = replaced.map_err(|source| match source {
         ReplaceError::Faults(faults) => StudyError::Filter(faults),
-        source => StudyError::EvidenceLet { definitions: question.definitions_name().to_owned(), source },
+        source => StudyError::EvidenceLet { definitions: question.definitions_name().display().to_string(), source },
     })?;
     if let Some(filter) = &question.filter {
         definitions = definitions.filtered("--where", filter, columns)?;

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::num::NonZeroUsize;
 
-use arrow::array::{AsArray as _, DictionaryArray};
+use arrow::array::{ArrayRef, AsArray as _, DictionaryArray};
 use arrow::datatypes::{Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -41,6 +41,9 @@ pub struct Info {
     pub replies: Option<ReplyCounts>,
     /// The columns of all files.
     pub columns: Vec<ColumnInfo>,
+    /// Every episode, in the order of files and rows; absent unless asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub episode_list: Option<Vec<EpisodeInfo>>,
     /// The files, in their order.
     pub files: Vec<FileInfo>,
 }
@@ -67,6 +70,25 @@ pub struct SeedRun {
     pub seed: i64,
     /// The run.
     pub run: i64,
+}
+
+/// One episode.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct EpisodeInfo {
+    /// Its id.
+    pub episode_id: String,
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The seed.
+    pub seed: i64,
+    /// The run within its seed.
+    pub run: i64,
+    /// Its steps.
+    pub steps: u64,
+    /// The name of its file.
+    pub file: String,
 }
 
 /// One column over all files.
@@ -111,20 +133,36 @@ pub struct FileInfo {
 /// What each model has of the seeds and runs of all: a study of seven models, five experiments and 20,000 runs has 700,000.
 const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments", 2_000_000);
 
+/// Whether episodes are listed, beside being counted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Listing {
+    /// Each one.
+    Episodes,
+    /// None.
+    Nothing,
+}
+
 /// Summarises these traces; reads the key columns and `reply_status` of all rows, and every byte for its hash.
 ///
 /// # Errors
 /// The first fault of the traces, or a file that cannot be read.
-pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
+pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<Info, TraceError> {
+    let mut listed = (listing == Listing::Episodes).then(Vec::new);
     let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
     let statuses: Vec<String> = set.column(REPLY_STATUS).map(|_| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
     let summary = set.scan(
         &Projection { unchecked: statuses, ..Projection::default() },
         threads,
-        |batch| Ok::<_, TraceError>((Keys::of(&batch), ReplyCounts::of_batch(&batch))),
-        |(keys, counts)| {
+        |batch| {
+            let list = if listing == Listing::Episodes { list(set, &batch) } else { Vec::new() };
+            Ok::<_, TraceError>((Keys::of(&batch), ReplyCounts::of_batch(&batch), list))
+        },
+        |(keys, counts, list)| {
             tally.add(keys);
+            if let Some(listed) = &mut listed {
+                listed.extend(list);
+            }
             if let Some(replies) = &mut replies {
                 replies.merge(&counts);
             }
@@ -157,6 +195,7 @@ pub fn info(set: &TraceSet, threads: NonZeroUsize) -> Result<Info, TraceError> {
         coverage: coverage(&cells, &pairs, &experiments, &models),
         replies,
         columns: columns(set),
+        episode_list: listed,
         files,
         seeds: pairs.iter().map(|pair| pair.seed).collect::<BTreeSet<_>>().into_iter().collect(),
         runs: pairs.iter().map(|pair| pair.run).collect::<BTreeSet<_>>().into_iter().collect(),
@@ -176,13 +215,8 @@ struct Keys {
 
 impl Keys {
     fn of(batch: &EpisodeBatch) -> Self {
-        let column = |name| batch.episodes.column_by_name(name).expect("a scan delivers the columns of an episode");
-        let [experiments, models] = ["experiment", "model"].map(|name| column(name).as_dictionary::<Int32Type>());
-        let [seeds, runs] = ["seed", "run"].map(|name| column(name).as_primitive::<Int64Type>().values());
-        let text = |column: &DictionaryArray<Int32Type>, row| {
-            let key = column.key(row);
-            key.map_or_else(String::new, |key| column.values().as_string::<i32>().value(key).to_owned())
-        };
+        let [experiments, models] = ["experiment", "model"].map(|name| texts_of(batch, name));
+        let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
         let (mut cells, mut known) = (Vec::new(), HashMap::new());
         let episode = |row: usize| {
             let cell = *known.entry((experiments.key(row), models.key(row))).or_insert_with(|| {
@@ -194,6 +228,40 @@ impl Keys {
         let episodes = (0..batch.episodes.num_rows()).map(episode).collect();
         Self { file: batch.origin.file, cells, episodes }
     }
+}
+
+fn column_of<'a>(batch: &'a EpisodeBatch, name: &str) -> &'a ArrayRef {
+    batch.episodes.column_by_name(name).expect("a scan delivers the columns of an episode")
+}
+
+fn texts_of<'a>(batch: &'a EpisodeBatch, name: &str) -> &'a DictionaryArray<Int32Type> {
+    column_of(batch, name).as_dictionary()
+}
+
+fn integers_of<'a>(batch: &'a EpisodeBatch, name: &str) -> &'a [i64] {
+    column_of(batch, name).as_primitive::<Int64Type>().values()
+}
+
+fn text(column: &DictionaryArray<Int32Type>, row: usize) -> String {
+    let key = column.key(row);
+    key.map_or_else(String::new, |key| column.values().as_string::<i32>().value(key).to_owned())
+}
+
+/// The episodes of a batch, in its order.
+fn list(set: &TraceSet, batch: &EpisodeBatch) -> Vec<EpisodeInfo> {
+    let [ids, experiments, models] = ["episode_id", "experiment", "model"].map(|name| texts_of(batch, name));
+    let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
+    let file = set.files()[batch.origin.file].name();
+    let episode = |row: usize| EpisodeInfo {
+        episode_id: text(ids, row),
+        experiment: text(experiments, row),
+        model: text(models, row),
+        seed: seeds[row],
+        run: runs[row],
+        steps: (batch.offsets[row + 1] - batch.offsets[row]) as u64,
+        file: file.to_owned(),
+    };
+    (0..batch.episodes.num_rows()).map(episode).collect()
 }
 
 #[derive(Default)]

@@ -6,12 +6,13 @@
 //! passed over: what other programs leave beside their Parquet.
 
 use std::collections::BTreeMap;
-use std::ffi::OsStr;
+use std::ffi::{OsStr, OsString};
 use std::fs;
-use std::io::{self, Read};
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use super::error::TraceError;
+use super::glob_paths::{GlobError, is_glob, matches};
 
 use crate::base::budget::Limit;
 use crate::base::input;
@@ -41,7 +42,7 @@ impl Input {
 /// # Errors
 /// [`TraceError::NoInput`] when an argument gives nothing, [`TraceError::Read`] when a folder or the list cannot be
 /// read.
-pub fn resolve(arguments: &[String], list: impl Read) -> Result<Vec<Input>, TraceError> {
+pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, TraceError> {
     let mut list = Some(list);
     let mut paths = Vec::new();
     for argument in arguments {
@@ -67,9 +68,9 @@ pub fn resolve(arguments: &[String], list: impl Read) -> Result<Vec<Input>, Trac
     Ok(inputs)
 }
 
-fn expand(argument: &str) -> Result<Vec<PathBuf>, TraceError> {
+fn expand(argument: &OsStr) -> Result<Vec<PathBuf>, TraceError> {
     let no_input = |found: &str, help| TraceError::NoInput {
-        argument: argument.to_owned(),
+        argument: argument.to_string_lossy().into_owned(),
         expected: "a trace file, a folder of them, a glob, or `-`",
         found: found.to_owned(),
         help,
@@ -83,16 +84,16 @@ fn expand(argument: &str) -> Result<Vec<PathBuf>, TraceError> {
             traces => Ok(traces),
         };
     }
-    if !argument.contains(['*', '?', '[']) {
+    // A pattern is text; what is not can only be a name.
+    let Some(pattern) = argument.to_str().filter(|text| is_glob(text)) else {
         return Err(no_input("no such file or folder", "check the spelling and the current folder"));
-    }
-    let matches = glob::glob(argument).map_err(|error| no_input(error.msg, "correct the glob, or name the files"))?;
+    };
+    let matches = matches(pattern).map_err(|error| match error {
+        GlobError::Pattern(error) => no_input(error.msg, "correct the glob, or name the files"),
+        GlobError::Folder(folder, source) => TraceError::Read { what: folder.display().to_string(), source },
+    })?;
     let mut traces = Vec::new();
     for path in matches {
-        let path = path.map_err(|error| TraceError::Read {
-            what: error.path().display().to_string(),
-            source: io::Error::new(error.error().kind(), error.to_string()),
-        })?;
         traces.extend(traces_at(&path)?);
     }
     if traces.is_empty() {
@@ -105,11 +106,11 @@ fn expand(argument: &str) -> Result<Vec<PathBuf>, TraceError> {
 const LONGEST_LIST: Limit = Limit::new("bytes of a list of traces", 64 << 20);
 
 fn listed(list: impl Read) -> Result<Vec<PathBuf>, TraceError> {
-    let text = input::text_of(list, LONGEST_LIST)
+    let bytes = input::bytes_of(list, LONGEST_LIST)
         .map_err(|source| TraceError::Read { what: "the list on standard input".into(), source })?;
     let mut paths = Vec::new();
-    for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
-        paths.extend(expand(line)?);
+    for line in bytes.split(|byte| *byte == b'\n').map(<[u8]>::trim_ascii).filter(|line| !line.is_empty()) {
+        paths.extend(expand(&name_of(line)?)?);
     }
     if paths.is_empty() {
         return Err(TraceError::NoInput {
@@ -120,6 +121,21 @@ fn listed(list: impl Read) -> Result<Vec<PathBuf>, TraceError> {
         });
     }
     Ok(paths)
+}
+
+/// A name as the system has it: any bytes on Unix, UTF-8 elsewhere.
+#[cfg(unix)]
+#[expect(clippy::unnecessary_wraps, reason = "elsewhere not every name is one")]
+fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
+    use std::os::unix::ffi::OsStrExt as _;
+    Ok(OsStr::from_bytes(bytes).to_owned())
+}
+
+/// A name as the system has it: any bytes on Unix, UTF-8 elsewhere.
+#[cfg(not(unix))]
+fn name_of(bytes: &[u8]) -> Result<OsString, TraceError> {
+    let text = input::utf8(bytes.to_owned());
+    text.map(Into::into).map_err(|source| TraceError::Read { what: "the list on standard input".into(), source })
 }
 
 /// The path itself, or the traces of the folder there.
@@ -205,7 +221,7 @@ mod tests {
     use super::*;
 
     fn names(arguments: &[&str], list: &str) -> Result<Vec<String>, String> {
-        let arguments: Vec<_> = arguments.iter().map(ToString::to_string).collect();
+        let arguments: Vec<OsString> = arguments.iter().map(Into::into).collect();
         match resolve(&arguments, list.as_bytes()) {
             Ok(inputs) => Ok(inputs.into_iter().map(|input| input.name).collect()),
             Err(error) => Err(error.to_string()),

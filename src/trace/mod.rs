@@ -21,6 +21,7 @@ pub mod episode_hash;
 pub mod error;
 #[cfg(feature = "fuzz")]
 pub mod fuzz;
+mod glob_paths;
 pub mod identification;
 pub mod import;
 pub mod info;

@@ -80,6 +80,16 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
         &["report", "a.parquet", "--by", "\u{1b}[31mmodel"],
         &["report", "a.parquet", "--style", "\u{1b}[31m"],
         &["score", "a.parquet", "--definitions", "\u{1b}[31m"],
+        &["score", "a.parquet", "--\u{1b}[31m"],
+        &["\u{1b}[31m\u{202e}"],
+        &["score", "a.parquet", "--threads", "\u{1b}[31m\u{202e}\r"],
+        &["completions", "\u{1b}]0;title\u{7}"],
+        &["diff", "paper", "\u{1b}[31m", "a.parquet"],
+        &["definitions", "check", "\u{1b}[31m"],
+        &["verify", "\u{1b}[31m"],
+        &["import", "\u{1b}[31m", "-o", "b.parquet"],
+        &["recover", "\u{1b}[31m", "-o", "b.parquet"],
+        &["--errors", "json", "score", "\u{1b}[31m\u{202e}"],
     ] {
         let answer = run(at, arguments);
         check(&answer);

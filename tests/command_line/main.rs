@@ -19,6 +19,8 @@ mod hostile;
 mod options;
 #[cfg(target_os = "linux")]
 mod outputs;
+#[cfg(target_os = "linux")]
+mod paths;
 mod plan;
 mod quality;
 mod refusals;
@@ -26,6 +28,7 @@ mod refusals;
 mod reports;
 mod scores;
 mod sensitivity;
+mod styles;
 mod widths;
 
 use harness::files::{contents, fixture};

@@ -24,7 +24,7 @@ use mirrorstats::report::plan::Plan;
 use mirrorstats::report::plan::register::RegisteredPlan;
 use mirrorstats::report::sensitivity::Sensitivity;
 use mirrorstats::report::statistics::{Sequential, Statistics};
-use mirrorstats::report::style::Sheet;
+use mirrorstats::report::style::shape::StyleFile;
 use mirrorstats::score::evidence::Evidence;
 use mirrorstats::stats::diff::Changes;
 use mirrorstats::study::verify::Verification;
@@ -69,7 +69,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("sensitivity", json!(schema_for!(Sensitivity))),
         ("stats", json!(schema_for!(Statistics))),
         ("stats-sequential", json!(schema_for!(Sequential))),
-        ("style", json!(schema_for!(Sheet))),
+        ("style", json!(schema_for!(StyleFile))),
         ("step", Name::Step.document()),
         ("trace", json!(SchemaDocument::current())),
         ("validation", json!(schema_for!(Validation))),

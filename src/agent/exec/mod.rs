@@ -281,15 +281,18 @@ impl ExecAgent {
         let lost = lost(failure);
         program.close().await;
         let words = self.kept.said.last_words(&self.shared.secrets);
-        let words = words.map_or_else(String::new, |words| format!("; its last words: {words}"));
-        let cause = self.shared.without_secrets(&format!("step {}: {}{words}", self.steps, lost.cause));
+        let words = words.map_or_else(String::new, |words| format!("; its last words:\n{words}"));
+        // What came before the reply spoilt the step before, though it is noticed now.
+        let earlier = matches!(failure, Failure::Chatter { .. }).then(|| self.steps - 1);
+        let step = earlier.unwrap_or(self.steps);
+        let cause = self.shared.without_secrets(&format!("step {step}: {}{words}", lost.cause));
         if let Failure::Ended(status) = failure
             && self.steps == 1
             && status.code().is_some_and(|code| NO_COMMAND.contains(&code))
         {
             self.shared.stop.get_or_init(|| format!("the command of --agent exec: cannot be run: {cause}"));
         }
-        Lost { cause, ..lost }
+        Lost { cause, step: earlier, ..lost }
     }
 }
 

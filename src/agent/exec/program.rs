@@ -43,6 +43,11 @@ pub enum Failure {
     )]
     OutOfTurn { line: String, before: String },
     #[error(
+        "the program wrote `{chatter}` where its reply was expected, and its reply would have come after it: `{line}` (one line \
+         on standard output for each observation, the JSON object of the reply; everything else belongs on standard error)"
+    )]
+    Chatter { chatter: String, line: String },
+    #[error(
         "the program wrote a line before it was asked for its first reply: `{0}` (one line on standard output for each \
          observation; everything else belongs on standard error)"
     )]
@@ -157,7 +162,13 @@ impl Program {
     }
 
     fn out_of_turn(&self, line: &[u8]) -> Failure {
-        Failure::OutOfTurn { line: beginning(line), before: self.last.clone() }
+        let (line, before) = (beginning(line), self.last.clone());
+        // Of two lines for one question, the one that is no object was not meant as the reply.
+        if before.trim_start().starts_with('{') {
+            Failure::OutOfTurn { line, before }
+        } else {
+            Failure::Chatter { chatter: before, line }
+        }
     }
 
     /// Bytes that the program was sent and has not read, as far as the system says.

@@ -54,13 +54,22 @@ impl Said {
         kept
     }
 
-    /// The end of it on one line; `None` if nothing was said.
+    /// The last lines of it, indented, each whole where there is more than one; `None` if nothing was said.
     pub fn last_words(&self, secrets: &[Secret]) -> Option<String> {
         let bytes = self.bytes(secrets);
-        let end = &bytes[bytes.len().saturating_sub(IN_MESSAGE)..];
-        let text = String::from_utf8_lossy(end).split_whitespace().collect::<Vec<_>>().join(" ");
-        (!text.is_empty()).then_some(text)
+        let text = String::from_utf8_lossy(last_lines(&bytes)).replace('\t', "    ");
+        let lines = text.lines().map(str::trim_end).filter(|line| !line.is_empty());
+        let lines: Vec<String> = lines.map(|line| format!("    {line}")).collect();
+        (!lines.is_empty()).then(|| lines.join("\n"))
     }
+}
+
+/// The newest bytes that a message holds, from the beginning of a line where one begins among them.
+fn last_lines(bytes: &[u8]) -> &[u8] {
+    let cut = bytes.len().saturating_sub(IN_MESSAGE);
+    let begins = |at: usize| at == 0 || bytes[at - 1] == b'\n';
+    let first = (cut..bytes.len()).find(|&at| begins(at)).unwrap_or(cut);
+    &bytes[first..]
 }
 
 /// A text without any of these keys.
@@ -113,13 +122,23 @@ mod tests {
         assert_eq!(said.last_words(&[]), None);
         said.add(&vec![b'x'; IN_FILE]);
         said.add(b"\n\x1b[1mthe\tend\xff\n");
-        let text = said.last_words(&[]).unwrap();
-        assert!(text.starts_with("xxx") && text.ends_with("xx \u{1b}[1mthe end\u{fffd}"), "{text}");
-        assert!(text.len() <= IN_MESSAGE + 2);
+        assert_eq!(said.last_words(&[]).unwrap(), "    \u{1b}[1mthe    end\u{fffd}");
         let bytes = said.bytes(&[]);
         assert!(bytes.len() == IN_FILE && bytes.ends_with(b"x\n\x1b[1mthe\tend\xff\n"));
         said.add(&vec![b'y'; 3 * IN_FILE]);
         assert_eq!(said.bytes(&[]), vec![b'y'; IN_FILE]);
+    }
+
+    #[test]
+    fn last_words_keep_their_lines() {
+        let said = Said::default();
+        said.add(b"Traceback (most recent call last):\r\n  File \"agent.py\", line 4, in f\n\n\tg()\nValueError: 12\n");
+        let expected =
+            ["Traceback (most recent call last):", "  File \"agent.py\", line 4, in f", "    g()", "ValueError: 12"];
+        assert_eq!(said.last_words(&[]).unwrap(), expected.map(|line| format!("    {line}")).join("\n"));
+        // A line that is longer than a message has its end there.
+        said.add(&vec![b'x'; 2 * IN_MESSAGE]);
+        assert_eq!(said.last_words(&[]).unwrap(), format!("    {}", "x".repeat(IN_MESSAGE)));
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub struct AuditArgs {
     pub episodes: Episodes,
     /// Definitions: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
-    pub definitions: String,
+    pub definitions: PathBuf,
     /// The most steps of an episode
     #[arg(long, value_name = "STEPS", default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub steps: u32,
@@ -37,7 +37,7 @@ pub struct AuditArgs {
     pub rounding: Vec<Rounding>,
     /// The style whose tables say what emphasis means, and where undefined prints as zero: `paper`, `default`, or a file
     #[arg(long, value_name = "STYLE", default_value = "paper")]
-    pub style: String,
+    pub style: PathBuf,
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
@@ -52,7 +52,7 @@ impl AuditArgs {
         let tables = self.tables.iter().map(|path| table(path)).collect::<Result<Vec<_>, _>>()?;
         let definitions = Definitions::load(&self.definitions, &schema_columns()).map_err(StudyError::from)?;
         let implied = implied(&definitions.plan, self.steps, has_value);
-        let style = Style::load(&self.style).map_err(Failure::input)?;
+        let style = Style::load(&self.style).map_err(StudyError::from)?;
         style.check_against(&definitions.catalog).map_err(Failure::input)?;
         let roundings = if self.rounding.is_empty() { Rounding::ALL.to_vec() } else { self.rounding };
         let terms = Terms {

@@ -1,7 +1,7 @@
 //! `compare`: what the traces print beside what is published.
 
 use std::io::{self, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
@@ -24,10 +24,10 @@ pub struct CompareArgs {
     pub published: PathBuf,
     /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
     #[arg(long, value_name = "NAME|FILE")]
-    pub definitions: Option<String>,
+    pub definitions: Option<PathBuf>,
     /// The style that prints the tables: `paper` or a style file
     #[arg(long, value_name = "STYLE", default_value = PAPER_STYLE)]
-    pub style: String,
+    pub style: PathBuf,
     /// The table to compare [default: the first that has all the published metrics]
     #[arg(long, value_name = "NAME")]
     pub table: Option<String>,
@@ -59,7 +59,7 @@ impl CompareArgs {
     fn errata(&self) -> Result<Errata, Failure> {
         match &self.errata {
             Some(path) => Errata::read(path).map_err(Failure::input),
-            None if self.style == PAPER_STYLE => Ok(Errata::of_paper()),
+            None if self.style == Path::new(PAPER_STYLE) => Ok(Errata::of_paper()),
             None => Ok(Errata::default()),
         }
     }

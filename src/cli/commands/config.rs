@@ -71,7 +71,7 @@ impl ConfigArgs {
                 setting.command.clone().unwrap_or_else(|| "all that have it".to_owned()),
                 format!("--{}", setting.option),
                 visible(&setting.values.join(",")),
-                setting.origin.to_string(),
+                visible(&setting.origin.to_string()),
             ]);
         }
         writeln!(out, "{table}")?;

@@ -1,6 +1,8 @@
 //! `definitions`: check a definition file, explain a metric, list and show the built-in files.
 
+use std::ffi::OsString;
 use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -32,10 +34,10 @@ pub enum Action {
     Check {
         /// `paper`, `extended`, or a TOML file
         #[arg(value_name = "NAME|FILE")]
-        file: String,
+        file: PathBuf,
         /// Traces whose own columns the definitions may use
         #[arg(value_name = "TRACES")]
-        traces: Vec<String>,
+        traces: Vec<OsString>,
         /// Print the answer as JSON
         #[arg(long)]
         json: bool,
@@ -47,7 +49,7 @@ pub enum Action {
         metric: String,
         /// `paper`, `extended`, or a TOML file
         #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
-        definitions: String,
+        definitions: PathBuf,
         /// Print the answer as JSON
         #[arg(long)]
         json: bool,
@@ -87,7 +89,7 @@ impl DefinitionsArgs {
     }
 }
 
-fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> {
+fn check(file: &Path, traces: &[OsString], json: bool) -> Result<Outcome, Failure> {
     let columns = if traces.is_empty() {
         score_traces::schema_columns()
     } else {
@@ -106,7 +108,7 @@ fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> 
             writeln!(
                 io::stdout().lock(),
                 "{}: no fault\n  {} metrics: {}\n  {} named expressions, {} experiments\n  sha256 {}",
-                visible(file),
+                visible(&file.display().to_string()),
                 metrics.len(),
                 visible(&metrics.join(", ")),
                 catalog.lets.len(),
@@ -123,7 +125,7 @@ fn check(file: &str, traces: &[String], json: bool) -> Result<Outcome, Failure> 
     }
 }
 
-fn explain(metric: &str, definitions: &str, json: bool) -> Result<Outcome, Failure> {
+fn explain(metric: &str, definitions: &Path, json: bool) -> Result<Outcome, Failure> {
     let definitions = Definitions::load(definitions, &score_traces::schema_columns()).map_err(StudyError::from)?;
     if let Some(explanation) = definitions.explain(metric) {
         return output::print(&explanation, json);

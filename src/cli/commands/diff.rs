@@ -1,6 +1,8 @@
 //! `diff`: what another set of definitions changes, or another set of scores.
 
+use std::ffi::OsString;
 use std::io::{self, Write as _};
+use std::path::PathBuf;
 
 use super::super::args::ThreadArgs;
 use super::super::outcome::{Failure, Outcome};
@@ -15,13 +17,13 @@ use crate::study::{DiffRequest, Side, diff, resolve};
 pub struct DiffArgs {
     /// The definitions before: `paper`, `extended`, or a TOML file; or a file of scores, or a report's folder
     #[arg(value_name = "OLD")]
-    pub old: String,
+    pub old: PathBuf,
     /// The definitions after, or scores
     #[arg(value_name = "NEW")]
-    pub new: String,
+    pub new: PathBuf,
     /// The traces to score; between two files of scores, those that tell which timesteps decided
     #[arg(value_name = "TRACES")]
-    pub traces: Vec<String>,
+    pub traces: Vec<OsString>,
     /// Only these metrics, separated by commas [default: all]
     #[arg(long, value_name = "METRICS", value_delimiter = ',')]
     pub metrics: Option<Vec<String>>,
@@ -33,7 +35,7 @@ pub struct DiffArgs {
     pub by: Vec<String>,
     /// What scores that do not say it were computed with: CSV, JSON lines, other engines' Parquet [default: paper]
     #[arg(long, value_name = "NAME|FILE")]
-    pub definitions: Option<String>,
+    pub definitions: Option<PathBuf>,
     /// The most lines of each list on the terminal; --json has all
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub limit: usize,

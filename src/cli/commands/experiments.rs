@@ -39,7 +39,7 @@ pub enum Action {
     Explain {
         /// A built-in experiment, or a TOML file
         #[arg(value_name = "NAME|FILE")]
-        experiment: String,
+        experiment: PathBuf,
         /// Print the experiment as traces carry it, as JSON
         #[arg(long)]
         json: bool,
@@ -102,11 +102,11 @@ fn answer(experiments: impl Iterator<Item = Experiment>) -> Result<Outcome, Fail
     output::print_json(&ExperimentsAnswer { experiments: experiments.map(|one| (*one).clone()).collect() })
 }
 
-fn explain(name: &str, json: bool) -> Result<Outcome, Failure> {
-    let experiments = match Experiment::parse(name) {
+fn explain(path: &Path, json: bool) -> Result<Outcome, Failure> {
+    let experiments = match Experiment::parse(&path.to_string_lossy()) {
         Ok(experiment) => vec![experiment],
-        Err(_) if Path::new(name).extension().is_some_and(|ending| ending == "toml") => {
-            placed(Path::new(name))?.into_iter().map(|one| one.experiment).collect()
+        Err(_) if path.extension().is_some_and(|ending| ending == "toml") => {
+            placed(path)?.into_iter().map(|one| one.experiment).collect()
         }
         Err(unknown) => return Err(unknown_name(&unknown)),
     };

@@ -28,7 +28,7 @@ pub struct FigureArgs {
     pub engine: EngineArgs,
     /// The style whose order of models is taken: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
-    pub style: String,
+    pub style: PathBuf,
     /// The file format [default: by the ending of FILE; svg on standard output]
     #[arg(long, value_enum)]
     pub format: Option<FigureFormat>,

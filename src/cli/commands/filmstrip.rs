@@ -1,5 +1,6 @@
 //! `mirrorstats filmstrip`: one episode as a row of frames.
 
+use std::ffi::OsString;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -19,7 +20,7 @@ pub struct FilmstripArgs {
     episode: String,
     /// Logs or traces to look for it in: files, folders or quoted globs
     #[arg(value_name = "RECORDINGS", default_value = "runs")]
-    recordings: Vec<String>,
+    recordings: Vec<OsString>,
     /// The picture to write: .png, .svg or .pdf
     #[arg(short, long, value_name = "FILE")]
     out: PathBuf,
@@ -70,19 +71,19 @@ impl FilmstripArgs {
             return Ok(figure);
         }
         Err(Failure::input(format!(
-            "no log or trace in {} has the episode `{}`; `mirrorstats info` lists episodes",
-            self.recordings.join(", "),
+            "no log or trace in {} has the episode `{}`; `mirrorstats info --episodes` lists those of traces",
+            self.recordings.iter().map(|named| named.to_string_lossy()).collect::<Vec<_>>().join(", "),
             self.episode
         )))
     }
 
-    fn sources(&self) -> Result<(Vec<PathBuf>, Vec<String>), Failure> {
+    fn sources(&self) -> Result<(Vec<PathBuf>, Vec<OsString>), Failure> {
         let (mut logs, mut traces) = (Vec::new(), Vec::new());
         for named in &self.recordings {
             let path = Path::new(named);
             if path.is_dir() {
                 let entries = std::fs::read_dir(path)
-                    .map_err(|error| Failure::input(format!("cannot read `{named}`: {error}")))?;
+                    .map_err(|error| Failure::input(format!("cannot read `{}`: {error}", path.display())))?;
                 let mut found: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
                 found.sort();
                 traces.extend(found.iter().any(|path| ends_in(path, "parquet")).then(|| named.clone()));

@@ -36,11 +36,11 @@ pub struct ImportArgs {
     out: PathBuf,
     /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
-    definitions: String,
+    definitions: PathBuf,
     /// The colours that there are, which the trace then declares: names with commas between them, a file of names, or
     /// `default`, the ten colours of the study
     #[arg(long, value_name = "NAMES|FILE|default")]
-    palette: Option<String>,
+    palette: Option<PathBuf>,
     /// What episodes share that are more alike than chance: statistics of the trace then take it as a cluster. Episodes with
     /// an equal `scene` are pairs without a word
     #[arg(long, value_enum, value_name = "COLUMN")]
@@ -129,16 +129,17 @@ impl ImportArgs {
 const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
 
 /// The palette that is typed, or in the file that is named. A text with a comma is no name of a file.
-fn palette(typed: &str) -> Result<Palette, Failure> {
+fn palette(path: &Path) -> Result<Palette, Failure> {
+    let typed = path.to_string_lossy();
     if typed == "default" {
         return Ok(Palette::of_study());
     }
-    let is_file = !typed.contains(',') && (typed.contains(['/', '\\', '.']) || Path::new(typed).is_file());
+    let is_file = !typed.contains(',') && (typed.contains(['/', '\\', '.']) || path.is_file());
     let names = if is_file {
-        input::text(Path::new(typed), LARGEST)
+        input::text(path, LARGEST)
             .map_err(|error| Failure::input(format!("--palette {typed}: cannot read it: {error}")))?
     } else {
-        typed.to_owned()
+        typed.clone().into_owned()
     };
     let names = names.split([',', '\n']).map(str::trim).filter(|name| !name.is_empty());
     let help = "name the colours with commas between them, or in a file one per line; or `default`";

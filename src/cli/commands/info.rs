@@ -16,13 +16,16 @@ use crate::cli::text_table::{aligned_right, counted, listing};
 use crate::report::tables::fit::{fitted, wrapped};
 use crate::score::quality::QualityByCell;
 use crate::trace::checksums::Checksums;
-use crate::trace::info::{Cell, Info, SeedRun, info};
+use crate::trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
 
 /// Summarise traces: episodes, steps, models, experiments, coverage, files
 #[derive(Clone, Debug, clap::Args)]
 pub struct InfoCommand {
     #[command(flatten)]
     input: TraceArgs,
+    /// List the episodes: their ids, steps and files
+    #[arg(long)]
+    episodes: bool,
     /// Print JSON
     #[arg(long)]
     json: bool,
@@ -45,7 +48,12 @@ impl InfoCommand {
     /// When the traces are not as they must be, or the output cannot be written.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let study = self.input.open()?;
-        let info = info(study.traces()?, self.input.threads.count()).map_err(Failure::input)?;
+        let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };
+        let info = info(study.traces()?, listing, self.input.threads.count()).map_err(Failure::input)?;
+        if let Some(episodes) = info.episode_list.as_ref().filter(|_| !self.json) {
+            writeln!(io::stdout().lock(), "{}", fitted(&list_of(episodes), 1, terminal::width()))?;
+            return Ok(Outcome::Done);
+        }
         let quality = if study.has_quality()? { study.quality()? } else { QualityByCell::default() };
         let mut out = io::stdout().lock();
         if self.json {
@@ -134,6 +142,22 @@ fn pairs(pairs: &[SeedRun]) -> String {
         0 => shown.join(" "),
         more => format!("{} and {more} more", shown.join(" ")),
     }
+}
+
+fn list_of(episodes: &[EpisodeInfo]) -> Table {
+    let mut table = listing(["episode", "experiment", "model", "seed", "run", "steps", "file"]);
+    for episode in episodes {
+        table.add_row([
+            visible(&episode.episode_id),
+            visible(&episode.experiment),
+            visible(&episode.model),
+            episode.seed.to_string(),
+            episode.run.to_string(),
+            episode.steps.to_string(),
+            visible(&episode.file),
+        ]);
+    }
+    aligned_right(table, 3..=5)
 }
 
 fn files(info: &Info) -> Table {

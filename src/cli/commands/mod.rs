@@ -29,6 +29,7 @@ pub mod score;
 pub mod sensitivity;
 pub mod sql;
 pub mod stats;
+pub mod style;
 pub mod validate;
 pub mod verify;
 #[cfg(feature = "sim")]
@@ -67,6 +68,7 @@ pub enum Command {
     Sql(sql::SqlArgs),
     Query(query::QueryArgs),
     Definitions(definitions::DefinitionsArgs),
+    Style(style::StyleArgs),
     Experiments(experiments::ExperimentsArgs),
     #[cfg(feature = "sim")]
     World(world::WorldArgs),
@@ -114,6 +116,7 @@ impl Command {
             Self::Sql(args) => args.run(),
             Self::Query(args) => args.run(),
             Self::Definitions(args) => args.run(),
+            Self::Style(args) => args.run(),
             Self::Experiments(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::World(args) => args.run(),

@@ -56,7 +56,7 @@ pub struct PlanArgs {
     pub chance: Option<Ratio>,
     /// Definitions that a registered plan names by their hash: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
-    pub definitions: String,
+    pub definitions: PathBuf,
     /// Write the plan, the hash of the definitions and its own hash to a new file
     #[arg(long, value_name = "FILE")]
     pub register: Option<PathBuf>,

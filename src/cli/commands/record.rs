@@ -44,7 +44,7 @@ pub struct RecordArgs {
     agent: String,
     /// The experiments: E1, E1..E5, E1,E3, others that are built in such as mark (`mirrorstats experiments show`), or a
     /// file of your own such as mine.toml
-    #[arg(long, value_name = "LIST", default_value = "E1..E5")]
+    #[arg(long, value_name = "LIST", default_value = "E1..E5", value_parser = experiments::parser())]
     experiment: Experiments,
     /// Seeds 1 to this for each experiment
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(i32).range(1..=4_000))]

@@ -1,5 +1,6 @@
 //! `mirrorstats replay`: a trace's episodes again, held against what was recorded.
 
+use std::ffi::OsString;
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -23,7 +24,7 @@ use crate::trace::inputs;
 pub struct ReplayArgs {
     /// Traces of `mirrorstats record`: files, folders or quoted globs
     #[arg(required = true, value_name = "TRACES")]
-    traces: Vec<String>,
+    traces: Vec<OsString>,
     /// Only this episode
     #[arg(long, value_name = "ID")]
     episode: Option<String>,

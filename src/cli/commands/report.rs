@@ -31,7 +31,7 @@ pub struct ReportArgs {
     pub out: PathBuf,
     /// How tables look: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
-    pub style: String,
+    pub style: PathBuf,
     /// How episodes are grouped into cells.
     #[command(flatten)]
     pub grouping: GroupingArgs,
@@ -76,8 +76,13 @@ impl ReportArgs {
     }
 
     fn print(&self, report: &Report) -> Result<Outcome, Failure> {
+        let mut out = io::stdout().lock();
         if let Some(table) = report.main_table() {
-            io::stdout().lock().write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
+            out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
+        }
+        if let Some(table) = report.other_table() {
+            writeln!(out, "\n{}: what the style names nowhere", table.title)?;
+            out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
         }
         let episodes = counted(report.results.episodes.len() as u64, "episode");
         output::say(&format!("{episodes}; the report is in {}", self.out.display()));

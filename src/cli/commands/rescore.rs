@@ -27,7 +27,7 @@ pub struct RescoreArgs {
     pub report: PathBuf,
     /// The definitions to score under: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE")]
-    pub definitions: String,
+    pub definitions: PathBuf,
     /// The folder to write [default: REPORT_DIR-rescored]
     #[arg(short, long, value_name = "DIR")]
     pub out: Option<PathBuf>,
@@ -36,7 +36,7 @@ pub struct RescoreArgs {
     pub traces: Vec<PathBuf>,
     /// How tables look; needed where the report's style was a file [default: the report's]
     #[arg(long, value_name = "STYLE")]
-    pub style: Option<String>,
+    pub style: Option<PathBuf>,
     /// Other metrics than the report's, separated by commas
     #[arg(long, value_name = "METRICS", value_delimiter = ',')]
     pub metrics: Option<Vec<String>>,

@@ -99,7 +99,7 @@ impl ScoreArgs {
         let cluster = self.engine.cluster();
         if are_uris(&self.traces.traces)? {
             return Ok(SparkJob::of_uris(
-                self.traces.traces.clone(),
+                self.traces.traces.iter().map(|uri| uri.to_string_lossy().into_owned()).collect(),
                 &self.scoring.question(&GroupingArgs::default()),
                 cluster,
             )?);

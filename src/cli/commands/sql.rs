@@ -1,5 +1,6 @@
 //! `sql`: the statement that computes the episode table on another engine.
 
+use std::ffi::OsString;
 use std::io::{self, Write as _};
 
 use super::super::args::{GroupingArgs, ScoringArgs};
@@ -13,7 +14,7 @@ use crate::study::Study;
 pub struct SqlArgs {
     /// Traces whose columns `steps` has [default: those that every trace has; what others mean then is part of the statement]
     #[arg(value_name = "TRACES")]
-    pub traces: Vec<String>,
+    pub traces: Vec<OsString>,
     /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,

@@ -1,6 +1,7 @@
 //! `mirrorstats stats`: what can be concluded at this n, and what cannot.
 
 use std::io::Write as _;
+use std::path::PathBuf;
 
 use crate::base::suggest::hint;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
@@ -20,7 +21,7 @@ pub struct StatsArgs {
     pub traces: TraceArgs,
     /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
     #[arg(long, value_name = "NAME|FILE")]
-    pub definitions: Option<String>,
+    pub definitions: Option<PathBuf>,
     /// Only episodes where this holds, in the language of definitions
     #[arg(long = "where", value_name = "EXPR")]
     pub condition: Option<String>,

@@ -1,6 +1,7 @@
 //! `mirrorstats validate`: every rule of the schema, all findings.
 
 use std::io::{self, Write};
+use std::path::PathBuf;
 
 use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
@@ -20,7 +21,7 @@ pub struct ValidateCommand {
     input: TraceArgs,
     /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
-    definitions: String,
+    definitions: PathBuf,
     /// Print all findings as JSON
     #[arg(long)]
     json: bool,

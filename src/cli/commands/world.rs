@@ -36,7 +36,7 @@ enum WorldVerb {
 #[derive(Clone, Debug, clap::Args)]
 struct SceneArgs {
     /// Which experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
-    #[arg(value_name = "LIST")]
+    #[arg(value_name = "LIST", value_parser = experiments::parser())]
     experiments: Experiments,
     /// The seed of the block of runs
     #[arg(long, default_value_t = 1)]
@@ -57,7 +57,7 @@ struct SheetArgs {
     #[arg(short, long, value_name = "DIR", default_value = "reports/world")]
     out: PathBuf,
     /// Which experiments, a row each: E1, E1..E5, E1,E3, or a file such as mine.toml
-    #[arg(long, value_name = "LIST", default_value = "E1..E5")]
+    #[arg(long, value_name = "LIST", default_value = "E1..E5", value_parser = experiments::parser())]
     experiment: Experiments,
     /// The seed of the scenes
     #[arg(long, default_value_t = 1)]

@@ -2,7 +2,9 @@
 
 use std::fs;
 
-use polars::prelude::{DataType, Expr, LazyFrame, NULL, PlRefPath, ScanArgsParquet, UnionArgs, col, concat, lit};
+use polars::prelude::{
+    DataType, Expr, LazyFrame, NULL, PlRefPath, ScanArgsParquet, ScanSources, UnionArgs, col, concat, lit,
+};
 
 use super::run::PolarsError;
 use crate::score::score_traces::ScoreError;
@@ -64,7 +66,7 @@ impl FrameColumn {
 /// checksums of pages, so that they are verified here.
 ///
 /// # Errors
-/// When a page is damaged, a file is gone, or its path is no text.
+/// When a page is damaged, or a file is gone.
 pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
     verify_pages(traces).map_err(ScoreError::from)?;
     let frames = traces.files().iter().map(|file| scan(file, columns)).collect::<Result<Vec<_>, _>>()?;
@@ -76,6 +78,13 @@ fn scan(file: &TraceFile, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsEr
     // A path from the root cannot be taken for an address on the network.
     let path = fs::canonicalize(file.path()).map_err(gone)?;
     let options = ScanArgsParquet { glob: false, cache: false, ..ScanArgsParquet::default() };
-    let frame = LazyFrame::scan_parquet(PlRefPath::try_from_path(&path)?, options)?;
+    let frame = match path.to_str() {
+        Some(_) => LazyFrame::scan_parquet(PlRefPath::try_from_path(&path)?, options)?,
+        // Polars takes paths as text; what has no such path is opened here.
+        None => {
+            let opened = file.reader().map_err(gone)?;
+            LazyFrame::scan_parquet_sources(ScanSources::Files([opened].into()), options)?
+        }
+    };
     Ok(frame.select(columns.iter().map(|column| column.of(file)).collect::<Vec<_>>()))
 }

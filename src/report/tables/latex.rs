@@ -8,11 +8,15 @@ use crate::base::escape::visible;
 use crate::metric::catalog::Better;
 use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
 
+/// What has to stand in the preamble, as a comment before the table.
+const PACKAGES: &str =
+    "% Needs in the preamble: \\usepackage{booktabs}, \\usepackage{graphicx}, \\usepackage[table]{xcolor}\n";
+
 /// The whole float, caption and label included.
 pub fn render(table: &Table) -> String {
     let columns = "c".repeat(table.columns.len());
     let mut text = format!(
-        "\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{l{columns}}}\n\\toprule\n{}\n",
+        "{PACKAGES}\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{l{columns}}}\n\\toprule\n{}\n",
         header(table)
     );
     for (at, group) in table.groups.iter().enumerate() {

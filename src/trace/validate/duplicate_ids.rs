@@ -197,7 +197,7 @@ mod tests {
     #[test]
     fn equal_hashes_of_different_ids_are_no_repetition() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/fixtures/paper").to_owned();
-        let inputs = resolve(&[folder], std::io::empty()).unwrap();
+        let inputs = resolve(&[folder.into()], std::io::empty()).unwrap();
         let set = TraceSet::open(&inputs).unwrap();
         let layout = Layout::new(&set, [], []).unwrap();
         let mut all = HashSet::new();

@@ -80,6 +80,37 @@ fn a_program_that_talks_out_of_turn() {
 }
 
 #[test]
+fn a_line_that_came_where_the_reply_belongs_is_what_is_blamed() {
+    // The observation is read, the banner comes before the reply: at the second observation both are told apart.
+    let bench = Bench::new();
+    bench.program(&format!("[ $n = 1 ] && echo 'loading the model'; echo '{FORWARD}'"));
+    let (code, found, said) = outcome(&bench.record(&[]).output().unwrap());
+    assert_eq!(code, Some(1), "{said}");
+    let lost = &found["lost"][0];
+    let reason = lost["reason"].as_str().unwrap();
+    assert!(
+        reason.starts_with("step 1: the program wrote `loading the model` where its reply was expected"),
+        "{reason}"
+    );
+    assert!(reason.contains("its reply would have come after it: `{\"view-description\""), "{reason}");
+    assert_eq!(lost["step"], 1);
+}
+
+#[test]
+fn a_traceback_keeps_its_lines() {
+    let bench = Bench::new();
+    bench.program("printf 'Traceback:\\n  File \"a.py\", line 4\\n\\033[31mValueError\\n' >&2; exit 1");
+    let (_, found, said) = outcome(&bench.record(&[]).output().unwrap());
+    let reason = found["lost"][0]["reason"].as_str().unwrap();
+    assert!(
+        reason.ends_with("its last words:\n    Traceback:\n      File \"a.py\", line 4\n    \u{1b}[31mValueError"),
+        "{reason}"
+    );
+    // On the terminal as lines, and nothing acts there.
+    assert!(said.contains("\n      File \"a.py\", line 4\n    \\u{1b}[31mValueError\n"), "{said}");
+}
+
+#[test]
 fn a_line_before_the_first_question_is_named_as_such() {
     let early = "the program wrote a line before it was asked for its first reply: `loading the model`";
     // Before it reads anything, at once and later; and between its task and the first observation, which it never reads.

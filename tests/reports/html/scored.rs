@@ -22,7 +22,7 @@ use crate::harness::files::fixture;
 /// The episodes of the bundled traces under the paper's definitions.
 pub static PAPER: LazyLock<EpisodeTable> = LazyLock::new(|| {
     let folder = fixture("paper").display().to_string();
-    let traces = TraceSet::open(&inputs::resolve(&[folder], std::io::empty()).unwrap()).unwrap();
+    let traces = TraceSet::open(&inputs::resolve(&[folder.into()], std::io::empty()).unwrap()).unwrap();
     let definitions = score_traces::definitions(&traces, &Request::of("paper")).unwrap();
     score_traces::score(&traces, &definitions, &["body_color".to_owned()], NonZeroUsize::MIN).unwrap()
 });

@@ -43,6 +43,75 @@ fn each_fault_of_a_style_file_is_named() {
     assert_shown!("style files, and what is said of each behind an arrow", told.join("\n"));
 }
 
+/// A folder with these files, of which the first is the style.
+fn files(files: &[(&str, &str)]) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, text) in files {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, text).unwrap();
+    }
+    let first = folder.path().join(files[0].0);
+    (folder, first)
+}
+
+fn fault_of(style: &std::path::Path) -> String {
+    Style::load(style).unwrap_err().to_string()
+}
+
+#[test]
+fn an_include_comes_first_and_what_differs_is_said() {
+    let mine = "include = ['paper', 'more/base.toml']\nundefined = 'n/a'\n[table.main]\ncolumns = ['TSA']\n\
+                print = { decimals = { rate = 3, quantity = 0 } }\n[column.TSA]\nlatex = 'T'\n";
+    let base = "[table.extra]\ntitle = 'Extra'\ncolumns = ['CR']\n[column.TSA]\nbetter = 'lower'\n";
+    let (_folder, path) = files(&[("mine.toml", mine), ("more/base.toml", base)]);
+    let (style, paper) = (Style::load(&path).unwrap(), Style::load("paper").unwrap());
+    let (main, of_paper) = (&style.sheet.table["main"], &paper.sheet.table["main"]);
+    assert_eq!((&main.title, &main.label, &main.columns), (&of_paper.title, &of_paper.label, &vec!["TSA".to_owned()]));
+    assert_eq!(main.print.rounding, of_paper.print.rounding, "a table of keys is put together key by key");
+    assert_eq!(main.print.decimals.unwrap().rate, 3);
+    assert_eq!(style.sheet.table["appendix"], paper.sheet.table["appendix"]);
+    assert_eq!(style.sheet.table["extra"].title, "Extra");
+    assert_eq!((style.sheet.undefined.as_str(), &style.sheet.row_order), ("n/a", &paper.sheet.row_order));
+    let column = &style.sheet.column["TSA"];
+    assert_eq!((column.latex.as_deref(), column.better.is_some()), (Some("T"), true));
+    // Metrics of a built-in style need not be there, those of one's own must.
+    let mut catalog = published::catalog();
+    catalog.metric.shift_remove("AR_SC");
+    assert!(style.check_against(&catalog).is_ok());
+    catalog.metric.shift_remove("CR");
+    assert!(style.check_against(&catalog).unwrap_err().to_string().contains("no metric `CR`"));
+    // Another text of an included file is another style.
+    let (_other, changed) = files(&[("mine.toml", mine), ("more/base.toml", &base.replace("Extra", "Other"))]);
+    assert_ne!(Style::load(&changed).unwrap().hash, style.hash);
+}
+
+#[test]
+fn includes_do_not_run_in_circles_or_without_end() {
+    let (_folder, path) = files(&[("a.toml", "include = ['b.toml']\n"), ("b.toml", "include = ['./a.toml']\n")]);
+    let said = fault_of(&path);
+    assert!(said.contains("the include leads back to itself: ") && said.contains("a.toml -> "), "{said}");
+
+    let twice = |name: &str| format!("include = ['{name}', '{name}']\n");
+    let names: Vec<String> = (0..8).map(|at| format!("s{at}.toml")).collect();
+    let texts: Vec<String> = names.iter().skip(1).map(|name| twice(name)).chain([MAIN.to_owned()]).collect();
+    let all: Vec<(&str, &str)> = names.iter().map(String::as_str).zip(texts.iter().map(String::as_str)).collect();
+    let (_folder, path) = files(&all);
+    assert!(fault_of(&path).contains("at most 32 includes of a style"), "{}", fault_of(&path));
+}
+
+#[test]
+fn nothing_of_what_an_include_says_is_shown() {
+    for secret in ["root:$6$hunter2:19000::\n", "password = 'hunter2'\n", "[table.hunter2]\ncolumns = 3\n"] {
+        let (_folder, path) = files(&[("in/mine.toml", "include = ['../secret']\n"), ("secret", secret)]);
+        let said = fault_of(&path);
+        assert!(said.contains("is no style: it cannot be read from line 1, column"), "{said}");
+        assert!(!said.contains("hunter2"), "{said}");
+    }
+    let (_folder, path) = files(&[("mine.toml", "include = ['nosuch.toml']\n")]);
+    assert!(fault_of(&path).contains("cannot read the style"), "{}", fault_of(&path));
+}
+
 #[test]
 fn a_name_that_is_no_style_gets_the_nearest() {
     let message = |name: &str| Style::load(name).unwrap_err().to_string();

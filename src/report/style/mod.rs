@@ -1,9 +1,11 @@
 //! Presentation as data: which tables there are, their columns and order, how a cell prints, what is emphasised.
 //!
 //! Rule: a style changes how a number looks, never the number. Styles are TOML, checked against the catalog
-//! before anything prints. `default` and `paper` are built in; any other name is a file.
+//! before anything prints. `default` and `paper` are built in; any other name is a file. [`read`] reads them.
 
-use std::collections::BTreeSet;
+mod read;
+pub mod shape;
+
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -11,12 +13,9 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::base::budget::Limit;
-use crate::base::hash;
-use crate::base::input;
-use crate::base::number::MOST_PLACES;
-use crate::base::suggest::hint;
+use crate::base::suggest::nearest;
 use crate::metric::catalog::{Better, Catalog, Kind};
+use crate::metric::fault::{Fault, Faults, Place};
 
 /// The table that every report has.
 pub const MAIN_TABLE: &str = "main";
@@ -25,8 +24,8 @@ pub const MAIN_TABLE: &str = "main";
 pub const OTHER_TABLE: &str = "other";
 
 const BUILT_IN: [(&str, &str); 2] = [
-    ("default", include_str!("../../assets/styles/default.toml")),
-    ("paper", include_str!("../../assets/styles/paper.toml")),
+    ("default", include_str!("../../../assets/styles/default.toml")),
+    ("paper", include_str!("../../../assets/styles/paper.toml")),
 ];
 
 /// A style ready for use.
@@ -38,51 +37,42 @@ pub struct Style {
     pub hash: String,
     /// What the file says.
     pub sheet: Sheet,
-    /// Whether it came with the program. A built-in style may name metrics that a catalog has not.
+    /// Every metric that a file of the user's names, and where. A built-in style may name metrics that a catalog has not.
+    named: Vec<(String, Place)>,
     is_built_in: bool,
 }
 
-/// A style file.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+/// What a style file says, with all that it includes.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Sheet {
     /// The models in the order of their rows; others come after them, by name.
-    #[serde(default)]
     pub row_order: Vec<String>,
     /// What stands where a value is undefined.
-    #[serde(default = "default_undefined")]
     pub undefined: String,
     /// The sentence that explains emphasis, under tables where something is emphasised.
-    #[serde(default)]
     pub emphasis_note: String,
     /// How cells print in every table, unless the table says otherwise.
-    #[serde(default)]
     pub print: PrintSheet,
     /// Headers and arrows, by metric.
-    #[serde(default)]
     pub column: IndexMap<String, ColumnSheet>,
     /// The tables by name; a name becomes a file name. `main` must be one of them.
     pub table: IndexMap<String, TableSheet>,
 }
 
 /// One table of a style file.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TableSheet {
     /// The first words of the caption, without a full stop.
     pub title: String,
     /// The sentences after them.
-    #[serde(default)]
     pub note: String,
     /// The LaTeX label; none if absent.
     pub label: Option<String>,
     /// The metrics, in the order of the columns. Those that the scores have not are left out.
     pub columns: Vec<String>,
     /// What prints otherwise than in the other tables.
-    #[serde(default)]
     pub print: PrintSheet,
     /// The metrics whose undefined cells print as zero and compete as zero (a quirk of the published main table).
-    #[serde(default)]
     pub undefined_as_zero: Vec<String>,
 }
 
@@ -191,89 +181,58 @@ pub enum StyleError {
     Unknown { name: String, hint: String },
     #[error("style {}: cannot read the file: {source}", path.display())]
     Unreadable { path: PathBuf, source: io::Error },
-    #[error("style {}: {source}", path.display())]
-    Malformed { path: PathBuf, source: Box<toml::de::Error> },
-    #[error("style `{style}`: {fault}")]
-    Invalid { style: String, fault: StyleFault },
+    #[error(transparent)]
+    Faults(#[from] Faults),
 }
 
-/// What is wrong with a well-formed style.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages say it")]
-pub enum StyleFault {
-    #[error("there is no table `main`: every report needs one, add `[table.main]`")]
-    NoMainTable,
-    #[error("table `{table}`: expected a name of lowercase letters, digits, `-` and `_`, and not `other`")]
-    TableName { table: String },
-    #[error("table `{table}` has no columns: name at least one metric")]
-    NoColumns { table: String },
-    #[error("table `{table}`: the metric `{metric}` is listed twice")]
-    RepeatedColumn { table: String, metric: String },
-    #[error("{place}: the definitions `{catalog}` have no metric `{metric}`{hint}")]
-    UnknownMetric { place: String, catalog: String, metric: String, hint: String },
-    #[error("decimals: expected at most {MOST_PLACES}, found {found}")]
-    Decimals { found: u32 },
+/// The names of the built-in styles.
+pub fn built_in_names() -> [&'static str; 2] {
+    BUILT_IN.map(|(name, _)| name)
+}
+
+/// The text of a built-in style.
+pub fn built_in(name: &str) -> Option<&'static str> {
+    BUILT_IN.into_iter().find(|(known, _)| *known == name).map(|(_, text)| text)
 }
 
 fn default_undefined() -> String {
     "--".to_owned()
 }
 
-/// A style is written by hand.
-const LARGEST: Limit = Limit::new("bytes of a style", 1 << 20);
-
 impl Style {
     /// The built-in style of that name, or else the style in that file.
     ///
     /// # Errors
     /// For a name that is neither, and for a file that is no style.
-    pub fn load(name_or_path: &str) -> Result<Self, StyleError> {
-        if let Some((name, text)) = BUILT_IN.into_iter().find(|(name, _)| *name == name_or_path) {
-            return Self::parse(name, text, Path::new(name), true);
-        }
-        let path = Path::new(name_or_path);
-        let text = match input::text(path, LARGEST) {
-            Ok(text) => text,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                let hint = hint(name_or_path, BUILT_IN.map(|(name, _)| name));
-                return Err(StyleError::Unknown { name: name_or_path.to_owned(), hint });
-            }
-            Err(source) => return Err(StyleError::Unreadable { path: path.to_owned(), source }),
-        };
-        let name = path.file_stem().map_or_else(|| name_or_path.into(), |stem| stem.to_string_lossy());
-        Self::parse(&name, &text, path, false)
-    }
-
-    fn parse(name: &str, text: &str, path: &Path, is_built_in: bool) -> Result<Self, StyleError> {
-        let sheet: Sheet = toml::from_str(text)
-            .map_err(|source| StyleError::Malformed { path: path.to_owned(), source: Box::new(source) })?;
-        let style = Self { name: name.to_owned(), hash: hash::of_bytes(text.as_bytes()), sheet, is_built_in };
-        style.sheet.check().map_err(|fault| style.invalid(fault))?;
-        Ok(style)
+    pub fn load(name_or_path: impl AsRef<Path>) -> Result<Self, StyleError> {
+        let path = name_or_path.as_ref();
+        let is_built_in = BUILT_IN.into_iter().any(|(name, _)| path == Path::new(name));
+        let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let read::Read { sheet, named, hash } = read::read(path)?;
+        Ok(Self { name, hash, sheet, named, is_built_in })
     }
 
     /// That the style names only metrics that the definitions have. A built-in style may name others.
     ///
     /// # Errors
-    /// For the first metric that is not there.
+    /// For every metric that is not there.
     pub fn check_against(&self, catalog: &Catalog) -> Result<(), StyleError> {
-        if self.is_built_in {
-            return Ok(());
-        }
-        let stranger = self.sheet.named_metrics().find(|(_, metric)| !catalog.metric.contains_key(*metric));
-        match stranger {
-            None => Ok(()),
-            Some((place, metric)) => Err(self.invalid(StyleFault::UnknownMetric {
-                place,
-                catalog: catalog.name.clone(),
-                metric: metric.to_owned(),
-                hint: hint(metric, catalog.metric.keys().map(String::as_str)),
-            })),
-        }
+        let strange = self.named.iter().filter(|(metric, _)| !catalog.metric.contains_key(metric));
+        let fault = |(metric, place): &(String, Place)| {
+            let near = nearest(metric, catalog.metric.keys().map(String::as_str));
+            let known = || catalog.metric.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+            let help =
+                near.map_or_else(|| format!("metrics are {}", known()), |near| format!("did you mean `{near}`?"));
+            let message = format!("the definitions `{}` have no metric `{metric}`", catalog.name);
+            Fault::new(place.clone(), message).help(help)
+        };
+        let faults: Vec<Fault> = strange.map(fault).collect();
+        if faults.is_empty() { Ok(()) } else { Err(Faults(faults).in_order().into()) }
     }
 
-    fn invalid(&self, fault: StyleFault) -> StyleError {
-        StyleError::Invalid { style: self.name.clone(), fault }
+    /// Whether the style came with the program.
+    pub fn is_built_in(&self) -> bool {
+        self.is_built_in
     }
 }
 
@@ -295,50 +254,6 @@ impl Sheet {
     pub fn better(&self, metric: &str, catalog: &Catalog) -> Better {
         let own = self.column.get(metric).and_then(|column| column.better);
         own.or_else(|| catalog.metric.get(metric).map(|m| m.better)).unwrap_or(Better::Neither)
-    }
-
-    fn check(&self) -> Result<(), StyleFault> {
-        if !self.table.contains_key(MAIN_TABLE) {
-            return Err(StyleFault::NoMainTable);
-        }
-        self.print.check()?;
-        for (name, table) in &self.table {
-            table.check(name)?;
-        }
-        Ok(())
-    }
-
-    /// Every metric that the sheet names, and where.
-    fn named_metrics(&self) -> impl Iterator<Item = (String, &str)> {
-        let of_tables = self.table.iter().flat_map(|(name, table)| {
-            let metrics = table.columns.iter().chain(&table.undefined_as_zero);
-            metrics.map(move |metric| (format!("table `{name}`"), metric.as_str()))
-        });
-        of_tables.chain(self.column.keys().map(|metric| (format!("column `{metric}`"), metric.as_str())))
-    }
-}
-
-impl TableSheet {
-    fn check(&self, name: &str) -> Result<(), StyleFault> {
-        let is_plain = |b: u8| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-' || b == b'_';
-        if name.is_empty() || !name.bytes().all(is_plain) || name == OTHER_TABLE {
-            return Err(StyleFault::TableName { table: name.to_owned() });
-        }
-        if self.columns.is_empty() {
-            return Err(StyleFault::NoColumns { table: name.to_owned() });
-        }
-        let mut seen = BTreeSet::new();
-        if let Some(metric) = self.columns.iter().find(|metric| !seen.insert(*metric)) {
-            return Err(StyleFault::RepeatedColumn { table: name.to_owned(), metric: metric.clone() });
-        }
-        self.print.check()
-    }
-}
-
-impl PrintSheet {
-    fn check(&self) -> Result<(), StyleFault> {
-        let most = self.decimals.map_or(0, |decimals| decimals.rate.max(decimals.quantity));
-        if most > MOST_PLACES { Err(StyleFault::Decimals { found: most }) } else { Ok(()) }
     }
 }
 

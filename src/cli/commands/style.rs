@@ -1,0 +1,76 @@
+//! `style`: show a built-in style, check a file of one's own.
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::base::escape::visible;
+use crate::base::suggest::hint;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::metric::definitions::Definitions;
+use crate::report::style::{Style, built_in, built_in_names};
+use crate::score::score_traces::schema_columns;
+use crate::study::StudyError;
+
+/// Show and check styles: how tables look
+#[derive(Clone, Debug, clap::Args)]
+pub struct StyleArgs {
+    /// What to do.
+    #[command(subcommand)]
+    action: Action,
+}
+
+/// What to do with styles.
+#[derive(Clone, Debug, clap::Subcommand)]
+enum Action {
+    /// Print a built-in style, to start your own from
+    Show {
+        /// `default` or `paper`
+        #[arg(value_name = "NAME", default_value = "default")]
+        name: String,
+    },
+    /// Show every fault of a style file, underlined, with a suggestion
+    Check {
+        /// `default`, `paper`, or a TOML file
+        #[arg(value_name = "NAME|FILE")]
+        file: PathBuf,
+        /// The definitions whose metrics it may name: `paper`, `extended`, or a TOML file
+        #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
+        definitions: PathBuf,
+    },
+}
+
+impl StyleArgs {
+    /// Does it.
+    ///
+    /// # Errors
+    /// A name that is no style; a file that cannot be read; faults of style or definitions.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self.action {
+            Action::Show { name } => show(&name),
+            Action::Check { file, definitions } => check(&file, &definitions),
+        }
+    }
+}
+
+fn show(name: &str) -> Result<Outcome, Failure> {
+    let Some(text) = built_in(name) else {
+        let names = built_in_names();
+        let (known, hint) = (names.join(", "), hint(name, names));
+        return Err(Failure::input(format!("no built-in style `{name}`; there are {known}{hint}")));
+    };
+    io::stdout().lock().write_all(text.as_bytes())?;
+    Ok(Outcome::Done)
+}
+
+fn check(file: &Path, definitions: &Path) -> Result<Outcome, Failure> {
+    let style = Style::load(file).map_err(StudyError::from)?;
+    let catalog = Definitions::load(definitions, &schema_columns()).map_err(StudyError::from)?.catalog;
+    style.check_against(&catalog).map_err(StudyError::from)?;
+    let mut out = io::stdout().lock();
+    writeln!(out, "{}: no fault", visible(&file.display().to_string()))?;
+    for (name, table) in &style.sheet.table {
+        writeln!(out, "  table {name}: {}", visible(&table.columns.join(", ")))?;
+    }
+    writeln!(out, "  sha256 {}", style.hash)?;
+    Ok(Outcome::Done)
+}

@@ -14,7 +14,7 @@
 //! SELECT ... FROM e1 ORDER BY ...
 //! ```
 //!
-//! The portable form uses nothing but CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN and arithmetic, so that Polars SQL,
+//! The portable form uses nothing but CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN (LEFT JOIN for `lag`) and arithmetic, so that Polars SQL,
 //! `DuckDB`, Spark SQL and `DataFusion` run it as it is. Of a search between two landmarks it makes a second pass, as
 //! Polars does, which has no filters of lists; `DuckDB` and Spark have them.
 //!

@@ -41,7 +41,12 @@ pub(super) const FUNCTIONS: [Entry; 15] = [
     entry(Function::Max, "max", "max(x): the largest x, or null", (1, 1)),
     entry(Function::Sum, "sum", "sum(x): the sum of an integer x, or null", (1, 1)),
     entry(Function::At, "at", "at(x, t0): the value of x at timestep t0, or null", (2, 2)),
-    entry(Function::Lag, "lag", "lag(x): the value of x at step t - 1 of the same episode, null at the first step", (1, 1)),
+    entry(
+        Function::Lag,
+        "lag",
+        "lag(x): the value of x at step t - 1 of the same episode, null at the first step",
+        (1, 1),
+    ),
     entry(Function::Length, "length", "length(): the number of steps", (0, 0)),
     entry(Function::Coalesce, "coalesce", "coalesce(x, y, ...): the first that is not null", (1, MANY)),
     entry(Function::NullIf, "nullif", "nullif(x, y): null where x = y, else x", (2, 2)),

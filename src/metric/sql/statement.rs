@@ -110,7 +110,8 @@ impl<'l, 'p> Statement<'l, 'p> {
         let layout = self.layout;
         for (&lag, columns) in earlier {
             let [id, next, time] = ["id", "next", "t"].map(|word| layout.lag_column(lag, word));
-            let _ = write!(self.text, "\n  LEFT JOIN (\n    SELECT episode_id AS {id}, t + {lag} AS {next}, t AS {time}");
+            let _ =
+                write!(self.text, "\n  LEFT JOIN (\n    SELECT episode_id AS {id}, t + {lag} AS {next}, t AS {time}");
             for &column in columns {
                 if let Op::Column(name) = &layout.plan.node(column).op {
                     let own = layout.lag_column(lag, &column.index().to_string());

@@ -147,7 +147,7 @@ fn definitions() -> Vec<Vec<u8>> {
 }
 
 /// An expression for each construct of the grammar.
-const EXPRESSIONS: [&str; 12] = [
+const EXPRESSIONS: [&str; 13] = [
     "first(action = 'done')",
     "coalesce(last(mirror_visible and t < length()), 7)",
     "any(x is null or x between 1 and 3)",
@@ -160,6 +160,7 @@ const EXPRESSIONS: [&str; 12] = [
     "count(pose_x is distinct from 1.5)",
     "case experiment when 'E1' then 1 when 'E2' then 2 end",
     "sum(9223372036854775807)",
+    "count(x < lag(x)) + count(lag(lag(action)) = action)",
 ];
 
 const STYLE: &[u8] = b"[print]\ncell = \"mean_se\"\nrounding = \"once\"\ndecimals = { rate = 2, quantity = 1 }\nemphasis = \"none\"\n\

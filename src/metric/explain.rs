@@ -263,6 +263,7 @@ fn call(name: &str, arguments: &[Expr], expr: &Expr) -> String {
         ("max", [x]) => format!("the largest {} of the steps", value(x)),
         ("sum", [x]) => format!("the sum of {} over the steps", value(x)),
         ("at", [x, moment]) => format!("{} at step {}", value(x), value(moment)),
+        ("lag", [x]) => format!("{} at the step before", value(x)),
         ("coalesce", values) => values.iter().map(value).collect::<Vec<_>>().join(", or else "),
         ("nullif", [x, y]) => format!("{} unless it is {}", value(x), value(y)),
         ("div", [x, y]) => format!("({}) divided by ({}), the fraction dropped", value(x), value(y)),

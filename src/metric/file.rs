@@ -35,10 +35,12 @@ use crate::base::ratio::Ratio;
 use crate::base::suggest::nearest;
 
 /// The built-in definition files, by name.
-const BUILT_IN: [(&str, &str); 3] = [
+const BUILT_IN: [(&str, &str); 5] = [
     ("paper", include_str!("../../assets/definitions/paper.toml")),
     ("extended", include_str!("../../assets/definitions/extended.toml")),
     ("battery", include_str!("../../assets/definitions/battery.toml")),
+    ("reach", include_str!("../../assets/definitions/reach.toml")),
+    ("reach-fallback", include_str!("../../assets/definitions/reach-fallback.toml")),
 ];
 
 /// A definition file and all that it includes, merged in order: what comes later replaces what came before.

@@ -12,6 +12,7 @@ pub(super) enum Function {
     Max,
     Sum,
     At,
+    Lag,
     Length,
     Coalesce,
     NullIf,
@@ -30,7 +31,7 @@ pub(super) struct Entry {
 const MANY: usize = usize::MAX;
 
 /// Every function, in the order of the documentation.
-pub(super) const FUNCTIONS: [Entry; 14] = [
+pub(super) const FUNCTIONS: [Entry; 15] = [
     entry(Function::First, "first", "first(p): the t of the first step where p holds, or null", (1, 1)),
     entry(Function::Last, "last", "last(p): the t of the last step where p holds, or null", (1, 1)),
     entry(Function::Any, "any", "any(p): whether p holds at some step", (1, 1)),
@@ -40,6 +41,12 @@ pub(super) const FUNCTIONS: [Entry; 14] = [
     entry(Function::Max, "max", "max(x): the largest x, or null", (1, 1)),
     entry(Function::Sum, "sum", "sum(x): the sum of an integer x, or null", (1, 1)),
     entry(Function::At, "at", "at(x, t0): the value of x at timestep t0, or null", (2, 2)),
+    entry(
+        Function::Lag,
+        "lag",
+        "lag(x): the value of x at step t - 1 of the same episode, null at the first step",
+        (1, 1),
+    ),
     entry(Function::Length, "length", "length(): the number of steps", (0, 0)),
     entry(Function::Coalesce, "coalesce", "coalesce(x, y, ...): the first that is not null", (1, MANY)),
     entry(Function::NullIf, "nullif", "nullif(x, y): null where x = y, else x", (2, 2)),

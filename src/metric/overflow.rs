@@ -62,7 +62,7 @@ fn range(op: &Op, rows: i128, column: impl Fn(&str) -> Option<(i64, i64)>, of: i
             let (low, high) = of(*x);
             (low.min(low * rows), high.max(high * rows))
         }
-        Op::Aggregate(_, x) | Op::At(x, _) | Op::Spread(x) => of(*x),
+        Op::Aggregate(_, x) | Op::At(x, _) | Op::Spread(x) | Op::Lag(x) => of(*x),
         Op::Negate(x) => (-of(*x).1, -of(*x).0),
         Op::Arithmetic(op, x, y) => arithmetic(*op, of(*x), of(*y)),
         Op::Case { branches, otherwise } => hull(branches.iter().map(|(_, then)| *then).chain(*otherwise).map(of)),

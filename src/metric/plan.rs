@@ -84,6 +84,8 @@ pub enum Op {
     Aggregate(Aggregate, NodeId),
     /// The value of the first operand at the timestep given by the second; null where there is no such step.
     At(NodeId, NodeId),
+    /// The value at step t - 1 of the same episode; null at the first step.
+    Lag(NodeId),
 }
 
 /// A constant; floats by their bits so that equal constants are one node.
@@ -276,6 +278,7 @@ impl Op {
             Self::FloatFromInt(x) => Self::FloatFromInt(to(*x)),
             Self::Aggregate(aggregate, x) => Self::Aggregate(*aggregate, to(*x)),
             Self::At(x, moment) => Self::At(to(*x), to(*moment)),
+            Self::Lag(x) => Self::Lag(to(*x)),
         }
     }
 }
@@ -285,15 +288,28 @@ impl Op {
 pub(super) struct Builder {
     plan: Plan,
     known: HashMap<(Op, Type, Level), NodeId>,
+    /// How many steps back each node looks from the step that it is read at.
+    lags: Vec<u8>,
 }
 
 impl Builder {
     /// The node of this operation, new or known.
     pub(super) fn add(&mut self, op: Op, ty: Type, level: Level) -> NodeId {
         *self.known.entry((op, ty, level)).or_insert_with_key(|(op, ty, level)| {
+            let deepest = op.operands().iter().map(|operand| self.lags[operand.0]).max().unwrap_or(0);
+            self.lags.push(match op {
+                Op::Lag(_) => deepest.saturating_add(1),
+                Op::Aggregate(..) | Op::At(..) => 0,
+                _ => deepest,
+            });
             self.plan.nodes.push(Node { op: op.clone(), ty: *ty, level: *level });
             NodeId(self.plan.nodes.len() - 1)
         })
+    }
+
+    /// How many steps back a node looks from the step that it is read at.
+    pub(super) fn lags(&self, id: NodeId) -> u8 {
+        self.lags[id.0]
     }
 
     /// Remembers how a node was written, the first time.

@@ -70,6 +70,7 @@ impl Op {
             Self::Coalesce(_) => "coalesce",
             Self::IntFromBool(_) => "int",
             Self::FloatFromInt(_) => "float",
+            Self::Lag(_) => "lag",
             _ => "",
         }
     }

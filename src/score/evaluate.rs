@@ -3,6 +3,7 @@
 //! It deliberately does not know where batches come from, in which order, or on which thread.
 
 use arrow::array::{Array, ArrayRef, AsArray as _, BooleanArray, Datum, RecordBatch, UInt32Array};
+use arrow::compute::kernels::window::shift;
 use arrow::compute::kernels::{boolean, cmp, numeric};
 use arrow::compute::{cast, filter as select, nullif};
 use arrow::datatypes::{DataType, Int64Type};
@@ -153,6 +154,10 @@ impl Evaluation<'_> {
             Kernel::Search { aggregate, condition, within } => Ok(self.search(*aggregate, *condition, *within)),
             Kernel::Fold(aggregate, x) => Ok(self.fold(*aggregate, *x)?),
             Kernel::At { values, moments } => Ok(self.at(*values, *moments, step.ty)),
+            Kernel::Lag(x) => {
+                let shifted = shift(self.of(*x).array(), 1)?;
+                Ok(Vector::Array(nullif(&shifted, &segments.first_rows())?))
+            }
             Kernel::NullWhereAbsent { values, moments } => {
                 let absent = BooleanArray::new(!&segments.exist(self.of(*moments).ints()), None);
                 Ok(Vector::Array(nullif(self.of(*values).array(), &absent)?))

@@ -63,6 +63,16 @@ impl<'a> Segments<'a> {
         times.into()
     }
 
+    /// Which rows are the first of their episode; never null.
+    pub(super) fn first_rows(self) -> BooleanArray {
+        let mut rows = Bits::with_capacity(self.rows());
+        for (_, length) in self.each() {
+            rows.fill(1, true);
+            rows.fill(length - 1, false);
+        }
+        BooleanArray::new(rows.finish(), None)
+    }
+
     /// An episode's truth value for each of its rows.
     pub(super) fn spread_bools(self, values: &BooleanArray) -> BooleanArray {
         let bits = self.spread_bits(values.values());

@@ -150,6 +150,7 @@ impl Author {
                 Expr::Case(Some(operand), branches, None)
             }
             3 => Expr::NullIf(self.boxed(ty, level, depth), self.boxed_or_null(ty, level, depth)),
+            4 if level == Level::Step && self.pick(2) == 0 => Expr::Lag(self.boxed(ty, level, depth)),
             _ => Expr::At(self.boxed(ty, Level::Step, depth), self.boxed_or_null(Type::Int, Level::Episode, depth)),
         }
     }

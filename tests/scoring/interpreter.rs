@@ -183,6 +183,10 @@ impl Reading<'_> {
                 _ => Null,
             },
             Expr::Aggregate(name, x) => self.aggregate(name, x),
+            Expr::Lag(x) => match t.expect("a step") {
+                1 => Null,
+                t => self.eval(x, Some(t - 1)),
+            },
             Expr::At(x, moment) => match eval(moment) {
                 Value::Int(moment) => match usize::try_from(moment) {
                     Ok(t) if (1..=self.episode.steps.len()).contains(&t) => self.eval(x, Some(t)),

@@ -35,6 +35,7 @@ pub enum Expr {
     /// `first`, `last`, `any`, `all`, `count`, `min`, `max` or `sum`.
     Aggregate(&'static str, Box<Expr>),
     At(Box<Expr>, Box<Expr>),
+    Lag(Box<Expr>),
 }
 
 /// A definition: its name, its value, and for a metric where it is defined.
@@ -95,6 +96,7 @@ fn sql(expr: &Expr, names: &[Definition]) -> String {
         Expr::NullIf(x, y) => format!("nullif({}, {})", one(x), one(y)),
         Expr::Matches(x, pattern) => format!("regexp_like({}, '{pattern}')", one(x)),
         Expr::Aggregate(name, x) => format!("{name}({})", one(x)),
+        Expr::Lag(x) => format!("lag({})", one(x)),
         Expr::At(x, moment) => format!("at({}, {})", one(x), one(moment)),
     }
 }

@@ -19,4 +19,6 @@ mod plain_loop;
 #[cfg(feature = "polars")]
 mod query;
 mod random;
+#[cfg(feature = "polars")]
+mod reach;
 mod traces;

@@ -9,6 +9,9 @@ use super::scope::Scope;
 use crate::base::suggest::nearest;
 use crate::metric::columns::{Level, Type};
 
+/// How many steps back an expression looks; each is a join of the steps in SQL.
+const DEEPEST_LAG: u8 = 8;
+
 impl Scope<'_, '_> {
     pub(super) fn call(&mut self, name: &str, arguments: &[Expr], whole: &Expr) -> Option<Bound> {
         let Some(entry) = functions::find(name) else {
@@ -42,6 +45,7 @@ impl Scope<'_, '_> {
             Function::Max => self.extreme(Aggregate::Max, &arguments[0]),
             Function::Sum => self.sum(&arguments[0]),
             Function::At => self.at(&arguments[0], &arguments[1]),
+            Function::Lag => self.lag(&arguments[0], whole),
             Function::Length => Some(self.unary(Op::Length, Type::Int, Level::Episode)),
             Function::Coalesce => self.coalesce(arguments, whole),
             Function::NullIf => self.null_if(&arguments[0], &arguments[1], whole),
@@ -118,6 +122,21 @@ impl Scope<'_, '_> {
         let steps = self.binder.spread(value.node, ty, value.level, Level::Step);
         let moment = self.binder.spread(moment.node, Type::Int, moment.level, Level::Episode);
         let bound = self.unary(Op::At(steps, moment), ty, Level::Episode);
+        Some(Bound { rate: value.rate, ..bound })
+    }
+
+    /// The value at the step before: at t what `x` is at t - 1, null at the first step.
+    fn lag(&mut self, value: &Expr, whole: &Expr) -> Option<Bound> {
+        let value = self.bind(value)?;
+        // Null is null at every step.
+        let Some(ty) = value.ty else { return Some(value) };
+        if self.binder.builder.lags(value.node) == DEEPEST_LAG {
+            let message = format!("`lag` looks back by {DEEPEST_LAG} steps at most");
+            let fault = Fault::new(self.place(whole), message).label("one step more");
+            return self.binder.refuse(fault.help("at(x, t0) is the value at any one step"));
+        }
+        let steps = self.binder.spread(value.node, ty, value.level, Level::Step);
+        let bound = self.unary(Op::Lag(steps), ty, Level::Step);
         Some(Bound { rate: value.rate, ..bound })
     }
 

@@ -69,7 +69,7 @@ impl Binder<'_> {
                 Op::Column(name) => possible.add_column(name, self.columns.values(name)?),
                 Op::Constant(Constant::Text(text)) => possible.texts.push(text.clone()),
                 Op::Constant(Constant::Null) => {}
-                Op::Spread(x) | Op::At(x, _) => todo.push(*x),
+                Op::Spread(x) | Op::At(x, _) | Op::Lag(x) => todo.push(*x),
                 Op::Coalesce(values) => todo.extend(values.iter().rev()),
                 Op::Case { branches, otherwise } => {
                     todo.extend(otherwise);

@@ -166,6 +166,7 @@ fn of_op(op: &Op, steps: i128, of: impl Fn(NodeId) -> Possible) -> Possible {
         Op::Time | Op::Length => Possible::always((1, steps)),
         Op::Constant(constant) => of_constant(constant),
         Op::Spread(x) | Op::IntFromBool(x) | Op::FloatFromInt(x) => of(*x),
+        Op::Lag(x) => Possible { may_be_null: true, ..of(*x) },
         Op::Not(x) => of(*x).map(|(low, high)| (1 - high, 1 - low)),
         Op::And(x, y) => both(of(*x), of(*y)),
         Op::Or(x, y) => {

@@ -29,6 +29,31 @@ impl Layout<'_> {
         self.dialect.quoted(name)
     }
 
+    /// A column at the step that is read.
+    fn of_step(&self, id: NodeId, name: &str) -> String {
+        match self.lag.get() {
+            0 => format!("s.{}", self.name(name)),
+            lag => format!("lag{lag}.{}", self.lag_column(lag, &id.index().to_string())),
+        }
+    }
+
+    /// The timestep that is read.
+    fn time(&self) -> String {
+        match self.lag.get() {
+            0 => "s.t".to_owned(),
+            lag => format!("lag{lag}.{}", self.lag_column(lag, "t")),
+        }
+    }
+
+    /// What is written of the step before the one that is read; null where there is none.
+    fn lagged(&self, written: impl FnOnce() -> String) -> String {
+        let lag = self.lag.get();
+        self.lag.set(lag + 1);
+        let (time, value) = (self.time(), written());
+        self.lag.set(lag);
+        format!("CASE WHEN {time} IS NOT NULL THEN {value} END")
+    }
+
     /// An aggregate of a pass.
     pub(super) fn aggregate(&self, id: NodeId) -> String {
         let node = self.plan.node(id);
@@ -78,7 +103,7 @@ impl Layout<'_> {
         let nodes = self.plan.needed_by([summed]);
         let varies = |id: &NodeId| {
             let op = &self.plan.node(*id).op;
-            matches!(op, Op::Time | Op::Column(_)) || self.is_aggregate(*id)
+            matches!(op, Op::Time | Op::Column(_) | Op::Lag(_)) || self.is_aggregate(*id)
         };
         if self.dialect != Dialect::Polars || nodes.iter().any(varies) {
             return text;
@@ -100,7 +125,7 @@ impl Layout<'_> {
         match &self.plan.node(id).op {
             _ if self.is_aggregate(id) => Some(format!("e{}.{}", self.pass(id), self.column('n', id))),
             Op::Column(name) if self.plan.node(id).level == Level::Episode => Some(format!("e1.{name}")),
-            _ if self.shared.contains(&id) => Some(format!("s.{}", self.step_column(id))),
+            _ if self.is_shared(id) => Some(format!("s.{}", self.step_column(id))),
             _ => None,
         }
     }
@@ -116,9 +141,10 @@ impl Layout<'_> {
             return column;
         }
         match &node.op {
-            Op::Column(name) if node.ty == Type::Float => format!("CAST(s.{} AS DOUBLE)", self.name(name)),
-            Op::Column(name) => format!("s.{}", self.name(name)),
-            Op::Time => "s.t".to_owned(),
+            Op::Column(name) if node.ty == Type::Float => format!("CAST({} AS DOUBLE)", self.of_step(id, name)),
+            Op::Column(name) => self.of_step(id, name),
+            Op::Time => self.time(),
+            Op::Lag(x) => self.lagged(|| self.value(*x)),
             Op::Constant(constant) => self.dialect.constant(constant, node.ty),
             Op::Spread(x) => self.value(*x),
             Op::Negate(x) => format!("(0 - {})", self.number(*x)),
@@ -174,9 +200,10 @@ impl Layout<'_> {
 
     fn truth_as_int_of(&self, id: NodeId) -> String {
         match &self.plan.node(id).op {
-            _ if self.shared.contains(&id) => self.int_of_truth(id),
+            _ if self.is_shared(id) => self.int_of_truth(id),
             _ if self.is_aggregate(id) || self.list(id).is_some() => self.value(id),
             Op::Spread(x) => self.truth_as_int(*x),
+            Op::Lag(x) => self.lagged(|| self.truth_as_int(*x)),
             Op::Case { branches, otherwise } => self.case(branches, *otherwise, |id| self.truth_as_int(id)),
             Op::Coalesce(values) => coalesce(values.iter().map(|&id| self.truth_as_int(id))),
             Op::Constant(Constant::Bool(value)) => i64::from(*value).to_string(),
@@ -214,14 +241,14 @@ impl Layout<'_> {
 
     fn truth_of(&self, id: NodeId) -> String {
         let node = self.plan.node(id);
-        if self.shared.contains(&id) {
+        if self.is_shared(id) {
             return format!("s.{}", self.step_column(id));
         }
         match &node.op {
-            Op::Column(name) if node.level == Level::Step => format!("s.{}", self.name(name)),
+            Op::Column(name) if node.level == Level::Step => self.of_step(id, name),
             Op::Spread(x) => self.truth(*x),
             Op::Not(x) => match &self.plan.node(*x).op {
-                Op::IsNull(y) if !self.shared.contains(x) => format!("({} IS NOT NULL)", self.operand(*y)),
+                Op::IsNull(y) if !self.is_shared(*x) => format!("({} IS NOT NULL)", self.operand(*y)),
                 _ => format!("(NOT {})", self.truth(*x)),
             },
             Op::And(x, y) => format!("({} AND {})", self.truth(*x), self.truth(*y)),
@@ -261,7 +288,7 @@ impl Layout<'_> {
         for (when, then) in branches {
             // Null counts as false here.
             let when = match self.plan.node(*when).op {
-                Op::IsTrue(x) if !self.shared.contains(when) => self.truth(x),
+                Op::IsTrue(x) if !self.is_shared(*when) => self.truth(x),
                 _ => self.truth(*when),
             };
             let _ = write!(text, " WHEN {when} THEN {}", value(*then));

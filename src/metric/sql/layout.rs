@@ -27,6 +27,8 @@ pub(super) struct Layout<'p> {
     lists: BTreeMap<NodeId, Windowed>,
     /// The values per step that several others need: columns of a table of steps.
     pub(super) shared: BTreeSet<NodeId>,
+    /// How many steps before `s` the step is of which is written.
+    pub(super) lag: Cell<usize>,
     /// Bytes that were written of nodes, those of nodes in other nodes counted each time.
     written: Rc<Cell<usize>>,
 }
@@ -53,6 +55,7 @@ impl<'p> Layout<'p> {
             passes: BTreeMap::new(),
             lists,
             shared: BTreeSet::new(),
+            lag: Cell::new(0),
             written: Rc::default(),
         };
         for id in layout.needed.clone() {
@@ -82,15 +85,35 @@ impl<'p> Layout<'p> {
         for id in &self.needed {
             self.plan.node(*id).op.operands().into_iter().for_each(|operand| *users.entry(operand).or_default() += 1);
         }
+        let mut lagging = BTreeSet::new();
+        for id in &self.needed {
+            let op = &self.plan.node(*id).op;
+            let looks_back = matches!(op, Op::Lag(_)) || op.operands().iter().any(|operand| lagging.contains(operand));
+            if looks_back && self.plan.node(*id).level == Level::Step {
+                lagging.insert(*id);
+            }
+        }
         let is_shared = |id: &NodeId| {
             let node = self.plan.node(*id);
             let simple = matches!(node.op, Op::Column(_) | Op::Time | Op::Constant(_) | Op::Spread(_));
             node.level == Level::Step
                 && !simple
+                // The steps before are joined to the table of steps.
+                && !lagging.contains(id)
                 && self.passes[id] == 0
                 && users.get(id).is_some_and(|&count| count > 1)
         };
         self.needed.iter().copied().filter(is_shared).collect()
+    }
+
+    /// Whether a value is a column of the table of steps, and read there: of the steps before there is no such table.
+    pub(super) fn is_shared(&self, id: NodeId) -> bool {
+        self.lag.get() == 0 && self.shared.contains(&id)
+    }
+
+    /// A column of the steps so many before, where no column of the traces has its name.
+    pub(super) fn lag_column(&self, lag: usize, word: &str) -> String {
+        self.free_name(format!("lag{lag}_{word}"))
     }
 
     /// Counts what is written; `false` once that is too much.
@@ -159,7 +182,11 @@ impl<'p> Layout<'p> {
 
     /// The column of a value per step in the table of steps, where no column of the traces has its name.
     pub(super) fn step_column(&self, id: NodeId) -> String {
-        let mut name = self.column('c', id);
+        self.free_name(self.column('c', id))
+    }
+
+    /// The name, or one like it that no column of the traces has.
+    fn free_name(&self, mut name: String) -> String {
         let columns = self.plan.columns(&self.needed);
         while columns.iter().any(|(column, _)| column.eq_ignore_ascii_case(&name)) {
             name.push('_');

@@ -14,7 +14,7 @@
 //! SELECT ... FROM e1 ORDER BY ...
 //! ```
 //!
-//! The portable form uses nothing but CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN and arithmetic, so that Polars SQL,
+//! The portable form uses nothing but CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN (LEFT JOIN for `lag`) and arithmetic, so that Polars SQL,
 //! `DuckDB`, Spark SQL and `DataFusion` run it as it is. Of a search between two landmarks it makes a second pass, as
 //! Polars does, which has no filters of lists; `DuckDB` and Spark have them.
 //!
@@ -201,6 +201,31 @@ mod tests {
         assert!(lower(&odd, Dialect::Spark).unwrap().contains("MAX(s.`grip force`)"));
         let same = plan("[metric.A-B]\nvalue = \"length()\"\n[metric.a_b]\nvalue = \"1\"");
         assert_eq!(lower(&same, Dialect::Portable), Err(LoweringError::SameName { name: "a_b".into() }));
+    }
+
+    #[test]
+    fn the_step_before_is_joined_on_its_time() {
+        let text = "count(lag(action) = action and lag(lag(t)) > 1) + length()";
+        let statement = lower(&metric(text), Dialect::Portable).unwrap();
+        for (lag, columns) in [(1, "t AS lag1_t,\n      action AS lag1_0"), (2, "t AS lag2_t\n")] {
+            assert_eq!(statement.matches(&format!("LEFT JOIN (\n    SELECT episode_id AS lag{lag}_id")).count(), 1);
+            assert!(statement.contains(columns), "{statement}");
+            let on = format!("ON s.episode_id = lag{lag}.lag{lag}_id AND s.t = lag{lag}.lag{lag}_next");
+            assert!(statement.contains(&on), "{statement}");
+        }
+        assert!(statement.contains("CASE WHEN lag1.lag1_t IS NOT NULL THEN lag1.lag1_0 END = s.action"), "{statement}");
+    }
+
+    #[test]
+    fn an_expression_looks_back_by_so_many_steps() {
+        let nested = |depth: usize| format!("max({}t{})", "lag(".repeat(depth), ")".repeat(depth));
+        assert_eq!(lower(&metric(&nested(8)), Dialect::Duckdb).unwrap().matches("LEFT JOIN").count(), 8);
+        let text =
+            format!("[let]\nx = \"{}\"\n[metric.M]\nvalue = \"max(lag(x))\"", &nested(8)[4..nested(8).len() - 1]);
+        let refused = Definitions::from_toml("test", &text, &Columns::default()).unwrap_err().to_string();
+        assert!(refused.contains("`lag` looks back by 8 steps at most"), "{refused}");
+        // An aggregate is one value, from which lags are counted anew.
+        lower(&metric(&format!("count(lag(t) < {})", nested(8))), Dialect::Duckdb).unwrap();
     }
 
     #[test]

@@ -1,6 +1,6 @@
 //! The text of a statement: a common table expression per pass over the steps, then a row per episode.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use super::LoweringError;
@@ -25,8 +25,12 @@ pub(super) struct Statement<'l, 'p> {
 struct Reads {
     columns: BTreeSet<String>,
     shared: BTreeSet<NodeId>,
-    /// The nodes that were gone through.
-    seen: BTreeSet<NodeId>,
+    /// Columns of the steps so many before.
+    earlier: BTreeMap<usize, BTreeSet<NodeId>>,
+    /// The nodes that were gone through, and of how many steps before.
+    seen: BTreeSet<(usize, NodeId)>,
+    /// How many steps before the step is of which is read.
+    lag: usize,
 }
 
 impl<'l, 'p> Statement<'l, 'p> {
@@ -71,7 +75,9 @@ impl<'l, 'p> Statement<'l, 'p> {
             self.column(4, column)?;
             layout.reads(*read, &mut reads);
         }
+        let earlier = std::mem::take(&mut reads.earlier);
         self.steps(pass, reads)?;
+        self.earlier_steps(&earlier)?;
         for before in 1..pass {
             let _ = write!(self.text, "\n  JOIN e{before} ON s.episode_id = e{before}.episode_id");
         }
@@ -96,6 +102,27 @@ impl<'l, 'p> Statement<'l, 'p> {
             self.column(6, &format!("{value} AS {}", inline.step_column(id)))?;
         }
         self.text.push_str("\n    FROM steps s\n  ) s");
+        Ok(())
+    }
+
+    /// The steps before, beside each step: those of the same episode at t - 1, t - 2, ..., as far as is looked back.
+    fn earlier_steps(&mut self, earlier: &BTreeMap<usize, BTreeSet<NodeId>>) -> Result<(), LoweringError> {
+        let layout = self.layout;
+        for (&lag, columns) in earlier {
+            let [id, next, time] = ["id", "next", "t"].map(|word| layout.lag_column(lag, word));
+            let _ =
+                write!(self.text, "\n  LEFT JOIN (\n    SELECT episode_id AS {id}, t + {lag} AS {next}, t AS {time}");
+            for &column in columns {
+                if let Op::Column(name) = &layout.plan.node(column).op {
+                    let own = layout.lag_column(lag, &column.index().to_string());
+                    self.column(6, &format!("{} AS {own}", layout.dialect.quoted(name)))?;
+                }
+            }
+            let _ = write!(
+                self.text,
+                "\n    FROM steps\n  ) lag{lag} ON s.episode_id = lag{lag}.{id} AND s.t = lag{lag}.{next}"
+            );
+        }
         Ok(())
     }
 
@@ -146,12 +173,19 @@ impl Layout<'_> {
     /// What a value reads of its step.
     fn reads(&self, id: NodeId, reads: &mut Reads) {
         let node = self.plan.node(id);
-        if !reads.seen.insert(id) {
+        if !reads.seen.insert((reads.lag, id)) {
             return;
         }
         match &node.op {
             _ if node.level != Level::Step => {}
-            _ if self.shared.contains(&id) => drop(reads.shared.insert(id)),
+            _ if reads.lag == 0 && self.shared.contains(&id) => drop(reads.shared.insert(id)),
+            Op::Lag(x) => {
+                reads.lag += 1;
+                reads.earlier.entry(reads.lag).or_default();
+                self.reads(*x, reads);
+                reads.lag -= 1;
+            }
+            Op::Column(_) if reads.lag > 0 => drop(reads.earlier.entry(reads.lag).or_default().insert(id)),
             Op::Column(name) => drop(reads.columns.insert(self.dialect.quoted(name))),
             op => op.operands().into_iter().for_each(|operand| self.reads(operand, reads)),
         }

@@ -75,6 +75,7 @@ impl<'a> Lowering<'a> {
             (Op::Compare(comparison, x, y), _) => self.compare(&node.op, *comparison, (*x, *y), at),
             (Op::Aggregate(aggregate, x), _) => self.aggregate(*aggregate, *x),
             (Op::At(x, moment), _) => return self.lookup(*x, *moment),
+            (Op::Lag(x), _) => Kernel::Lag(self.full(*x, Shape::Timesteps, None)),
             (Op::Case { branches, otherwise }, _) => self.case(branches, *otherwise, node.ty, shape, at),
             (op, _) => self.elementwise(op, shape, at),
         };
@@ -108,7 +109,7 @@ impl<'a> Lowering<'a> {
             Op::Matches(x, pattern) => self.matches(*x, pattern, at),
             Op::IntFromBool(x) => Kernel::IntFromBool(self.node(*x, at)),
             Op::FloatFromInt(x) => Kernel::FloatFromInt(self.node(*x, at)),
-            Op::Spread(_) | Op::Compare(..) | Op::Case { .. } | Op::Aggregate(..) | Op::At(..) => {
+            Op::Spread(_) | Op::Compare(..) | Op::Case { .. } | Op::Aggregate(..) | Op::At(..) | Op::Lag(_) => {
                 unreachable!("these have functions of their own")
             }
         }

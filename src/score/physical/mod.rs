@@ -149,6 +149,8 @@ pub enum Kernel {
         /// The timesteps, per episode.
         moments: StepId,
     },
+    /// The value at the timestep before, null at the first one; not a constant. Takes values.
+    Lag(StepId),
     /// Values per episode, null where the episode has no such timestep.
     NullWhereAbsent {
         /// The values, per episode.
@@ -176,7 +178,8 @@ impl Kernel {
             | Self::SymbolsMatch(x, _)
             | Self::IntFromBool(x)
             | Self::FloatFromInt(x)
-            | Self::Fold(_, x) => vec![*x],
+            | Self::Fold(_, x)
+            | Self::Lag(x) => vec![*x],
             Self::And(x, y)
             | Self::Or(x, y)
             | Self::Compare(_, x, y)

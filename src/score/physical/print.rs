@@ -97,6 +97,7 @@ impl Kernel {
             Self::Coalesce(_) => "coalesce",
             Self::IntFromBool(_) => "int",
             Self::FloatFromInt(_) => "float",
+            Self::Lag(_) => "lag",
             _ => "",
         }
     }

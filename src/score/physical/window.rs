@@ -55,7 +55,7 @@ pub(super) fn split(plan: &Plan, condition: NodeId) -> (NodeId, Vec<(Comparison,
 /// instead of once per timestep. Not where a timestep that is not looked at could leave 64 bits.
 pub(super) fn computes_after_lookup(plan: &Plan, value: NodeId) -> bool {
     let node = plan.node(value);
-    let alone = matches!(node.op, Op::Column(_)) || node.level == Level::Episode;
+    let alone = matches!(node.op, Op::Column(_) | Op::Lag(_)) || node.level == Level::Episode;
     !alone && inner_nodes(plan, value).iter().all(|id| !matches!(plan.node(*id).op, Op::Arithmetic(..) | Op::Negate(_)))
 }
 
@@ -73,5 +73,5 @@ fn inner_nodes(plan: &Plan, value: NodeId) -> BTreeSet<NodeId> {
 /// Whether a lookup takes the values of this node as they are.
 pub(super) fn is_leaf(plan: &Plan, id: NodeId) -> bool {
     let node = plan.node(id);
-    node.level == Level::Episode || matches!(node.op, Op::Column(_) | Op::Constant(_))
+    node.level == Level::Episode || matches!(node.op, Op::Column(_) | Op::Constant(_) | Op::Lag(_))
 }

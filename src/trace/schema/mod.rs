@@ -138,7 +138,8 @@ pub const COLUMNS: &[Column] = &[
     .since(2),
     constant!(start_distance, Int32, "Manhattan distance from the hand to its target at the start (reaching tasks).")
         .unit("mm")
-        .since(2),
+        .since(2)
+        .default("null"),
     constant!(
         shown_color,
         String,
@@ -168,7 +169,7 @@ pub const COLUMNS: &[Column] = &[
     extra!(reasoning, String, "Why it acts, as replied."),
     extra!(summary, String, "Its notes for the next step, as replied."),
     extra!(identification, String, "How it says it recognised itself, as replied."),
-    extra!(reply, String, "The whole reply, raw."),
+    extra!(reply, String, "The whole reply, raw.").default("null"),
     extra!(latency_ms, Int32, "From sending the request to the end of the reply.").unit("ms"),
     extra!(prompt_tokens, Int32, "Tokens of the request, as billed.").unit("tokens"),
     extra!(completion_tokens, Int32, "Tokens of the reply, as billed.").unit("tokens"),
@@ -190,7 +191,8 @@ pub const COLUMNS: &[Column] = &[
         "Manhattan distance from the hand to its target after the step's action (reaching tasks)."
     )
     .unit("mm")
-    .since(2),
+    .since(2)
+    .default("null"),
 ];
 
 /// The timestep is the place of its row.

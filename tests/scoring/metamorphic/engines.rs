@@ -68,15 +68,32 @@ pub fn answers(engine: Engine, cases: &[Case]) -> Vec<Answers> {
     let folder = tempfile::tempdir().unwrap();
     let prepared: Vec<Prepared> =
         cases.iter().enumerate().map(|(at, case)| Prepared::of(folder.path(), at, case)).collect();
+    answers_to(engine, folder.path(), &prepared)
+}
+
+/// What an engine answers about all traces of a folder in `folder`.
+pub fn answers_about(
+    engine: Engine,
+    folder: &Path,
+    traces: TraceSet,
+    definitions: Definitions,
+) -> Result<Rows, String> {
+    let place = folder.join("traces").to_str().unwrap().to_owned();
+    let columns = columns(&traces);
+    let prepared = Prepared { folder: place, traces, columns, definitions: vec![definitions] };
+    answers_to(engine, folder, &[prepared]).remove(0).remove(0)
+}
+
+fn answers_to(engine: Engine, folder: &Path, prepared: &[Prepared]) -> Vec<Answers> {
     match engine {
-        Engine::Native => each(&prepared, |traces, definitions| {
+        Engine::Native => each(prepared, |traces, definitions| {
             score_traces::score(traces, definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())
         }),
-        Engine::Polars => each(&prepared, |traces, definitions| {
+        Engine::Polars => each(prepared, |traces, definitions| {
             polars::score(traces, definitions, &[], NonZeroUsize::MIN).map_err(|error| error.to_string())
         }),
-        Engine::Duckdb => outside("duckdb", &need::duckdb(), Dialect::Duckdb, folder.path(), &prepared),
-        Engine::Spark => outside("spark", &need::spark(), Dialect::Spark, folder.path(), &prepared),
+        Engine::Duckdb => outside("duckdb", &need::duckdb(), Dialect::Duckdb, folder, prepared),
+        Engine::Spark => outside("spark", &need::spark(), Dialect::Spark, folder, prepared),
     }
 }
 

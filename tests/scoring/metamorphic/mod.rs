@@ -6,7 +6,7 @@
 //! Database Systems via Query Partitioning" (2020), "Detecting Optimization Bugs in Database Engines via Non-Optimizing
 //! Reference Engine Construction" (2020).
 
-mod engines;
+pub mod engines;
 mod on_cluster;
 mod words;
 

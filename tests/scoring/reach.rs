@@ -1,0 +1,153 @@
+//! The definitions `reach` on series of distances: the formulas of the protocol in whole numbers, on every engine.
+
+use std::fs;
+use std::path::Path;
+
+use mirrorstats::metric::definitions::Definitions;
+use mirrorstats::score::score_traces::trace_columns;
+use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use mirrorstats::trace::inputs::Input;
+use mirrorstats::trace::open::TraceSet;
+use mirrorstats::trace::write::write_episodes;
+use proptest::collection::vec;
+use proptest::option;
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
+
+use crate::harness::traces;
+use crate::metamorphic::engines::{Engine, Rows, answers_about};
+
+const METRICS: [&str; 5] = ["SUCCESS", "SIR", "FCR", "PCR", "UNREADABLE"];
+
+/// The distance at the start, and after each step with whether its answer could be read; mm.
+type Series = (i32, Vec<(i32, bool)>);
+
+fn episode(id: usize, (start, steps): &Series) -> Episode {
+    let step = |&(distance, is_readable): &(i32, bool)| Step {
+        action: is_readable.then_some(Action::MoveForward),
+        extra: Extra { target_distance: Some(distance), ..Extra::default() },
+        ..Step::default()
+    };
+    let steps = steps.iter().map(step).collect();
+    Episode {
+        experiment: "any name".into(),
+        start_distance: Some(*start),
+        ..traces::episode(&format!("e{id:03}"), steps)
+    }
+}
+
+/// Parts per million of a fraction, rounded half up.
+fn ppm(part: i64, whole: i64) -> i64 {
+    (2_000_000 * part + whole).div_euclid(2 * whole)
+}
+
+/// The protocol's formulas: d is the series from the start on.
+fn by_formula((start, steps): &Series) -> Vec<Option<i64>> {
+    let d: Vec<i64> = std::iter::once(*start).chain(steps.iter().map(|step| step.0)).map(i64::from).collect();
+    let steps_count = i64::try_from(steps.len()).unwrap();
+    let improved = d.windows(2).filter(|pair| pair[1] < pair[0]).count();
+    let completion = |distance: i64| (d[0] > 100).then(|| ppm(d[0] - distance, d[0] - 100));
+    vec![
+        Some(i64::from(d[1..].iter().any(|distance| *distance <= 100))),
+        Some(ppm(i64::try_from(improved).unwrap(), steps_count)),
+        completion(*d.last().unwrap()),
+        completion(*d.iter().min().unwrap()),
+        Some(i64::try_from(steps.iter().filter(|step| !step.1).count()).unwrap()),
+    ]
+}
+
+/// Worked out by hand, then drawn ones: an unreadable answer repeats the distance before.
+fn cases() -> Vec<Series> {
+    let readable = |distances: &[i32]| distances.iter().map(|distance| (*distance, true)).collect::<Vec<_>>();
+    let mut cases = vec![
+        (500, readable(&[400, 300, 200, 100])),
+        (500, readable(&[600, 700])),
+        (400, vec![(400, false), (300, true), (300, false), (400, true)]),
+        (100, readable(&[200])),
+        (0, readable(&[0])),
+        (700, readable(&[600, 700, 600, 500, 500, 600, 600])),
+    ];
+    let mut runner =
+        TestRunner::new_with_rng(ProptestConfig::default(), TestRng::deterministic_rng(RngAlgorithm::ChaCha));
+    let drawn = (0..25_i32, vec(option::weighted(0.8, -2..=2_i32), 1..30));
+    for _ in 0..60 {
+        let (start, moves) = drawn.new_tree(&mut runner).unwrap().current();
+        let mut distance = start * 100;
+        let step = |moved: &Option<i32>| {
+            distance = (distance + 100 * moved.unwrap_or(0)).max(0);
+            (distance, moved.is_some())
+        };
+        let steps = moves.iter().map(step).collect();
+        cases.push((start * 100, steps));
+    }
+    cases
+}
+
+/// Two files, and the definitions over them.
+fn written(folder: &Path, cases: &[Series]) -> (TraceSet, Definitions) {
+    let episodes: Vec<Episode> = cases.iter().enumerate().map(|(id, series)| episode(id, series)).collect();
+    fs::create_dir(folder.join("traces")).unwrap();
+    let (first, second) = episodes.split_at(episodes.len() / 2);
+    let inputs = [("a.parquet", first), ("b.parquet", second)].map(|(name, episodes)| {
+        let path = folder.join("traces").join(name);
+        write_episodes(&path, None, episodes).unwrap();
+        Input::new(path)
+    });
+    let traces = TraceSet::open(&inputs).unwrap();
+    let definitions = Definitions::load("reach", &trace_columns(&traces)).unwrap();
+    (traces, definitions)
+}
+
+fn check(engine: Engine) {
+    let cases = cases();
+    let folder = tempfile::tempdir().unwrap();
+    let (traces, definitions) = written(folder.path(), &cases);
+    let Rows { names, values } = answers_about(engine, folder.path(), traces, definitions).unwrap();
+    assert_eq!(names, METRICS);
+    assert_eq!(values.len(), cases.len());
+    for (found, series) in values.values().zip(&cases) {
+        assert_eq!(*found, by_formula(series), "{engine:?}: {series:?}");
+    }
+}
+
+#[test]
+fn a_series_worked_out_by_hand() {
+    let cases = cases();
+    let expected = [
+        // Four steps nearer, of the 400 mm to go all.
+        [Some(1), Some(1_000_000), Some(1_000_000), Some(1_000_000), Some(0)],
+        // 200 mm further away, of 400 mm: minus a half.
+        [Some(0), Some(0), Some(-500_000), Some(0), Some(0)],
+        // One step of four; back at the start; once a third of the 300 mm.
+        [Some(0), Some(250_000), Some(0), Some(333_333), Some(2)],
+        // Nothing to complete.
+        [Some(0), Some(0), None, None, Some(0)],
+        [Some(1), Some(0), None, None, Some(0)],
+        // Three of seven; a sixth of 600 mm, and two sixths.
+        [Some(0), Some(428_571), Some(166_667), Some(333_333), Some(0)],
+    ];
+    for (series, expected) in cases.iter().zip(expected) {
+        assert_eq!(by_formula(series), expected, "{series:?}");
+    }
+}
+
+#[test]
+fn native_is_the_formulas() {
+    check(Engine::Native);
+}
+
+#[test]
+fn polars_is_the_formulas() {
+    check(Engine::Polars);
+}
+
+#[test]
+fn duckdb_is_the_formulas() {
+    check(Engine::Duckdb);
+}
+
+#[test]
+fn spark_is_the_formulas() {
+    check(Engine::Spark);
+}

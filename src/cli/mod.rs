@@ -65,9 +65,17 @@ fn long_version() -> String {
 
 /// Runs the program with these arguments, the program's name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    ExitCode::from(run_to_code(arguments))
+}
+
+/// As [`run`]; gives the code as a number, for a process that is not ours to end.
+pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let format = ErrorFormat::asked_for(&arguments);
-    outcome::exit_code(execute(arguments).and_then(flushed), format)
+    let code = outcome::exit_code(execute(arguments).and_then(flushed), format);
+    // What was printed before a failure is still to be seen.
+    let _ = io::stdout().flush();
+    code
 }
 
 fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {

@@ -12,7 +12,6 @@ use std::error::Error;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
-use std::process::ExitCode;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -98,17 +97,17 @@ pub struct ErrorAnswer {
 }
 
 /// Says what went wrong on standard error and gives the code to leave with.
-pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> ExitCode {
+pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
     match result {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::CheckFailed) => ExitCode::from(1),
-        Ok(Outcome::Lossy) => ExitCode::from(3),
-        Ok(Outcome::Interrupted) => ExitCode::from(130),
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::CheckFailed) => 1,
+        Ok(Outcome::Lossy) => 3,
+        Ok(Outcome::Interrupted) => 130,
         // The reader of a pipe has seen enough (`| head`): not an error.
-        Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => 0,
         Err(failure) => {
             say(&failure, format);
-            ExitCode::from(BAD_INPUT)
+            BAD_INPUT
         }
     }
 }

@@ -10,6 +10,7 @@
 //! in between is an error. Nothing here knows a command line: text for people comes from errors and from `report`.
 
 mod backend;
+mod between;
 mod design;
 mod diff;
 mod empty_filter;
@@ -51,6 +52,7 @@ use crate::stats::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group};
 use crate::stats::losses::LostCounts;
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
+use crate::trace::steps::Steps;
 
 pub use backend::Backend;
 pub(crate) use backend::{SparkJob, are_uris};
@@ -267,6 +269,20 @@ impl Study {
     /// Scores, which have no steps.
     pub fn traces(&self) -> Result<&TraceSet, StudyError> {
         self.source.traces()
+    }
+
+    /// The steps of the episodes that the filter keeps, with these columns in this order, all if absent.
+    ///
+    /// # Errors
+    /// Scores, which have no steps; a column that no trace has, or that two have with different types; with a filter, as
+    /// [`Study::score`].
+    pub fn steps(&self, columns: Option<&[String]>) -> Result<Steps, StudyError> {
+        let traces = self.source.traces()?;
+        if self.question.filter.is_none() {
+            return Ok(Steps::new(traces, columns, None)?);
+        }
+        let kept = self.score()?.episodes.keys.iter().map(|key| key.episode_id.to_owned()).collect();
+        Ok(Steps::new(traces, columns, Some(kept))?)
     }
 
     /// The episode table.

@@ -100,6 +100,18 @@ fn budget_setting() -> Result<(), Failure> {
     budget::setting().map(drop).map_err(Failure::input)
 }
 
+/// The options of a command, as the command line understands them: for a program that has them from elsewhere. No settings of
+/// a file or of the environment are looked at.
+///
+/// # Errors
+/// Options that the command refuses, in its words.
+pub fn options_of<A: clap::Args>(verb: &str, options: impl IntoIterator<Item = OsString>) -> Result<A, Failure> {
+    let name = format!("{NAME} {verb}");
+    let command = A::augment_args(clap::Command::new(name.clone()).bin_name(&name).no_binary_name(true));
+    let parsed = command.try_get_matches_from(options).and_then(|matches| A::from_arg_matches(&matches));
+    parsed.map_err(|error| Failure::Usage(Box::new(error)))
+}
+
 /// The outcome, once all of standard output is out: what is left in its buffer at the end is written without a word
 /// about a full disk.
 fn flushed(outcome: Outcome) -> Result<Outcome, Failure> {

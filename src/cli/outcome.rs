@@ -96,6 +96,15 @@ pub struct ErrorAnswer {
     pub faults: Vec<FaultRecord>,
 }
 
+impl ErrorAnswer {
+    /// What is said of a failure.
+    pub fn of(failure: &Failure) -> Self {
+        let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
+        let text = words(failure, false);
+        Self { error: text.trim_end().trim_start_matches("error: ").to_owned(), code: BAD_INPUT, faults }
+    }
+}
+
 /// Says what went wrong on standard error and gives the code to leave with.
 pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
     match result {
@@ -118,10 +127,7 @@ fn say(failure: &Failure, format: ErrorFormat) {
         (Failure::Usage(error), ErrorFormat::Text) => error.print(),
         (failure, ErrorFormat::Text) => writeln!(io::stderr(), "{}", words(failure, colored()).trim_end()),
         (failure, ErrorFormat::Json) => {
-            let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
-            let text = words(failure, false);
-            let error = text.trim_end().trim_start_matches("error: ").to_owned();
-            let answer = ErrorAnswer { error, code: BAD_INPUT, faults };
+            let answer = ErrorAnswer::of(failure);
             serde_json::to_string(&answer).map_err(io::Error::from).and_then(|line| writeln!(io::stderr(), "{line}"))
         }
     };

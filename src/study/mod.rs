@@ -249,7 +249,10 @@ impl Study {
     }
 
     /// Puts a whole question at once.
-    pub(crate) fn asked(mut self, question: Question) -> Result<Self, StudyError> {
+    ///
+    /// # Errors
+    /// Every fault of the definitions and the condition; a metric that the definitions do not have.
+    pub fn asked(mut self, question: Question) -> Result<Self, StudyError> {
         self.question = question;
         self.checked()
     }

@@ -173,6 +173,7 @@ pub use figures::{Figure, FigureFormat, FigureName};
 pub use report::bundle::Manifest;
 pub use report::statistics::{Options as StatisticsOptions, Statistics};
 pub use report::table::Table;
+pub use score::columns::record_batch as episode_batch;
 pub use score::evidence::Evidence;
 pub use score::table::{EpisodeKey, EpisodeTable, MetricColumn};
 pub use stats::cell::{Cells, Group, KeyValue};

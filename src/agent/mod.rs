@@ -8,6 +8,8 @@
 #[cfg(feature = "sim")]
 pub mod exec;
 #[cfg(feature = "sim")]
+pub mod function;
+#[cfg(feature = "sim")]
 pub mod perception;
 pub mod prompt;
 pub mod reply;

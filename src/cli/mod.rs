@@ -66,9 +66,17 @@ fn long_version() -> String {
 
 /// Runs the program with these arguments, the program's name first.
 pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
+    ExitCode::from(run_to_code(arguments))
+}
+
+/// As [`run`]; gives the code as a number, for a process that is not ours to end.
+pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let format = ErrorFormat::asked_for(&arguments);
-    outcome::exit_code(execute(arguments).and_then(flushed), format)
+    let code = outcome::exit_code(execute(arguments).and_then(flushed), format);
+    // What was printed before a failure is still to be seen.
+    let _ = io::stdout().flush();
+    code
 }
 
 fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
@@ -100,6 +108,18 @@ fn execute(arguments: Vec<OsString>) -> Result<Outcome, Failure> {
 /// Refuses a factor of all budgets that is none before anything is read.
 fn budget_setting() -> Result<(), Failure> {
     budget::setting().map(drop).map_err(Failure::input)
+}
+
+/// The options of a command, as the command line understands them: for a program that has them from elsewhere. No settings of
+/// a file or of the environment are looked at.
+///
+/// # Errors
+/// Options that the command refuses, in its words.
+pub fn options_of<A: clap::Args>(verb: &str, options: impl IntoIterator<Item = OsString>) -> Result<A, Failure> {
+    let name = format!("{NAME} {verb}");
+    let command = A::augment_args(clap::Command::new(name.clone()).bin_name(&name).no_binary_name(true));
+    let parsed = command.try_get_matches_from(options).and_then(|matches| A::from_arg_matches(&matches));
+    parsed.map_err(|error| Failure::Usage(Box::new(error)))
 }
 
 /// The outcome, once all of standard output is out: what is left in its buffer at the end is written without a word

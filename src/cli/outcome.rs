@@ -12,7 +12,6 @@ use std::error::Error;
 use std::ffi::OsString;
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
-use std::process::ExitCode;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -97,18 +96,27 @@ pub struct ErrorAnswer {
     pub faults: Vec<FaultRecord>,
 }
 
+impl ErrorAnswer {
+    /// What is said of a failure.
+    pub fn of(failure: &Failure) -> Self {
+        let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
+        let text = words(failure, false);
+        Self { error: text.trim_end().trim_start_matches("error: ").to_owned(), code: BAD_INPUT, faults }
+    }
+}
+
 /// Says what went wrong on standard error and gives the code to leave with.
-pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> ExitCode {
+pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
     match result {
-        Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::CheckFailed) => ExitCode::from(1),
-        Ok(Outcome::Lossy) => ExitCode::from(3),
-        Ok(Outcome::Interrupted) => ExitCode::from(130),
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::CheckFailed) => 1,
+        Ok(Outcome::Lossy) => 3,
+        Ok(Outcome::Interrupted) => 130,
         // The reader of a pipe has seen enough (`| head`): not an error.
-        Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => ExitCode::SUCCESS,
+        Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => 0,
         Err(failure) => {
             say(&failure, format);
-            ExitCode::from(BAD_INPUT)
+            BAD_INPUT
         }
     }
 }
@@ -119,10 +127,7 @@ fn say(failure: &Failure, format: ErrorFormat) {
         (Failure::Usage(error), ErrorFormat::Text) if colored() => write!(io::stderr(), "{}", error.render().ansi()),
         (failure, ErrorFormat::Text) => writeln!(io::stderr(), "{}", words(failure, colored()).trim_end()),
         (failure, ErrorFormat::Json) => {
-            let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
-            let text = words(failure, false);
-            let error = text.trim_end().trim_start_matches("error: ").to_owned();
-            let answer = ErrorAnswer { error, code: BAD_INPUT, faults };
+            let answer = ErrorAnswer::of(failure);
             serde_json::to_string(&answer).map_err(io::Error::from).and_then(|line| writeln!(io::stderr(), "{line}"))
         }
     };

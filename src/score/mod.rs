@@ -9,6 +9,7 @@
 //! `score_traces.rs` is the one scan that feeds it. Rule: pure. No file is opened here, no clock read, no thread started.
 
 pub mod builder;
+pub mod columns;
 pub mod declared_experiments;
 mod elementwise;
 pub mod error;

@@ -182,6 +182,18 @@ pub enum StudyError {
         /// As given.
         argument: String,
     },
+    /// A table that a style does not lay out.
+    #[error("no table of the style `{style}` is named `{name}`; it has {known}{hint}")]
+    NoTable {
+        /// The name asked for.
+        name: String,
+        /// The style.
+        style: String,
+        /// The tables that there are.
+        known: String,
+        /// The nearest of them, in words; may be empty.
+        hint: String,
+    },
     /// A filter that keeps no episode.
     #[error("{words}\n  help: give a filter that holds for some of them, or none")]
     EmptyFilter {

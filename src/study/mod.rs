@@ -10,6 +10,7 @@
 //! in between is an error. Nothing here knows a command line: text for people comes from errors and from `report`.
 
 mod backend;
+mod between;
 mod design;
 mod diff;
 mod empty_filter;
@@ -52,6 +53,7 @@ use crate::stats::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group};
 use crate::stats::losses::LostCounts;
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
+use crate::trace::steps::Steps;
 
 pub use backend::Backend;
 pub(crate) use backend::{SparkJob, are_uris};
@@ -248,7 +250,10 @@ impl Study {
     }
 
     /// Puts a whole question at once.
-    pub(crate) fn asked(mut self, question: Question) -> Result<Self, StudyError> {
+    ///
+    /// # Errors
+    /// Every fault of the definitions and the condition; a metric that the definitions do not have.
+    pub fn asked(mut self, question: Question) -> Result<Self, StudyError> {
         self.question = question;
         self.checked()
     }
@@ -268,6 +273,20 @@ impl Study {
     /// Scores, which have no steps.
     pub fn traces(&self) -> Result<&TraceSet, StudyError> {
         self.source.traces()
+    }
+
+    /// The steps of the episodes that the filter keeps, with these columns in this order, all if absent.
+    ///
+    /// # Errors
+    /// Scores, which have no steps; a column that no trace has, or that two have with different types; with a filter, as
+    /// [`Study::score`].
+    pub fn steps(&self, columns: Option<&[String]>) -> Result<Steps, StudyError> {
+        let traces = self.source.traces()?;
+        if self.question.filter.is_none() {
+            return Ok(Steps::new(traces, columns, None)?);
+        }
+        let kept = self.score()?.episodes.keys.iter().map(|key| key.episode_id.to_owned()).collect();
+        Ok(Steps::new(traces, columns, Some(kept))?)
     }
 
     /// The episode table.

@@ -8,6 +8,7 @@ use super::figure_inputs::{Drawings, FigureInputs};
 use super::losses::Counted;
 use super::results::{Outputs, Results};
 use super::{LostAs, Study, scores};
+use crate::base::suggest::hint;
 use crate::figures::FigureName;
 use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
 use crate::report::html::{self, Figure, Page};
@@ -169,6 +170,19 @@ impl Report {
     /// The metrics that the style names nowhere, where there are too many of them for the main table.
     pub fn other_table(&self) -> Option<&Table> {
         self.tables.iter().find(|table| table.name == OTHER_TABLE)
+    }
+
+    /// The table of this name.
+    ///
+    /// # Errors
+    /// Where the style has none: which there are.
+    pub fn table(&self, name: &str) -> Result<&Table, StudyError> {
+        self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
+            let known = || self.tables.iter().map(|table| table.name.as_str());
+            let (style, known, hint) =
+                (self.style.name.clone(), known().collect::<Vec<_>>().join(", "), hint(name, known()));
+            StudyError::NoTable { name: name.to_owned(), style, known, hint }
+        })
     }
 
     /// A table as Markdown; `None` where the style has no table of this name.

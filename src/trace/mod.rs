@@ -38,6 +38,6 @@ pub mod write;
 pub(crate) use read::flat::FlatRows;
 pub use read::flat::TableFile;
 pub(crate) use read::footer::shape as footer_shape;
-pub use read::{in_order, open, verify};
+pub use read::{in_order, open, steps, verify};
 pub use schema::{colors, describe};
 pub use write::merge;

@@ -62,6 +62,7 @@ fn the_library_promises_these_names_and_no_others() {
     StudyError
     Table
     diff
+    episode_batch
     record_batch
     resolve
     ");

@@ -3,6 +3,7 @@
 //! | file | what it knows |
 //! |---|---|
 //! | [`message`] | the lines that a program is sent |
+//! | `conversation` | which lines an episode has, and how replies are read |
 //! | [`program`] | running it, and the names of what can go wrong |
 //! | [`said`] | what it says on standard error |
 //! | [`group`] | that nothing of it stays behind |
@@ -14,35 +15,29 @@
 //! Rule: a program sees the words and the frame that a model gets. It inherits the environment, keys included, but no
 //! value of a variable that holds a key is kept of what it says.
 
+pub(super) mod conversation;
 pub mod files;
 pub mod group;
 pub mod message;
 pub mod program;
 pub mod said;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-use base64::Engine as _;
-use base64::engine::general_purpose::STANDARD;
-
+use self::conversation::{Conversation, unusable};
 use self::files::Unreadable;
 use self::group::Groups;
-use self::message::{EndMessage, Image, Message, ObservationMessage, PROTOCOL, Position, TaskMessage};
+use self::message::{EndMessage, Message, PROTOCOL};
 use self::program::{Failure, Program};
 use self::said::Kept;
-use super::prompt::{self, Prompt, Rendered};
-use super::reply::{self, Ending};
 use super::vlm::secrets::{Secret, from_every_key_variable};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
 use crate::base::hash;
-use crate::base::replace::TemporaryFolder;
 
 /// What the shell's exit code says of a command that there is not, or that cannot be run.
 const NO_COMMAND: [i32; 2] = [126, 127];
-/// What the temporary folder of an episode's frames is named after.
-const FRAMES: &str = "frames";
 
 /// How a program gets its frames.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -132,24 +127,12 @@ impl Player for Exec {
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let shared = Arc::clone(&self.shared);
-        let prompt = Prompt::of(task.experiment).map_err(unusable)?;
-        let frames = match shared.settings.images {
-            Images::Path => Some(Frames::new(&shared.settings.scratch)?),
-            Images::Base64 => None,
-        };
+        let Settings { images, scratch, .. } = &shared.settings;
+        let conversation = Conversation::new(task, episode_id, *images, scratch)?;
         let kept = Kept::new(&shared.settings.standard_error, episode_id, Arc::clone(&shared.secrets));
         let program = Program::start(&shared.settings.command, &shared.groups, &kept.said);
         let program = program.map_err(|failure| lost(&failure))?;
-        Ok(Box::new(ExecAgent {
-            shared,
-            task,
-            episode_id: episode_id.to_owned(),
-            prompt,
-            frames,
-            program: Some(program),
-            kept,
-            steps: 0,
-        }))
+        Ok(Box::new(ExecAgent { shared, conversation, program: Some(program), kept, steps: 0 }))
     }
 
     fn waits(&self) -> bool {
@@ -169,10 +152,7 @@ impl Player for Exec {
 #[derive(Debug)]
 struct ExecAgent {
     shared: Arc<Shared>,
-    task: Task,
-    episode_id: String,
-    prompt: Prompt,
-    frames: Option<Frames>,
+    conversation: Conversation,
     /// `None` once it is of no use.
     program: Option<Program>,
     kept: Kept,
@@ -209,45 +189,9 @@ impl ExecAgent {
 
     /// The task, before the first observation alone, and the observation.
     fn lines(&self, observation: &Observation) -> Result<(Option<Vec<u8>>, Vec<u8>), Lost> {
-        let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(unusable)?;
-        let task = (self.steps == 1).then(|| self.task_message(system).line()).transpose();
-        let question = self.observation_message(observation, user)?.line();
-        Ok((task.map_err(unusable)?, question.map_err(unusable)?))
-    }
-
-    fn task_message(&self, system_prompt: String) -> Message {
-        let experiment = self.episode_id.split('/').next().unwrap_or_default().to_owned();
-        Message::Task(TaskMessage {
-            protocol: PROTOCOL,
-            episode_id: self.episode_id.clone(),
-            experiment,
-            family: self.task.experiment.prompt.replace('-', "_"),
-            stated_color: self.task.stated_color.clone(),
-            max_steps: self.task.step_budget,
-            seed: self.task.seed,
-            system_prompt,
-            reply_schema: reply::structure(&self.task.experiment.reply),
-        })
-    }
-
-    fn observation_message(&self, observation: &Observation, user_prompt: String) -> Result<Message, Lost> {
-        let png = observation.frame.to_png().map_err(unusable)?;
-        let image = match &self.frames {
-            Some(frames) => Image::Path(frames.keep(observation.t, png)?),
-            None => Image::Base64(STANDARD.encode(png)),
-        };
-        let (last_action, last_thought) = observation.history.clone().unwrap_or_default();
-        Ok(Message::Observation(ObservationMessage {
-            t: observation.t,
-            remaining_steps: observation.remaining,
-            position: Position { x: observation.x, y: observation.y },
-            orientation: observation.yaw,
-            wall_warning: observation.bumped,
-            last_action: last_action.map(|action| prompt::letter(action).to_owned()),
-            last_thought,
-            user_prompt,
-            image,
-        }))
+        let (task, question) = self.conversation.messages(observation)?;
+        let task = task.map(|task| task.line()).transpose();
+        Ok((task.map_err(unusable)?, question.line().map_err(unusable)?))
     }
 
     /// The reply in a line, read as that of a model.
@@ -257,7 +201,7 @@ impl ExecAgent {
         match str::from_utf8(line) {
             Ok(text) => {
                 let text = self.shared.without_secrets(text);
-                reply::read(&text, &self.task.experiment.reply, Ending::Whole).into_reply(text, usage)
+                self.conversation.read(text, usage)
             }
             // With its bytes replaced it might pass for something that the program did not say.
             Err(_) => Reply {
@@ -308,31 +252,4 @@ fn lost(failure: &Failure) -> Lost {
         _ => Status::ServerError,
     };
     Lost::counted_as(status, failure.to_string())
-}
-
-/// Something between the world and the program cannot be made.
-fn unusable(fault: impl std::fmt::Display) -> Lost {
-    Lost::because(format!("the observation cannot be made: {fault}"))
-}
-
-/// The frames of one episode as files.
-#[derive(Debug)]
-struct Frames(TemporaryFolder);
-
-impl Frames {
-    fn new(scratch: &Path) -> Result<Self, Lost> {
-        let made = std::path::absolute(scratch).and_then(|folder| TemporaryFolder::create(&folder, FRAMES));
-        made.map(Self).map_err(unusable)
-    }
-
-    /// Writes a frame and says where it is.
-    fn keep(&self, t: i32, png: &[u8]) -> Result<String, Lost> {
-        let path = self.0.path().join(format!("{t:03}.png"));
-        std::fs::write(&path, png).map_err(unusable)?;
-        path.into_os_string().into_string().map_err(|_| {
-            unusable(
-                "the folder's name is not UTF-8, which JSON cannot hold\n  help: --exec-images base64 needs no file",
-            )
-        })
-    }
 }

@@ -92,8 +92,17 @@ impl ImportArgs {
     /// # Errors
     /// Lines that are no steps, episodes that are not whole, a file that cannot be read or written.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let experiments = known_experiments(&self.definitions)?;
         self.check_places()?;
+        let texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
+        output::print(&self.import(texts)?, self.json)
+    }
+
+    /// Makes a trace of the steps in these texts, wherever they are from.
+    ///
+    /// # Errors
+    /// As [`ImportArgs::run`].
+    pub fn import(&self, mut texts: Vec<Text>) -> Result<ImportAnswer, Failure> {
+        let experiments = known_experiments(&self.definitions)?;
         let palette = self.palette.as_deref().map(palette).transpose()?;
         let limits = Limits {
             experiments: experiments.as_deref(),
@@ -101,17 +110,15 @@ impl ImportArgs {
             cluster: self.cluster.map(|ClusterArg::Seed| Cluster::Seed),
             is_reconstruction: self.reconstruction,
         };
-        let mut texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
         let imported = import::import(&mut texts, &self.out, limits).map_err(Failure::input)?;
         let own = imported.own.into_iter().map(|own| OwnColumn { name: own.name, kind: own.kind });
-        let answer = ImportAnswer {
+        Ok(ImportAnswer {
             out: Input::new(&self.out).name,
             episodes: imported.episodes,
             steps: imported.steps,
             columns: imported.columns.into_iter().map(str::to_owned).collect(),
             own_columns: own.collect(),
-        };
-        output::print(&answer, self.json)
+        })
     }
 
     /// Standard input is there once, and no file is written over its own lines.

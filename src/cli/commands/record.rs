@@ -2,10 +2,10 @@
 
 use std::collections::BTreeSet;
 use std::num::{NonZeroU32, NonZeroUsize};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crate::agent::Player;
 use crate::agent::scripted::{Renamed, Scripted};
@@ -25,7 +25,7 @@ use crate::record::index::{Place, RecordingIndex};
 use crate::record::metadata::Recordings;
 use crate::record::plan::{Experiments, Key, Plan, Shard, Subject};
 use crate::record::run::{Recording, Settings, Tally};
-use crate::record::shares::Shares;
+use crate::record::shares::{Shares, Spent};
 use crate::record::store::Store;
 use crate::sim::Experiment;
 use crate::sim::config::WorldConfig;
@@ -110,27 +110,63 @@ impl RecordArgs {
     /// # Errors
     /// For an agent or a configuration that cannot be used, and whatever the world, the eye or the disk refuse.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let config = match &self.config {
-            Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
-            None => WorldConfig::default(),
-        };
-        let plan = Plan {
-            experiments: experiments::asked(&self.experiment, &config)?,
-            seeds: self.seeds,
-            runs: self.runs,
-            repeats: self.repeats,
-            shard: self.shard,
-        };
+        let config = self.world()?;
+        let plan = self.planned(&config)?;
         if self.dry_run {
             return self.forecast(&config, &plan);
         }
         let player = self.player()?;
-        let subject = self.subject(player.as_ref());
-        let recording = self.recordings(&config, &plan, player.as_ref())?;
-        let store = Store::open(&self.out, subject.clone(), recording).map_err(Failure::input)?;
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         stop_at_interrupt(stop, Arc::clone(&player))?;
-        self.record(&config, player.as_ref(), &subject, &plan, &store, stop)
+        let recorded = self.record(player.as_ref(), stop)?;
+        recording::say(&recorded.answer, (&self.out, &recorded.lost_list), recorded.elapsed, recorded.times)?;
+        if self.json {
+            output::print_json(&recorded.answer)?;
+        }
+        match recorded.gave_up {
+            Some(reason) => Err(Failure::input(reason)),
+            None => Ok(outcome_of(&recorded.answer)),
+        }
+    }
+
+    /// Who plays, as `--agent` names it.
+    ///
+    /// # Errors
+    /// For an agent that cannot be used.
+    pub fn player(&self) -> Result<Arc<dyn Player>, Failure> {
+        if let Some(command) = self.agent.strip_prefix("exec:") {
+            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
+        }
+        match self.agent.as_str() {
+            "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
+            name => {
+                let script = scripted(name)?;
+                let model = self.vlm.name().unwrap_or_else(|| script.name()).to_owned();
+                Ok(Arc::new(Renamed { script, model }))
+            }
+        }
+    }
+
+    /// The folder for traces and logs.
+    pub fn out(&self) -> &Path {
+        &self.out
+    }
+
+    fn world(&self) -> Result<WorldConfig, Failure> {
+        match &self.config {
+            Some(path) => WorldConfig::load(path).map_err(Failure::input),
+            None => Ok(WorldConfig::default()),
+        }
+    }
+
+    fn planned(&self, config: &WorldConfig) -> Result<Plan, Failure> {
+        Ok(Plan {
+            experiments: experiments::asked(&self.experiment, config)?,
+            seeds: self.seeds,
+            runs: self.runs,
+            repeats: self.repeats,
+            shard: self.shard,
+        })
     }
 
     /// Says what recording would come to.
@@ -157,15 +193,16 @@ impl RecordArgs {
         Ok(Outcome::Done)
     }
 
-    fn record(
-        &self,
-        config: &WorldConfig,
-        player: &dyn Player,
-        subject: &Subject,
-        plan: &Plan,
-        store: &Store,
-        stop: &AtomicBool,
-    ) -> Result<Outcome, Failure> {
+    /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is told.
+    ///
+    /// # Errors
+    /// For a configuration that cannot be used, and whatever the world, the eye or the disk refuse.
+    pub fn record(&self, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
+        let config = &self.world()?;
+        let plan = &self.planned(config)?;
+        let subject = &self.subject(player);
+        let recording = self.recordings(config, plan, player)?;
+        let store = &Store::open(&self.out, subject.clone(), recording).map_err(Failure::input)?;
         let planned = plan.keys();
         let todo = unrecorded(plan, &planned, |experiment| store.recorded(experiment))?;
         if todo.len() < planned.len() {
@@ -206,28 +243,8 @@ impl RecordArgs {
             traces: files(plan, |experiment| store.trace(experiment)),
             logs: files(plan, |experiment| store.log(experiment)),
         };
-        recording::say(&answer, (&self.out, &store.lost_list()), start.elapsed(), shares.spent())?;
-        if self.json {
-            output::print_json(&answer)?;
-        }
-        match player.stopped().or_else(|| given_up.map(|given_up| given_up.to_string())) {
-            Some(reason) => Err(Failure::input(reason)),
-            None => Ok(outcome_of(&answer)),
-        }
-    }
-
-    fn player(&self) -> Result<Arc<dyn Player>, Failure> {
-        if let Some(command) = self.agent.strip_prefix("exec:") {
-            return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
-        }
-        match self.agent.as_str() {
-            "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
-            name => {
-                let script = scripted(name)?;
-                let model = self.vlm.name().unwrap_or_else(|| script.name()).to_owned();
-                Ok(Arc::new(Renamed { script, model }))
-            }
-        }
+        let gave_up = player.stopped().or_else(|| given_up.map(|given_up| given_up.to_string()));
+        Ok(Recorded { answer, gave_up, lost_list: store.lost_list(), elapsed: start.elapsed(), times: shares.spent() })
     }
 
     /// What the traces say of how they were recorded.
@@ -253,6 +270,21 @@ impl RecordArgs {
             max_unusable: (!self.keep_going).then_some(self.max_unusable),
         }
     }
+}
+
+/// A recording that ran to its end, or was stopped.
+#[derive(Debug)]
+pub struct Recorded {
+    /// What became of the episodes.
+    pub answer: RecordAnswer,
+    /// Why the agent could not go on, if it could not.
+    pub gave_up: Option<String>,
+    /// The list of episodes that were lost.
+    lost_list: PathBuf,
+    /// How long it took.
+    elapsed: Duration,
+    /// Where the threads' time went.
+    times: Spent,
 }
 
 /// How a recording that ran to its end, or was interrupted, is told from outside.

@@ -36,11 +36,7 @@ impl ValidateCommand {
     /// # Errors
     /// When an argument gives no file, for faults of the definitions, or when the output cannot be written.
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let experiments = known_experiments(&self.definitions)?;
-        let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
-        let threads = self.input.threads.count();
-        let mut report = validate(&inputs, experiments.as_deref(), threads).map_err(Failure::input)?;
-        report.findings.extend(experiment_findings(&self.definitions, &inputs)?);
+        let report = self.findings()?;
         let mut out = io::stdout().lock();
         if self.json {
             writeln!(out, "{:#}", serde_json::json!(report))?;
@@ -49,9 +45,26 @@ impl ValidateCommand {
         }
         Ok(if report.count(Severity::Error) == 0 { Outcome::Done } else { Outcome::CheckFailed })
     }
+
+    /// Everything that is found.
+    ///
+    /// # Errors
+    /// When an argument gives no file, and for faults of the definitions.
+    pub fn findings(&self) -> Result<Validation, Failure> {
+        let experiments = known_experiments(&self.definitions)?;
+        let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
+        let threads = self.input.threads.count();
+        let mut report = validate(&inputs, experiments.as_deref(), threads).map_err(Failure::input)?;
+        report.findings.extend(experiment_findings(&self.definitions, &inputs)?);
+        Ok(report)
+    }
 }
 
-fn print(out: &mut impl Write, report: &Validation) -> io::Result<()> {
+/// The findings for people, some of each kind, and how many there are.
+///
+/// # Errors
+/// When `out` cannot be written.
+pub fn print(out: &mut impl Write, report: &Validation) -> io::Result<()> {
     let (shown, rest) = report.abridged(SHOWN);
     for finding in shown {
         writeln!(out, "{finding}\n")?;

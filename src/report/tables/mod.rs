@@ -5,6 +5,7 @@
 
 pub mod csv;
 pub mod fit;
+pub mod html;
 pub mod latex;
 pub mod markdown;
 pub mod side_by_side;

@@ -8,8 +8,7 @@ use crate::metric::catalog::Catalog;
 use crate::score::builder::TableBuilder;
 use crate::score::table::{EpisodeTable, Header, KeyRef};
 
-/// The key columns, in the order of the file.
-pub(super) const KEYS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
+pub(super) use crate::score::columns::KEYS;
 
 /// Writes a table as comma-separated values.
 pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatError> {

@@ -4,9 +4,10 @@ use std::io::Write;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use arrow::array::{Array, ArrayRef, AsArray as _, Int32Array, Int64Array, RecordBatch, StringArray};
+use arrow::array::{Array, ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
-use arrow::datatypes::{DataType, Field, Float64Type, Int64Type, Schema};
+use arrow::datatypes::{DataType, Float64Type, Int64Type, Schema};
+use arrow::error::ArrowError;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
 use parquet::arrow::arrow_writer::{ArrowColumnChunk, ArrowColumnWriter, ArrowRowGroupWriterFactory, compute_leaves};
@@ -23,7 +24,8 @@ use super::footer;
 use super::partition::Partition;
 use crate::metric::catalog::Catalog;
 use crate::score::builder::TableBuilder;
-use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
+use crate::score::columns;
+use crate::score::table::{EpisodeTable, Header, KeyRef};
 use crate::trace::catch_panic::contained;
 use crate::trace::checksums::{self, CREATED_BY, Held};
 use crate::trace::declared::Declared;
@@ -107,7 +109,7 @@ pub struct Writer<W: Write + Send> {
 /// Whatever writing gives.
 pub fn encoder<W: Write + Send>(table: &EpisodeTable, out: W) -> Result<(Encoder<'_>, Writer<W>), FormatError> {
     let header = table.header();
-    let schema = Arc::new(schema(&header));
+    let schema = Arc::new(columns::schema(&header));
     let properties = properties(&header, &table.declared)?;
     let parquet = ArrowWriter::try_new(Held::new(out), Arc::clone(&schema), Some(properties))?;
     let (file, factory) = parquet.into_serialized_writer()?;
@@ -137,7 +139,7 @@ impl Encoder<'_> {
             while !rows.is_empty() {
                 let some = rows.start..self.until(job.column, &rows);
                 rows.start = some.end;
-                for leaf in compute_leaves(field, &self.values(job.column, some)?)? {
+                for leaf in compute_leaves(field, &columns::values(self.table, job.column, some).map_err(failed)?)? {
                     writer.write(&leaf)?;
                 }
             }
@@ -156,7 +158,7 @@ impl Encoder<'_> {
 
     /// The end of as many of these rows as may be gathered: a dictionary holds a text once, and an array each time.
     fn until(&self, column: usize, rows: &Range<usize>) -> usize {
-        let Some(texts) = self.texts(column) else { return rows.end };
+        let Some(texts) = columns::texts(self.table, column) else { return rows.end };
         let mut bytes = 0;
         let full = |row: &usize| {
             bytes += texts.get(*row).map_or(0, str::len);
@@ -164,39 +166,6 @@ impl Encoder<'_> {
         };
         rows.clone().find(full).map_or(rows.end, |row| row + 1)
     }
-
-    /// A column of text of the schema.
-    fn texts(&self, column: usize) -> Option<&TextColumn> {
-        let EpisodeTable { keys, labels, .. } = self.table;
-        match column {
-            0 => Some(&keys.episode_id),
-            1 => Some(&keys.model),
-            2 => Some(&keys.experiment),
-            other => labels.get(other.checked_sub(KEYS.len())?).map(|label| &label.values),
-        }
-    }
-
-    /// Some values of a column of the schema.
-    fn values(&self, column: usize, rows: Range<usize>) -> Result<ArrayRef, FormatError> {
-        if let Some(texts) = self.texts(column) {
-            return Ok(texts_of(texts, rows));
-        }
-        let EpisodeTable { keys, labels, metrics, .. } = self.table;
-        let number = |numbers: &Int32Array| Arc::new(numbers.slice(rows.start, rows.len())) as ArrayRef;
-        Ok(match column {
-            3 => number(&keys.seed),
-            4 => number(&keys.run),
-            other => {
-                let metric = &metrics[other - KEYS.len() - labels.len()];
-                cast(&metric.array().slice(rows.start, rows.len()), &DataType::Int64)
-                    .map_err(|error| ParquetError::ArrowError(error.to_string()))?
-            }
-        })
-    }
-}
-
-fn texts_of(column: &TextColumn, rows: Range<usize>) -> ArrayRef {
-    Arc::new(rows.map(|row| column.get(row)).collect::<StringArray>())
 }
 
 impl<W: Write + Send> Writer<W> {
@@ -255,12 +224,8 @@ fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, 
     Ok(properties.build())
 }
 
-fn schema(header: &Header) -> Schema {
-    let keys = KEYS.iter().zip([DataType::Utf8, DataType::Utf8, DataType::Utf8, DataType::Int32, DataType::Int32]);
-    let keys = keys.map(|(name, ty)| Field::new(*name, ty, false));
-    let labels = header.labels.iter().map(|name| Field::new(name, DataType::Utf8, true));
-    let metrics = header.metrics.iter().map(|name| Field::new(name, DataType::Int64, true));
-    Schema::new(keys.chain(labels).chain(metrics).collect::<Vec<_>>())
+fn failed(error: ArrowError) -> ParquetError {
+    ParquetError::ArrowError(error.to_string())
 }
 
 pub(super) fn read(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {

@@ -11,5 +11,6 @@ pub mod open;
 pub(in crate::trace) mod pages;
 pub(in crate::trace) mod parallel_scan;
 pub(in crate::trace) mod projection;
+pub mod steps;
 mod thrift;
 pub mod verify;

@@ -205,7 +205,7 @@ impl TraceFile {
     }
 
     /// What was made of its bytes so far.
-    pub(in crate::trace) fn expansion(&self) -> &Expansion {
+    pub(in crate::trace) fn expansion(&self) -> &Arc<Expansion> {
         &self.expansion
     }
 

@@ -1,0 +1,1 @@
+"""Scores mirror self-recognition episodes: step traces in, exact metrics, tables and reports out."""

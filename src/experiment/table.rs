@@ -4,6 +4,7 @@ use std::path::Path;
 
 use indexmap::IndexMap;
 
+use super::limits::{LATEST, LONGEST_NAME, MOST_CUBES, MOST_OTHERS, MOST_STEPS};
 use super::prompt::Templates;
 use super::spec::{
     Actions, Behavior, BodyShown, Camera, Colors, Cubes, Decision, Layout, MOST_MARKS, MOST_PANES, Mark, MarkColor,
@@ -15,16 +16,6 @@ use crate::base::ratio::Ratio;
 use crate::base::suggest::{self, nearest};
 use crate::metric::fault::{Fault, Place};
 use crate::metric::keys::Keys;
-
-/// The most characters of a name.
-const LONGEST_NAME: usize = 40;
-/// The most other agents and cubes of a world.
-const MOST_OTHERS: u32 = 6;
-const MOST_CUBES: u32 = 12;
-/// The longest episode.
-const MOST_STEPS: u32 = 100_000;
-/// The latest that a mirror may be, steps.
-const LATEST: u32 = 1000;
 
 /// An experiment as read, and where its parts stand, for faults that only a drawing shows.
 #[derive(Debug)]

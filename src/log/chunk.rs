@@ -8,8 +8,7 @@ use std::sync::Arc;
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::parse::parsed;
-use super::records::{FRAME, LONGEST};
+use super::parse::{FRAME, LONGEST, parsed};
 use crate::base::budget::{Budget, Exceeded, Limit};
 
 /// What is unpacked of a log, and how much of it is looked at for chunks behind damage.

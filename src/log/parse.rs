@@ -5,6 +5,12 @@
 
 use mcap::records::{Record, op};
 
+/// No record of a log is longer, chunks included; a longer one is damage.
+pub(super) const LONGEST: usize = 1 << 30;
+
+/// Of an opcode and a length.
+pub(super) const FRAME: usize = 9;
+
 /// The record of this body.
 ///
 /// # Errors

@@ -9,13 +9,7 @@ use mcap::MAGIC;
 use mcap::records::{Record, op};
 
 use super::chunk::{Budgets, inside};
-use super::parse::parsed;
-
-/// No record of a log is longer, chunks included; a longer one is damage.
-pub(super) const LONGEST: usize = 1 << 30;
-
-/// Of an opcode and a length.
-pub(super) const FRAME: usize = 9;
+use super::parse::{FRAME, LONGEST, parsed};
 
 /// The header of a chunk without the name of its compression.
 const CHUNK_HEADER: usize = 8 + 8 + 8 + 4 + 4 + 8;

@@ -23,6 +23,8 @@ mod outputs;
 mod paths;
 mod plan;
 mod quality;
+#[cfg(all(target_os = "linux", feature = "polars", feature = "raster", feature = "sim"))]
+mod readme;
 mod refusals;
 #[cfg(unix)]
 mod reports;

@@ -61,7 +61,7 @@ impl From<Output> for Answer {
     }
 }
 
-fn clean(mut command: Command, folder: &Path) -> Command {
+pub fn clean(mut command: Command, folder: &Path) -> Command {
     command.current_dir(folder);
     for name in SETTINGS {
         command.env_remove(name);

@@ -9,8 +9,7 @@ use std::fs::{self, DirEntry, File};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use super::place::PREFIX;
-use super::temporary::RANDOM;
+use super::place::{PREFIX, RANDOM};
 
 /// The folders that this process has swept. Once is enough, and a folder of a hundred thousand files takes its time.
 static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());

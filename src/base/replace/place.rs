@@ -7,6 +7,8 @@ use std::path::Path;
 
 /// Every temporary name begins with this; those who look for data pass over names that begin with a dot.
 pub(super) const PREFIX: &str = ".mirrorstats-";
+/// How many random characters end a temporary name.
+pub(super) const RANDOM: usize = 6;
 /// The longest part of the target's name in a temporary name, bytes: file systems allow 255 in all.
 const LONGEST_NAME: usize = 200;
 

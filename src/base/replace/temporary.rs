@@ -12,9 +12,8 @@ use std::mem;
 use std::path::{Path, PathBuf};
 
 use super::leftover;
+use super::place::RANDOM;
 
-/// How many random characters end a temporary name.
-pub(super) const RANDOM: usize = 6;
 /// The characters, which are no others where a file system does not tell capitals apart.
 const CHARACTERS: &[u8; 36] = b"abcdefghijklmnopqrstuvwxyz0123456789";
 

@@ -13,7 +13,7 @@ const GROUPS: &[(&str, &[&str])] = &[
     ("Record", &["record", "replay", "filmstrip", "world", "experiments", "plan"]),
     (
         "Score and report",
-        &["report", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit", "verify"],
+        &["report", "view", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit", "verify"],
     ),
     ("Traces", &["info", "validate", "check", "import", "recover", "renormalize", "schema"]),
     ("Definitions and queries", &["definitions", "query", "sql"]),
@@ -121,6 +121,14 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ),
     ("validate", &[("Every rule, every finding", "validate runs")]),
     ("verify", &[("Whether a report is as it was written", "verify reports/latest")]),
+    (
+        "view",
+        &[
+            ("The report, and every episode step by step", "view runs"),
+            ("What another definition changes", "view runs --against mine.toml"),
+            ("A copy for any web server, or from the disk", "view runs --export page"),
+        ],
+    ),
     ("world config", &[("A configuration to begin with", "world config > world.toml")]),
     ("world scene", &[("Where everything stands", "world scene E1")]),
     ("world sheet", &[("Pictures of the first scenes", "world sheet --out sheet.png")]),

@@ -31,6 +31,8 @@ pub mod sql;
 pub mod stats;
 pub mod validate;
 pub mod verify;
+#[cfg(feature = "view")]
+pub mod view;
 #[cfg(feature = "sim")]
 pub mod world;
 
@@ -43,6 +45,8 @@ pub enum Command {
     Report(report::ReportArgs),
     #[cfg(feature = "sim")]
     Record(record::RecordArgs),
+    #[cfg(feature = "view")]
+    View(view::ViewArgs),
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
@@ -90,6 +94,8 @@ impl Command {
             Self::Report(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Record(args) => args.run(),
+            #[cfg(feature = "view")]
+            Self::View(args) => args.run(),
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),

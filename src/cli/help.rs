@@ -10,7 +10,7 @@ use crate::report::tables::fit::wrapped;
 
 /// The commands by what they are for, in the order of a first use.
 const GROUPS: &[(&str, &[&str])] = &[
-    ("Record", &["record", "replay", "filmstrip", "world", "experiments", "plan"]),
+    ("Record", &["record", "replay", "filmstrip", "participants", "world", "experiments", "plan"]),
     (
         "Score and report",
         &["report", "view", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit", "verify"],
@@ -66,6 +66,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ),
     ("info", &[("What is there, and what is missing", "info runs")]),
     ("man", &[("Manual pages, a file per command", "man ~/.local/share/man/man1")]),
+    ("participants remove", &[("Out of traces, logs and journals", "participants remove P01 runs")]),
     (
         "plan",
         &[
@@ -91,6 +92,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ),
             ("What it will cost, without a request", "record --agent vlm --model gpt-5.1 --dry-run"),
             ("Your own program", "record --agent exec:'python3 agent.py' --model mine --experiment E1 --out runs"),
+            ("Two people, each in a browser", "record --agent human --model people --participants P01,P02 --consent words.txt"),
         ],
     ),
     ("recover", &[("A trace out of a log that was cut off", "recover runs/E1-oracle.mcap -o E1-oracle.parquet")]),

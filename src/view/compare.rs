@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::episode::about;
+use super::episode::{LONGEST, about};
 use super::error::ViewError;
 use super::filter::{Query, required};
 use super::snapshot::Snapshot;
@@ -48,8 +48,8 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
         "first": differences.first().cloned().or(behind),
         "differences": differences,
         "constants": constants.iter().filter(|(_, at)| !at.is_empty()).map(|(name, _)| *name).collect::<Vec<_>>(),
-        "a": about(snapshot, &a)?,
-        "b": about(snapshot, &b)?,
+        "a": about(snapshot, &a, LONGEST)?,
+        "b": about(snapshot, &b, LONGEST)?,
     }))
 }
 

@@ -14,20 +14,20 @@ use crate::trace::episode::Episode;
 use crate::trace::schema::{COLUMNS, Column, Value as Cell};
 
 /// The most characters of a text in an answer; the rest is asked for by itself.
-const LONGEST: usize = 4_000;
+pub(super) const LONGEST: usize = 4_000;
 
 /// Everything about an episode but its frames.
 pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let id = required(query, "id")?;
     let opened = snapshot.episode(id)?;
-    let mut told = about(snapshot, &opened)?;
+    let mut told = about(snapshot, &opened, LONGEST)?;
     told["siblings"] = list::siblings(snapshot, id).into();
     told["neighbours"] = list::neighbours(snapshot, query, id)?;
     Ok(told)
 }
 
-/// An episode without its place in a list.
-pub(super) fn about(snapshot: &Snapshot, opened: &Opened) -> Result<Value, ViewError> {
+/// An episode without its place in a list, its texts cut to so many characters.
+pub(super) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Result<Value, ViewError> {
     let episode = &opened.episode;
     let (metrics, against) = scores(snapshot, opened)?;
     let marks = moments(episode).into_iter().map(|(t, moment)| json!({"t": t, "title": moment.title()}));
@@ -38,8 +38,8 @@ pub(super) fn about(snapshot: &Snapshot, opened: &Opened) -> Result<Value, ViewE
         "running": opened.running.is_some(),
         "frames": snapshot.has_log(opened) && episode.steps.iter().any(|step| step.extra.frame_time.is_some()),
         "lost": is_lost(snapshot, &episode.episode_id),
-        "constants": constants(episode),
-        "steps": steps(episode),
+        "constants": constants(episode, longest),
+        "steps": steps(episode, longest),
         "marks": marks.collect::<Vec<_>>(),
         "metrics": metrics,
         "against": against,
@@ -67,13 +67,13 @@ fn is_lost(snapshot: &Snapshot, id: &str) -> bool {
 }
 
 /// The columns that are the same at every step.
-fn constants(episode: &Episode) -> Vec<Value> {
+fn constants(episode: &Episode, longest: usize) -> Vec<Value> {
     let with_step = |column: &&Column| column.constant && column.name != "episode_hash";
     let columns = COLUMNS.iter().filter(with_step);
     columns
         .filter_map(|column| {
             let value = column.of_steps(episode).next().flatten().or_else(|| head(episode, column))?;
-            Some(json!({"name": column.name, "doc": column.doc, "value": shown(value)}))
+            Some(json!({"name": column.name, "doc": column.doc, "value": shown(value, longest)}))
         })
         .collect()
 }
@@ -89,26 +89,26 @@ fn head<'e>(episode: &'e Episode, column: &Column) -> Option<Cell<'e>> {
 }
 
 /// The columns of the steps that have some value, each with a value per step.
-fn steps(episode: &Episode) -> Value {
+fn steps(episode: &Episode, longest: usize) -> Value {
     let mut all = Map::new();
     for column in COLUMNS.iter().filter(|column| !column.constant && column.name != "frame_time") {
         let values: Vec<Option<Cell<'_>>> = column.of_steps(episode).collect();
         if values.iter().all(Option::is_none) {
             continue;
         }
-        let values: Vec<Value> = values.into_iter().map(|value| value.map_or(Value::Null, shown)).collect();
+        let values: Vec<Value> = values.into_iter().map(|value| value.map_or(Value::Null, |value| shown(value, longest))).collect();
         all.insert(column.name.to_owned(), json!({"doc": column.doc, "unit": column.unit, "values": values}));
     }
     Value::Object(all)
 }
 
 /// A value for the page; a long text is cut, and says how long it is.
-fn shown(value: Cell<'_>) -> Value {
+fn shown(value: Cell<'_>, longest: usize) -> Value {
     match value {
         Cell::Bool(value) => json!(value),
         Cell::Int(value) => json!(value),
         Cell::Float(value) => json!((value * 1e6).round() / 1e6),
-        Cell::Text(text) => match text.char_indices().nth(LONGEST) {
+        Cell::Text(text) => match text.char_indices().nth(longest) {
             None => json!(lines(text)),
             Some((end, _)) => json!({"text": lines(&text[..end]), "characters": text.chars().count()}),
         },

@@ -31,6 +31,16 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     }))
 }
 
+/// The whole list, for a copy.
+pub(super) fn everything(snapshot: &Snapshot) -> Result<Value, ViewError> {
+    let table = &snapshot.table()?.results.episodes;
+    Ok(json!({
+        "metrics": table.metrics.iter().map(|metric| visible(&metric.name)).collect::<Vec<_>>(),
+        "has_conditions": table.has_conditions(),
+        "rows": (0..table.len()).map(|row| told(table, row)).collect::<Vec<_>>(),
+    }))
+}
+
 /// The ids before and behind an episode in the same list.
 pub(super) fn neighbours(snapshot: &Snapshot, query: &Query, id: &str) -> Result<Value, ViewError> {
     let Some(scored) = &snapshot.scored else { return Ok(json!({})) };

@@ -6,14 +6,18 @@ use serde_json::{Value, json};
 
 use super::error::ViewError;
 use super::filter::{Query, required};
-use super::snapshot::Snapshot;
+use super::snapshot::{Opened, Snapshot};
 use crate::base::escape::visible;
 use crate::log::frames::Shape;
 
 /// The shapes of an episode, and which of them are there at each step.
 pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
-    let opened = snapshot.episode(required(query, "id")?)?;
-    let by_step = snapshot.shapes(&opened)?;
+    of(snapshot, &snapshot.episode(required(query, "id")?)?)
+}
+
+/// The same of an episode that is open.
+pub(super) fn of(snapshot: &Snapshot, opened: &Opened) -> Result<Value, ViewError> {
+    let by_step = snapshot.shapes(opened)?;
     let (mut places, mut shapes) = (BTreeMap::new(), Vec::new());
     let mut place = |shape: &Shape| {
         let told = told(shape);

@@ -311,7 +311,7 @@ fn base_knows_no_arrow_starts_no_thread_and_opens_files_in_two_places() {
 }
 
 /// Files outside `trace` that open files, or read Parquet; none of them opens a trace.
-const OPENS_OTHER_FILES: [&str; 17] = [
+const OPENS_OTHER_FILES: [&str; 18] = [
     // Files that appear whole or not at all.
     "src/base/replace/",
     // What others open files by.
@@ -337,8 +337,9 @@ const OPENS_OTHER_FILES: [&str; 17] = [
     // Experiments and prompts, of bounded length.
     "src/experiment/load.rs",
     "src/experiment/prompt.rs",
-    // Answers of models.
+    // Answers of models, and of people.
     "src/agent/vlm/journal.rs",
+    "src/agent/human/journal.rs",
 ];
 
 #[test]
@@ -402,8 +403,9 @@ fn only_base_formats_floats() {
 
 /// Files that may look at a clock: what they learn from it goes to standard error, into a wait, or into the latency of a
 /// reply, and nowhere else.
-const MAY_LOOK_AT_A_CLOCK: [&str; 10] = [
+const MAY_LOOK_AT_A_CLOCK: [&str; 11] = [
     "src/agent/exec/mod.rs",
+    "src/agent/human/hub.rs",
     "src/agent/vlm/failure.rs",
     "src/agent/vlm/provider.rs",
     "src/cli/commands/record.rs",

@@ -14,6 +14,8 @@ pub mod filmstrip;
 pub mod import;
 pub mod info;
 pub mod man;
+#[cfg(all(feature = "sim", feature = "view"))]
+pub mod participants;
 pub mod plan;
 pub mod query;
 #[cfg(feature = "sim")]
@@ -67,6 +69,8 @@ pub enum Command {
     Replay(replay::ReplayArgs),
     #[cfg(feature = "sim")]
     Filmstrip(filmstrip::FilmstripArgs),
+    #[cfg(all(feature = "sim", feature = "view"))]
+    Participants(participants::ParticipantsArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
     Query(query::QueryArgs),
@@ -116,6 +120,8 @@ impl Command {
             Self::Replay(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Filmstrip(args) => args.run(),
+            #[cfg(all(feature = "sim", feature = "view"))]
+            Self::Participants(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
             Self::Query(args) => args.run(),

@@ -18,6 +18,7 @@
 //! | room | what it knows |
 //! |---|---|
 //! | [`cli`] | what was typed, standard output, exit codes |
+//! | `view` | the local web application: a study as a page, its server, its static copy (feature `view`) |
 //! | [`study`] | inputs, definitions and a filter, opened once and scanned once; every answer is a function of it |
 //! | `record` | runs episodes: a world, an agent; a trace and a log (feature `sim`) |
 //! | [`replay`] | a recorded episode again: re-simulated, as frames, as a film strip |
@@ -167,6 +168,9 @@ pub mod stats;
 pub mod study;
 #[doc(hidden)]
 pub mod trace;
+#[cfg(feature = "view")]
+#[doc(hidden)]
+pub mod view;
 
 // The library. What is reachable besides is for this project's own tests and examples, and may change at any time.
 pub use figures::{Figure, FigureFormat, FigureName};

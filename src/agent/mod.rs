@@ -9,6 +9,8 @@
 pub mod exec;
 #[cfg(feature = "sim")]
 pub mod function;
+#[cfg(all(feature = "sim", feature = "view"))]
+pub mod human;
 #[cfg(feature = "sim")]
 pub mod perception;
 pub mod prompt;
@@ -196,6 +198,19 @@ pub type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
 pub trait Agent {
     /// Decides the next action.
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
+
+    /// The code of the person who plays; `None` where no person does.
+    fn participant(&self) -> Option<&str> {
+        None
+    }
+
+    /// Whether an episode of another scene is to be played first, which is not recorded.
+    fn wants_practice(&self) -> bool {
+        false
+    }
+
+    /// Hears that what follows is practice, on this task, or that the practice is over.
+    fn practise(&mut self, _task: Option<Task>) {}
 
     /// Hears that there is nothing more to decide; not called for an episode that is lost.
     fn end(&mut self, _ended: Ended) -> Farewell<'_> {

@@ -1,8 +1,12 @@
 //! The features that this build has.
 
 /// Every feature, in the order of their names, and whether it is there.
-const ALL: [(&str, bool); 3] =
-    [("polars", cfg!(feature = "polars")), ("raster", cfg!(feature = "raster")), ("sim", cfg!(feature = "sim"))];
+const ALL: [(&str, bool); 4] = [
+    ("polars", cfg!(feature = "polars")),
+    ("raster", cfg!(feature = "raster")),
+    ("sim", cfg!(feature = "sim")),
+    ("view", cfg!(feature = "view")),
+];
 
 /// The features that are there, separated by commas.
 pub fn present() -> String {

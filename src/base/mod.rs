@@ -16,3 +16,5 @@ pub mod ratio;
 pub mod replace;
 pub mod rounding;
 pub mod suggest;
+#[cfg(feature = "view")]
+pub mod web;

@@ -10,10 +10,10 @@ use crate::report::tables::fit::wrapped;
 
 /// The commands by what they are for, in the order of a first use.
 const GROUPS: &[(&str, &[&str])] = &[
-    ("Record", &["record", "replay", "filmstrip", "world", "experiments", "plan"]),
+    ("Record", &["record", "replay", "filmstrip", "participants", "world", "experiments", "plan"]),
     (
         "Score and report",
-        &["report", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit", "verify"],
+        &["report", "view", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit", "verify"],
     ),
     ("Traces", &["info", "validate", "check", "import", "recover", "renormalize", "schema"]),
     ("Definitions and queries", &["definitions", "style", "query", "sql"]),
@@ -69,6 +69,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[("What is there, and what is missing", "info runs"), ("Every episode by its id", "info runs --episodes")],
     ),
     ("man", &[("Manual pages, a file per command", "man ~/.local/share/man/man1")]),
+    ("participants remove", &[("Out of traces, logs and journals", "participants remove P01 runs")]),
     (
         "plan",
         &[
@@ -94,6 +95,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ),
             ("What it will cost, without a request", "record --agent vlm --model gpt-5.1 --dry-run"),
             ("Your own program", "record --agent exec:'python3 agent.py' --model mine --experiment E1 --out runs"),
+            (
+                "Two people, each in a browser",
+                "record --agent human --model people --participants P01,P02 --consent words.txt",
+            ),
         ],
     ),
     ("recover", &[("A trace out of a log that was cut off", "recover runs/E1-oracle.mcap -o E1-oracle.parquet")]),
@@ -126,6 +131,14 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ("style show", &[("A file to begin with", "style show paper > mine.toml")]),
     ("validate", &[("Every rule, every finding", "validate runs")]),
     ("verify", &[("Whether a report is as it was written", "verify reports/latest")]),
+    (
+        "view",
+        &[
+            ("The report, and every episode step by step", "view runs"),
+            ("What another definition changes", "view runs --against mine.toml"),
+            ("A copy for any web server, or from the disk", "view runs --export page"),
+        ],
+    ),
     ("world config", &[("A configuration to begin with", "world config > world.toml")]),
     ("world scene", &[("Where everything stands", "world scene E1")]),
     ("world sheet", &[("Pictures of the first scenes", "world sheet --out sheet.png")]),

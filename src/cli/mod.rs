@@ -12,6 +12,8 @@ pub mod dry_run;
 pub mod exec;
 mod experiments;
 mod help;
+#[cfg(all(feature = "sim", feature = "view"))]
+mod human;
 pub mod outcome;
 pub mod output;
 pub mod quality;

@@ -1,6 +1,8 @@
 //! One log out of several: episodes in the order of the trace, each in chunks of its own.
 
 use std::collections::BTreeMap;
+#[cfg(feature = "view")]
+use std::collections::BTreeSet;
 use std::fs::File;
 use std::io::{BufReader, BufWriter, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -66,6 +68,30 @@ pub fn assemble(
 ) -> Result<(), LogError> {
     let file = NewFile::create_in(scratch, out).map_err(LogError::io("write", out))?;
     join(file, before.map(Source::open).transpose()?, out, parts, recording)
+}
+
+/// Writes the log at `path` anew without the episodes of these ids.
+///
+/// # Errors
+/// When the log cannot be read or is damaged, and whatever writing gives; the log is as it was then.
+#[cfg(feature = "view")]
+pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result<(), LogError> {
+    let mut source = Source::open(path)?;
+    let file = NewFile::create(path).map_err(LogError::io("write", path))?;
+    let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
+    write_recording(&mut log, recording).map_err(LogError::writing(path))?;
+    while let Some((head, _)) = &source.begin {
+        if ids.contains(&head.episode_id) {
+            // Up to the next begin.
+            source.begin = None;
+            source.advance()?;
+        } else {
+            source.copy_episode(&mut log, path)?;
+        }
+    }
+    log.finish().map_err(LogError::writing(path))?;
+    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", path)(error.into_error()))?;
+    file.commit().map_err(LogError::io("write", path))
 }
 
 /// Writes a log and gives it its name.

@@ -21,6 +21,8 @@
 pub mod assemble;
 mod chunk;
 mod error;
+#[cfg(feature = "view")]
+pub mod frames;
 pub mod message;
 mod messages;
 mod parse;

@@ -134,6 +134,12 @@ impl<R: Read + Seek> Records<R> {
 
     /// The channels that the file's summary names, if its end is there.
     pub(super) fn of_summary(&mut self) -> io::Result<Vec<mcap::records::Channel>> {
+        let channel = |record| if let Record::Channel(channel) = record { Some(channel) } else { None };
+        Ok(self.summary()?.into_iter().filter_map(channel).collect())
+    }
+
+    /// The records of the file's summary, if its end is there; none where it is not.
+    pub(super) fn summary(&mut self) -> io::Result<Vec<Record<'static>>> {
         /// Two places and a checksum.
         const FOOTER: usize = FRAME + 20;
         let last = self.end.saturating_sub((FOOTER + MAGIC.len()) as u64);
@@ -146,12 +152,20 @@ impl<R: Read + Seek> Records<R> {
         let mut at = start;
         while let Some(frame) = self.frame(at)?.filter(|_| at < last) {
             let whole = self.whole(at, frame)?;
-            if let Ok(Piece::Record(Record::Channel(channel))) = decode(at, frame.opcode, &whole) {
-                found.push(channel);
+            if let Ok(Piece::Record(record)) = decode(at, frame.opcode, &whole) {
+                found.push(record);
             }
             at += whole.len() as u64;
         }
         Ok(found)
+    }
+
+    /// The chunk that begins at a place, with its frame; `None` where no chunk does.
+    pub(super) fn chunk_at(&mut self, at: u64) -> io::Result<Option<Vec<u8>>> {
+        match self.frame(at)?.filter(|frame| frame.opcode == op::CHUNK) {
+            Some(frame) => self.whole(at, frame).map(Some),
+            None => Ok(None),
+        }
     }
 
     /// The data's checksum is that of all before its end record, the index's that of all behind it up to the checksum.

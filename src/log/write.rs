@@ -113,6 +113,7 @@ impl EpisodeLog {
         // What its rows hash to is not known before its end, and stands there.
         let head = Episode { episode_hash: None, ..head.clone() };
         log.json(channel, time, &EpisodeMessage::Begin(Box::new(head)))?;
+        log.flush()?;
         Ok(log)
     }
 
@@ -143,7 +144,14 @@ impl EpisodeLog {
     /// # Errors
     /// Whatever writing gives.
     pub fn decided(&mut self, time: u64, row: &Decision) -> Result<(), LogError> {
-        self.json(self.channels.decision, time, row)
+        let channel = self.channels.decision;
+        self.json(channel, time, row)?;
+        self.flush()
+    }
+
+    /// Ends the chunk of a step, so that others can read it while the episode goes on.
+    fn flush(&mut self) -> Result<(), LogError> {
+        self.out.flush().map_err(LogError::writing(&self.path))
     }
 
     /// Ends the log of an episode of these rows, tells their hash, and gives the log its name.

@@ -36,6 +36,8 @@ pub mod folder_lock;
 pub mod index;
 pub mod lock;
 pub mod metadata;
+#[cfg(feature = "view")]
+pub mod participants;
 pub mod plan;
 pub mod queue;
 pub mod replies;

@@ -20,7 +20,7 @@ use super::rollout::{self, Observer, Played, Stage};
 use super::shares::Shares;
 use super::store::Store;
 use super::unusable::{GivenUp, Unusable};
-use crate::agent::{Ended, Player};
+use crate::agent::{Agent, Ended, Player};
 use crate::replay::log::{Log, Seen};
 use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
@@ -42,6 +42,9 @@ pub trait Progress: Sync {
     /// Nothing is left to do but episodes that other processes have; this one is among them. Told again and again.
     fn waiting(&self, id: &str, held: Held);
 }
+
+/// The seed of what is practised; those of recordings are smaller.
+const PRACTICE_SEED: i32 = 9_000;
 
 /// The time between two looks at episodes that other processes have.
 const AGAIN: Duration = Duration::from_millis(50);
@@ -225,13 +228,17 @@ impl Recording<'_> {
     ) -> Result<usize, RecordError> {
         let start = Instant::now();
         let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
-        let episode = rollout::head(self.config, &scene, key, self.subject);
+        let mut episode = rollout::head(self.config, &scene, key, self.subject);
         let task = rollout::task(self.config, &scene, key);
         let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
         self.shares.visibility(start);
         let agent = self.player.agent(task, &episode.episode_id);
         let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
+        episode.participant = agent.participant().map(str::to_owned);
         let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
+        if agent.wants_practice() {
+            self.practise(&stage, agent.as_mut(), key).await?;
+        }
         let log = if self.settings.log {
             Some(Log::begin(&self.store.log_part(key), &episode).map_err(RecordError::fatal)?)
         } else {
@@ -247,6 +254,18 @@ impl Recording<'_> {
             agent.end(ended).await;
         }
         committed.and(played).map(|played| played.episode.steps.len())
+    }
+
+    /// An episode of a scene that no recording has, of which nothing is kept.
+    async fn practise(&self, stage: &Stage<'_>, agent: &mut dyn Agent, key: Key) -> Result<(), RecordError> {
+        let key = Key::first(key.experiment, PRACTICE_SEED, 1);
+        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
+        let head = rollout::head(self.config, &scene, key, self.subject);
+        agent.practise(Some(rollout::task(self.config, &scene, key)));
+        let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
+        rollout::play(stage, &mut world, agent, key, head, &mut Nobody).await?;
+        agent.practise(None);
+        Ok(())
     }
 
     /// Makes an episode whole on the disk, its trace last.
@@ -320,6 +339,19 @@ fn ended(played: &Result<Played, RecordError>) -> Option<Ended> {
 
 fn panicked() -> RecordError {
     RecordError::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
+}
+
+/// Looks on where nothing is kept.
+struct Nobody;
+
+impl Observer for Nobody {
+    fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn done(&mut self, _: i32, _: &Step) -> Result<(), RecordError> {
+        Ok(())
+    }
 }
 
 /// Counts steps and unusable replies, and writes the log if there is one.

@@ -20,6 +20,7 @@ mod figure_inputs;
 mod input_hashes;
 mod inputs;
 mod losses;
+mod overview;
 mod pooled;
 mod provenance;
 mod report;
@@ -63,6 +64,7 @@ pub use experiment_findings::experiment_findings;
 pub use figure_inputs::{Drawings, FigureInputs};
 pub use inputs::{ScoreFile, Source, resolve};
 pub use losses::LostAs;
+pub use overview::{Overview, Part};
 pub use provenance::ProvenanceError;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
@@ -384,6 +386,16 @@ impl Study {
         let found = evidence::explain(traces, &definitions, episode_id, self.threads);
         self.check_unchanged()?;
         Ok(found?)
+    }
+
+    /// As [`Study::explain`], of an episode that is known to be in one of the inputs: no other is read.
+    ///
+    /// # Errors
+    /// As [`Study::explain`].
+    pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
+        let definitions = self.question.bind(self.source.traces()?)?;
+        let one = TraceSet::open(std::slice::from_ref(input))?;
+        Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
     }
 
     /// A table of the study beside a published one, cell by cell. `table` names it; otherwise it is the first that has

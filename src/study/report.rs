@@ -246,6 +246,6 @@ impl Report {
     }
 }
 
-fn figure_of(name: FigureName, svg: &str) -> Figure<'_> {
+pub(super) fn figure_of(name: FigureName, svg: &str) -> Figure<'_> {
     Figure { name: name.name(), title: name.title(), caption: name.caption(), svg }
 }

@@ -3,11 +3,14 @@
 //! Rule: what reaches `work` is whole episodes that keep every rule of the schema in the columns that are read; the
 //! first fault by file, row group and row ends the scan, the same one for any number of threads.
 
+use std::collections::HashMap;
 use std::num::NonZeroUsize;
+use std::ops::Range;
 use std::sync::Arc;
 
-use arrow::array::{Array as _, ArrayRef, RecordBatch, RecordBatchOptions, StringArray, UInt8Array};
-use arrow::datatypes::{Field, Schema};
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch, RecordBatchOptions, StringArray, UInt8Array};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Schema};
 use arrow::error::ArrowError;
 
 use super::diagnostic::Finding;
@@ -169,6 +172,38 @@ impl TraceSet {
             None => Ok(summary),
         }
     }
+}
+
+/// Where an episode is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EpisodePlace {
+    /// The file's position in [`TraceSet::files`].
+    pub file: usize,
+    /// Its rows, counted from the first of the file.
+    pub rows: Range<usize>,
+}
+
+/// Where each episode is, by its id: one pass over the columns that tell episodes apart.
+///
+/// # Errors
+/// The first fault of the traces in these columns.
+pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMap<String, EpisodePlace>, TraceError> {
+    let mut places = HashMap::new();
+    let work = |batch: EpisodeBatch| -> Result<Vec<(String, EpisodePlace)>, TraceError> {
+        let Origin { file, row_group, row } = batch.origin;
+        let before: usize = (0..row_group).map(|group| traces.files()[file].row_group_rows(group)).sum();
+        let start = before + row;
+        let ids = batch.episodes.column_by_name("episode_id").expect("every batch names its episodes");
+        let ids = cast(ids, &DataType::Utf8).map_err(TraceError::Memory)?;
+        let ids = ids.as_string::<i32>();
+        let ends = batch.offsets.windows(2).map(|pair| start + pair[0]..start + pair[1]);
+        Ok(ends.enumerate().map(|(at, rows)| (ids.value(at).to_owned(), EpisodePlace { file, rows })).collect())
+    };
+    traces.scan(&Projection::default(), threads, work, |found| {
+        places.extend(found);
+        Ok(())
+    })?;
+    Ok(places)
 }
 
 /// What a worker found out about some episodes.

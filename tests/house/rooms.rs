@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 use regex::Regex;
 
 /// From the top to the bottom: a room imports only from the rooms below it.
-const ROOMS: [&str; 16] = [
+const ROOMS: [&str; 17] = [
     "cli",
+    "view",
     "study",
     "record",
     "replay",
@@ -310,12 +311,13 @@ fn base_knows_no_arrow_starts_no_thread_and_opens_files_in_two_places() {
 }
 
 /// Files outside `trace` that open files, or read Parquet; none of them opens a trace.
-const OPENS_OTHER_FILES: [&str; 16] = [
+const OPENS_OTHER_FILES: [&str; 18] = [
     // Files that appear whole or not at all.
     "src/base/replace/",
     // What others open files by.
     "src/base/input.rs",
     // Logs.
+    "src/log/frames.rs",
     "src/log/messages.rs",
     "src/log/recover.rs",
     // What Spark writes: scores.
@@ -335,8 +337,9 @@ const OPENS_OTHER_FILES: [&str; 16] = [
     // Experiments and prompts, of bounded length.
     "src/experiment/load.rs",
     "src/experiment/prompt.rs",
-    // Answers of models.
+    // Answers of models, and of people.
     "src/agent/vlm/journal.rs",
+    "src/agent/human/journal.rs",
 ];
 
 #[test]
@@ -400,9 +403,10 @@ fn only_base_formats_floats() {
 
 /// Files that may look at a clock: what they learn from it goes to standard error, into a wait, or into the latency of a
 /// reply, and nowhere else.
-const MAY_LOOK_AT_A_CLOCK: [&str; 10] = [
+const MAY_LOOK_AT_A_CLOCK: [&str; 12] = [
     "src/agent/exec/mod.rs",
     "src/agent/function.rs",
+    "src/agent/human/hub.rs",
     "src/agent/vlm/failure.rs",
     "src/agent/vlm/provider.rs",
     "src/cli/commands/record.rs",
@@ -411,6 +415,7 @@ const MAY_LOOK_AT_A_CLOCK: [&str; 10] = [
     "src/record/rollout.rs",
     "src/record/run.rs",
     "src/record/shares.rs",
+    "src/view/live.rs",
 ];
 
 #[test]

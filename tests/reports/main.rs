@@ -9,3 +9,5 @@ mod reconstruction;
 mod report;
 mod sequential;
 mod statistics;
+#[cfg(feature = "view")]
+mod view;

@@ -14,6 +14,8 @@ pub mod filmstrip;
 pub mod import;
 pub mod info;
 pub mod man;
+#[cfg(all(feature = "sim", feature = "view"))]
+pub mod participants;
 pub mod plan;
 pub mod query;
 #[cfg(feature = "sim")]
@@ -32,6 +34,8 @@ pub mod stats;
 pub mod style;
 pub mod validate;
 pub mod verify;
+#[cfg(feature = "view")]
+pub mod view;
 #[cfg(feature = "sim")]
 pub mod world;
 
@@ -44,6 +48,8 @@ pub enum Command {
     Report(report::ReportArgs),
     #[cfg(feature = "sim")]
     Record(record::RecordArgs),
+    #[cfg(feature = "view")]
+    View(view::ViewArgs),
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
@@ -64,6 +70,8 @@ pub enum Command {
     Replay(replay::ReplayArgs),
     #[cfg(feature = "sim")]
     Filmstrip(filmstrip::FilmstripArgs),
+    #[cfg(all(feature = "sim", feature = "view"))]
+    Participants(participants::ParticipantsArgs),
     Schema(schema::SchemaCommand),
     Sql(sql::SqlArgs),
     Query(query::QueryArgs),
@@ -92,6 +100,8 @@ impl Command {
             Self::Report(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Record(args) => args.run(),
+            #[cfg(feature = "view")]
+            Self::View(args) => args.run(),
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
@@ -112,6 +122,8 @@ impl Command {
             Self::Replay(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Filmstrip(args) => args.run(),
+            #[cfg(all(feature = "sim", feature = "view"))]
+            Self::Participants(args) => args.run(),
             Self::Schema(command) => command.run(),
             Self::Sql(args) => args.run(),
             Self::Query(args) => args.run(),

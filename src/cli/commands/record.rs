@@ -15,6 +15,8 @@ use crate::cli::args::ThreadArgs;
 use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
 use crate::cli::exec::ExecArgs;
 use crate::cli::experiments;
+#[cfg(feature = "view")]
+use crate::cli::human::HumanArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
@@ -38,8 +40,8 @@ use crate::sim::config::WorldConfig;
 #[derive(Clone, Debug, clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
 pub struct RecordArgs {
-    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; or
-    /// exec:'CMD', a program of your own that takes and gives JSON lines
+    /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; human, people
+    /// in a browser; or exec:'CMD', a program of your own that takes and gives JSON lines
     #[arg(long, value_name = "AGENT")]
     agent: String,
     /// The experiments: E1, E1..E5, E1,E3, others that are built in such as mark (`mirrorstats experiments show`), or a
@@ -102,6 +104,10 @@ pub struct RecordArgs {
     /// A program of one's own.
     #[command(flatten)]
     exec: ExecArgs,
+    /// People.
+    #[cfg(feature = "view")]
+    #[command(flatten)]
+    human: HumanArgs,
 }
 
 impl RecordArgs {
@@ -139,6 +145,8 @@ impl RecordArgs {
         }
         match self.agent.as_str() {
             "vlm" => Ok(Arc::new(self.vlm.player(&self.out)?)),
+            #[cfg(feature = "view")]
+            "human" => Ok(Arc::new(self.human.player(self.vlm.name(), &self.out, !self.dry_run)?)),
             name => {
                 let script = scripted(name)?;
                 let model = self.vlm.name().unwrap_or_else(|| script.name()).to_owned();
@@ -307,7 +315,8 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
     if let Some(scripted) = Scripted::named(name) {
         return Ok(scripted);
     }
-    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", "exec:'CMD'"]).collect();
+    let known: Vec<&str> =
+        Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", "human", "exec:'CMD'"]).collect();
     let near = hint(name, known.iter().copied());
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }

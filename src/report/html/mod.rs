@@ -74,6 +74,26 @@ pub enum HtmlError {
     Template(#[from] minijinja::Error),
 }
 
+/// Some sections of the page by themselves, for a page that is put together in the browser: `tables`, `figures`, `statistics`,
+/// `quality`, `definitions`, each as its element.
+///
+/// # Errors
+/// When tables, cells and episodes are not of one report.
+pub fn sections(page: &Page<'_>, names: &[&str]) -> Result<Vec<String>, HtmlError> {
+    let content = page::content(page)?;
+    names.iter().map(|name| Ok(template::section(name, &content)?)).collect()
+}
+
+/// The style sheet of the page, with its font.
+pub fn style_sheet() -> String {
+    format!("{}\n{}", crate::figures::font_style_sheet(), template::STYLE)
+}
+
+/// Every metric of a catalog with its sentence, for a page.
+pub fn metrics(catalog: &crate::metric::catalog::Catalog) -> Vec<serde_json::Value> {
+    definitions::metrics(catalog)
+}
+
 /// The text of `report.html`.
 ///
 /// The same input gives the same text.

@@ -21,7 +21,7 @@ const TEMPLATES: [(&str, &str); 8] = [
     ("provenance.html", include_str!("../../../assets/templates/provenance.html")),
 ];
 
-const STYLE: &str = concat!(
+pub(super) const STYLE: &str = concat!(
     include_str!("../../../assets/templates/style/page.css"),
     include_str!("../../../assets/templates/style/tables.css"),
     include_str!("../../../assets/templates/style/figures.css"),
@@ -47,17 +47,29 @@ const SCRIPT: &str = concat!(
 /// # Errors
 /// When the templates ask for what the content lacks.
 pub(super) fn render(content: Value) -> Result<String, Error> {
-    let mut environment = Environment::new();
-    environment.set_undefined_behavior(UndefinedBehavior::Strict);
-    for (name, source) in TEMPLATES {
-        environment.add_template(name, source)?;
-    }
-    environment.get_template(PAGE)?.render(context! {
+    environment()?.get_template(PAGE)?.render(context! {
         style => markup(STYLE),
         script => markup(SCRIPT),
         script_hash => integrity_of_bytes(SCRIPT.as_bytes()),
         ..content
     })
+}
+
+/// One section of the page with this content.
+///
+/// # Errors
+/// When there is no such section, or it asks for what the content lacks.
+pub(super) fn section(name: &str, content: &Value) -> Result<String, Error> {
+    environment()?.get_template(&format!("{name}.html"))?.render(content)
+}
+
+fn environment() -> Result<Environment<'static>, Error> {
+    let mut environment = Environment::new();
+    environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    for (name, source) in TEMPLATES {
+        environment.add_template(name, source)?;
+    }
+    Ok(environment)
 }
 
 /// A text that stands in the page as it is.

@@ -3,6 +3,7 @@
 //! Rule: the same episodes in the same order give the same bytes, whatever files they came from.
 
 use std::borrow::Cow;
+use std::ops::Range;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -10,6 +11,7 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch, StringArray}
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::{DataType, Int64Type, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{RowSelection, RowSelector};
 
 use super::decode_episode::{self, NotAnEpisode};
 use crate::base::input;
@@ -22,7 +24,7 @@ use crate::trace::error::TraceError;
 use crate::trace::inputs::Input;
 use crate::trace::read::budget::Expansion;
 use crate::trace::read::footer::bounds;
-use crate::trace::read::footer::{Extent, Footer, footer, plain};
+use crate::trace::read::footer::{Extent, Footer, footer, plain, rows_of};
 use crate::trace::read::open::is_nested;
 use crate::trace::read::pages::{FaultSlot, Library, Store, damaged};
 use crate::trace::schema::{self, COLUMNS};
@@ -125,19 +127,56 @@ pub fn read(path: &Path) -> Result<Vec<EpisodeRows>, TraceError> {
     }
 }
 
-fn decode(name: &str, store: Store, Footer { metadata, chunks, .. }: Footer) -> Result<Vec<EpisodeRows>, TraceError> {
+/// The episodes in some rows of a trace file, counted from its first; only the row groups that hold them are read.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_rows(path: &Path, rows: Range<usize>) -> Result<Vec<EpisodeRows>, TraceError> {
+    let name = path.display().to_string();
+    let damaged = |finding: Finding| unreadable(&name, finding.to_string().into());
+    let file = input::open(path).map_err(|error| unreadable(&name, error.into()))?;
+    let footer = footer(&Input::new(path), Extent::Pages).map_err(|finding| damaged(*finding))?;
+    if let Some(fault) = bounds::fault(&name, footer.bytes, &footer.metadata) {
+        return Err(damaged(fault));
+    }
+    let (mut before, mut groups, mut skipped) = (0, Vec::new(), None);
+    for group in 0..footer.metadata.num_row_groups() {
+        let behind = before + rows_of(footer.metadata.row_group(group));
+        if behind > rows.start && before < rows.end {
+            skipped.get_or_insert(rows.start - before);
+            groups.push(group);
+        }
+        before = behind;
+    }
+    let skipped = skipped.unwrap_or_default();
+    let selection = vec![RowSelector::skip(skipped), RowSelector::select(rows.len())];
+    let store = Store::new(file, Arc::new(Expansion::new(footer.bytes)));
+    decode_some(&name, store, footer, groups, Some(selection.into()))
+}
+
+fn decode(name: &str, store: Store, footer: Footer) -> Result<Vec<EpisodeRows>, TraceError> {
+    let row_groups = (0..footer.metadata.num_row_groups()).collect();
+    decode_some(name, store, footer, row_groups, None)
+}
+
+fn decode_some(
+    name: &str,
+    store: Store,
+    Footer { metadata, chunks, .. }: Footer,
+    row_groups: Vec<usize>,
+    selection: Option<RowSelection>,
+) -> Result<Vec<EpisodeRows>, TraceError> {
     let failed = |source: Box<dyn std::error::Error + Send + Sync>| unreadable(name, source);
     let columns = metadata.file_metadata().schema_descr().columns();
     if let Some(nested) = columns.iter().find(|column| column.path().parts().len() > 1) {
         return Err(failed(is_nested(name, &nested.path().parts()[0]).to_string().into()));
     }
     contained(|| {
-        let row_groups = (0..metadata.num_row_groups()).collect();
         let slot = FaultSlot::default();
         let (metadata, kept) = (Arc::new(metadata), Arc::clone(&slot));
         let library = Library { store, metadata, checksums: chunks, row_groups, slot: kept, writes_out: true };
         let damaged = |error: String| failed(damaged(name, &slot, &error).to_string().into());
-        let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, None);
+        let reader = library.reader(ProjectionMask::all(), None, BATCH_ROWS, selection);
         let batches = reader.map_err(|error| damaged(plain(&error)))?.collect::<Result<Vec<_>, _>>();
         let batches = batches.map_err(|error| damaged(error.to_string()))?;
         let Some(first) = batches.first() else { return Ok(Vec::new()) };

@@ -65,6 +65,7 @@ impl OptionalColumns {
         let has_marks = experiment["mark"].is_array() || is_there(&experiment["reply"], "mark");
         let is_given = |name: &str| match name {
             "reply_repair" => reads_replies,
+            "participant" => agent.get("human").is_some(),
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             "shown_color" => shows_another_color(&experiment["mirror"]),
             _ => !OF_OTHER_TASKS.contains(&name),

@@ -58,7 +58,24 @@ impl Browser {
         let mut browser = Self::start(&need::browser());
         let file = browser.home.path().join("report.html");
         std::fs::write(&file, html).unwrap();
-        browser.page = format!("file://{}", file.display());
+        let page = format!("file://{}", file.display());
+        browser.visit(&page, &page, before);
+        browser
+    }
+
+    /// Opens an address; whatever lies beside it belongs to the page.
+    #[cfg(feature = "view")]
+    pub fn at(address: &str) -> Self {
+        let mut browser = Self::start(&need::browser());
+        let folder = address.split('?').next().unwrap().rsplit_once('/').unwrap().0.to_owned() + "/";
+        browser.visit(address, &folder, &[]);
+        browser
+    }
+
+    /// Goes to an address; requests for what begins as `page` are its own.
+    fn visit(&mut self, address: &str, page: &str, before: &[(&str, Value)]) {
+        let browser = self;
+        page.clone_into(&mut browser.page);
         let target = browser.send("Target.createTarget", &json!({"url": "about:blank"}));
         let attached = json!({"targetId": target["targetId"], "flatten": true});
         let session = browser.send("Target.attachToTarget", &attached)["sessionId"].as_str().unwrap().to_owned();
@@ -69,11 +86,10 @@ impl Browser {
         for (method, parameters) in before {
             browser.send(method, parameters);
         }
-        browser.send("Page.navigate", &json!({"url": browser.page.clone()}));
+        browser.send("Page.navigate", &json!({"url": address}));
         while browser.loads == 0 {
             browser.receive();
         }
-        browser
     }
 
     /// The pipe has the numbers 3 and 4, which a shell sets up.
@@ -219,6 +235,7 @@ impl Browser {
             "ArrowDown" => (key, 40, ""),
             "End" => (key, 35, ""),
             "Home" => (key, 36, ""),
+            "/" => ("Slash", 191, "/"),
             other => panic!("no key {other}"),
         };
         let mut event = json!({"type": "keyDown", "key": key, "code": code, "windowsVirtualKeyCode": number});

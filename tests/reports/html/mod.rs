@@ -1,6 +1,6 @@
 //! `report.html`: its text, and what a browser makes of it.
 
-mod browser;
+pub mod browser;
 mod document;
 mod episodes;
 mod figures;

@@ -1,0 +1,96 @@
+// Two episodes step by step, and what other definitions change.
+import { counted, make } from "./dom.js";
+import { ask } from "./data.js";
+import { changed, go, link, query } from "./state.js";
+import { sight, stepPanel } from "./episode.js";
+
+function side(episode, differing) {
+  const panel = make("div", { class: "panel" });
+  const head = make("h2", {}, make("a", { href: link(new URLSearchParams({ view: "episode", id: episode.id })) }, episode.name));
+  const place = make("p", { class: "quiet" });
+  const element = make("section", { class: "side" }, head, make("p", { class: "quiet" }, `${episode.length} steps`), place);
+  return { episode, element, panel, place, differing };
+}
+
+async function shown(own) {
+  const { elements, show } = await sight(own.episode);
+  own.element.append(make("div", { class: "sights" }, elements), own.panel);
+  own.show = (t, columns) => {
+    const at = Math.min(t, own.episode.length);
+    own.place.textContent = t > own.episode.length ? `ended at t = ${own.episode.length}` : `t = ${t}`;
+    show(at);
+    own.panel.replaceChildren(stepPanel(own.episode, at));
+    for (const name of columns) for (const cell of own.panel.querySelectorAll(`[data-column="${name}"]`)) cell.classList.add("differs");
+  };
+}
+
+function metricTable(a, b) {
+  const names = [...new Set([...a.metrics, ...b.metrics].map((metric) => metric.name))];
+  const value = (episode, name) => episode.metrics.find((metric) => metric.name === name)?.value ?? "undefined";
+  const rows = names.map((name) => {
+    const [left, right] = [value(a, name), value(b, name)];
+    return make("tr", { class: left === right ? null : "differs" }, make("th", { scope: "row" }, name), make("td", {}, left), make("td", {}, right));
+  });
+  return make("table", { class: "plain pair" }, make("thead", {}, make("tr", {}, ["Metric", a.name, b.name].map((name) => make("th", { scope: "col" }, name)))), make("tbody", {}, rows));
+}
+
+/** The page of two episodes. */
+export async function comparePage(content) {
+  const told = await ask("compare", new URLSearchParams({ a: query().get("a") ?? "", b: query().get("b") ?? "" }));
+  const { a, b, first, differences } = told;
+  const last = Math.max(a.length, b.length, 1);
+  const columnsAt = new Map(differences.map(({ t, columns }) => [t, columns]));
+  const limit = (t) => Math.min(last, Math.max(1, Math.round(t) || 1));
+  let t = limit(query().has("t") ? Number(query().get("t")) : (first?.t ?? 1));
+  const sides = [side(a), side(b)];
+  await Promise.all(sides.map(shown));
+  const slider = make("input", { type: "range", min: 1, max: last, step: 1, "aria-label": "Timestep" });
+  const clock = make("output", { class: "clock" });
+  const where = make("p", { class: "parted" });
+  const draw = () => {
+    const columns = columnsAt.get(t) ?? [];
+    slider.value = t;
+    clock.textContent = `t = ${t} of ${last}`;
+    where.textContent = columns.length === 0 ? "Here both are alike." : `Here they differ in ${columns.join(", ").replaceAll("_", " ")}.`;
+    for (const own of sides) own.show(t, columns);
+  };
+  const jump = (next) => {
+    t = limit(next);
+    go(changed({ t }), { replace: true });
+    draw();
+  };
+  slider.addEventListener("input", () => jump(Number(slider.value)));
+  const to = make("button", { type: "button", id: "first-difference" }, first === null ? "No difference" : `First difference: t = ${first.t}`);
+  to.disabled = first === null;
+  to.addEventListener("click", () => jump(first.t));
+  const after = make("button", { type: "button" }, "Next difference");
+  after.addEventListener("click", () => jump(differences.find((found) => found.t > t)?.t ?? t));
+  const constants = told.constants.filter((name) => !["episode_id", "model", "run", "seed", "fingerprint"].includes(name));
+  content.replaceChildren(make("h1", {}, "Two episodes"),
+    make("p", { class: "quiet" }, constants.length > 0 ? `The episodes differ in ${constants.join(", ").replaceAll("_", " ")}.` : ""),
+    make("div", { class: "controls" }, to, after, clock, make("div", { class: "slider" }, slider)), where,
+    make("div", { class: "pair-of-sides" }, sides.map((own) => own.element)), metricTable(a, b));
+  draw();
+  return { keys: { ArrowRight: () => jump(t + 1), ArrowLeft: () => jump(t - 1), Home: () => jump(1), End: () => jump(last) }, moved: () => {} };
+}
+
+/** The page of what other definitions change. */
+export async function changesPage(content) {
+  const told = await ask("changes");
+  const value = (number) => (number === null ? "undefined" : String(number));
+  const steps = (list) => (list === null || list.length === 0 ? "" : `t = ${list.slice(0, 6).join(", ")}${list.length > 6 ? ", …" : ""}`);
+  const rows = told.flips.map((flip) => {
+    const at = flip.timesteps.after?.[0] ?? flip.timesteps.before?.[0] ?? null;
+    const next = new URLSearchParams({ view: "episode", id: flip.id });
+    if (at !== null) next.set("t", at);
+    return make("tr", {}, make("th", { scope: "row" }, flip.metric), make("td", {}, make("a", { href: link(next) }, flip.name)), make("td", {}, `${value(flip.value.before)} → ${value(flip.value.after)}`), make("td", {}, steps(flip.timesteps.before)), make("td", {}, steps(flip.timesteps.after)));
+  });
+  const texts = told.rewritten.map((change) => make("tr", {}, make("th", { scope: "row" }, `${change.name} ${change.part}`), make("td", {}, make("code", {}, change.text.before ?? "--")), make("td", {}, make("code", {}, change.text.after ?? "--"))));
+  const heads = (names) => make("thead", {}, make("tr", {}, names.map((name) => make("th", { scope: "col" }, name))));
+  content.replaceChildren(make("h1", {}, `From ${told.before} to ${told.after}`),
+    make("p", { class: "lead" }, `${told.cells.length} of ${counted(told.cells_compared, "cell")} moved; ${counted(told.flips.length, "flip")}.`),
+    make("h2", {}, "Written differently"), make("div", { class: "scroll" }, make("table", { class: "plain" }, heads(["Name", told.before, told.after]), make("tbody", {}, texts))),
+    make("h2", {}, "Episodes that flipped"), make("div", { class: "scroll" }, make("table", { class: "plain", id: "flips" }, heads(["Metric", "Episode", "Value", "decided before at", "decided after at"]), make("tbody", {}, rows))),
+    told.notes.map((note) => make("p", { class: "quiet" }, note)));
+  return {};
+}

@@ -1,0 +1,28 @@
+// Recordings that go on: the page asks now and then, and draws again what has changed.
+import { one } from "./dom.js";
+import { ask, isCopy } from "./data.js";
+
+const PAUSE = 1000;
+
+/** Asks again and again; `changed(told)` hears of each newer state, `heard(told)` of every answer. */
+export function watch({ changed, heard }) {
+  if (isCopy) return;
+  const status = one("#live");
+  let generation = null;
+  const turn = async () => {
+    try {
+      if (document.visibilityState === "visible") {
+        const told = await ask("live");
+        const words = told.running.length > 0 ? `${told.running.length} under way${told.rate === null ? "" : `, ${told.rate} steps a second`}` : "";
+        status.textContent = told.fault === null ? words : `shown as it was before: ${told.fault}`;
+        heard(told);
+        if (generation !== null && told.generation !== generation) await changed(told);
+        generation = told.generation;
+      }
+    } catch {
+      status.textContent = "the program has ended; the page stays as it is";
+    }
+    setTimeout(turn, PAUSE);
+  };
+  turn();
+}

@@ -1,0 +1,125 @@
+// Everything begins here: which page the address names, keys, and the theme.
+import { make, notice, one } from "./dom.js";
+import { ask, isCopy } from "./data.js";
+import { changed, filtered, go, link, query } from "./state.js";
+import { overview, showRunning } from "./overview.js";
+import { list, listQuery } from "./list.js";
+import { episodePage } from "./episode.js";
+import { changesPage, comparePage } from "./compare.js";
+import { watch } from "./live.js";
+
+const content = one("#content");
+const KEYS = [["← →", "one step back, one step on"], ["↑ ↓", "ten steps back, ten steps on"], ["Home End", "the first step, the last step"], ["space", "play and pause"], ["[ ]", "the previous episode, the next episode"], ["/", "search"], ["?", "these keys"]];
+
+let study = null;
+let page = {};
+let turn = 0;
+
+function tabs() {
+  const view = query().get("view") ?? "overview";
+  const tab = (name, words, next) => make("a", { href: link(next), "aria-current": view === name ? "page" : false }, words);
+  const all = [tab("overview", "Overview", filtered({})), tab("episodes", "Episodes", listQuery())];
+  if (study?.against) all.push(tab("changes", `Against ${study.against}`, filtered({ view: "changes" })));
+  one("#tabs").replaceChildren(...all);
+  one("#find").elements.search.value = query().get("search") ?? "";
+}
+
+const PAGES = { overview, episodes: list, episode: episodePage, compare: comparePage, changes: changesPage };
+
+/** Draws what the address names. */
+async function show({ keep = false } = {}) {
+  turn += 1;
+  const own = turn;
+  page.leave?.();
+  const scroll = keep ? scrollY : 0;
+  try {
+    study = keep || study === null ? await ask("study") : study;
+    const fresh = document.createElement("div");
+    tabs();
+    const made = (await (PAGES[query().get("view") ?? "overview"] ?? overview)(content, study)) ?? {};
+    if (own === turn) page = made;
+    document.title = `${one("h1", content)?.textContent ?? "mirrorstats"} · mirrorstats`;
+    fresh.remove();
+  } catch (error) {
+    if (own === turn) {
+      page = {};
+      const back = make("p", {}, make("a", { href: link(filtered({ view: query().get("view"), where: null })) }, "Without the condition"));
+      content.replaceChildren(notice(error.message), query().has("where") ? back : "");
+    }
+  }
+  if (own === turn) {
+    scrollTo(0, scroll);
+    document.documentElement.dataset.shown = String(own);
+  }
+}
+
+function startTheme() {
+  const root = document.documentElement;
+  const button = one("#theme");
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const isDark = () => (root.dataset.theme ?? (system.matches ? "dark" : "light")) === "dark";
+  const tell = () => button.setAttribute("aria-pressed", String(isDark()));
+  button.addEventListener("click", () => {
+    root.dataset.theme = isDark() ? "light" : "dark";
+    tell();
+  });
+  system.addEventListener("change", tell);
+  tell();
+}
+
+function startHelp() {
+  const dialog = one("#help");
+  const close = make("button", { type: "button" }, "Close");
+  close.addEventListener("click", () => dialog.close());
+  const rows = KEYS.flatMap(([key, words]) => [make("dt", {}, make("kbd", {}, key)), make("dd", {}, words)]);
+  dialog.append(make("div", { class: "inside" }, make("header", {}, make("h2", { id: "help-title" }, "Keys"), close), make("dl", { class: "values" }, rows)));
+  one("#help-button").addEventListener("click", () => dialog.showModal());
+  return dialog;
+}
+
+function startKeys(help) {
+  document.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.metaKey || event.altKey || help.open) return;
+    const isTyping = event.target.matches("input:not([type=range]):not([type=checkbox]), select, textarea");
+    if (isTyping) {
+      if (event.key === "Escape") event.target.blur();
+      return;
+    }
+    if (event.key === "/") one("#find").elements.search.focus();
+    else if (event.key === "?") help.showModal();
+    else if (page.keys?.[event.key] && !(event.key === " " && event.target.matches("button, summary, a, input"))) page.keys[event.key]();
+    else return;
+    event.preventDefault();
+  });
+}
+
+function startSearch() {
+  const form = one("#find");
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    go(changed({ view: "episodes", search: form.elements.search.value.trim(), id: null, t: null, pick: null }));
+  });
+}
+
+let running = [];
+document.addEventListener("state", ({ detail }) => detail.replace || show());
+startTheme();
+startKeys(startHelp());
+startSearch();
+if (query().has("token")) history.replaceState(null, "", link(changed({})));
+show().then(() =>
+  watch({
+    heard(told) {
+      running = told.running;
+      if ((query().get("view") ?? "overview") === "overview") showRunning(content, running, told.rate);
+    },
+    async changed() {
+      const view = query().get("view") ?? "overview";
+      if (view === "compare" || (view === "episode" && !page.running)) return;
+      if (view === "episode" && query().has("t")) go(changed({ t: null }), { replace: true });
+      await show({ keep: true });
+      if (view === "overview") showRunning(content, running, null);
+    },
+  }),
+);
+if (isCopy) document.body.dataset.copy = "yes";

@@ -1,0 +1,136 @@
+// The report, live: tables whose cells lead to their episodes; figures and statistics when they are opened.
+import { all, counted, make, notice, one, parsed } from "./dom.js";
+import { ask, isCopy } from "./data.js";
+import { changed, filtered, link, query } from "./state.js";
+import { filterLine, groupQuery } from "./filters.js";
+
+/** What the server is asked for: the filters alone. */
+function wanted() {
+  return isCopy ? new URLSearchParams() : filtered({});
+}
+
+/** Each cell becomes a link to its episodes; Tab stops once in a table, the arrows lead on. */
+function linkCells(table, { by, groups }) {
+  for (const cell of all("td[data-metric]", table)) {
+    const { group } = cell.closest("tr").dataset;
+    const metric = cell.dataset.metric;
+    const next = changed({ view: "episodes", sort: metric }, groupQuery(by, groups[Number(group)]));
+    const words = [`n ${cell.dataset.n}`, cell.dataset.mean === "" ? "undefined" : `mean ${cell.dataset.mean}`];
+    if (cell.dataset.ciLow !== "") words.push(`95 % ${cell.dataset.ciLow} to ${cell.dataset.ciHigh}`);
+    cell.replaceChildren(make("a", { href: link(next), tabindex: -1, title: words.join(", ") }, ...cell.childNodes));
+  }
+  const links = () => all("tbody tr:not(.heading):not([hidden])", table).map((row) => all("td[data-metric] a", row));
+  const first = links()[0]?.[0];
+  if (first) first.tabIndex = 0;
+  table.addEventListener("keydown", (event) => {
+    const steps = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1] };
+    if (!(event.key in steps) || !event.target.matches("td a")) return;
+    const rows = links();
+    const row = rows.findIndex((cells) => cells.includes(event.target));
+    const [down, right] = steps[event.key];
+    const next = rows[row + down]?.[rows[row].indexOf(event.target) + right];
+    if (!next) return;
+    event.preventDefault();
+    event.target.tabIndex = -1;
+    next.tabIndex = 0;
+    next.focus();
+  });
+}
+
+/** In a copy nobody computes: rows of values that are not chosen are hidden. */
+function hideRows(sections) {
+  const now = query();
+  for (const row of all(".results tbody tr[data-group]", sections)) {
+    const is = (column) => now.getAll(column).length === 0 || now.getAll(column).includes(row.dataset[column]);
+    row.hidden = !is("experiment") || !is("model");
+  }
+}
+
+/** Headers sort the rows of each group by their means. */
+function makeSorted(table) {
+  for (const head of all("thead th[data-metric]", table)) {
+    const button = make("button", { type: "button" }, ...head.childNodes);
+    head.append(button);
+    button.addEventListener("click", () => {
+      const was = head.getAttribute("aria-sort");
+      const way = was === null ? head.dataset.first : was === head.dataset.first ? (was === "ascending" ? "descending" : "ascending") : null;
+      for (const other of all("thead th", table)) other.removeAttribute("aria-sort");
+      if (way !== null) head.setAttribute("aria-sort", way);
+      for (const body of all("tbody", table)) order(body, head.dataset.metric, way);
+    });
+  }
+}
+
+function order(body, metric, way) {
+  const rows = all(":scope > tr:not(.heading)", body);
+  rows.forEach((row, at) => (row.dataset.at ??= String(at)));
+  const mean = (row) => all("td[data-metric]", row).find((cell) => cell.dataset.metric === metric)?.dataset.mean ?? "";
+  const sign = way === "descending" ? -1 : 1;
+  rows.sort((a, b) => {
+    if (way === null) return Number(a.dataset.at) - Number(b.dataset.at);
+    const [left, right] = [mean(a), mean(b)];
+    if (left === "" || right === "") return (left === "") - (right === "");
+    return sign * (Number(left) - Number(right));
+  });
+  body.append(...rows);
+}
+
+/** A section that is asked for when it is opened. */
+function later(title, name) {
+  const details = make("details", { class: "later", id: `section-${name}` }, make("summary", {}, title));
+  details.addEventListener("toggle", async () => {
+    if (!details.open || details.dataset.asked) return;
+    details.dataset.asked = "yes";
+    const waiting = make("p", { class: "quiet" }, "…");
+    details.append(waiting);
+    try {
+      const { sections } = await ask(name, wanted());
+      waiting.replaceWith(...(sections.length > 0 ? sections.flatMap(parsed) : [make("p", { class: "quiet" }, "There is none.")]));
+    } catch (error) {
+      waiting.replaceWith(notice(error.message));
+    }
+  });
+  return details;
+}
+
+function running(list) {
+  const rows = list.map((episode) => {
+    const facts = [counted(episode.steps, "step"), episode.action, episode.cost === null ? null : `${episode.cost} US dollars`, episode.unreadable > 0 ? `${episode.unreadable} unreadable` : null];
+    const next = new URLSearchParams({ view: "episode", id: episode.id });
+    return make("li", {}, make("a", { href: link(next) }, episode.name), ` ${facts.filter((fact) => fact !== null).join(", ")}`);
+  });
+  return make("section", { id: "under-way" }, make("h2", {}, "Under way"), make("ul", { class: "running" }, rows));
+}
+
+/** The recordings that go on, where there are any. */
+export function showRunning(content, list, rate) {
+  one("#under-way", content)?.remove();
+  if (list.length === 0) return;
+  const section = running(list);
+  if (rate !== null) one("h2", section).append(` ${rate} steps a second`);
+  one("#overview-head", content)?.after(section);
+}
+
+/** The page. */
+export async function overview(content, study) {
+  const head = make("div", { id: "overview-head" }, make("h1", {}, "Mirror self-recognition"));
+  const sections = make("div", { id: "sections" });
+  content.replaceChildren(head, filterLine(study), sections);
+  const told = await ask("overview", wanted());
+  const lead = `${counted(told.episodes, "episode")} under the definitions ${study.definitions?.name ?? ""}`;
+  const list = make("a", { href: link(changed({ view: "episodes" }, filtered({}))) }, "all of them, one by one");
+  head.append(make("p", { class: "lead" }, `${lead}: `, list));
+  if (told.episodes === 0) {
+    sections.append(make("p", { class: "quiet" }, "No episode is like that."));
+    return;
+  }
+  const nodes = told.sections.flatMap(parsed);
+  sections.append(...nodes);
+  if (isCopy) hideRows(sections);
+  for (const table of all("table.results", sections)) {
+    linkCells(table, told);
+    makeSorted(table);
+  }
+  const tables = one("#tables", sections);
+  tables?.after(later("Figures", "figures"), later("Statistics", "statistics"));
+}

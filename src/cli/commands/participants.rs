@@ -1,0 +1,68 @@
+//! `mirrorstats participants`: the people of a recording.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::base::escape::visible;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::text_table::counted;
+use crate::record::participants::{self, Removed};
+
+/// What is to be done about the people of a recording
+#[derive(Clone, Debug, clap::Args)]
+pub struct ParticipantsArgs {
+    #[command(subcommand)]
+    command: ParticipantsCommand,
+}
+
+#[derive(Clone, Debug, clap::Subcommand)]
+enum ParticipantsCommand {
+    /// Remove a person: out of the traces, the logs and the journal of a folder
+    ///
+    /// Reports that were made before keep their numbers: make them again.
+    Remove {
+        /// The code of the person
+        #[arg(value_name = "CODE")]
+        code: String,
+        /// The folder of the recording
+        #[arg(value_name = "FOLDER")]
+        folder: PathBuf,
+        /// Print what was removed as JSON
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+/// The answer.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[serde(transparent)]
+struct RemovedAnswer(Removed);
+
+impl fmt::Display for RemovedAnswer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Removed { episodes, files, journal_lines } = &self.0;
+        let ids = episodes.iter().map(|id| format!("\n  {}", visible(id))).collect::<String>();
+        let (count, lines) = (counted(episodes.len() as u64, "episode"), counted(*journal_lines as u64, "line"));
+        write!(f, "removed {count} from {}, and {lines} of the journal{ids}", counted(files.len() as u64, "file"))
+    }
+}
+
+impl ParticipantsArgs {
+    /// Does it.
+    ///
+    /// # Errors
+    /// A folder that cannot be read or written, and a code that it does not have.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let ParticipantsCommand::Remove { code, folder, json } = self.command;
+        let removed = participants::remove(&folder, &code).map_err(Failure::input)?;
+        if removed == Removed::default() {
+            let (code, folder) = (visible(&code), folder.display());
+            return Err(Failure::input(format!("nothing in {folder} is of the participant `{code}`")));
+        }
+        output::print(&RemovedAnswer(removed), json)
+    }
+}

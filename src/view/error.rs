@@ -1,0 +1,47 @@
+//! Why something cannot be shown.
+
+use std::error::Error as _;
+
+use crate::base::escape::visible_lines;
+use crate::log::LogError;
+use crate::study::StudyError;
+use crate::trace::error::TraceError;
+
+/// Why something cannot be shown.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum ViewError {
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error("{0}")]
+    Absent(String),
+    #[error("{0}")]
+    Request(String),
+    #[error("cannot write the page: {0}")]
+    Write(#[from] crate::base::replace::FolderError),
+}
+
+impl ViewError {
+    /// In words for the page: faults of a filter underlined, causes named.
+    pub(super) fn words(&self) -> String {
+        if let Self::Study(error) = self
+            && let Some(faults) = error.faults()
+        {
+            return faults.render(false);
+        }
+        let mut words = visible_lines(&self.to_string());
+        let mut cause = self.source();
+        while let Some(error) = cause {
+            let text = visible_lines(&error.to_string());
+            if !words.contains(&text) {
+                words += &format!("\n{text}");
+            }
+            cause = error.source();
+        }
+        words
+    }
+}

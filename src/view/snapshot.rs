@@ -1,0 +1,262 @@
+//! The state of recordings at one time: their episodes, scored, and where each is.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::Options;
+use super::error::ViewError;
+use super::found::{Found, Stamp};
+use crate::log::frames::{self, LogIndex, Moment, Shape};
+use crate::study::{Outputs, Question, Results, Study};
+use crate::trace::episode::Episode;
+use crate::trace::inputs::Input;
+use crate::trace::merge;
+use crate::trace::scan::{EpisodePlace, episode_places};
+
+/// How many indices of logs are kept.
+const KEPT_INDICES: usize = 64;
+
+/// Recordings as they were when they were read.
+#[derive(Debug)]
+pub(super) struct Snapshot {
+    /// Raised with each newer state.
+    pub generation: u64,
+    /// What was asked.
+    pub options: Options,
+    /// What was scored; `None` where no episode is whole yet.
+    pub scored: Option<Arc<Scored>>,
+    /// Episodes under way, by their logs.
+    pub running: Vec<Running>,
+    /// The state of the files.
+    pub stamps: Vec<Stamp>,
+    logs: Vec<PathBuf>,
+    indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
+}
+
+/// Episodes with their scores.
+#[derive(Debug)]
+pub(super) struct Scored {
+    /// The traces, opened.
+    pub study: Study,
+    /// The episode table and what goes with it.
+    pub results: Results,
+    /// Where each row of the table is, by the episode's id.
+    pub rows: HashMap<String, usize>,
+    /// The files.
+    pub inputs: Vec<Input>,
+    places: HashMap<String, EpisodePlace>,
+}
+
+/// An episode under way.
+#[derive(Clone, Debug)]
+pub(super) struct Running {
+    /// Its log.
+    pub log: PathBuf,
+    /// What is there of it.
+    pub episode: Episode,
+}
+
+/// An episode, and whether it is still being recorded.
+#[derive(Clone, Debug)]
+pub(super) struct Opened {
+    /// The episode, or what is there of it.
+    pub episode: Episode,
+    /// The log of an episode under way.
+    pub running: Option<PathBuf>,
+    /// The trace.
+    pub input: Option<Input>,
+}
+
+impl Snapshot {
+    /// Reads the state of the recordings now.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the arguments, the traces, the definitions or the style.
+    pub fn open(options: &Options, generation: u64) -> Result<Self, ViewError> {
+        crate::report::style::Style::load(&options.style).map_err(crate::study::StudyError::from)?;
+        let found = Found::of(&options.runs)?;
+        let stamps = found.stamps();
+        let scored = Self::scored(options, &found)?.map(Arc::new);
+        let running = running(&found, scored.as_deref());
+        if scored.is_none() && running.is_empty() {
+            let runs = options.runs.join(", ");
+            return Err(ViewError::Absent(format!(
+                "{runs}: expected traces, or a recording that has begun, found no episode\n  help: `mirrorstats recover` makes \
+                 a trace of a log"
+            )));
+        }
+        let (options, indices) = (options.clone(), Mutex::default());
+        Ok(Self { generation, options, scored, running, stamps, logs: found.logs, indices })
+    }
+
+    /// The same with the episodes under way as they are now.
+    pub fn grown(&self, found: &Found) -> Self {
+        Self {
+            generation: self.generation + 1,
+            options: self.options.clone(),
+            scored: self.scored.clone(),
+            running: running(found, self.scored.as_deref()),
+            stamps: self.stamps.clone(),
+            logs: self.logs.clone(),
+            indices: Mutex::default(),
+        }
+    }
+
+    /// The steps of the episodes under way.
+    pub fn steps_under_way(&self) -> u64 {
+        self.running.iter().map(|running| running.episode.steps.len() as u64).sum()
+    }
+
+    /// Scores what is whole. Parts that a recording is just taking over into a trace are there twice for a moment, or gone.
+    fn scored(options: &Options, found: &Found) -> Result<Option<Scored>, ViewError> {
+        let with_parts: Vec<Input> = found.traces.iter().chain(&found.parts).cloned().collect();
+        if with_parts.is_empty() {
+            return Ok(None);
+        }
+        match Scored::of(options, with_parts) {
+            Err(_) if !found.parts.is_empty() && !found.traces.is_empty() => {
+                Scored::of(options, found.traces.clone()).map(Some)
+            }
+            scored => scored.map(Some),
+        }
+    }
+
+    /// How many episodes are whole.
+    pub fn episodes(&self) -> usize {
+        self.scored.as_ref().map_or(0, |scored| scored.results.episodes.len())
+    }
+
+    /// The episodes with their scores.
+    ///
+    /// # Errors
+    /// Where none is whole yet.
+    pub fn table(&self) -> Result<&Scored, ViewError> {
+        self.scored.as_deref().ok_or_else(|| ViewError::Absent("no episode is whole yet".to_owned()))
+    }
+
+    /// An episode by its id.
+    ///
+    /// # Errors
+    /// Where there is none, or its trace cannot be read.
+    pub fn episode(&self, id: &str) -> Result<Opened, ViewError> {
+        if let Some(scored) = &self.scored
+            && let Some(place) = scored.places.get(id)
+        {
+            let input = &scored.inputs[place.file];
+            let rows = merge::read_rows(&input.path, place.rows.clone())?;
+            let own = rows.iter().find(|rows| rows.episode_id == id);
+            let own =
+                own.ok_or_else(|| ViewError::Absent(format!("`{}` was replaced; load the page again", input.name)))?;
+            let episode = own.episode().map_err(|fault| ViewError::Absent(format!("`{}`: {fault}", input.name)))?;
+            return Ok(Opened { episode, running: None, input: Some(input.clone()) });
+        }
+        // What there is by now, not what there was: it grows.
+        let own = self.running.iter().find(|running| running.episode.episode_id == id);
+        let own = own.ok_or_else(|| ViewError::Absent(format!("no episode `{id}`")))?;
+        let now = frames::unfinished(&own.log).ok().flatten().map_or_else(|| own.episode.clone(), |log| log.episode);
+        Ok(Opened { episode: now, running: Some(own.log.clone()), input: None })
+    }
+
+    /// What the logs have of a step.
+    ///
+    /// # Errors
+    /// A log that cannot be read.
+    pub fn moment(&self, opened: &Opened, t: usize) -> Result<Option<Moment>, ViewError> {
+        let Some(time) = time_of(&opened.episode, t) else { return Ok(None) };
+        if let Some(log) = &opened.running {
+            return Ok(frames::unfinished_step(log, time)?);
+        }
+        for index in self.logs_of(opened) {
+            if let Some(moment) = index.step(&opened.episode.episode_id, time)? {
+                return Ok(Some(moment));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The shapes of each step, by its t; nothing where there is no log.
+    ///
+    /// # Errors
+    /// A log that cannot be read.
+    pub fn shapes(&self, opened: &Opened) -> Result<BTreeMap<usize, Vec<Shape>>, ViewError> {
+        let times: BTreeMap<u64, usize> =
+            (1..=opened.episode.steps.len()).filter_map(|t| Some((time_of(&opened.episode, t)?, t))).collect();
+        let named = |found: BTreeMap<u64, Vec<Shape>>| -> BTreeMap<usize, Vec<Shape>> {
+            found.into_iter().filter_map(|(time, shapes)| Some((*times.get(&time)?, shapes))).collect()
+        };
+        if let Some(log) = &opened.running {
+            return Ok(named(frames::unfinished_shapes(log)?));
+        }
+        let wanted: BTreeSet<u64> = times.keys().copied().collect();
+        for index in self.logs_of(opened) {
+            let found = index.shapes(&opened.episode.episode_id, &wanted)?;
+            if !found.is_empty() {
+                return Ok(named(found));
+            }
+        }
+        Ok(BTreeMap::new())
+    }
+
+    /// Whether there may be frames of an episode.
+    pub fn has_log(&self, opened: &Opened) -> bool {
+        opened.running.is_some() || self.logs_of(opened).next().is_some()
+    }
+
+    /// The logs where an episode may be: the one beside its trace, then those that were named.
+    fn logs_of<'a>(&'a self, opened: &'a Opened) -> impl Iterator<Item = Arc<LogIndex>> + 'a {
+        let beside = opened.input.as_ref().map(|input| input.path.with_extension("mcap"));
+        let own = self.logs.iter().find(|log| Some(*log) == beside.as_ref());
+        let others = self.logs.iter().filter(move |_| own.is_none());
+        own.into_iter().chain(others).filter_map(|log| self.index(log))
+    }
+
+    /// The index of a log, read once; `None` where it cannot be read.
+    fn index(&self, log: &Path) -> Option<Arc<LogIndex>> {
+        let mut indices = self.indices.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(index) = indices.get(log) {
+            return index.clone();
+        }
+        if indices.len() >= KEPT_INDICES {
+            indices.clear();
+        }
+        let index = LogIndex::open(log).ok().flatten().map(Arc::new);
+        indices.insert(log.to_owned(), index.clone());
+        index
+    }
+}
+
+impl Scored {
+    fn of(options: &Options, inputs: Vec<Input>) -> Result<Self, ViewError> {
+        let study = Self::study(options, inputs.clone(), options.question.clone())?;
+        let places = episode_places(study.traces()?, options.threads)?;
+        let outputs = Outputs { losses: true, quality: true, hashes: false, ..Outputs::default() };
+        let results = study.scan(outputs)?;
+        let rows = results.episodes.keys.iter().enumerate().map(|(at, key)| (key.episode_id.to_owned(), at)).collect();
+        Ok(Self { study, results, rows, inputs, places })
+    }
+
+    /// These files under another question.
+    pub fn study(options: &Options, inputs: Vec<Input>, question: Question) -> Result<Study, ViewError> {
+        Ok(Study::of(inputs)?.threads(options.threads).asked(question)?)
+    }
+}
+
+/// The time of a step in its log, ns.
+fn time_of(episode: &Episode, t: usize) -> Option<u64> {
+    let step = episode.steps.get(t.checked_sub(1)?)?;
+    u64::try_from(step.extra.frame_time?).ok()
+}
+
+/// The episodes under way; one that is whole by now is none of them.
+fn running(found: &Found, scored: Option<&Scored>) -> Vec<Running> {
+    let read = |log: &PathBuf| {
+        let episode = frames::unfinished(log).ok().flatten()?.episode;
+        let is_whole = scored.is_some_and(|scored| scored.rows.contains_key(&episode.episode_id));
+        (!is_whole).then(|| Running { log: log.clone(), episode })
+    };
+    let mut running: Vec<Running> = found.unfinished.iter().filter_map(read).collect();
+    running.sort_by(|a, b| a.episode.episode_id.cmp(&b.episode.episode_id));
+    running.dedup_by(|a, b| a.episode.episode_id == b.episode.episode_id);
+    running
+}

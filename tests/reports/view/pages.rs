@@ -1,0 +1,84 @@
+//! What a reader does with the page.
+
+use crate::html::browser::Browser;
+use crate::view::{PAPER, RECORDED, Server};
+
+/// Waits in the page until an expression holds.
+pub fn until(browser: &mut Browser, expression: &str) {
+    let wait = format!(
+        "new Promise((done) => {{ const look = () => {{ let is = false; try {{ is = Boolean({expression}); }} catch {{ }} \
+         if (is) done(true); else setTimeout(look, 20); }}; look(); }})"
+    );
+    browser.value(&wait);
+}
+
+#[test]
+fn from_the_report_to_the_step_that_decided() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let mut browser = Browser::at(&server.link);
+    until(&mut browser, "document.querySelector('#table-main td[data-metric=MCR] a')");
+    browser.click("#table-main tr[data-experiment='E1'][data-model='guesser'] td[data-metric='MCR'] a");
+    until(&mut browser, "document.querySelector('.list .rows a')");
+    let address = browser.text("location.search");
+    assert!(address.contains("view=episodes") && address.contains("model=guesser"), "{address}");
+    browser.click(".list .rows a");
+    until(&mut browser, "document.querySelector('.metric') && document.querySelector('img.frame').complete");
+    assert!(browser.holds("document.querySelector('img.frame').naturalWidth > 0"));
+    until(&mut browser, "document.querySelectorAll('svg.map .cube').length > 0");
+    browser.press("ArrowRight");
+    assert!(browser.text("location.search").contains("t=2"));
+    let t = browser.text("document.querySelector('.metric button.jump').dataset.t");
+    browser.click(".metric button.jump");
+    assert!(browser.text("document.querySelector('.clock').textContent").starts_with(&format!("t = {t} ")));
+    let address = browser.text("location.href");
+    let mut again = Browser::at(&address);
+    until(&mut again, "document.querySelector('.clock')");
+    assert!(again.text("document.querySelector('.clock').textContent").starts_with(&format!("t = {t} ")));
+    again.close();
+    browser.close();
+}
+
+#[test]
+fn filters_are_in_the_address_and_faults_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[PAPER]);
+    let mut browser =
+        Browser::at(&format!("{}?view=episodes&experiment=E1&where=TSA+%3D+0+and+MCR+%3D+1", server.link));
+    until(&mut browser, "document.querySelector('.list .rows a')");
+    let expected = server.get("/api/episodes?experiment=E1&where=TSA+%3D+0+and+MCR+%3D+1").json()["total"].to_string();
+    assert!(browser.text("document.querySelector('#count').textContent").starts_with(&format!("{expected} of 840")));
+    assert!(browser.holds("document.querySelector('input[name=experiment][value=E1]').checked"));
+    let rows = "document.querySelectorAll('.list .rows a').length";
+    assert!(browser.value(rows).as_u64().unwrap() < 100, "what is out of view is not drawn");
+    browser.press("/");
+    assert!(browser.holds("document.activeElement.name === 'search'"));
+    browser.close();
+}
+
+#[test]
+fn two_episodes_stand_beside_each_other_at_their_first_difference() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[PAPER]);
+    let ids = ["E1/gpt-5-1/s1/r1", "E1/qwen-3-6-plus/s1/r1"];
+    let told = server.get(&format!("/api/compare?a={}&b={}", ids[0], ids[1])).json();
+    let first = told["first"]["t"].to_string();
+    let mut browser = Browser::at(&format!("{}?view=compare&a={}&b={}", server.link, ids[0], ids[1]));
+    until(&mut browser, "document.querySelectorAll('.side .step').length === 2");
+    assert!(browser.text("document.querySelector('.clock').textContent").starts_with(&format!("t = {first} ")));
+    assert!(browser.holds("document.querySelectorAll('.differs').length > 0"));
+    browser.close();
+}
+
+#[test]
+fn every_flip_of_other_definitions_leads_to_its_episode() {
+    let folder = tempfile::tempdir().unwrap();
+    let inclusive = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/definitions/inclusive.toml");
+    let server = Server::start(folder.path(), &[PAPER, "--against", inclusive]);
+    let mut browser = Browser::at(&format!("{}?view=changes", server.link));
+    until(&mut browser, "document.querySelector('#flips tbody tr')");
+    assert_eq!(browser.value("document.querySelectorAll('#flips tbody tr').length"), 32);
+    browser.click("#flips tbody a");
+    until(&mut browser, "document.querySelector('.metric .flipped')");
+    browser.close();
+}

@@ -1,0 +1,193 @@
+//! A person in the agent's place: what they get, what they give, and what becomes of it.
+
+use std::io::{BufRead as _, BufReader};
+use std::path::Path;
+use std::process::{ChildStderr, Stdio};
+
+use serde_json::{Value, json};
+
+use crate::harness::need;
+use crate::harness::program::{Running, program, run};
+use crate::html::browser::Browser;
+use crate::view::pages::until;
+use crate::view::{Response, ask};
+
+/// A recording whose agents are people, and their links.
+struct People {
+    process: Running,
+    links: Vec<String>,
+    _rest: BufReader<ChildStderr>,
+}
+
+impl People {
+    fn start(folder: &Path, codes: &str, more: &[&str]) -> Self {
+        let mut command = program(folder);
+        command.args(["record", "--agent", "human", "--model", "people", "--experiment", "E1", "--seeds", "1"]);
+        command.args(["--out", "runs", "--human-port", "0", "--participants", codes]).args(more);
+        let mut process = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut lines = BufReader::new(process.stderr.take().unwrap());
+        let mut links = Vec::new();
+        while links.len() < codes.split(',').count() {
+            let mut line = String::new();
+            assert!(lines.read_line(&mut line).unwrap() > 0, "the recording ended before it told its links");
+            links.extend(line.trim().split_once(" plays at ").map(|(_, link)| link.to_owned()));
+        }
+        Self { process: Running(process), links, _rest: lines }
+    }
+
+    fn person(&self, at: usize) -> Person {
+        let link = &self.links[at];
+        let port = link.split('/').nth(2).unwrap().rsplit_once(':').unwrap().1.parse().unwrap();
+        let token = link.split_once("?p=").unwrap().1.to_owned();
+        Person { port, token, heard: Vec::new() }
+    }
+
+    fn ends(mut self) {
+        assert!(self.process.0.wait().unwrap().success());
+    }
+}
+
+/// Somebody with a link, who remembers every byte.
+struct Person {
+    port: u16,
+    token: String,
+    heard: Vec<u8>,
+}
+
+impl Person {
+    fn ask(&mut self, method: &str, name: &str, body: &Value) -> Response {
+        let (host, origin) = (format!("127.0.0.1:{}", self.port), format!("http://127.0.0.1:{}", self.port));
+        let headers = [("Host", host.as_str()), ("Origin", origin.as_str())];
+        let path = format!("/{name}?p={}", self.token);
+        let answer = ask(self.port, method, &path, &headers, &body.to_string());
+        self.heard.extend(answer.head.as_bytes());
+        self.heard.extend(&answer.body);
+        answer
+    }
+
+    /// What the page shows once it is in one of these phases.
+    fn state(&mut self, phases: &[&str]) -> Value {
+        loop {
+            let told = self.ask("GET", "state", &Value::Null).json();
+            if phases.iter().any(|phase| told["phase"] == **phase) {
+                return told;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    }
+
+    fn act(&mut self, action: &str, identification: &str, cube: &str) {
+        let told = self.state(&["play", "practice"]);
+        assert_eq!(self.ask("GET", "frame", &Value::Null).status, 200);
+        let reply = json!({"view-description": "", "reasoning": "", "summary": "on", "action": action,
+            "identification": identification, "selected_cube": cube});
+        let taken = self.ask("POST", "reply", &json!({"number": told["number"], "reply": reply})).json();
+        assert_eq!(taken["taken"], true);
+    }
+}
+
+#[test]
+fn a_person_plays_and_nothing_tells_them_the_truth() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("consent.txt"), "You may stop at any time.").unwrap();
+    let people = People::start(folder.path(), "P7", &["--runs", "1", "--consent", "consent.txt"]);
+    let mut person = people.person(0);
+    for path in ["/api/study", "/api/episodes", "/api/episode", "/episodes", "/assets/main.js", "/runs"] {
+        let host = format!("127.0.0.1:{}", person.port);
+        assert_eq!(ask(person.port, "GET", path, &[("Host", &host)], "").status, 404, "{path}");
+    }
+    let stranger = ask(person.port, "GET", "/state?p=0", &[("Host", &format!("127.0.0.1:{}", person.port))], "");
+    assert_eq!(stranger.status, 401);
+    assert_eq!(person.state(&["consent"])["words"], "You may stop at any time.");
+    assert_eq!(person.ask("GET", "frame", &Value::Null).status, 404, "nothing is shown before");
+    person.ask("POST", "agree", &json!({}));
+    assert_eq!(person.state(&["practice", "play"])["phase"], "practice");
+    person.act("done", "unknown", "red");
+    assert_eq!(person.state(&["play"])["t"], 1);
+    person.act("a", "unknown", "none");
+    assert_eq!(person.ask("POST", "pause", &json!({})).json()["phase"], "break");
+    assert_eq!(person.ask("POST", "resume", &json!({})).json()["phase"], "play");
+    person.act("d", "I am the red one", "none");
+    person.state(&["play"]);
+    let heard = String::from_utf8_lossy(&person.heard).into_owned();
+    person.act("done", "I am the red one", "red");
+    people.ends();
+    let rows = run(folder.path(), &["score", "runs", "--json"]).done();
+    let row: Value = serde_json::from_str(rows.lines().next().unwrap()).unwrap();
+    assert_eq!((rows.lines().count(), &row["model"]), (1, &json!("people")));
+    for word in ["body_color", "mirror_visible", "pose_", "_px", "E1/", "seed", "scene", "shown_color", "distractor"] {
+        assert!(!heard.contains(word), "a response names `{word}`");
+    }
+    let colors = heard.matches("\"colors\":[\"blue\",\"brown\"").count();
+    assert!(colors > 0, "the list of colours is the same for everybody");
+    let info = std::fs::read(folder.path().join("runs/E1-people.parquet")).unwrap();
+    let text = String::from_utf8_lossy(&info);
+    assert!(text.contains("P7") && text.contains("\"human\":\"people\""), "the trace says who played, and how");
+    let report = run(folder.path(), &["report", "runs", "--no-figures"]).done();
+    assert!(report.contains("people"), "{report}");
+}
+
+#[test]
+fn two_people_play_at_once_and_one_is_removed() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let people = People::start(folder.path(), "P1,P2", &["--runs", "2"]);
+    let mut both = [people.person(0), people.person(1)];
+    for person in &mut both {
+        person.act("done", "unknown", "red");
+    }
+    for person in &mut both {
+        person.act("a", "unknown", "none");
+        person.act("done", "blue", "blue");
+    }
+    people.ends();
+    let removed = run(folder.path(), &["participants", "remove", "P1", "runs", "--json"]).json();
+    assert_eq!(removed["episodes"].as_array().unwrap().len(), 1);
+    for entry in std::fs::read_dir(folder.path().join("runs")).unwrap().flatten() {
+        let bytes = std::fs::read(entry.path()).unwrap_or_default();
+        assert!(!bytes.windows(2).any(|two| two == b"P1"), "{}", entry.path().display());
+    }
+    run(folder.path(), &["validate", "runs"]).done();
+    assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
+    run(folder.path(), &["replay", "runs"]).done();
+    run(folder.path(), &["participants", "remove", "P1", "runs"]).refused();
+}
+
+#[test]
+fn a_recording_that_was_ended_goes_on_at_the_same_step() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let mut people = People::start(folder.path(), "P3", &["--runs", "1"]);
+    let mut person = people.person(0);
+    person.act("done", "unknown", "red");
+    person.act("a", "unknown", "none");
+    person.act("a", "unknown", "none");
+    person.state(&["play"]);
+    let _ = people.process.0.kill();
+    let _ = people.process.0.wait();
+    let people = People::start(folder.path(), "P3", &["--runs", "1"]);
+    let mut person = people.person(0);
+    assert_eq!(person.state(&["play", "practice"])["t"], 3, "neither the practice nor a step comes again");
+    person.act("done", "red", "red");
+    people.ends();
+}
+
+#[test]
+fn the_page_is_played_by_keys() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let people = People::start(folder.path(), "P1", &["--runs", "1"]);
+    let mut browser = Browser::at(&people.links[0]);
+    until(&mut browser, "document.querySelector('.practice') && document.querySelector('img').naturalWidth === 640");
+    browser.click("button[data-action=done]");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 1'");
+    browser.press("ArrowLeft");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
+    assert!(browser.text("document.querySelector('#user').textContent").contains("the previous action was a"));
+    browser.click("button[data-action=done]");
+    people.ends();
+    browser.complaints();
+    drop(browser);
+    assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
+}

@@ -1,5 +1,7 @@
 //! What other definitions change: every cell and every flip.
 
+use std::path::Path;
+
 use serde_json::{Value, json};
 
 use super::error::ViewError;
@@ -14,7 +16,7 @@ pub(super) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
     let Some(against) = &options.against else {
         return Err(ViewError::Absent("no other definitions were named; `mirrorstats view --against` does".to_owned()));
     };
-    let own = options.question.definitions.as_deref().unwrap_or(DEFAULT_DEFINITIONS);
+    let own = options.question.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS));
     let scored = snapshot.table()?;
     let request = DiffRequest {
         metrics: options.question.metrics.clone(),

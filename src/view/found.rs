@@ -1,6 +1,7 @@
 //! The files that the arguments name: traces, logs, and what a recording has under way.
 
 use std::collections::BTreeSet;
+use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -35,7 +36,7 @@ impl Found {
     ///
     /// # Errors
     /// An argument that names nothing.
-    pub fn of(runs: &[String]) -> Result<Self, ViewError> {
+    pub fn of(runs: &[OsString]) -> Result<Self, ViewError> {
         let mut found = Self::default();
         let (mut folders, mut named) = (BTreeSet::new(), Vec::new());
         for argument in runs {
@@ -61,7 +62,7 @@ impl Found {
     }
 
     /// The traces among the arguments; a folder in which a recording has only begun has none yet.
-    fn traces(&self, named: &[String]) -> Result<Vec<Input>, ViewError> {
+    fn traces(&self, named: &[OsString]) -> Result<Vec<Input>, ViewError> {
         if named.is_empty() {
             return Ok(Vec::new());
         }

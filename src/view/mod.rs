@@ -26,7 +26,9 @@ mod page;
 pub mod routes;
 mod snapshot;
 
+use std::ffi::OsString;
 use std::num::NonZeroUsize;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use crate::study::Question;
@@ -38,11 +40,11 @@ use snapshot::Snapshot;
 #[derive(Clone, Debug)]
 pub struct Options {
     /// Traces, logs, and folders of them.
-    pub runs: Vec<String>,
+    pub runs: Vec<OsString>,
     /// Definitions, a filter, groups, as for a report.
     pub question: Question,
     /// Definitions to hold the others against, by name or path; none if absent.
-    pub against: Option<String>,
+    pub against: Option<PathBuf>,
     /// How tables look.
     pub style: String,
     /// How many threads to use.

@@ -32,9 +32,8 @@ pub(super) fn study(snapshot: &Snapshot) -> Value {
 }
 
 /// What definitions are called, without the folders that a file is in.
-fn named(definitions: &str) -> String {
-    let stem = Path::new(definitions).file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    visible(&stem.unwrap_or_else(|| definitions.to_owned()))
+fn named(definitions: &Path) -> String {
+    visible(&definitions.file_stem().unwrap_or(definitions.as_os_str()).to_string_lossy())
 }
 
 /// The values of a column, where there are several.

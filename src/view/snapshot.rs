@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::Options;
 use super::error::ViewError;
 use super::found::{Found, Stamp};
+use crate::base::escape::visible;
 use crate::log::frames::{self, LogIndex, Moment, Shape};
 use crate::study::{Outputs, Question, Results, Study};
 use crate::trace::episode::Episode;
@@ -80,7 +81,7 @@ impl Snapshot {
         let scored = Self::scored(options, &found)?.map(Arc::new);
         let running = running(&found, scored.as_deref());
         if scored.is_none() && running.is_empty() {
-            let runs = options.runs.join(", ");
+            let runs = options.runs.iter().map(|run| visible(&run.to_string_lossy())).collect::<Vec<_>>().join(", ");
             return Err(ViewError::Absent(format!(
                 "{runs}: expected traces, or a recording that has begun, found no episode\n  help: `mirrorstats recover` makes \
                  a trace of a log"

@@ -1,5 +1,6 @@
 //! `mirrorstats view`: recordings in the browser.
 
+use std::ffi::OsString;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
@@ -19,7 +20,7 @@ use crate::view::{Options, View, ViewError, export, routes};
 pub struct ViewArgs {
     /// Traces, logs, folders of them, quoted globs
     #[arg(value_name = "RUNS", default_value = "runs")]
-    runs: Vec<String>,
+    runs: Vec<OsString>,
     /// How the metrics are defined.
     #[command(flatten)]
     scoring: ScoringArgs,
@@ -28,7 +29,7 @@ pub struct ViewArgs {
     grouping: GroupingArgs,
     /// Other definitions, to show what they change: a name or a TOML file
     #[arg(long, value_name = "NAME|FILE")]
-    against: Option<String>,
+    against: Option<PathBuf>,
     /// How tables look: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     style: String,

@@ -3,7 +3,7 @@
 use std::fs;
 
 use polars::prelude::{
-    DataType, Expr, LazyFrame, NULL, PlRefPath, ScanArgsParquet, ScanSources, UnionArgs, col, concat, lit,
+    DataType, Expr, HiveOptions, LazyFrame, NULL, PlRefPath, ScanArgsParquet, ScanSources, UnionArgs, col, concat, lit,
 };
 
 use super::run::PolarsError;
@@ -83,6 +83,7 @@ fn scan(file: &TraceFile, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsEr
         // Polars takes paths as text; what has no such path is opened here.
         None => {
             let opened = file.reader().map_err(gone)?;
+            let options = ScanArgsParquet { hive_options: HiveOptions::new_disabled(), ..options };
             LazyFrame::scan_parquet_sources(ScanSources::Files([opened].into()), options)?
         }
     };

@@ -1,28 +1,29 @@
 #!/bin/sh
-# A report first, of the bundled recordings: what it needs is built in half of the time. Then the world is built, a few
-# episodes of the scripted agents are recorded, and they are reported on. Where MuJoCo or a renderer cannot be had, it says
-# what to do about it and ends with the first report. PNG and PDF are left out, which cost as much to compile as the world.
+# Reports on the bundled recordings as soon as the program is built, then records a few episodes of the scripted agents and
+# reports on them. Where MuJoCo or a renderer cannot be had, it says what to do about it and ends with the first report.
+# One build, without the features whose results it does not need: figures as PNG and PDF cost as much to compile as the world.
 set -eu
 cd "$(dirname "$0")/.."
 traces=runs/demo
 report=reports/latest
-program() { cargo run --quiet --profile demo --no-default-features "$@"; }
-recorder() { program --features sim -- "$@"; }
-record() { recorder record --out "$traces" --seeds 1 --runs 1 "$@"; }
+features=sim
+scripts/get-mujoco.sh && scripts/get-egl.sh || features=
+program() { cargo run --quiet --profile demo --no-default-features --features "$features" -- "$@"; }
+record() { program record --out "$traces" --seeds 1 --runs 1 "$@"; }
 
-echo "demo: building what scores and reports; then the tables of recordings that were made before"
-program -- report fixtures/recorded --out "$report"
+echo "demo: building; then the tables of recordings that were made before"
+program report fixtures/recorded --out "$report"
 
-if scripts/get-mujoco.sh && scripts/get-egl.sh; then
+if [ -n "$features" ]; then
   echo
-  echo "demo: building the world, and recording a few episodes"
+  echo "demo: recording a few episodes"
   # Each where its name says what to expect. What is recorded already is not recorded again.
   record --agent oracle --experiment E1..E4
   record --agent gullible --experiment E3
   record --agent mimic --experiment E4
   record --agent guesser --experiment E1
   record --agent frozen --experiment E1 --no-frames
-  recorder report "$traces" --out "$report"
+  program report "$traces" --out "$report"
 else
   echo "demo: recording needs MuJoCo and a renderer, see above" >&2
   traces=fixtures/recorded

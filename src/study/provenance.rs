@@ -3,6 +3,7 @@
 //! Rule: a file is the trace that the manifest names if it has its hash, whatever the folder it lies in; every trace
 //! that changed or is missing is told at once, and no report is made without them.
 
+use std::ffi::OsStr;
 use std::fmt;
 use std::fs::{self};
 use std::io;
@@ -158,12 +159,30 @@ fn find(wanted: &bundle::Input, places: &[PathBuf]) -> Result<PathBuf, TraceFaul
 fn candidates(wanted: &bundle::Input, place: &Path) -> Vec<PathBuf> {
     let path = Path::new(&wanted.path);
     if place.is_file() {
-        return if place.file_name() == path.file_name() { vec![place.to_owned()] } else { Vec::new() };
+        let names = [place, path].map(|path| path.file_name().map(OsStr::to_string_lossy));
+        return if names[0] == names[1] { vec![place.to_owned()] } else { Vec::new() };
     }
-    let mut candidates = vec![place.join(path)];
-    candidates.extend(path.file_name().map(|name| place.join(name)).filter(|bare| *bare != candidates[0]));
+    let mut candidates = shown_as(place, path);
+    for bare in path.file_name().map(|name| shown_as(place, Path::new(name))).unwrap_or_default() {
+        if !candidates.contains(&bare) {
+            candidates.push(bare);
+        }
+    }
     candidates.retain(|path| path.is_file());
     candidates
+}
+
+/// The paths below a folder that a manifest writes so: what is no text in a name stands there as U+FFFD.
+fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
+    path.components().fold(vec![folder.to_owned()], |folders, part| {
+        let part = part.as_os_str().to_string_lossy();
+        if !part.contains(char::REPLACEMENT_CHARACTER) {
+            return folders.iter().map(|folder| folder.join(&*part)).collect();
+        }
+        let is_shown = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy() == part);
+        let entries = folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten();
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(is_shown).collect()
+    })
 }
 
 /// Where the traces of a report are looked for: where one is told, else the current folder, the report's folder and

@@ -89,12 +89,12 @@ fn names_of_models_and_episodes_cannot_reach_the_terminal_raw() {
         &["verify", "\u{1b}[31m"],
         &["import", "\u{1b}[31m", "-o", "b.parquet"],
         &["recover", "\u{1b}[31m", "-o", "b.parquet"],
-        &["--errors", "json", "score", "\u{1b}[31m\u{202e}"],
     ] {
         let answer = run(at, arguments);
         check(&answer);
         answer.refused();
     }
+    check(&run(at, &["--errors", "json", "score", "\u{1b}[31m\u{202e}"]));
     // A file of scores is read back as it was, whatever the names.
     run(at, &["score", "a.parquet", "-o", "s.csv"]).done();
     run(at, &["score", "a.parquet", "-o", "s.jsonl"]).done();

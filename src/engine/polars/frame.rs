@@ -3,7 +3,7 @@
 use std::fs;
 
 use polars::prelude::{
-    DataType, Expr, LazyFrame, NULL, PlRefPath, ScanArgsParquet, ScanSources, UnionArgs, col, concat, lit,
+    DataType, Expr, HiveOptions, LazyFrame, NULL, PlRefPath, ScanArgsParquet, ScanSources, UnionArgs, col, concat, lit,
 };
 
 use super::run::PolarsError;
@@ -78,13 +78,13 @@ fn scan(file: &TraceFile, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsEr
     // A path from the root cannot be taken for an address on the network.
     let path = fs::canonicalize(file.path()).map_err(gone)?;
     let options = ScanArgsParquet { glob: false, cache: false, ..ScanArgsParquet::default() };
-    let frame = match path.to_str() {
-        Some(_) => LazyFrame::scan_parquet(PlRefPath::try_from_path(&path)?, options)?,
+    let frame = if path.to_str().is_some() {
+        LazyFrame::scan_parquet(PlRefPath::try_from_path(&path)?, options)?
+    } else {
         // Polars takes paths as text; what has no such path is opened here.
-        None => {
-            let opened = file.reader().map_err(gone)?;
-            LazyFrame::scan_parquet_sources(ScanSources::Files([opened].into()), options)?
-        }
+        let opened = file.reader().map_err(gone)?;
+        let options = ScanArgsParquet { hive_options: HiveOptions::new_disabled(), ..options };
+        LazyFrame::scan_parquet_sources(ScanSources::Files([opened].into()), options)?
     };
     Ok(frame.select(columns.iter().map(|column| column.of(file)).collect::<Vec<_>>()))
 }

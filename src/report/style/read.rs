@@ -70,7 +70,7 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
     };
     let mut reading = Reading::default();
     reading.file(file);
-    reading.finish(whole).map_err(|faults| StyleError::Faults(Faults(faults).in_order()))
+    reading.finish(&whole).map_err(|faults| StyleError::Faults(Faults(faults).in_order()))
 }
 
 /// The built-in style of this name, or the one at this path.
@@ -116,7 +116,7 @@ struct Reading {
 }
 
 impl Reading {
-    fn finish(mut self, whole: Place) -> Result<Read, Vec<Fault>> {
+    fn finish(mut self, whole: &Place) -> Result<Read, Vec<Fault>> {
         if self.faults.is_empty() && !self.table.contains_key(MAIN_TABLE) {
             let message = format!("there is no table `{MAIN_TABLE}`: every report needs one");
             let help = format!("add `[table.{MAIN_TABLE}]`, or `include = [\"default\"]`");

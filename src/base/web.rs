@@ -89,7 +89,10 @@ impl Guard {
             _ => return Err((StatusCode::METHOD_NOT_ALLOWED, "this server is asked by GET")),
         }
         if !self.has_token(headers, query) {
-            return Err((StatusCode::UNAUTHORIZED, "the link of this server has a token: open the link as it was printed"));
+            return Err((
+                StatusCode::UNAUTHORIZED,
+                "the link of this server has a token: open the link as it was printed",
+            ));
         }
         Ok(())
     }
@@ -106,9 +109,8 @@ impl Guard {
         let name = name.to_ascii_lowercase();
         let ip = name.trim_start_matches('[').trim_end_matches(']').parse::<IpAddr>().ok();
         // A name can be made to point anywhere, an address cannot.
-        let is_address = ip.is_some_and(|ip| {
-            if self.address.ip().is_unspecified() { true } else { ip == self.address.ip() }
-        });
+        let is_address =
+            ip.is_some_and(|ip| if self.address.ip().is_unspecified() { true } else { ip == self.address.ip() });
         is_address
             || name == "localhost" && (self.address.ip().is_loopback() || self.address.ip().is_unspecified())
             || self.name.as_ref() == Some(&name)
@@ -154,7 +156,8 @@ fn is_same(a: &str, b: &str) -> bool {
 pub fn check_token(token: &str) -> Result<(), String> {
     let is_plain = token.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte));
     if token.len() < 16 || !is_plain {
-        return Err("expected at least 16 letters, digits, `-`, `_`, `.` or `~`, such as `openssl rand -hex 16` gives".to_owned());
+        return Err("expected at least 16 letters, digits, `-`, `_`, `.` or `~`, such as `openssl rand -hex 16` gives"
+            .to_owned());
     }
     Ok(())
 }
@@ -254,8 +257,14 @@ mod tests {
         assert_eq!(asked(&guard, &[host], "token=0123456789abcdeX"), Some(StatusCode::UNAUTHORIZED));
         assert_eq!(asked(&guard, &[host], "view=episodes&token=0123456789abcdef"), None);
         assert_eq!(asked(&guard, &[host, ("cookie", "a=b; mirrorstats-7000=0123456789abcdef")], ""), None);
-        assert_eq!(asked(&guard, &[host, ("cookie", "mirrorstats-7001=0123456789abcdef")], "").map(|s| s.as_u16()), Some(401));
-        assert_eq!(asked(&guard, &[("host", "other.example:7000")], "token=0123456789abcdef").map(|s| s.as_u16()), Some(403));
+        assert_eq!(
+            asked(&guard, &[host, ("cookie", "mirrorstats-7001=0123456789abcdef")], "").map(|s| s.as_u16()),
+            Some(401)
+        );
+        assert_eq!(
+            asked(&guard, &[("host", "other.example:7000")], "token=0123456789abcdef").map(|s| s.as_u16()),
+            Some(403)
+        );
         assert_eq!(guard.link(), "http://lab.example:7000/?token=0123456789abcdef");
         assert!(check_token(token).is_ok());
         assert!(check_token("short").is_err() && check_token("with a space in it").is_err());

@@ -92,7 +92,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ),
             ("What it will cost, without a request", "record --agent vlm --model gpt-5.1 --dry-run"),
             ("Your own program", "record --agent exec:'python3 agent.py' --model mine --experiment E1 --out runs"),
-            ("Two people, each in a browser", "record --agent human --model people --participants P01,P02 --consent words.txt"),
+            (
+                "Two people, each in a browser",
+                "record --agent human --model people --participants P01,P02 --consent words.txt",
+            ),
         ],
     ),
     ("recover", &[("A trace out of a log that was cut off", "recover runs/E1-oracle.mcap -o E1-oracle.parquet")]),

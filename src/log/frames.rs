@@ -390,9 +390,8 @@ fn rgba(color: Rgba) -> [f64; 4] {
 
 /// A vector turned by a unit quaternion.
 fn turned(q: Quaternion, [x, y, z]: [f64; 3]) -> [f64; 3] {
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let (axis, v) = ([q.x, q.y, q.z], [x, y, z]);
     let once = cross(axis, v).map(|part| 2.0 * part);
     let twice = cross(axis, once);
@@ -417,7 +416,11 @@ fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     };
     let mut outline = half(&mut points.iter().copied());
     outline.extend(half(&mut points.iter().rev().copied()));
-    if outline.is_empty() { points.truncate(1) } else { points = outline }
+    if outline.is_empty() {
+        points.truncate(1)
+    } else {
+        points = outline
+    }
     points
 }
 

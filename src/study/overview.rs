@@ -1,12 +1,12 @@
 //! The sections of a report for some episodes that are scored already: what a page shows that is put together while it is
 //! looked at.
 
+use super::Study;
 use super::error::StudyError;
 use super::figure_inputs::FigureInputs;
 use super::losses::Counted;
 use super::report::figure_of;
 use super::results::Results;
-use super::Study;
 use crate::report::bundle::Manifest;
 use crate::report::html::{self, Figure, Page};
 use crate::report::layout;

@@ -187,10 +187,7 @@ pub struct EpisodePlace {
 ///
 /// # Errors
 /// The first fault of the traces in these columns.
-pub fn episode_places(
-    traces: &TraceSet,
-    threads: NonZeroUsize,
-) -> Result<HashMap<String, EpisodePlace>, TraceError> {
+pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMap<String, EpisodePlace>, TraceError> {
     let mut places = HashMap::new();
     let work = |batch: EpisodeBatch| -> Result<Vec<(String, EpisodePlace)>, TraceError> {
         let Origin { file, row_group, row } = batch.origin;

@@ -30,13 +30,16 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
 pub(super) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Result<Value, ViewError> {
     let episode = &opened.episode;
     let (metrics, against) = scores(snapshot, opened)?;
+    // A damaged log is told by its frames, and keeps nothing else from being shown.
+    let first = snapshot.moment(opened, 1).unwrap_or_default();
     let marks = moments(episode).into_iter().map(|(t, moment)| json!({"t": t, "title": moment.title()}));
     Ok(json!({
         "id": episode.episode_id,
         "name": visible(&episode.episode_id),
         "length": episode.steps.len(),
         "running": opened.running.is_some(),
-        "frames": snapshot.has_log(opened) && episode.steps.iter().any(|step| step.extra.frame_time.is_some()),
+        "frames": first.as_ref().is_some_and(|moment| moment.frame.is_some()),
+        "log": first.is_some(),
         "lost": is_lost(snapshot, &episode.episode_id),
         "constants": constants(episode, longest),
         "steps": steps(episode, longest),
@@ -54,7 +57,11 @@ pub(super) fn text(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewErro
     let column = COLUMNS.iter().find(|column| column.name == name && !column.constant);
     let at = t.checked_sub(1).filter(|at| *at < opened.episode.steps.len());
     let (Some(column), Some(at)) = (column, at) else {
-        return Err(ViewError::Absent(format!("`{}` has no text `{}` at t = {t}", visible(&opened.episode.episode_id), visible(name))));
+        return Err(ViewError::Absent(format!(
+            "`{}` has no text `{}` at t = {t}",
+            visible(&opened.episode.episode_id),
+            visible(name)
+        )));
     };
     match column.of_steps(&opened.episode).nth(at).flatten() {
         Some(Cell::Text(text)) => Ok(json!({"text": lines(text)})),
@@ -96,7 +103,8 @@ fn steps(episode: &Episode, longest: usize) -> Value {
         if values.iter().all(Option::is_none) {
             continue;
         }
-        let values: Vec<Value> = values.into_iter().map(|value| value.map_or(Value::Null, |value| shown(value, longest))).collect();
+        let values: Vec<Value> =
+            values.into_iter().map(|value| value.map_or(Value::Null, |value| shown(value, longest))).collect();
         all.insert(column.name.to_owned(), json!({"doc": column.doc, "unit": column.unit, "values": values}));
     }
     Value::Object(all)

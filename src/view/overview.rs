@@ -9,6 +9,7 @@ use super::error::ViewError;
 use super::filter::{COLUMNS, Filter, Query, condition_of};
 use super::snapshot::{Scored, Snapshot};
 use crate::base::escape::visible;
+use crate::base::palette::Color;
 use crate::report::html;
 use crate::score::table::EpisodeTable;
 use crate::study::{Outputs, Overview, Part, Question};
@@ -27,6 +28,7 @@ pub(super) fn study(snapshot: &Snapshot) -> Value {
         "where": snapshot.options.question.filter,
         "choices": COLUMNS.iter().filter_map(|column| choice(table, column)).collect::<Vec<_>>(),
         "metrics": html::metrics(&table.catalog),
+        "paint": Color::ALL.map(|color| json!({"name": color.name(), "rgb": color.rgb()})),
         "version": env!("CARGO_PKG_VERSION"),
     })
 }
@@ -47,9 +49,9 @@ fn choice(table: &EpisodeTable, column: &str) -> Option<Value> {
     let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
     (0..table.len()).for_each(|row| *counts.entry(value(row)).or_default() += 1);
     let title = |name: &str| table.catalog.experiment.get(name).map(|experiment| visible(&experiment.title));
-    let values = counts.iter().map(|(name, count)| {
-        json!({"value": name, "name": visible(name), "title": title(name), "episodes": count})
-    });
+    let values = counts
+        .iter()
+        .map(|(name, count)| json!({"value": name, "name": visible(name), "title": title(name), "episodes": count}));
     (counts.len() > 1).then(|| json!({"column": column, "values": values.collect::<Vec<_>>()}))
 }
 

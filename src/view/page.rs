@@ -53,7 +53,9 @@ pub(super) fn style() -> String {
 pub(super) fn classic() -> String {
     let bodies = MODULES.iter().map(|(_, text)| {
         let lines = text.lines().filter(|line| !line.starts_with("import "));
-        lines.map(|line| line.strip_prefix("export ").unwrap_or(line)).fold(String::new(), |all, line| all + line + "\n")
+        lines
+            .map(|line| line.strip_prefix("export ").unwrap_or(line))
+            .fold(String::new(), |all, line| all + line + "\n")
     });
     format!("(() => {{\n\"use strict\";\n{}}})();\n", bodies.collect::<String>())
 }
@@ -69,7 +71,10 @@ mod tests {
                 let from = line.rsplit_once("\"./").and_then(|(_, rest)| rest.strip_suffix("\";")).unwrap();
                 assert!(MODULES[..at].iter().any(|(known, _)| *known == from), "{name} imports {from}");
             }
-            assert!(!text.contains("innerHTML ="), "{name}: text becomes elements by the program's own templates alone");
+            assert!(
+                !text.contains("innerHTML ="),
+                "{name}: text becomes elements by the program's own templates alone"
+            );
         }
     }
 

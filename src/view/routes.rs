@@ -81,7 +81,9 @@ async fn api(
             refused(status, &error.words())
         }
         Ok(None) => refused(StatusCode::NOT_FOUND, "no such question"),
-        Err(_) => refused(StatusCode::INTERNAL_SERVER_ERROR, "the answer could not be made; this is a fault of mirrorstats"),
+        Err(_) => {
+            refused(StatusCode::INTERNAL_SERVER_ERROR, "the answer could not be made; this is a fault of mirrorstats")
+        }
     }
 }
 

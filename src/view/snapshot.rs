@@ -146,7 +146,8 @@ impl Snapshot {
             let input = &scored.inputs[place.file];
             let rows = merge::read_rows(&input.path, place.rows.clone())?;
             let own = rows.iter().find(|rows| rows.episode_id == id);
-            let own = own.ok_or_else(|| ViewError::Absent(format!("`{}` was replaced; load the page again", input.name)))?;
+            let own =
+                own.ok_or_else(|| ViewError::Absent(format!("`{}` was replaced; load the page again", input.name)))?;
             let episode = own.episode().map_err(|fault| ViewError::Absent(format!("`{}`: {fault}", input.name)))?;
             return Ok(Opened { episode, running: None, input: Some(input.clone()) });
         }
@@ -195,11 +196,6 @@ impl Snapshot {
             }
         }
         Ok(BTreeMap::new())
-    }
-
-    /// Whether there may be frames of an episode.
-    pub fn has_log(&self, opened: &Opened) -> bool {
-        opened.running.is_some() || self.logs_of(opened).next().is_some()
     }
 
     /// The logs where an episode may be: the one beside its trace, then those that were named.

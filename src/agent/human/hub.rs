@@ -82,7 +82,8 @@ impl Hub {
     pub fn new(people: Vec<(String, String)>, consent: Option<String>, journal: Journal) -> Self {
         let answers = journal.entries().into_iter().map(|entry| ((entry.episode_id.clone(), entry.t), entry)).collect();
         let seat = |code: &String| {
-            let (has_agreed, has_practised) = (journal.has_agreed(code, consent.as_deref()), journal.has_practised(code));
+            let (has_agreed, has_practised) =
+                (journal.has_agreed(code, consent.as_deref()), journal.has_practised(code));
             Mutex::new(Seat { has_agreed, has_practised, ..Seat::default() })
         };
         let (codes, tokens): (Vec<String>, Vec<String>) = people.into_iter().unzip();

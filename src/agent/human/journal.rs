@@ -40,9 +40,15 @@ pub struct Entry {
 enum Line {
     Answer(Entry),
     /// Somebody agreed to words of this hash.
-    Agreed { participant: String, consent: String },
+    Agreed {
+        participant: String,
+        consent: String,
+    },
     /// Somebody has the practice behind.
-    Practised { participant: String, practised: bool },
+    Practised {
+        participant: String,
+        practised: bool,
+    },
 }
 
 impl Line {

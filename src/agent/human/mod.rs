@@ -148,7 +148,8 @@ impl HumanAgent {
             return Ok(read(&entry.reply, task, entry.latency_ms));
         }
         let unusable = |fault: String| Lost::because(format!("the observation cannot be made: {fault}"));
-        let Rendered { system, user } = self.prompt.render(task, observation).map_err(|fault| unusable(fault.to_string()))?;
+        let Rendered { system, user } =
+            self.prompt.render(task, observation).map_err(|fault| unusable(fault.to_string()))?;
         let question = Question {
             frame: Arc::clone(&observation.frame),
             system,

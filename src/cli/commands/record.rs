@@ -283,7 +283,8 @@ fn scripted(name: &str) -> Result<Scripted, Failure> {
     if let Some(scripted) = Scripted::named(name) {
         return Ok(scripted);
     }
-    let known: Vec<&str> = Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", "human", "exec:'CMD'"]).collect();
+    let known: Vec<&str> =
+        Scripted::ALL.iter().map(|agent| agent.name()).chain(["vlm", "human", "exec:'CMD'"]).collect();
     let near = hint(name, known.iter().copied());
     Err(Failure::input(format!("no agent is called `{name}`{near}; expected one of {}", known.join(", "))))
 }

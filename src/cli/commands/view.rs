@@ -115,7 +115,8 @@ fn open(link: &str) {
     } else {
         "xdg-open"
     };
-    let quiet = Command::new(program).arg(link).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let quiet =
+        Command::new(program).arg(link).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
     if quiet.is_err() {
         output::say("no browser was opened: open the address above");
     }

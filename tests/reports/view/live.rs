@@ -29,7 +29,10 @@ fn a_recording_appears_and_grows_and_ends() {
     let mut recording = record("1");
     wait_for("a log that is being written", || {
         let parts = std::fs::read_dir(runs.join(".parts")).ok()?;
-        parts.flatten().any(|entry| entry.metadata().is_ok_and(|data| data.is_file() && data.len() > 10_000)).then_some(())
+        parts
+            .flatten()
+            .any(|entry| entry.metadata().is_ok_and(|data| data.is_file() && data.len() > 10_000))
+            .then_some(())
     });
     let server = Server::start(folder.path(), &["runs"]);
     let mut browser = Browser::at(&server.link);

@@ -43,7 +43,8 @@ fn from_the_report_to_the_step_that_decided() {
 fn filters_are_in_the_address_and_faults_are_told() {
     let folder = tempfile::tempdir().unwrap();
     let server = Server::start(folder.path(), &[PAPER]);
-    let mut browser = Browser::at(&format!("{}?view=episodes&experiment=E1&where=TSA+%3D+0+and+MCR+%3D+1", server.link));
+    let mut browser =
+        Browser::at(&format!("{}?view=episodes&experiment=E1&where=TSA+%3D+0+and+MCR+%3D+1", server.link));
     until(&mut browser, "document.querySelector('.list .rows a')");
     let expected = server.get("/api/episodes?experiment=E1&where=TSA+%3D+0+and+MCR+%3D+1").json()["total"].to_string();
     assert!(browser.text("document.querySelector('#count').textContent").starts_with(&format!("{expected} of 840")));

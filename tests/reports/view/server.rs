@@ -101,9 +101,12 @@ fn the_list_has_the_values_that_score_writes() {
             assert_eq!(*value, own, "{metric}");
         }
     }
-    let some = server.get("/api/episodes?experiment=E1&model=GPT%205.1&where=TSA%20%3D%200%20and%20MCR%20%3D%201").json();
+    let some =
+        server.get("/api/episodes?experiment=E1&model=GPT%205.1&where=TSA%20%3D%200%20and%20MCR%20%3D%201").json();
     let is_wanted = |score: &&serde_json::Value| {
-        (&score["experiment"], &score["model"]) == (&"E1".into(), &"GPT 5.1".into()) && score["TSA"] == 0 && score["MCR"] == 1
+        (&score["experiment"], &score["model"]) == (&"E1".into(), &"GPT 5.1".into())
+            && score["TSA"] == 0
+            && score["MCR"] == 1
     };
     assert_eq!(some["total"].as_u64().unwrap() as usize, scores.iter().filter(is_wanted).count());
     let fault = server.get("/api/episodes?where=TSAA%20%3D%200");
@@ -117,7 +120,8 @@ fn an_episode_is_explained_as_score_explains_it() {
     let server = Server::start(folder.path(), &[RECORDED, "--against", "extended"]);
     let id = server.get("/api/episodes?limit=1&model=guesser").json()["rows"][0]["id"].as_str().unwrap().to_owned();
     let told = server.get(&format!("/api/episode?id={id}")).json();
-    let explained = crate::harness::program::run(folder.path(), &["score", RECORDED, "--explain", &id, "--json"]).json();
+    let explained =
+        crate::harness::program::run(folder.path(), &["score", RECORDED, "--explain", &id, "--json"]).json();
     for (own, expected) in told["metrics"].as_array().unwrap().iter().zip(explained["metrics"].as_array().unwrap()) {
         assert_eq!((&own["name"], &own["timesteps"]), (&expected["metric"], &expected["timesteps"]));
     }

@@ -22,10 +22,21 @@ export function spelled(value, unit = null) {
   return unit === null ? String(value) : `${value} ${unit}`;
 }
 
+const paints = new Map();
+
+/** The colours of the study, as the program paints them. */
+export function setPaint(list) {
+  for (const { name, rgb } of list) paints.set(name, `rgb(${rgb.join(" ")})`);
+}
+
+/** The paint of a colour's name; other names as the browser knows them, or none. */
+const paintOf = (name) => paints.get(name) ?? (CSS.supports("color", name) ? name : null);
+
 /** A colour with a patch of it; other words stay as they are. */
 function colored(value) {
-  const patch = CSS.supports("color", value) ? make("i", { class: "patch", "aria-hidden": "true" }) : null;
-  if (patch !== null) patch.style.background = value;
+  const paint = paintOf(value);
+  const patch = paint === null ? null : make("i", { class: "patch", "aria-hidden": "true" });
+  if (patch !== null) patch.style.background = paint;
   return make("span", {}, patch, spelled(value));
 }
 
@@ -36,13 +47,13 @@ export async function sight(episode) {
   const map = make("figure", { class: "above" });
   const places = { show: () => {} };
   let at = 1;
-  if (episode.frames) {
+  if (!episode.frames) shown.replaceChildren(make("p", { class: "quiet missing" }, "No frames: they are in no log among the files that were opened."));
+  if (episode.log) {
     ask("map", new URLSearchParams({ id: episode.id }))
       .then((told) => told, () => ({ shapes: [], steps: [] }))
       .then((told) => place(told));
   } else {
     place({ shapes: [], steps: [] });
-    shown.replaceChildren(make("p", { class: "quiet missing" }, "No frames: the log is not among the files that were opened."));
   }
   function place(told) {
     const { picture, show } = mapOf(episode, told);
@@ -101,7 +112,7 @@ function strips(episode, jump) {
       canvas.height = Math.round(16 * devicePixelRatio);
       const pen = canvas.getContext("2d");
       const style = getComputedStyle(document.documentElement);
-      const resolved = (name) => (name.startsWith("--") ? tone(style, name) : name);
+      const resolved = (name) => (name.startsWith("--") ? tone(style, name) : (paintOf(name) ?? tone(style, "--quiet")));
       list.forEach((value, at) => {
         const name = color(value, at);
         if (name === null) return;

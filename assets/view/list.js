@@ -91,7 +91,7 @@ export async function list(content, study) {
   const rows = new Rows(frame, body, []);
   const told = await rows.page(0);
   rows.columns = columnsOf(told);
-  const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(4.2rem, .6fr)" };
+  const widths = { id: "minmax(13rem, 2.2fr)", short: "6.5rem", name: "minmax(9rem, 1.4fr)", number: "minmax(3.4rem, .5fr)" };
   frame.style.setProperty("--columns", rows.columns.map(({ kind }) => widths[kind]).join(" "));
   frame.setAttribute("aria-rowcount", told.total + 1);
   frame.append(header(rows.columns), body);

@@ -4,7 +4,7 @@ import { ask, isCopy } from "./data.js";
 import { changed, filtered, go, link, query } from "./state.js";
 import { overview, showRunning } from "./overview.js";
 import { list, listQuery } from "./list.js";
-import { episodePage } from "./episode.js";
+import { episodePage, setPaint } from "./episode.js";
 import { changesPage, comparePage } from "./compare.js";
 import { watch } from "./live.js";
 
@@ -34,6 +34,7 @@ async function show({ keep = false } = {}) {
   const scroll = keep ? scrollY : 0;
   try {
     study = keep || study === null ? await ask("study") : study;
+    setPaint(study.paint ?? []);
     const fresh = document.createElement("div");
     tabs();
     const made = (await (PAGES[query().get("view") ?? "overview"] ?? overview)(content, study)) ?? {};

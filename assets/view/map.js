@@ -7,7 +7,7 @@ function bounds(map, path) {
   const points = map.shapes.flatMap((shape) => shape.outline).concat(path);
   const [xs, ys] = [points.map(([x]) => x), points.map(([, y]) => y)];
   const [left, right, low, high] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-  const margin = 0.05 * Math.max(right - left, high - low, 1);
+  const margin = map.shapes.length > 0 ? 0.05 * Math.max(right - left, high - low, 1) : REACH;
   return { left: left - margin, width: right - left + 2 * margin, top: high + margin, height: high - low + 2 * margin };
 }
 

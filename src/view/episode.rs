@@ -30,13 +30,16 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
 pub(super) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Result<Value, ViewError> {
     let episode = &opened.episode;
     let (metrics, against) = scores(snapshot, opened)?;
+    // A damaged log is told by its frames, and keeps nothing else from being shown.
+    let first = snapshot.moment(opened, 1).unwrap_or_default();
     let marks = moments(episode).into_iter().map(|(t, moment)| json!({"t": t, "title": moment.title()}));
     Ok(json!({
         "id": episode.episode_id,
         "name": visible(&episode.episode_id),
         "length": episode.steps.len(),
         "running": opened.running.is_some(),
-        "frames": snapshot.has_log(opened) && episode.steps.iter().any(|step| step.extra.frame_time.is_some()),
+        "frames": first.as_ref().is_some_and(|moment| moment.frame.is_some()),
+        "log": first.is_some(),
         "lost": is_lost(snapshot, &episode.episode_id),
         "constants": constants(episode, longest),
         "steps": steps(episode, longest),

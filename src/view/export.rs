@@ -96,7 +96,7 @@ fn add_episode(files: &mut Files, snapshot: &Snapshot, at: usize, id: &str) -> R
     let mut told = episode::about(snapshot, &opened, usize::MAX)?;
     told["siblings"] = list::siblings(snapshot, id).into();
     files.part(&format!("episode-{at}"), &told)?;
-    if told["frames"] != true {
+    if told["log"] != true {
         return Ok(());
     }
     files.part(&format!("map-{at}"), &map::of(snapshot, &opened)?)?;

@@ -9,6 +9,7 @@ use super::error::ViewError;
 use super::filter::{COLUMNS, Filter, Query, condition_of};
 use super::snapshot::{Scored, Snapshot};
 use crate::base::escape::visible;
+use crate::base::palette::Color;
 use crate::report::html;
 use crate::score::table::EpisodeTable;
 use crate::study::{Outputs, Overview, Part, Question};
@@ -27,6 +28,7 @@ pub(super) fn study(snapshot: &Snapshot) -> Value {
         "where": snapshot.options.question.filter,
         "choices": COLUMNS.iter().filter_map(|column| choice(table, column)).collect::<Vec<_>>(),
         "metrics": html::metrics(&table.catalog),
+        "paint": Color::ALL.map(|color| json!({"name": color.name(), "rgb": color.rgb()})),
         "version": env!("CARGO_PKG_VERSION"),
     })
 }

@@ -199,11 +199,6 @@ impl Snapshot {
         Ok(BTreeMap::new())
     }
 
-    /// Whether there may be frames of an episode.
-    pub fn has_log(&self, opened: &Opened) -> bool {
-        opened.running.is_some() || self.logs_of(opened).next().is_some()
-    }
-
     /// The logs where an episode may be: the one beside its trace, then those that were named.
     fn logs_of<'a>(&'a self, opened: &'a Opened) -> impl Iterator<Item = Arc<LogIndex>> + 'a {
         let beside = opened.input.as_ref().map(|input| input.path.with_extension("mcap"));

@@ -174,7 +174,8 @@ impl Report {
     pub fn table(&self, name: &str) -> Result<&Table, StudyError> {
         self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
             let known = || self.tables.iter().map(|table| table.name.as_str());
-            let (style, known, hint) = (self.style.name.clone(), known().collect::<Vec<_>>().join(", "), hint(name, known()));
+            let (style, known, hint) =
+                (self.style.name.clone(), known().collect::<Vec<_>>().join(", "), hint(name, known()));
             StudyError::NoTable { name: name.to_owned(), style, known, hint }
         })
     }

@@ -163,8 +163,9 @@ impl Pending {
     /// Opens the file: one at a time is open.
     fn reader(self, schema: &Schema) -> Result<Reader, Box<Finding>> {
         let Self { name, path, readable, expansion } = self;
-        let unreadable =
-            |error: io::Error| Box::new(Finding::new(Code::Unreadable, &name, "a file that can be read", error.to_string()));
+        let unreadable = |error: io::Error| {
+            Box::new(Finding::new(Code::Unreadable, &name, "a file that can be read", error.to_string()))
+        };
         let store = Store::new(input::open(&path).map_err(unreadable)?, expansion);
         let metadata = Arc::clone(readable.footer.metadata());
         let (checksums, slot) = (readable.chunks.clone(), FaultSlot::default());

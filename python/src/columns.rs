@@ -1,4 +1,4 @@
-//! Columns through Arrow's PyCapsule interface: any library that knows it takes them without a copy.
+//! Columns through Arrow's C interface in capsules: any library that knows it takes them without a copy.
 
 use std::sync::Arc;
 
@@ -81,7 +81,7 @@ impl Steps {
         requested_schema: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyCapsule>> {
         drop(requested_schema);
-        let steps = py.detach(|| self.study.steps(self.columns.as_deref())).map_err(error::of_study)?;
+        let steps = py.detach(|| self.study.steps(self.columns.as_deref()).map_err(error::of_study))?;
         let rows = steps.map(|rows| rows.map_err(|fault| ArrowError::ExternalError(Box::new(fault))));
         stream(py, Box::new(RecordBatchIterator::new(rows, Arc::clone(&self.schema))))
     }
@@ -104,7 +104,7 @@ fn names(schema: &SchemaRef) -> Vec<String> {
     schema.fields().iter().map(|field| field.name().clone()).collect()
 }
 
-fn stream<'py>(py: Python<'py>, rows: Box<dyn RecordBatchReader + Send>) -> PyResult<Bound<'py, PyCapsule>> {
+fn stream(py: Python<'_>, rows: Box<dyn RecordBatchReader + Send>) -> PyResult<Bound<'_, PyCapsule>> {
     PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(rows), c"arrow_array_stream")
 }
 

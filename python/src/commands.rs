@@ -3,7 +3,6 @@
 use std::ffi::OsString;
 use std::io::Cursor;
 
-use arrow::array::RecordBatchReader as _;
 use arrow::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow::json::WriterBuilder;
 use arrow::json::writer::LineDelimited;
@@ -27,8 +26,10 @@ pub fn run(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 /// All findings of `mirrorstats validate` with these options.
 #[pyfunction]
 pub fn validate(py: Python<'_>, options: Vec<OsString>) -> PyResult<Answer> {
-    let found = py.detach(|| cli::options_of::<ValidateCommand>("validate", options)?.findings());
-    let found = found.map_err(|failure| error::of_failure(&failure))?;
+    let found = py.detach(|| {
+        let command = cli::options_of("validate", options).map_err(|failure| error::of_failure(&failure))?;
+        ValidateCommand::findings(&command).map_err(|failure| error::of_failure(&failure))
+    })?;
     let mut words = Vec::new();
     print(&mut words, &found)?;
     answer::of(&found, String::from_utf8_lossy(&words).into_owned())
@@ -38,11 +39,10 @@ pub fn validate(py: Python<'_>, options: Vec<OsString>) -> PyResult<Answer> {
 #[pyfunction]
 pub fn import_text(py: Python<'_>, name: &str, lines: Vec<u8>, options: Vec<OsString>) -> PyResult<Answer> {
     let imported = py.detach(|| {
-        let args: ImportArgs = cli::options_of("import", options)?;
-        let text = Text::spool(name, Cursor::new(lines)).map_err(cli::outcome::Failure::input)?;
-        args.import(vec![text])
-    });
-    let imported = imported.map_err(|failure| error::of_failure(&failure))?;
+        let args: ImportArgs = cli::options_of("import", options).map_err(|failure| error::of_failure(&failure))?;
+        let text = Text::spool(name, Cursor::new(lines)).map_err(error::of_input)?;
+        args.import(vec![text]).map_err(|failure| error::of_failure(&failure))
+    })?;
     let words = imported.to_string();
     answer::of(&imported, words)
 }
@@ -57,7 +57,6 @@ pub fn lines_of(py: Python<'_>, stream: &Bound<'_, PyCapsule>) -> PyResult<Vec<u
     let reader = unsafe { RecordBatchStreamReader::from_raw(pointer.as_ptr()) };
     let reader = reader.map_err(|fault| PyValueError::new_err(fault.to_string()))?;
     let written = py.detach(|| {
-        let _ = reader.schema();
         let mut lines = Vec::new();
         let mut writer = WriterBuilder::new().with_explicit_nulls(true).build::<_, LineDelimited>(&mut lines);
         for batch in reader {

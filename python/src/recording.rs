@@ -59,9 +59,10 @@ pub fn record(py: Python<'_>, options: Vec<OsString>, agent: Option<PythonAgent>
     let args: RecordArgs = cli::options_of("record", options).map_err(failed)?;
     let player = match agent {
         Some(agent) => agent.player(&args),
-        None => py.detach(|| args.player()).map_err(failed)?,
+        None => py.detach(|| args.player().map_err(failed))?,
     };
-    let Recorded { answer, gave_up, .. } = py.detach(|| until_interrupted(&args, player.as_ref()))?.map_err(failed)?;
+    let recorded = py.detach(|| until_interrupted(&args, player.as_ref()))?;
+    let Recorded { answer, gave_up, .. } = recorded.map_err(|failure| failed(*failure))?;
     match gave_up {
         Some(reason) => Err(error::of_input(reason)),
         None => answer::of(&answer, String::new()),
@@ -70,11 +71,14 @@ pub fn record(py: Python<'_>, options: Vec<OsString>, agent: Option<PythonAgent>
 
 /// Records on another thread, while this one looks for Ctrl-C, which only the main thread hears of. The first one lets the
 /// steps under way be done; whole episodes stay.
-fn until_interrupted(args: &RecordArgs, player: &dyn Player) -> PyResult<Result<Recorded, Failure>> {
+fn until_interrupted(args: &RecordArgs, player: &dyn Player) -> PyResult<Result<Recorded, Box<Failure>>> {
     let (stop, (done, ended)) = (AtomicBool::new(false), channel());
     let stop = &stop;
     thread::scope(|scope| {
-        scope.spawn(move || done.send(args.record(player, stop)));
+        scope.spawn(move || {
+            // Whoever waits for it waits until this is done.
+            let _ = done.send(args.record(player, stop).map_err(Box::new));
+        });
         let mut interrupted = None;
         loop {
             match ended.recv_timeout(GLANCE) {
@@ -86,10 +90,18 @@ fn until_interrupted(args: &RecordArgs, player: &dyn Player) -> PyResult<Result<
                 }
                 Err(RecvTimeoutError::Timeout) => {}
             }
-            if let Err(signal) = Python::attach(|py| py.check_signals()) {
+            if let Err(signal) = signals() {
                 stop.store(true, Ordering::Relaxed);
                 interrupted.get_or_insert(signal);
             }
         }
+    })
+}
+
+/// Lets the interpreter handle what signals there are; an error is what it raised, for one `KeyboardInterrupt`.
+fn signals() -> PyResult<()> {
+    Python::attach(|py| {
+        py.check_signals()?;
+        Ok(())
     })
 }

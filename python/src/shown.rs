@@ -94,7 +94,8 @@ impl Figure {
         self.svg(py)
     }
 
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
+        let path = path.extract::<PathBuf>()?;
         py.detach(|| {
             let bytes = FigureFormat::of(&path).map_err(error::of_input)?.encode(&self.figure);
             let bytes = bytes.map_err(error::of_input)?;

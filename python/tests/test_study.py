@@ -34,6 +34,7 @@ def test_episodes_are_those_that_score_writes(fixture, where, definitions, reque
 
 
 COLORS = ["red", "green", "blue", "white"]
+PIXELS = ["mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px"]
 WORDS = ["view_description", "reasoning", "summary", "identification"]
 TEXTS = ["a mirror", "I am red", "that is me", "another agent", "", None]
 ACTIONS = ["move_forward", "move_backward", "turn_left", "turn_right"]
@@ -64,7 +65,7 @@ def random_rows(seed):
                     "self_color": chance.choice([*COLORS, "unknown", None]),
                     "selected_cube": chance.choice([*COLORS, "none", None]),
                     "mirror_visible": chance.random() < 0.4,
-                    "mirror_self_px": chance.choice([0, 1, 59, 60, 200]),
+                    **{name: chance.choice([0, 1, 59, 60, 200]) for name in PIXELS},
                     **{name: chance.choice(TEXTS) for name in WORDS},
                 }
             )

@@ -1,14 +1,14 @@
 # The two commands of the README: `make demo` and `make test`.
 
 .DELETE_ON_ERROR:
-.PHONY: demo test fmt lint needed unit soak fuzz docs end-to-end bless recorded calibrate bench bench-scores bench-world bench-agents sheet
+.PHONY: demo test fmt lint needed unit soak fuzz docs end-to-end wheel test-wheel bless recorded calibrate bench bench-scores bench-world bench-agents sheet
 
 ## Build, record a few episodes of the scripted agents, report on them, say where the results are.
 demo:
 	scripts/demo.sh
 
 ## Everything that CI checks.
-test: fmt lint unit docs end-to-end
+test: fmt lint unit docs end-to-end test-wheel
 
 fmt:
 	cargo fmt --all --check
@@ -46,6 +46,14 @@ docs:
 ## The main job from outside: the committed report again byte for byte, the published tables cell by cell.
 end-to-end:
 	scripts/end-to-end.sh
+
+## The wheel for others: the command and the Python package, for every Linux with glibc 2.28 or newer. A long build.
+wheel:
+	scripts/wheel.sh
+
+# The package as its users have it, installed where there is no Rust; from the dependencies that the tests have compiled.
+test-wheel: needed
+	scripts/test-wheel.sh
 
 ## Write generated files anew: JSON Schemas, snapshots, the committed report.
 bless: needed

@@ -1,5 +1,6 @@
 #!/bin/sh
-# Puts MuJoCo's library, out of the wheel on PyPI, into .mujoco/lib, where the feature `sim` looks for it.
+# Puts MuJoCo's library, out of the wheel on PyPI, into .mujoco/lib, where the feature `sim` looks for it, and its licence
+# into .mujoco/LICENSE.
 # Does nothing if it is there already. Needs python3 with pip.
 set -eu
 version=3.17.0
@@ -16,7 +17,7 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 lib=$root/.mujoco/lib
 file=libmujoco.so.$version
 holds() { echo "$sha  $1" | sha256sum -c --status - 2>/dev/null; }
-if [ -f "$lib/$file" ] && holds "$lib/$file"; then
+if [ -f "$lib/$file" ] && [ -f "$root/.mujoco/LICENSE" ] && holds "$lib/$file"; then
   exit 0
 fi
 echo "get-mujoco: fetching MuJoCo $version" >&2
@@ -27,5 +28,6 @@ python3 -m pip download -q --disable-pip-version-check --no-deps --only-binary=:
 python3 -m zipfile -e "$tmp"/mujoco-*.whl "$tmp/wheel"
 holds "$tmp/wheel/mujoco/$file" || { echo "get-mujoco: $file has another sha256 than expected" >&2; exit 1; }
 mkdir -p "$lib"
+cp "$tmp/wheel/mujoco-$version.dist-info/licenses/LICENSE" "$root/.mujoco/LICENSE"
 install -m 755 "$tmp/wheel/mujoco/$file" "$lib/$file"
 ln -sf "$file" "$lib/libmujoco.so"

@@ -1,7 +1,5 @@
 //! A few episodes and the trace of them, as every target that needs some has them.
 
-use std::sync::LazyLock;
-
 use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use mirrorstats::trace::inputs::Input;
 use mirrorstats::trace::open::TraceSet;
@@ -50,12 +48,14 @@ pub fn trace(count: usize) -> Vec<u8> {
     encoder.finish().expect("memory takes any bytes")
 }
 
-/// The same trace, open.
+/// The same trace, open: one for each thread, whose files end with it.
 pub fn open() -> &'static TraceSet {
-    static OPEN: LazyLock<TraceSet> = LazyLock::new(|| {
-        let path = scratch::path("episodes.parquet");
-        std::fs::write(&path, trace(6)).expect("a folder for temporary files");
-        TraceSet::open(&[Input::new(path)]).expect("a sound trace")
-    });
-    &OPEN
+    thread_local! {
+        static OPEN: &'static TraceSet = {
+            let path = scratch::path("episodes.parquet");
+            std::fs::write(&path, trace(6)).expect("a folder for temporary files");
+            Box::leak(Box::new(TraceSet::open(&[Input::new(path)]).expect("a sound trace")))
+        };
+    }
+    OPEN.with(|open| *open)
 }

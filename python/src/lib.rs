@@ -1,19 +1,30 @@
 //! The native library of the Python package: the command line, and the study library as Python sees it.
 //!
-//! Rule: no logic of its own. Whatever has an answer has it from the library `mirrorstats`.
+//! Rule: no logic of its own. Whatever has an answer has it from the library `mirrorstats`, and every error has the words of
+//! the command line. Work that takes time is done with the interpreter's lock released.
 
-use std::ffi::OsString;
+mod answer;
+mod columns;
+mod commands;
+mod error;
+mod recording;
+mod shown;
+mod study;
 
 use pyo3::prelude::*;
-
-/// Runs the command line with these arguments, the program's name first, and gives its exit code.
-#[pyfunction]
-fn run(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
-    py.detach(|| mirrorstats::cli::run_to_code(arguments))
-}
 
 /// The module.
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(run, module)?)
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<columns::Table>()?;
+    module.add_class::<columns::Steps>()?;
+    module.add_class::<shown::ReportTable>()?;
+    module.add_class::<shown::Figure>()?;
+    module.add_class::<study::Study>()?;
+    module.add_function(wrap_pyfunction!(commands::run, module)?)?;
+    module.add_function(wrap_pyfunction!(commands::validate, module)?)?;
+    module.add_function(wrap_pyfunction!(commands::import_text, module)?)?;
+    module.add_function(wrap_pyfunction!(commands::lines_of, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::record, module)?)
 }

@@ -16,6 +16,8 @@
 mod calibration;
 #[cfg(all(feature = "sim", unix))]
 mod exec;
+#[cfg(feature = "sim")]
+mod function;
 #[path = "../harness/mod.rs"]
 mod harness;
 #[cfg(feature = "sim")]

@@ -1,5 +1,6 @@
 //! Scoring, proved from outside: by hand, against a plain loop, against an interpreter, and over every layout of a file.
 
+mod arrow_columns;
 mod author;
 mod by_hand;
 mod changes;

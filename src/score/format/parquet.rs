@@ -139,7 +139,10 @@ impl Encoder<'_> {
             while !rows.is_empty() {
                 let some = rows.start..self.until(job.column, &rows);
                 rows.start = some.end;
-                for leaf in compute_leaves(field, &columns::values(self.table, job.column, some).map_err(failed)?)? {
+                for leaf in compute_leaves(
+                    field,
+                    &columns::values(self.table, job.column, some).map_err(|error| failed(&error))?,
+                )? {
                     writer.write(&leaf)?;
                 }
             }
@@ -224,7 +227,7 @@ fn properties(header: &Header, declared: &Declared) -> Result<WriterProperties, 
     Ok(properties.build())
 }
 
-fn failed(error: ArrowError) -> ParquetError {
+fn failed(error: &ArrowError) -> ParquetError {
     ParquetError::ArrowError(error.to_string())
 }
 

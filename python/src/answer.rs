@@ -1,0 +1,15 @@
+//! Answers as the command line gives them: what `--json` prints, and what people read.
+
+use pyo3::prelude::*;
+use serde::Serialize;
+
+use crate::error;
+
+/// The JSON of an answer and its text, for `mirrorstats._answer`.
+pub type Answer = (String, String);
+
+/// An answer with the text that the command line prints.
+pub fn of(answer: &impl Serialize, text: String) -> PyResult<Answer> {
+    let json = serde_json::to_string(answer).map_err(error::of_input)?;
+    Ok((json, text))
+}

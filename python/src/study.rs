@@ -1,0 +1,168 @@
+//! A study as Python sees it: opened once, and each answer a call of the library.
+
+use std::path::Path;
+use std::str::FromStr as _;
+use std::sync::{Arc, OnceLock};
+
+use arrow::array::RecordBatch;
+use mirrorstats::report::changes::{self, Limit};
+use mirrorstats::report::statistics::text::{self, Length};
+use mirrorstats::study::{LostAs, Question};
+use mirrorstats::{FigureName, ReportOptions, StatisticsOptions};
+use pyo3::prelude::*;
+
+use crate::answer::{self, Answer};
+use crate::columns::{Steps, Table};
+use crate::error;
+use crate::shown::{Figure, ReportTable};
+
+/// The lines of each list in the text of a difference, as on the command line.
+const LISTED: usize = 20;
+
+/// A study: inputs, definitions and a filter.
+#[pyclass(frozen, module = "mirrorstats._native")]
+pub struct Study {
+    inner: Arc<mirrorstats::Study>,
+    inputs: Vec<String>,
+    episodes: OnceLock<RecordBatch>,
+    cells: OnceLock<RecordBatch>,
+}
+
+/// How a study is asked for, with the defaults of the command line.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+struct Asked {
+    paths: Vec<String>,
+    definitions: Option<String>,
+    r#where: Option<String>,
+    metrics: Option<Vec<String>>,
+    by: Option<Vec<String>>,
+    pool: bool,
+    lost_as_failure: bool,
+    threads: Option<std::num::NonZeroUsize>,
+}
+
+impl Asked {
+    fn open(self) -> PyResult<mirrorstats::Study> {
+        let lost = if self.lost_as_failure { LostAs::Failure } else { LostAs::Nothing };
+        let (definitions, filter) = (self.definitions, self.r#where);
+        let question = Question { definitions, filter, metrics: self.metrics, by: self.by, pool: self.pool, lost };
+        let study = mirrorstats::Study::open(self.paths).map_err(error::of_study)?;
+        let study = study.asked(question).map_err(error::of_study)?;
+        Ok(match self.threads {
+            Some(threads) => study.threads(threads),
+            None => study,
+        })
+    }
+}
+
+#[pymethods]
+impl Study {
+    #[new]
+    fn new(py: Python<'_>, asked: Asked) -> PyResult<Self> {
+        let inputs = asked.paths.clone();
+        let inner = Arc::new(py.detach(|| asked.open())?);
+        Ok(Self { inner, inputs, episodes: OnceLock::new(), cells: OnceLock::new() })
+    }
+
+    #[getter]
+    fn inputs(&self) -> Vec<String> {
+        self.inputs.clone()
+    }
+
+    #[getter]
+    fn definitions(&self) -> &str {
+        self.inner.definitions_name()
+    }
+
+    #[getter]
+    fn episodes(&self, py: Python<'_>) -> PyResult<Table> {
+        py.detach(|| {
+            once(&self.episodes, || {
+                mirrorstats::episode_batch(&self.inner.score().map_err(error::of_study)?.episodes)
+                    .map_err(error::of_input)
+            })
+        })
+    }
+
+    #[getter]
+    fn cells(&self, py: Python<'_>) -> PyResult<Table> {
+        py.detach(|| {
+            once(&self.cells, || {
+                mirrorstats::record_batch(&self.inner.cells().map_err(error::of_study)?).map_err(error::of_input)
+            })
+        })
+    }
+
+    #[pyo3(signature = (columns=None))]
+    fn steps(&self, py: Python<'_>, columns: Option<Vec<String>>) -> PyResult<Steps> {
+        py.detach(|| Steps::new(Arc::clone(&self.inner), columns))
+    }
+
+    #[pyo3(signature = (name, style))]
+    fn table(&self, py: Python<'_>, name: &str, style: String) -> PyResult<ReportTable> {
+        py.detach(|| {
+            let report = self.inner.report(&ReportOptions { style, figures: false }).map_err(error::of_study)?;
+            Ok(ReportTable::new(report.table(name).map_err(error::of_study)?.clone()))
+        })
+    }
+
+    #[pyo3(signature = (style))]
+    fn tables(&self, py: Python<'_>, style: String) -> PyResult<Vec<ReportTable>> {
+        py.detach(|| {
+            let report = self.inner.report(&ReportOptions { style, figures: false }).map_err(error::of_study)?;
+            Ok(report.tables.into_iter().map(ReportTable::new).collect())
+        })
+    }
+
+    #[pyo3(signature = (name, style))]
+    fn figure(&self, py: Python<'_>, name: &str, style: &str) -> PyResult<Figure> {
+        let name = FigureName::from_str(name).map_err(error::of_input)?;
+        let figure = py.detach(|| self.inner.figure(name, style).map_err(error::of_study))?;
+        Ok(Figure::new(figure, name.name()))
+    }
+
+    #[pyo3(signature = (out, style, figures))]
+    fn report(&self, py: Python<'_>, out: &str, style: String, figures: bool) -> PyResult<Answer> {
+        let (written, notes) = py.detach(|| {
+            let options = ReportOptions { style, figures };
+            let out = Path::new(out);
+            self.inner.check_folder(out, &options).map_err(error::of_study)?;
+            let report = self.inner.report(&options).map_err(error::of_study)?;
+            Ok::<_, PyErr>((report.write(out).map_err(error::of_study)?, report.notes))
+        })?;
+        answer::of(&written.manifest, [written.files, notes].concat().join("\n"))
+    }
+
+    #[pyo3(signature = (confidence, horizon))]
+    fn stats(&self, py: Python<'_>, confidence: f64, horizon: Option<i64>) -> PyResult<Answer> {
+        let options = StatisticsOptions { confidence, horizon, improvements: true, ..StatisticsOptions::default() };
+        let found = py.detach(|| self.inner.statistics(&options).map_err(error::of_study))?;
+        answer::of(&found, text::render(&found, &found.headline, Length::Short, None))
+    }
+
+    #[pyo3(signature = (other))]
+    fn diff(&self, py: Python<'_>, other: &Self) -> PyResult<Answer> {
+        let found = py.detach(|| self.inner.diff(&other.inner).map_err(error::of_study))?;
+        let shown = changes::render(&found.changes, Limit(LISTED), None);
+        let notes = found.notes.iter().map(|note| format!("note: {note}"));
+        answer::of(&found.changes, notes.chain([shown]).collect::<Vec<_>>().join("\n"))
+    }
+
+    #[pyo3(signature = (episode_id))]
+    fn explain(&self, py: Python<'_>, episode_id: &str) -> PyResult<Answer> {
+        let found = py.detach(|| self.inner.explain(episode_id).map_err(error::of_study))?;
+        let words = found.to_string();
+        answer::of(&found, words)
+    }
+}
+
+/// What is computed the first time, as a table.
+fn once(kept: &OnceLock<RecordBatch>, compute: impl FnOnce() -> PyResult<RecordBatch>) -> PyResult<Table> {
+    if let Some(batch) = kept.get() {
+        return Ok(Table::new(batch.clone()));
+    }
+    // Two threads may compute the same at once.
+    let batch = compute()?;
+    Ok(Table::new(kept.get_or_init(|| batch).clone()))
+}

@@ -1,0 +1,103 @@
+"""Recordings: a Python function beside the same agent as a program."""
+
+import os
+import pathlib
+import signal
+import subprocess
+import sys
+import time
+
+import agent
+import mirrorstats as ms
+import pyarrow.parquet
+import pytest
+
+# What differs between a function and a program: how long a reply took, and what the agent is.
+OWN = ["latency_ms", "fingerprint", "episode_hash"]
+SHORT = {"experiment": "E1,E4", "seeds": 1, "runs": 2, "model": "walker"}
+
+
+def rows(folder, experiment):
+    table = pyarrow.parquet.read_table(pathlib.Path(folder) / f"{experiment}-walker.parquet")
+    return table.drop_columns([name for name in OWN if name in table.column_names]).to_pylist()
+
+
+@pytest.mark.parametrize("images", ["path", "base64"])
+def test_a_function_records_what_the_same_program_records(images, tmp_path):
+    program = f"exec:{sys.executable} {agent.__file__}"
+    by_program = ms.record(program, **SHORT, exec_images=images, out=tmp_path / "program")
+    by_function = ms.record(agent.decide, **SHORT, images=images, out=tmp_path / "function")
+    assert by_program["recorded"] == by_function["recorded"] == 4
+    assert by_program["steps"] == by_function["steps"] == 48
+    for experiment in ["E1", "E4"]:
+        found = rows(tmp_path / "function", experiment)
+        assert found == rows(tmp_path / "program", experiment)
+        # The frames are the same too: the agent says their hashes, and not always the same one.
+        assert len({row["view_description"] for row in found}) > 2
+    assert by_function["traces"] and ms.validate(tmp_path / "function")["findings"] == []
+
+
+def test_of_a_class_each_episode_has_an_instance(tmp_path):
+    ms.record(agent.Counting, "E1", seeds=1, runs=3, out=tmp_path, model="walker", no_log=True)
+    last = [row["reasoning"] for row in rows(tmp_path, "E1") if row["t"] == 12]
+    assert last == ["task " + " ".join(["observation"] * 12)] * 3
+
+
+def test_an_agent_that_raises_loses_its_episode_and_the_same_call_continues(tmp_path):
+    def stumbles(message):
+        if message["kind"] == "observation" and message["t"] == 3:
+            raise RuntimeError("no legs")
+        return agent.decide(message)
+
+    def wrong(message):
+        return 7
+
+    with pytest.warns(RuntimeWarning, match="no legs"):
+        answer = ms.record(stumbles, "E1", seeds=1, runs=1, out=tmp_path, model="walker", no_log=True)
+    assert answer["recorded"] == 0 and "step 3: RuntimeError: no legs" in answer["lost"][0]["reason"]
+    with pytest.warns(RuntimeWarning, match="expected a reply, a dict or a text, found int"):
+        ms.record(wrong, "E1", seeds=1, runs=1, out=tmp_path / "wrong", no_log=True)
+
+
+def test_texts_that_are_no_replies_stop_a_recording_as_on_the_command_line(tmp_path):
+    with pytest.raises(ms.Error, match="gave 5 replies in a row without a decision") as raised:
+        ms.record(lambda message: "well", "E1", seeds=1, runs=1, out=tmp_path, model="walker", max_unusable=5)
+    assert raised.value.hint.startswith("--max-unusable N allows more")
+
+
+SLOW = """
+import sys, time, mirrorstats as ms
+def slow(message):
+    if message["kind"] == "observation":
+        print(message["t"], flush=True)
+        time.sleep(0.2)
+    return {}
+try:
+    ms.record(slow, "E1", seeds=1, runs=1, out=sys.argv[1], keep_going=True, no_log=True, model="slow")
+except KeyboardInterrupt:
+    print("interrupted")
+"""
+
+
+def test_an_interrupt_ends_a_recording(tmp_path):
+    started = subprocess.Popen([sys.executable, "-c", SLOW, tmp_path], stdout=subprocess.PIPE, text=True)
+    assert started.stdout.readline() == "1\n"
+    started.send_signal(signal.SIGINT)
+    said, _ = started.communicate(timeout=60)
+    assert said.splitlines()[-1] == "interrupted" and started.returncode == 0
+
+
+def test_an_interrupt_ends_the_command_as_it_ends_the_program(tmp_path):
+    command = pathlib.Path(sys.executable).parent / "mirrorstats"
+    # A command that listens ends with a code of its own, another one by the signal.
+    words = ["record", "--agent", "exec:sleep 60", "--experiment", "E1", "--seeds", "1", "--runs", "1", "--out", "runs"]
+    for arguments, code in [(words, 130), (["score", "-"], -signal.SIGINT)]:
+        started = subprocess.Popen([command, *arguments], cwd=tmp_path, stdin=subprocess.PIPE, stderr=subprocess.PIPE)
+        # What is waited for is that it has begun; that takes some time on a machine that is busy.
+        time.sleep(5)
+        started.send_signal(signal.SIGINT)
+        if code == 130:
+            time.sleep(1)
+            started.send_signal(signal.SIGINT)
+        assert started.wait(timeout=60) == code, os.fsdecode(started.stderr.read())
+        started.stdin.close()

@@ -1,0 +1,126 @@
+//! What a study gives as Arrow: episodes as `score` writes them, steps as the traces have them, what differs from another study.
+
+use std::path::Path;
+
+use arrow::array::{Array as _, AsArray as _, RecordBatch};
+use arrow::compute::concat_batches;
+use mirrorstats::score::format::Format;
+use mirrorstats::study::write_scores;
+use mirrorstats::trace::episode::{Action, Extra, Step};
+use mirrorstats::trace::write::{OptionalColumns, write_episodes};
+use mirrorstats::{DiffRequest, Side, Study, StudyError, diff, episode_batch, resolve};
+
+use crate::harness::traces::{episode, rows, write_trace};
+
+#[test]
+fn episodes_are_those_that_score_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scores.parquet");
+    for (traces, definitions) in [("fixtures/paper", "paper"), ("fixtures/recorded", "extended")] {
+        let table = Study::open([traces]).unwrap().definitions(definitions).unwrap().score().unwrap().episodes;
+        let mut bytes = Vec::new();
+        write_scores(&table, Format::Parquet, &mut bytes, std::num::NonZeroUsize::MIN).unwrap();
+        std::fs::write(&path, bytes).unwrap();
+        let (batch, written) = (episode_batch(&table).unwrap(), rows(&path));
+        assert_eq!(batch.columns(), written.columns(), "{traces}");
+        assert_eq!(batch.schema().fields(), written.schema().fields(), "{traces}");
+    }
+}
+
+/// `a.parquet` of episodes e1 and e2 with poses, `b.parquet` of e3 without.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let step = |x| Step {
+        action: Some(Action::TurnLeft),
+        extra: Extra { pose_x: Some(x), ..Extra::default() },
+        ..Step::default()
+    };
+    let done = || Step { action: Some(Action::Done), ..Step::default() };
+    let posed = |id: &str| episode(id, vec![step(0.5), step(0.25)]);
+    write_episodes(&folder.path().join("a.parquet"), None, &[posed("e1"), posed("e2")]).unwrap();
+    write_trace(&folder.path().join("b.parquet"), &[episode("e3", vec![done()])], OptionalColumns::NONE);
+    folder
+}
+
+fn study(folder: &Path) -> Study {
+    Study::open([folder.to_str().unwrap()]).unwrap()
+}
+
+fn steps(study: &Study, columns: Option<&[String]>) -> RecordBatch {
+    let steps = study.steps(columns).unwrap();
+    let schema = steps.schema();
+    concat_batches(&schema, &steps.collect::<Result<Vec<_>, _>>().unwrap()).unwrap()
+}
+
+#[test]
+fn steps_have_the_columns_of_all_files_in_the_order_asked_for() {
+    let folder = folder();
+    let study = study(folder.path());
+    let columns = ["pose_x", "t", "episode_id"].map(str::to_owned);
+    let found = steps(&study, Some(&columns));
+    assert_eq!(found.schema().fields().iter().map(|field| field.name().as_str()).collect::<Vec<_>>(), columns);
+    assert_eq!(found.column(2).as_string::<i32>().iter().flatten().collect::<Vec<_>>(), ["e1", "e1", "e2", "e2", "e3"]);
+    assert_eq!((found.column(0).null_count(), found.column(0).is_null(4)), (1, true));
+    let all = steps(&study, None);
+    assert_eq!((all.num_rows(), all.column_by_name("pose_x").unwrap()), (5, found.column(0)));
+    assert!(matches!(study.steps(Some(&["pose_z".to_owned()])), Err(StudyError::Trace(_))));
+}
+
+#[test]
+fn a_filter_keeps_the_steps_of_its_episodes() {
+    let folder = folder();
+    let study = study(folder.path()).filter("length() = 2 and episode_id <> 'e1'").unwrap();
+    let found = steps(&study, Some(&["pose_x".to_owned()]));
+    assert_eq!((found.num_rows(), found.num_columns()), (2, 1));
+    assert_eq!(steps(&study, Some(&[])).num_rows(), 2);
+}
+
+#[test]
+fn nothing_follows_a_damaged_page() {
+    let folder = folder();
+    let path = folder.path().join("a.parquet");
+    let study = study(folder.path());
+    let mut bytes = std::fs::read(&path).unwrap();
+    for byte in &mut bytes[40..80] {
+        *byte ^= 0x55;
+    }
+    std::fs::write(&path, bytes).unwrap();
+    let found: Vec<_> = study.steps(None).unwrap().collect();
+    assert_eq!((found.len(), found[0].is_err()), (1, true));
+}
+
+#[test]
+fn two_studies_of_the_same_traces_differ_as_their_definitions_do() {
+    let folder = folder();
+    let mine = folder.path().join("mine.toml");
+    std::fs::write(&mine, "include = [\"paper\"]\n[let]\nmirror_evidence = \"t > 1\"\n").unwrap();
+    let (mine, by) = (mine.to_str().unwrap().to_owned(), ["experiment".to_owned()]);
+    let (old, new) = (study(folder.path()), study(folder.path()).definitions(&mine).unwrap());
+    let [old, new] = [old, new].map(|study| study.by(by.clone()));
+    let traces = resolve(&[folder.path().to_str().unwrap().to_owned()], std::io::empty()).unwrap();
+    let request = DiffRequest { by: by.to_vec(), ..DiffRequest::default() };
+    let expected = diff(&Side::of("paper").unwrap(), &Side::of(&mine).unwrap(), &traces, &request).unwrap();
+    let found = old.diff(&new).unwrap();
+    assert_eq!(found.changes, expected.changes);
+    assert!(!found.changes.flips.is_empty() && found.notes.is_empty());
+    assert!(old.diff(&old).unwrap().changes.is_empty());
+}
+
+#[test]
+fn studies_of_other_traces_differ_without_timesteps() {
+    let folder = folder();
+    let of = |file: &str| Study::open([folder.path().join(file).to_str().unwrap()]).unwrap();
+    let found = of("a.parquet").diff(&of("b.parquet")).unwrap();
+    assert!(found.changes.flips.is_empty() && !found.changes.is_empty(), "no episode is on both sides");
+    let filtered = study(folder.path()).filter("length() = 1").unwrap();
+    assert!(!study(folder.path()).diff(&filtered).unwrap().changes.is_empty());
+}
+
+#[test]
+fn a_table_that_a_style_does_not_have_is_told_with_those_that_it_has() {
+    let options = mirrorstats::ReportOptions { figures: false, ..Default::default() };
+    let report = Study::open(["fixtures/paper"]).unwrap().report(&options).unwrap();
+    assert_eq!(report.table("main").unwrap().name, "main");
+    let error = report.table("mian").unwrap_err().to_string();
+    assert!(error.contains("`mian`; it has main") && error.ends_with("did you mean `main`?"), "{error}");
+}

@@ -97,7 +97,7 @@ fn two_studies_of_the_same_traces_differ_as_their_definitions_do() {
     let (mine, by) = (mine.to_str().unwrap().to_owned(), ["experiment".to_owned()]);
     let (old, new) = (study(folder.path()), study(folder.path()).definitions(&mine).unwrap());
     let [old, new] = [old, new].map(|study| study.by(by.clone()));
-    let traces = resolve(&[folder.path().to_str().unwrap().to_owned()], std::io::empty()).unwrap();
+    let traces = resolve(&[folder.path().as_os_str().to_owned()], std::io::empty()).unwrap();
     let request = DiffRequest { by: by.to_vec(), ..DiffRequest::default() };
     let expected = diff(&Side::of("paper").unwrap(), &Side::of(&mine).unwrap(), &traces, &request).unwrap();
     let found = old.diff(&new).unwrap();

@@ -124,9 +124,12 @@ impl Reading {
         }
         let mut tables = IndexMap::new();
         for (name, draft) in std::mem::take(&mut self.table) {
-            let place = draft.place.clone().unwrap_or_else(|| whole.clone());
+            // What an included file says is not shown, nor are its faults told twice.
+            let own = draft.place.clone().filter(|place| place.source == whole.source);
+            let place = own.unwrap_or_else(|| whole.clone());
             match draft.whole() {
                 Ok(sheet) => drop(tables.insert(name, sheet)),
+                Err(_) if !self.faults.is_empty() => {}
                 Err(key) => self.faults.push(
                     Fault::new(place, format!("a table needs `{key}`")).help("add it, or include a style that has it"),
                 ),
@@ -183,7 +186,7 @@ impl Reading {
         self.row_order = order.map(without_places).or(self.row_order.take());
         self.undefined = root.text("undefined", faults).map(|(text, _)| text).or(self.undefined.take());
         self.emphasis_note = root.text("emphasis_note", faults).map(|(text, _)| text).or(self.emphasis_note.take());
-        self.print = over(print(root, faults), self.print);
+        self.print = over(printing(root, faults), self.print);
         for (metric, place, keys) in root.tables("column", faults) {
             let read = column(keys, faults);
             let sheet = self.column.entry(metric.clone()).or_default();
@@ -304,7 +307,7 @@ fn read_table(
         named.extend(zero.iter().cloned());
         draft.undefined_as_zero = Some(without_places(zero));
     }
-    draft.print = over(print(&mut keys, faults), draft.print);
+    draft.print = over(printing(&mut keys, faults), draft.print);
     draft.place = Some(place);
     keys.refuse_the_rest(faults);
 }
@@ -330,7 +333,7 @@ fn column(mut keys: Keys, faults: &mut Vec<Fault>) -> ColumnSheet {
     ColumnSheet { latex, better }
 }
 
-fn print(root: &mut Keys, faults: &mut Vec<Fault>) -> PrintSheet {
+fn printing(root: &mut Keys, faults: &mut Vec<Fault>) -> PrintSheet {
     let Some(mut keys) = root.table("print", faults) else { return PrintSheet::default() };
     let cell = [("mean_se", CellForm::MeanSe), ("count_interval", CellForm::CountInterval)];
     let rounding = [("once", Rounding::Once), ("once_binary", Rounding::OnceBinary), ("twice", Rounding::Twice)];

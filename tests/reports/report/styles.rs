@@ -105,7 +105,7 @@ fn nothing_of_what_an_include_says_is_shown() {
     for secret in ["root:$6$hunter2:19000::\n", "password = 'hunter2'\n", "[table.hunter2]\ncolumns = 3\n"] {
         let (_folder, path) = files(&[("in/mine.toml", "include = ['../secret']\n"), ("secret", secret)]);
         let said = fault_of(&path);
-        assert!(said.contains("is no style: it cannot be read from line 1, column"), "{said}");
+        assert!(said.contains("is no style: it cannot be read from line "), "{said}");
         assert!(!said.contains("hunter2"), "{said}");
     }
     let (_folder, path) = files(&[("mine.toml", "include = ['nosuch.toml']\n")]);

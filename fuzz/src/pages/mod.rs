@@ -71,7 +71,10 @@ pub fn outcome(data: &[u8]) -> Outcome {
         (Ok(ours), Err(error)) => panic!("the library refuses what is read: {error}; read: {}", shown(&ours)),
         (Err(refusal), Err(_)) => Outcome::Refused(depth(&refusal)),
         (Err(refusal), Ok(theirs)) => {
-            let known = refusal.expected.as_deref().and_then(stricter::of).and_then(|(reason, _)| reason);
+            let known = match &refusal.expected {
+                Some(expected) => stricter::of(expected).and_then(|(reason, _)| reason),
+                None => (refusal.found == stricter::SPLIT_TEXTS).then_some(Reason::Texts),
+            };
             let read = || theirs.iter().map(shown).collect::<String>();
             Outcome::Stricter(
                 known.unwrap_or_else(|| panic!("no listed reason: {refusal:?}; the library reads {}", read())),

@@ -36,6 +36,12 @@ pub enum Reason {
     /// A page of no values in a delta encoding has the encoding's own header, which says that there are none. The library does
     /// not look for it where it needs no value.
     HeaderOfDelta,
+    /// Texts of which a length is below 0. The library adds lengths up as they are, and takes what comes of it if it is within
+    /// the page.
+    LengthsOfTexts,
+    /// A character of which one text has the first bytes and the next text the rest. The library looks at all texts of a
+    /// delta-encoded page at once.
+    Texts,
     /// Integers without a sign beyond the largest one of 64 bits with a sign: metrics cannot say them.
     LargeInteger,
 }
@@ -54,7 +60,7 @@ pub enum Depth {
 }
 
 /// What the program says it expected, its numbers left out; the reason that it is; how far the mutant came.
-const EXPECTED: [(&str, Reason, Depth); 22] = [
+const EXPECTED: [(&str, Reason, Depth); 23] = [
     ("a page header", Reason::HeaderOfOneMeaning, Depth::Header),
     ("a page header that has one meaning", Reason::HeaderOfOneMeaning, Depth::Header),
     ("a size that # bytes can hold", Reason::SizeOfPage, Depth::Header),
@@ -76,8 +82,12 @@ const EXPECTED: [(&str, Reason, Depth); 22] = [
     ("as many bytes as its values take", Reason::ValuesOfPage, Depth::Values),
     ("as many values as its levels say", Reason::ValuesOfPage, Depth::Values),
     ("the number of its values", Reason::HeaderOfDelta, Depth::Values),
+    ("lengths from #", Reason::LengthsOfTexts, Depth::Values),
     ("a number up to #", Reason::LargeInteger, Depth::Values),
 ];
+
+/// What is found in values that the library has decoded, where nothing else is expected.
+pub const SPLIT_TEXTS: &str = "texts that are not UTF-8";
 
 /// What a refusal of the program is; `None` for words that are not listed, and no reason for what the library refuses, too.
 pub fn of(expected: &str) -> Option<(Option<Reason>, Depth)> {

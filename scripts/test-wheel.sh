@@ -18,7 +18,7 @@ if [ -z "$wheel" ]; then
   cargo test --quiet --workspace --all-features --no-run
   scripts/wheel-parts.sh "$target/debug/mirrorstats"
   (cd python && "$tools/bin/maturin" build --quiet --profile dev --features tested --compatibility linux --auditwheel skip \
-    --strip --out "$out/wheels")
+    --out "$out/wheels")
   wheel=$(echo "$out"/wheels/mirrorstats-*.whl)
 fi
 

@@ -3,6 +3,7 @@
 # one; else one of the profile that the tests have, from the dependencies that they have compiled already.
 set -eu
 cd "$(dirname "$0")/.."
+checkout=$PWD
 target=${CARGO_TARGET_DIR:-target}
 mkdir -p "$target"
 target=$(cd "$target" && pwd)
@@ -12,13 +13,13 @@ tools=$(scripts/get-python.sh)
 out=$(mktemp -d)
 trap 'rm -rf "$out"' EXIT
 
-wheel=${1:-}
+wheel=${1:+$(realpath "$1")}
 if [ -z "$wheel" ]; then
   echo "test-wheel: building it"
   cargo test --quiet --workspace --all-features --no-run
   scripts/wheel-parts.sh "$target/debug/mirrorstats"
   (cd python && "$tools/bin/maturin" build --quiet --profile dev --features tested --compatibility linux --auditwheel skip \
-    --strip --out "$out/wheels")
+    --out "$out/wheels")
   wheel=$(echo "$out"/wheels/mirrorstats-*.whl)
 fi
 
@@ -58,10 +59,9 @@ echo "$packages" >"$site/tools.pth"
 clean python -c "import mirrorstats, polars
 study = mirrorstats.open('runs')
 print(polars.DataFrame(study.episodes))"
-cd - >/dev/null
-
-
-clean MIRRORSTATS_TEST_FIXTURES="$PWD/fixtures" python -m pytest --quiet -p no:cacheprovider --rootdir "$out" python/tests
+# Still in that folder: what is named by its path from the checkout would differ.
+clean MIRRORSTATS_TEST_FIXTURES="$checkout/fixtures" python -m pytest --quiet -p no:cacheprovider --rootdir "$out" \
+  "$checkout/python/tests"
 
 echo "test-wheel: the notebook"
-clean python scripts/run-notebook.py python/notebooks/first-steps.ipynb "$out/notebook"
+clean python "$checkout/scripts/run-notebook.py" "$checkout/python/notebooks/first-steps.ipynb" "$out/notebook"

@@ -92,17 +92,18 @@ fn nothing_follows_a_damaged_page() {
 #[test]
 fn two_studies_of_the_same_traces_differ_as_their_definitions_do() {
     let folder = folder();
-    let mine = folder.path().join("mine.toml");
-    std::fs::write(&mine, "include = [\"paper\"]\n[let]\nmirror_evidence = \"t > 1\"\n").unwrap();
-    let (mine, by) = (mine.to_str().unwrap().to_owned(), ["experiment".to_owned()]);
-    let (old, new) = (study(folder.path()), study(folder.path()).definitions(&mine).unwrap());
+    let [early, late] = ["early", "late"].map(|name| folder.path().join(format!("{name}.toml")).display().to_string());
+    std::fs::write(&early, "[metric.LONG]\nvalue = \"count(t >= 1)\"\n").unwrap();
+    std::fs::write(&late, "[metric.LONG]\nvalue = \"count(t >= 2)\"\n").unwrap();
+    let by = ["experiment".to_owned()];
+    let [old, new] = [&early, &late].map(|name| study(folder.path()).definitions(name).unwrap());
     let [old, new] = [old, new].map(|study| study.by(by.clone()));
     let traces = resolve(&[folder.path().as_os_str().to_owned()], std::io::empty()).unwrap();
     let request = DiffRequest { by: by.to_vec(), ..DiffRequest::default() };
-    let expected = diff(&Side::of("paper").unwrap(), &Side::of(&mine).unwrap(), &traces, &request).unwrap();
+    let expected = diff(&Side::of(&early).unwrap(), &Side::of(&late).unwrap(), &traces, &request).unwrap();
     let found = old.diff(&new).unwrap();
     assert_eq!(found.changes, expected.changes);
-    assert!(!found.changes.flips.is_empty() && found.notes.is_empty());
+    assert_eq!((found.changes.flips.len(), found.notes.len()), (3, 0));
     assert!(old.diff(&old).unwrap().changes.is_empty());
 }
 

@@ -401,6 +401,7 @@ fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
 /// The convex hull of some points, counter-clockwise (Andrew's monotone chain).
 fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
     let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {
         let mut kept: Vec<[f64; 2]> = Vec::new();
         for point in points {

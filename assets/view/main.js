@@ -102,7 +102,7 @@ function startSearch() {
   });
 }
 
-let running = [];
+let underWay = [];
 document.addEventListener("state", ({ detail }) => detail.replace || show());
 startTheme();
 startKeys(startHelp());
@@ -111,15 +111,15 @@ if (query().has("token")) history.replaceState(null, "", link(changed({})));
 show().then(() =>
   watch({
     heard(told) {
-      running = told.running;
-      if ((query().get("view") ?? "overview") === "overview") showRunning(content, running, told.rate);
+      underWay = told.running;
+      if ((query().get("view") ?? "overview") === "overview") showRunning(content, underWay, told.rate);
     },
     async changed() {
       const view = query().get("view") ?? "overview";
       if (view === "compare" || (view === "episode" && !page.running)) return;
       if (view === "episode" && query().has("t")) go(changed({ t: null }), { replace: true });
       await show({ keep: true });
-      if (view === "overview") showRunning(content, running, null);
+      if (view === "overview") showRunning(content, underWay, null);
     },
   }),
 );

@@ -169,7 +169,7 @@ pub fn check_token(token: &str) -> Result<(), String> {
 pub fn new_token() -> Result<String, std::io::Error> {
     let mut bytes = [0_u8; 16];
     getrandom::fill(&mut bytes).map_err(std::io::Error::other)?;
-    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+    Ok(format!("{:032x}", u128::from_be_bytes(bytes)))
 }
 
 /// The routes behind the guard, each answer with the headers of all.

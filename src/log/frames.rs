@@ -389,18 +389,19 @@ fn rgba(color: Rgba) -> [f64; 4] {
 }
 
 /// A vector turned by a unit quaternion.
-fn turned(q: Quaternion, [x, y, z]: [f64; 3]) -> [f64; 3] {
+fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-    let (axis, v) = ([q.x, q.y, q.z], [x, y, z]);
-    let once = cross(axis, v).map(|part| 2.0 * part);
+    let axis = [turn.x, turn.y, turn.z];
+    let once = cross(axis, vector).map(|part| 2.0 * part);
     let twice = cross(axis, once);
-    std::array::from_fn(|at| v[at] + q.w * once[at] + twice[at])
+    std::array::from_fn(|at| vector[at] + turn.w * once[at] + twice[at])
 }
 
 /// The convex hull of some points, counter-clockwise (Andrew's monotone chain).
 fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
     let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {
         let mut kept: Vec<[f64; 2]> = Vec::new();
         for point in points {
@@ -417,9 +418,9 @@ fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let mut outline = half(&mut points.iter().copied());
     outline.extend(half(&mut points.iter().rev().copied()));
     if outline.is_empty() {
-        points.truncate(1)
+        points.truncate(1);
     } else {
-        points = outline
+        points = outline;
     }
     points
 }

@@ -15,7 +15,8 @@
 //! Every message of step t has the time of the row's `frame_time`, which is no clock's but the step's own place on the
 //! time line; the metadata record `mirrorstats.recording` holds what the trace's footer does.
 //!
-//! Rule: an episode fills chunks of its own, and the chunk with its `end` is on disk before the next one begins: of a log
+//! Rule: an episode fills chunks of its own, one for each step while it is recorded, so that it can be read before it ends, and
+//! the chunk with its `end` is on disk before the next one begins: of a log
 //! that was cut off, every episode whose `end` is there is whole.
 
 pub mod assemble;

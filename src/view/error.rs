@@ -12,7 +12,7 @@ use crate::trace::error::TraceError;
 #[expect(missing_docs, reason = "the messages say it")]
 pub enum ViewError {
     #[error(transparent)]
-    Study(#[from] StudyError),
+    Study(Box<StudyError>),
     #[error(transparent)]
     Trace(#[from] TraceError),
     #[error(transparent)]
@@ -23,6 +23,12 @@ pub enum ViewError {
     Request(String),
     #[error("cannot write the page: {0}")]
     Write(#[from] crate::base::replace::FolderError),
+}
+
+impl From<StudyError> for ViewError {
+    fn from(error: StudyError) -> Self {
+        Self::Study(Box::new(error))
+    }
 }
 
 impl ViewError {
@@ -38,7 +44,8 @@ impl ViewError {
         while let Some(error) = cause {
             let text = visible_lines(&error.to_string());
             if !words.contains(&text) {
-                words += &format!("\n{text}");
+                words.push('\n');
+                words.push_str(&text);
             }
             cause = error.source();
         }

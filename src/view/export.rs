@@ -54,7 +54,7 @@ impl Files {
 
     /// A part of the data: a script that hands its value over.
     fn part(&mut self, name: &str, value: &Value) -> Result<(), ViewError> {
-        self.add(&format!("data/{name}.js"), format!("mirrorstatsPart({:?}, {value});\n", name))
+        self.add(&format!("data/{name}.js"), format!("mirrorstatsPart({name:?}, {value});\n"))
     }
 }
 

@@ -79,6 +79,18 @@ mod tests {
     }
 
     #[test]
+    fn no_name_stands_at_the_top_of_two_modules() {
+        let mut names = std::collections::BTreeSet::new();
+        for line in classic().lines() {
+            let words: Vec<&str> = line.trim_end().split([' ', '(', '=']).filter(|word| *word != "async").collect();
+            if let ["function" | "const" | "let" | "class", name, ..] = words[..] {
+                assert!(name.starts_with(['[', '{']) || names.insert(name.to_owned()), "{name}");
+            }
+        }
+        assert!(names.len() > 50);
+    }
+
+    #[test]
     fn the_classic_script_has_no_word_of_modules() {
         assert!(!classic().lines().any(|line| line.starts_with("import ") || line.starts_with("export ")));
     }

@@ -47,7 +47,7 @@ use super::outcome::{Failure, Outcome};
 pub enum Command {
     Report(report::ReportArgs),
     #[cfg(feature = "sim")]
-    Record(record::RecordArgs),
+    Record(Box<record::RecordArgs>),
     #[cfg(feature = "view")]
     View(view::ViewArgs),
     Score(score::ScoreArgs),

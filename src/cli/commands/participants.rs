@@ -45,9 +45,9 @@ struct RemovedAnswer(Removed);
 impl fmt::Display for RemovedAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Removed { episodes, files, journal_lines } = &self.0;
-        let ids = episodes.iter().map(|id| format!("\n  {}", visible(id))).collect::<String>();
         let (count, lines) = (counted(episodes.len() as u64, "episode"), counted(*journal_lines as u64, "line"));
-        write!(f, "removed {count} from {}, and {lines} of the journal{ids}", counted(files.len() as u64, "file"))
+        write!(f, "removed {count} from {}, and {lines} of the journal", counted(files.len() as u64, "file"))?;
+        episodes.iter().try_for_each(|id| write!(f, "\n  {}", visible(id)))
     }
 }
 

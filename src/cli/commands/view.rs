@@ -97,7 +97,7 @@ impl ViewArgs {
 impl From<ViewError> for Failure {
     fn from(error: ViewError) -> Self {
         match error {
-            ViewError::Study(error) => error.into(),
+            ViewError::Study(error) => (*error).into(),
             error => Self::input(error),
         }
     }

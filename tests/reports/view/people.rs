@@ -106,6 +106,7 @@ fn a_person_plays_and_nothing_tells_them_the_truth() {
     person.act("done", "unknown", "red");
     assert_eq!(person.state(&["play"])["t"], 1);
     person.act("a", "unknown", "none");
+    person.state(&["play"]);
     assert_eq!(person.ask("POST", "pause", &json!({})).json()["phase"], "break");
     assert_eq!(person.ask("POST", "resume", &json!({})).json()["phase"], "play");
     person.act("d", "I am the red one", "none");
@@ -132,7 +133,7 @@ fn a_person_plays_and_nothing_tells_them_the_truth() {
 fn two_people_play_at_once_and_one_is_removed() {
     need::drawing();
     let folder = tempfile::tempdir().unwrap();
-    let people = People::start(folder.path(), "P1,P2", &["--runs", "2"]);
+    let people = People::start(folder.path(), "leaver-0001,stayer-0002", &["--runs", "2"]);
     let mut both = [people.person(0), people.person(1)];
     for person in &mut both {
         person.act("done", "unknown", "red");
@@ -142,16 +143,23 @@ fn two_people_play_at_once_and_one_is_removed() {
         person.act("done", "blue", "blue");
     }
     people.ends();
-    let removed = run(folder.path(), &["participants", "remove", "P1", "runs", "--json"]).json();
+    let removed = run(folder.path(), &["participants", "remove", "leaver-0001", "runs", "--json"]).json();
     assert_eq!(removed["episodes"].as_array().unwrap().len(), 1);
     for entry in std::fs::read_dir(folder.path().join("runs")).unwrap().flatten() {
         let bytes = std::fs::read(entry.path()).unwrap_or_default();
-        assert!(!bytes.windows(2).any(|two| two == b"P1"), "{}", entry.path().display());
+        assert!(!bytes.windows(11).any(|some| some == b"leaver-0001"), "{}", entry.path().display());
     }
     run(folder.path(), &["validate", "runs"]).done();
     assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
     run(folder.path(), &["replay", "runs"]).done();
-    run(folder.path(), &["participants", "remove", "P1", "runs"]).refused();
+    let recover = ["recover", "runs/E1-people.mcap", "-o", "log.parquet"];
+    run(folder.path(), &recover).done();
+    assert_eq!(
+        run(folder.path(), &["score", "log.parquet", "--json"]).done().lines().count(),
+        1,
+        "the log has one, too"
+    );
+    run(folder.path(), &["participants", "remove", "leaver-0001", "runs"]).refused();
 }
 
 #[test]

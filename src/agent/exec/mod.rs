@@ -257,7 +257,7 @@ impl ExecAgent {
         match str::from_utf8(line) {
             Ok(text) => {
                 let text = self.shared.without_secrets(text);
-                reply::read(&text, &self.task.experiment.reply, Ending::Whole).into_reply(text, usage)
+                reply::read(&text, &self.task.experiment, Ending::Whole).into_reply(text, usage)
             }
             // With its bytes replaced it might pass for something that the program did not say.
             Err(_) => Reply {

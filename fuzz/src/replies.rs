@@ -17,9 +17,8 @@ const DIALECTS: [Dialect; 4] =
 /// The text of a reply, as a program or a model gives it.
 fn text(raw: &str, ending: Ending) {
     for experiment in [Experiment::E1, Experiment::E5] {
-        let keys = experiment.reply.as_slice();
-        let reading = reply::read(raw, keys, ending);
-        assert_eq!(reading, reply::read(raw, keys, ending));
+        let reading = reply::read(raw, &experiment, ending);
+        assert_eq!(reading, reply::read(raw, &experiment, ending));
         let is_read = matches!(reading.status, Status::Ok | Status::Repaired);
         assert_eq!(is_read, reading.fault.is_none() && reading.action.is_some() && ending == Ending::Whole);
         assert_eq!(reading.status == Status::Repaired, !reading.repairs.is_empty());

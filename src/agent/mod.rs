@@ -222,7 +222,7 @@ pub trait Agent {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Ended {
-    /// The agent was done.
+    /// The agent was done, or what was to be reached is reached.
     Done,
     /// The steps were used up.
     Budget,

@@ -7,6 +7,7 @@ use minijinja::{Environment, Error, UndefinedBehavior, context};
 use super::{Observation, Task};
 use crate::base::number::Decimal;
 use crate::experiment::Experiment;
+use crate::experiment::spec::Actions;
 use crate::trace::episode::Action;
 
 /// The templates of one prompt.
@@ -73,7 +74,14 @@ impl Prompt {
         let warning = self.fill("warning", context! {})?;
         let user = self.fill(
             "user",
-            context! { history_text, position_text, bumped => observation.bumped, warning_if_bumped_wall => warning },
+            context! {
+                history_text,
+                position_text,
+                bumped => observation.bumped,
+                warning_if_bumped_wall => warning,
+                remaining => observation.remaining,
+                budget => task.step_budget,
+            },
         )?;
         Ok(Rendered { system, user })
     }
@@ -91,7 +99,7 @@ pub fn hashes() -> serde_json::Value {
     })
 }
 
-/// The letter by which the prompt names an action.
+/// The letter or number by which the prompt names an action.
 pub const fn letter(action: Action) -> &'static str {
     match action {
         Action::MoveForward => "w",
@@ -99,12 +107,26 @@ pub const fn letter(action: Action) -> &'static str {
         Action::TurnLeft => "a",
         Action::TurnRight => "d",
         Action::Done => "done",
+        Action::HandUp => "1",
+        Action::HandDown => "2",
+        Action::HandLeft => "3",
+        Action::HandRight => "4",
+        Action::HandForward => "5",
+        Action::HandBackward => "6",
     }
 }
 
 /// The action of a letter, exactly as the prompt spells it.
 pub fn action(letter_of_action: &str) -> Option<Action> {
     Action::ALL.into_iter().find(|action| letter(*action) == letter_of_action)
+}
+
+/// What an agent of an experiment can do.
+pub const fn actions(of: Actions) -> &'static [Action] {
+    match of {
+        Actions::Walk => &Action::WALK,
+        Actions::Hand => &Action::HAND,
+    }
 }
 
 /// A thought keeps to its line, so that it cannot pass for another part of the prompt.

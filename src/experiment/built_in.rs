@@ -12,7 +12,25 @@ macro_rules! files {
     };
 }
 
-files!("E1", "E2", "E3", "E4", "E5", "two-mirrors", "delayed", "decoy", "window", "mark");
+files!(
+    "E1",
+    "E2",
+    "E3",
+    "E4",
+    "E5",
+    "two-mirrors",
+    "delayed",
+    "decoy",
+    "window",
+    "mark",
+    "reach-scheme",
+    "reach-mirror",
+    "reach-hand",
+    "reach-bare",
+    "reach-no-mirror",
+    "reach-decoy",
+    "reach-late",
+);
 
 /// The names of the built-in experiments, in their order.
 pub fn built_in_names() -> Vec<&'static str> {

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use super::Experiment;
 use super::spec::{
-    Behavior, BodyShown, Colors, Cubes, Mark, MarkColor, Others, Paint, Pane, PaneKind, Start, Stated, Wall, Wearer,
+    Behavior, BodyShown, Camera, Colors, Cubes, Hand, Mark, MarkColor, Others, Paint, Pane, PaneKind, Picture, Start,
+    Stated, Wall, Wearer,
 };
 use crate::base::escape::visible;
 
@@ -26,6 +27,7 @@ pub fn explained(experiment: Experiment) -> String {
     let start = match experiment.layout.start {
         Start::FacingAway => "the first mirror, or its place, is out of view",
         Start::Any => "anywhere, facing anything",
+        Start::BeforeMirror => "two metres before the first mirror, or its place, facing it",
     };
     line("start", start.to_owned());
     for pane in &experiment.panes {
@@ -45,8 +47,26 @@ pub fn explained(experiment: Experiment) -> String {
     line("prompt", format!("{}{stated}", visible(&experiment.prompt)));
     let keys: Vec<&str> = experiment.reply.iter().map(|key| key.name()).collect();
     line("reply", keys.join(", "));
-    line("decision", format!("{} at `done`, held against {}", experiment.decision.name(), experiment.truth.name()));
-    let steps = experiment.steps.map_or_else(|| "as the world says".to_owned(), |steps| steps.to_string());
+    if let Some(hand) = experiment.hand {
+        line("hand", self::hand(hand));
+    }
+    let camera = match experiment.camera {
+        Camera::Eye => None,
+        Camera::Behind => Some("behind the body and above it, which looks over its head"),
+    };
+    camera.into_iter().for_each(|words| line("camera", words.to_owned()));
+    if let Some(Picture { width, height, fovy }) = experiment.view {
+        line("view", format!("{width} x {height} pixels, {fovy} degrees high"));
+    }
+    let at = if experiment.hand.is_some() { "at the end" } else { "at `done`" };
+    line("decision", format!("{} {at}, held against {}", experiment.decision.name(), experiment.truth.name()));
+    let steps = match (experiment.hand, experiment.steps) {
+        (Some(hand), None) => format!("those from the start to the mark, and {} more", hand.extra_steps),
+        (Some(hand), Some(most)) => {
+            format!("those from the start to the mark, and {} more; {most} at most", hand.extra_steps)
+        }
+        (None, steps) => steps.map_or_else(|| "as the world says".to_owned(), |steps| steps.to_string()),
+    };
     line("steps", steps);
     let chance: Vec<String> = experiment.chance.iter().map(|(metric, level)| format!("{metric} {level}")).collect();
     if !chance.is_empty() {
@@ -119,6 +139,14 @@ fn pane(pane: &Pane) -> String {
         Wall::South => "the wall at -y",
     };
     format!("{what}, on {wall}")
+}
+
+fn hand(hand: Hand) -> String {
+    let Hand { step_mm, least, most, within, .. } = hand;
+    format!(
+        "{step_mm} mm at a time in six directions, {least} to {most} steps from the mark at the start; the mark is reached \
+         within {within}"
+    )
 }
 
 fn mark(mark: Mark) -> String {

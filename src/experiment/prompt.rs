@@ -3,7 +3,7 @@
 //! | file | what it says | values |
 //! |---|---|---|
 //! | `system.txt` | the system prompt | `stated_color` |
-//! | `user.txt` | the user prompt | `history_text`, `position_text`, `bumped`, `warning_if_bumped_wall` |
+//! | `user.txt` | the user prompt | `history_text`, `position_text`, `bumped`, `warning_if_bumped_wall`, `remaining`, `budget` |
 //! | `history.txt` | the step before | `first`, `action`, `thought` |
 //! | `position.txt` | pose and budget | `x`, `y`, `yaw`, `remaining`, `budget` |
 //! | `warning.txt` | the last move was stopped | none |
@@ -33,7 +33,7 @@ pub type Template = (String, String);
 /// The names of the templates, and the values that each may use.
 const NAMES: [(&str, &[&str]); 5] = [
     ("system", &["stated_color"]),
-    ("user", &["history_text", "position_text", "bumped", "warning_if_bumped_wall"]),
+    ("user", &["history_text", "position_text", "bumped", "warning_if_bumped_wall", "remaining", "budget"]),
     ("history", &["first", "action", "thought"]),
     ("position", &["x", "y", "yaw", "remaining", "budget"]),
     ("warning", &[]),
@@ -55,7 +55,15 @@ macro_rules! folder {
 }
 
 /// The built-in folders, with their own two templates.
-const BUILT_IN: [(&str, [&str; 2]); 3] = [folder!("cube-selection"), folder!("exploration"), folder!("mark")];
+const BUILT_IN: [(&str, [&str; 2]); 7] = [
+    folder!("cube-selection"),
+    folder!("exploration"),
+    folder!("mark"),
+    folder!("reach-scheme"),
+    folder!("reach-mirror"),
+    folder!("reach-hand"),
+    folder!("reach-bare"),
+];
 
 /// The three that they share.
 const SHARED: [(&str, &str); 3] = [

@@ -50,18 +50,20 @@ pub struct ExperimentTable {
     pub others: Option<OthersTable>,
     /// How the agent stands at the start; `facing_away` if absent.
     pub start: Option<Start>,
-    /// The column that holds the decision; `selected_cube` if absent, `self_color` where there are no candidates.
+    /// The column that holds the decision; `selected_cube` if absent, `self_color` where there are no candidates,
+    /// `target_distance` where there is a hand.
     pub decision: Option<Decision>,
-    /// The column that holds what the decision should name; `body_color` if absent, `mark_color` for `mark_report`.
+    /// The column that holds what the decision should name; `body_color` if absent, `mark_color` for `mark_report`,
+    /// `start_distance` for `target_distance`.
     pub truth: Option<Truth>,
     /// What the prompt states of the body's colour; `none` if absent.
     pub stated_color: Option<Stated>,
     /// The keys of a reply, in the order of the prompt; those that the decision needs if absent.
     pub reply: Option<Vec<ReplyKey>>,
-    /// A built-in prompt (`cube-selection`, `exploration`, `mark`), or a folder beside the file or below it with
+    /// A built-in prompt (`cube-selection`, `exploration`, `mark`, `reach-scheme`, `reach-mirror`, `reach-hand`, `reach-bare`), or a folder beside the file or below it with
     /// `system.txt` and `user.txt`.
     pub prompt: String,
-    /// What the agent can do; `walk` if absent.
+    /// What the agent can do; `hand` if absent where there is one, else `walk`.
     pub actions: Option<Actions>,
     /// What the agent sees with; `eye` if absent.
     pub camera: Option<Camera>,
@@ -79,6 +81,46 @@ pub struct ExperimentTable {
     #[serde(default)]
     #[schemars(length(max = 4))]
     pub mark: Vec<MarkTable>,
+    /// The hand that moves in place of the body, to reach the mark on its front; none if absent.
+    pub hand: Option<HandTable>,
+    /// The size and the angle of the picture; the world's if absent.
+    pub view: Option<ViewTable>,
+}
+
+/// A hand that floats freely, a step at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct HandTable {
+    /// The length of its steps, m; 0.1 if absent.
+    #[schemars(range(min = 0.02, max = 0.5))]
+    pub step: Option<f64>,
+    /// Steps from the mark at the start at least, along the three directions together; 6 if absent.
+    #[schemars(range(min = 2, max = 40))]
+    pub least: Option<u32>,
+    /// The same at most; 12 if absent, or `least`.
+    #[schemars(range(min = 2, max = 40))]
+    pub most: Option<u32>,
+    /// Steps from the mark at which it is reached, fewer than `least`; 1 if absent.
+    #[schemars(range(min = 1, max = 40))]
+    pub within: Option<u32>,
+    /// The steps of an episode beyond those from the start to the mark; 10 if absent.
+    #[schemars(range(max = 1000))]
+    pub extra_steps: Option<u32>,
+}
+
+/// The size and the angle of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ViewTable {
+    /// Pixels in a row; 640 if absent.
+    #[schemars(range(min = 16, max = 1920))]
+    pub width: Option<u32>,
+    /// Rows; 480 if absent.
+    #[schemars(range(min = 12, max = 1440))]
+    pub height: Option<u32>,
+    /// The vertical field of view, degrees; 60 if absent.
+    #[schemars(range(min = 30, max = 115))]
+    pub fovy: Option<u32>,
 }
 
 /// A chance level.
@@ -175,6 +217,9 @@ pub struct MirrorTable {
     /// m; the world's if absent.
     #[schemars(range(min = 0.5, max = 5.0))]
     pub height: Option<f64>,
+    /// Of its lower edge above the floor, m; about the world's height of centres if absent.
+    #[schemars(range(min = 0.0, max = 3.0))]
+    pub bottom: Option<f64>,
 }
 
 /// A mark on a body.
@@ -244,6 +289,8 @@ mod tests {
             ("OthersTable", None, "others = { zzzzzz = 1 }"),
             ("MirrorTable", None, "mirror = [{ zzzzzz = 1 }]"),
             ("MarkTable", None, "mark = [{ part = 'head', zzzzzz = 1 }]"),
+            ("HandTable", None, "hand = { zzzzzz = 1 }"),
+            ("ViewTable", None, "view = { zzzzzz = 1 }"),
         ] {
             assert_eq!(keys_of_schema(name, kind), keys_of_reader(text), "{name} {kind:?}");
         }

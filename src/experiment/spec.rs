@@ -64,6 +64,40 @@ pub struct Spec {
     /// Marks on bodies.
     #[serde(default, rename = "mark", skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<Mark>,
+    /// The hand that moves in place of the body, where the task is to reach the mark on its front.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hand: Option<Hand>,
+    /// The size and the angle of the picture; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view: Option<Picture>,
+}
+
+/// A hand that floats freely, a step at a time, and what it takes to reach the mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Hand {
+    /// The length of its steps, mm.
+    pub step_mm: u32,
+    /// Steps from the mark at the start at least, along the three directions together.
+    pub least: u32,
+    /// The same at most.
+    pub most: u32,
+    /// Steps from the mark at which it is reached.
+    pub within: u32,
+    /// The steps of an episode beyond those from the start to the mark.
+    pub extra_steps: u32,
+}
+
+/// The size and the angle of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Picture {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The vertical field of view, degrees.
+    pub fovy: u32,
 }
 
 /// What is drawn from seed and run, the same for all experiments that share scenes.
@@ -162,9 +196,11 @@ pub enum Start {
     FacingAway,
     /// Anyhow.
     Any,
+    /// Two metres before the middle of the first pane, or of its place, facing it.
+    BeforeMirror,
 }
 
-names!(Start { FacingAway: "facing_away", Any: "any" });
+names!(Start { FacingAway: "facing_away", Any: "any", BeforeMirror: "before_mirror" });
 
 /// A wall of the room.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -246,9 +282,16 @@ pub enum Decision {
     SelfColor,
     /// The mark that the reply reports on the own body.
     MarkReport,
+    /// Where the hand is: no reply names it.
+    TargetDistance,
 }
 
-names!(Decision { SelectedCube: "selected_cube", SelfColor: "self_color", MarkReport: "mark_report" });
+names!(Decision {
+    SelectedCube: "selected_cube",
+    SelfColor: "self_color",
+    MarkReport: "mark_report",
+    TargetDistance: "target_distance",
+});
 
 impl Decision {
     /// The key of a reply that fills the column.
@@ -257,6 +300,7 @@ impl Decision {
             Self::SelectedCube => ReplyKey::SelectedCube,
             Self::SelfColor => ReplyKey::Identification,
             Self::MarkReport => ReplyKey::Mark,
+            Self::TargetDistance => ReplyKey::Action,
         }
     }
 }
@@ -269,9 +313,11 @@ pub enum Truth {
     BodyColor,
     /// The colour of the mark on the own body, `none` where there is none.
     MarkColor,
+    /// Where the hand starts: the way that it should leave behind.
+    StartDistance,
 }
 
-names!(Truth { BodyColor: "body_color", MarkColor: "mark_color" });
+names!(Truth { BodyColor: "body_color", MarkColor: "mark_color", StartDistance: "start_distance" });
 
 /// What the prompt states of the body's colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -295,9 +341,11 @@ pub enum Actions {
     /// Steps forward and back, turns by 30 degrees, and `done`.
     #[default]
     Walk,
+    /// Steps of a hand: up, down, left, right, away from the camera and towards it. The body stands still.
+    Hand,
 }
 
-names!(Actions { Walk: "walk" });
+names!(Actions { Walk: "walk", Hand: "hand" });
 
 /// What the agent sees with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -306,9 +354,12 @@ pub enum Camera {
     /// Its own eye, before its face.
     #[default]
     Eye,
+    /// A camera behind the body and above it, which looks over its head: 1.1 m behind, 2.0 m high, aimed at a point 1.7 m
+    /// above where the body stands.
+    Behind,
 }
 
-names!(Camera { Eye: "eye" });
+names!(Camera { Eye: "eye", Behind: "behind" });
 
 /// A mirror, or something in a mirror's place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -334,6 +385,9 @@ pub struct Pane {
     /// mm; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height_mm: Option<u32>,
+    /// Its lower edge above the floor, mm; about the world's height of centres if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bottom_mm: Option<u32>,
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
@@ -423,9 +477,11 @@ pub enum Part {
     Back,
     /// The chest.
     Chest,
+    /// A square patch somewhere on the front, of a body that stands still; its place and its size are drawn.
+    Front,
 }
 
-names!(Part { Head: "head", Back: "back", Chest: "chest" });
+names!(Part { Head: "head", Back: "back", Chest: "chest", Front: "front" });
 
 /// The colour of a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -462,6 +518,11 @@ impl Spec {
     /// Whether a reply names a cube.
     pub fn asks_for_cube(&self) -> bool {
         self.reply.contains(&ReplyKey::SelectedCube)
+    }
+
+    /// Whether a reply says how the agent knows itself.
+    pub fn asks_for_identification(&self) -> bool {
+        self.reply.contains(&ReplyKey::Identification)
     }
 
     /// Whether a reply names a mark.

@@ -1,5 +1,7 @@
 //! One `[experiment.NAME]` table, key by key.
 
+mod hand;
+
 use std::path::Path;
 
 use indexmap::IndexMap;
@@ -60,15 +62,27 @@ pub(super) fn read(
     let (scenes, layout) = scenes(name, &mut keys, first_wall, beside, faults);
     let decision_place = keys.value_place("decision").unwrap_or_else(|| place.clone());
     let has_candidates = matches!(layout.cubes, Cubes::Candidates { .. });
-    let default = if has_candidates { Decision::SelectedCube } else { Decision::SelfColor };
+    let hand_place = keys.value_place("hand").unwrap_or_else(|| place.clone());
+    let hand = hand::hand(&mut keys, faults);
+    let view = hand::view(&mut keys, faults);
+    let default = match hand {
+        Some(_) => Decision::TargetDistance,
+        None if has_candidates => Decision::SelectedCube,
+        None => Decision::SelfColor,
+    };
     let decision = keys.choice("decision", &pairs(Decision::ALL, Decision::name), faults).unwrap_or(default);
     let truth = keys.choice("truth", &pairs(Truth::ALL, Truth::name), faults);
-    let truth = truth.unwrap_or(if decision == Decision::MarkReport { Truth::MarkColor } else { Truth::BodyColor });
+    let truth = truth.unwrap_or(match decision {
+        Decision::MarkReport => Truth::MarkColor,
+        Decision::TargetDistance => Truth::StartDistance,
+        Decision::SelectedCube | Decision::SelfColor => Truth::BodyColor,
+    });
     let stated_place = keys.value_place("stated_color").unwrap_or_else(|| place.clone());
     let stated_color = keys.choice("stated_color", &pairs(Stated::ALL, Stated::name), faults).unwrap_or_default();
     let reply = reply(&mut keys, decision, faults);
     let (prompt, templates) = prompt(&mut keys, place, beside, faults);
-    let actions = keys.choice("actions", &pairs(Actions::ALL, Actions::name), faults).unwrap_or_default();
+    let own_actions = if hand.is_some() { Actions::Hand } else { Actions::Walk };
+    let actions = keys.choice("actions", &pairs(Actions::ALL, Actions::name), faults).unwrap_or(own_actions);
     let camera = keys.choice("camera", &pairs(Camera::ALL, Camera::name), faults).unwrap_or_default();
     let steps = keys.count("steps", [1, MOST_STEPS], faults).map(|(steps, _)| steps);
     let step_length_mm = keys.length("step_length", [0.1, 1.0], faults).map(|(length, _)| millimetres(length));
@@ -98,8 +112,11 @@ pub(super) fn read(
         step_length_mm,
         panes,
         marks,
+        hand,
+        view,
     };
     relations(&spec, [&decision_place, &stated_place, &marks_place], faults);
+    hand::relations(&spec, &hand_place, faults);
     (faults.len() == before).then(|| Entry {
         known: Known { spec, templates },
         name: place.clone(),
@@ -107,11 +124,11 @@ pub(super) fn read(
     })
 }
 
-fn pairs<T: Copy, const N: usize>(all: [T; N], name: impl Fn(T) -> &'static str) -> Vec<(&'static str, T)> {
+pub(super) fn pairs<T: Copy, const N: usize>(all: [T; N], name: impl Fn(T) -> &'static str) -> Vec<(&'static str, T)> {
     all.into_iter().map(|one| (name(one), one)).collect()
 }
 
-fn missing(place: &Place, key: &str, example: &str) -> Fault {
+pub(super) fn missing(place: &Place, key: &str, example: &str) -> Fault {
     Fault::new(place.clone(), format!("the experiment has no `{key}`")).help(format!("add `{key} = {example}`"))
 }
 
@@ -125,7 +142,7 @@ fn texts_of(reference: IndexMap<String, (Vec<Ratio>, Place)>) -> IndexMap<String
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lengths are checked to be small")]
-fn millimetres(metres: f64) -> u32 {
+pub(super) fn millimetres(metres: f64) -> u32 {
     (metres * 1000.0).round() as u32
 }
 
@@ -268,7 +285,7 @@ fn cubes(keys: &mut Keys<'_>, palette: usize, faults: &mut Vec<Fault>) -> Option
     cubes
 }
 
-fn in_order(least: Option<&(u32, Place)>, most: Option<&(u32, Place)>, faults: &mut Vec<Fault>) {
+pub(super) fn in_order(least: Option<&(u32, Place)>, most: Option<&(u32, Place)>, faults: &mut Vec<Fault>) {
     if let (Some((least, place)), Some((most, _))) = (least, most)
         && least > most
     {
@@ -297,6 +314,7 @@ fn reply(keys: &mut Keys<'_>, decision: Decision, faults: &mut Vec<Fault>) -> Ve
             Decision::SelectedCube => Some(SelectedCube),
             Decision::MarkReport => Some(Mark),
             Decision::SelfColor => None,
+            Decision::TargetDistance => return vec![Reasoning, Action],
         };
         let all = [ViewDescription, Reasoning, Action, Summary].into_iter().chain(asked).chain([Identification]);
         return all.collect();
@@ -396,6 +414,7 @@ fn pane(place: &Place, mut keys: Keys<'_>, faults: &mut Vec<Fault>) -> Option<Pa
     let wall = keys.choice("wall", &pairs(Wall::ALL, Wall::name), faults).unwrap_or_default();
     let width_mm = keys.length("width", [0.5, 10.0], faults).map(|(width, _)| millimetres(width));
     let height_mm = keys.length("height", [0.5, 5.0], faults).map(|(height, _)| millimetres(height));
+    let bottom_mm = keys.length("bottom", [0.0, 3.0], faults).map(|(bottom, _)| millimetres(bottom));
     keys.refuse_the_rest(faults);
     let misplaced =
         |key: &str, place: Place| Fault::new(place, format!("a mirror of the kind `{}` has no `{key}`", kind.name()));
@@ -424,7 +443,7 @@ fn pane(place: &Place, mut keys: Keys<'_>, faults: &mut Vec<Fault>) -> Option<Pa
     let delay = delay.map(|(delay, _)| delay).unwrap_or_default();
     // A mirror that is late is a late mirror, by whichever key it says so.
     let kind = if kind == PaneKind::Mirror && delay > 0 { PaneKind::Delayed } else { kind };
-    (faults.len() == before).then_some(Pane { kind, delay, color, body, wall, width_mm, height_mm })
+    (faults.len() == before).then_some(Pane { kind, delay, color, body, wall, width_mm, height_mm, bottom_mm })
 }
 
 fn paint(name: &str, place: Place, faults: &mut Vec<Fault>) -> Paint {

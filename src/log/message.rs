@@ -56,9 +56,9 @@ fn without_strangers(schema: &mut Schema) {
     schema.insert("required".to_owned(), required.unwrap_or_default());
 }
 
-/// An action that is none of the five.
+/// An action that is none.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("step {t}: expected one of the five actions, found `{found}`")]
+#[error("step {t}: expected an action such as `move_forward`, found `{found}`")]
 pub struct NoAction {
     t: i32,
     found: String,

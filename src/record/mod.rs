@@ -30,6 +30,7 @@
 
 mod continued;
 pub mod error;
+mod eyes;
 pub mod failures;
 pub mod fingerprint;
 pub mod folder_lock;

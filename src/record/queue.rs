@@ -102,6 +102,11 @@ impl<'a> Queue<'a> {
         Self { store, waiting: Mutex::new(waiting) }
     }
 
+    /// The experiments of all episodes, taken or not.
+    pub(super) fn experiments(&self) -> Vec<Experiment> {
+        self.waiting().experiments.keys().copied().collect()
+    }
+
     /// The next episode, with its lock.
     ///
     /// # Errors

@@ -56,7 +56,7 @@ pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
     Task {
         experiment: scene.experiment,
         stated_color: scene.stated_color.map(|color| color.name().to_owned()),
-        step_budget: i32::try_from(config.of(scene.experiment).episode.steps).unwrap_or(i32::MAX),
+        step_budget: i32::try_from(scene.budget(config)).unwrap_or(i32::MAX),
         seed: key.agent_seed(),
     }
 }
@@ -76,6 +76,7 @@ pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) ->
         body_color: scene.body_color.name().to_owned(),
         stated_color: scene.stated_color.map(|color| color.name().to_owned()),
         shown_color: scene.shown_color().map(|color| color.name().to_owned()),
+        start_distance: scene.start_distance(),
         distractors: Some(i8::try_from(scene.others.len()).unwrap_or(i8::MAX)),
         ..Episode::default()
     }
@@ -90,9 +91,11 @@ pub struct Played {
     pub model: Option<String>,
     /// Another id that came later in the episode, and the step of its first answer.
     pub other_model: Option<(i32, String)>,
+    /// Whether a hand has reached its mark, which ends an episode.
+    pub is_reached: bool,
 }
 
-/// Plays an episode to its end: `done`, or the last step of the budget.
+/// Plays an episode to its end: `done`, a mark that is reached, or the last step of the budget.
 ///
 /// # Errors
 /// When the recording is stopped, the agent is lost, or something fails that every episode needs.
@@ -104,7 +107,7 @@ pub async fn play(
     mut episode: Episode,
     observer: &mut dyn Observer,
 ) -> Result<Played, RecordError> {
-    let budget = i32::try_from(world.config().episode.steps).unwrap_or(i32::MAX);
+    let budget = i32::try_from(world.scene().budget(world.config())).unwrap_or(i32::MAX);
     let (mut bumped, mut history, mut thought) = (false, None, None);
     let (mut model, mut other_model): (Option<String>, _) = (None, None);
     for t in 1..=budget {
@@ -146,13 +149,14 @@ pub async fn play(
         bumped = world.act(action).bumped;
         stage.shares.visibility(start);
         row.extra.bumped = Some(bumped);
+        row.extra.target_distance = world.target_distance();
         observer.done(t, &row)?;
         episode.steps.push(row);
-        if action == Some(crate::trace::episode::Action::Done) {
+        if action == Some(crate::trace::episode::Action::Done) || world.is_reached() {
             break;
         }
     }
-    Ok(Played { episode, model, other_model })
+    Ok(Played { episode, model, other_model, is_reached: world.is_reached() })
 }
 
 fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 use futures_util::stream::{FuturesUnordered, StreamExt as _};
 
 use super::error::RecordError;
+use super::eyes::Eyes;
 use super::failures::{LostEpisode, lost_episode};
 use super::lock::EpisodeLock;
 use super::plan::{Key, Subject};
@@ -153,14 +154,14 @@ impl Recording<'_> {
     fn episodes(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
         let is_needed = self.settings.frames || self.player.looks();
         let start = Instant::now();
-        let eye =
-            is_needed.then(|| Camera::new(self.config)).transpose().map_err(RecordError::fatal)?.map(RefCell::new);
+        let eyes =
+            is_needed.then(|| Eyes::of(self.config, queue.experiments())).transpose().map_err(RecordError::fatal)?;
         self.shares.rendering(start);
         let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RecordError::fatal)?;
         let mut tally = Tally::default();
         runtime.block_on(async {
-            let play = |key, lock| {
-                let eye = eye.as_ref();
+            let play = |key: Key, lock| {
+                let eye = eyes.as_ref().map(|eyes| eyes.eye(self.config, key.experiment));
                 async move { (key, self.episode(key, lock, eye, unusable).await) }
             };
             let mut under_way = FuturesUnordered::new();
@@ -328,9 +329,9 @@ impl Recording<'_> {
 /// What the agent is told of the end; nothing where it, or everything, has failed.
 fn ended(played: &Result<Played, RecordError>) -> Option<Ended> {
     match played {
-        Ok(Played { episode, .. }) => {
-            let last = episode.steps.last().and_then(|step| step.action);
-            Some(if last == Some(Action::Done) { Ended::Done } else { Ended::Budget })
+        Ok(played @ Played { episode, .. }) => {
+            let is_done = episode.steps.last().is_some_and(|step| step.action == Some(Action::Done));
+            Some(if is_done || played.is_reached { Ended::Done } else { Ended::Budget })
         }
         Err(RecordError::Stopped) => Some(Ended::Stopped),
         Err(RecordError::Lost { .. } | RecordError::Fatal(_)) => None,

@@ -110,6 +110,8 @@ pub fn again<E: From<ReplayError>>(
             columns.extend(counts(step, &world, &visibility));
         }
         let bumped = world.act(step.action).bumped;
+        let distance = world.target_distance().map_or("none".to_owned(), |distance| distance.to_string());
+        columns.extend(step.extra.target_distance.map(|own| ("target_distance", own.to_string(), distance)));
         columns.extend(step.extra.bumped.map(|own| ("bumped", own.to_string(), bumped.to_string())));
         parted = parted.or_else(|| differs(episode, t, &columns));
     }
@@ -139,6 +141,8 @@ fn constants(episode: &Episode, scene: &Scene) -> Vec<Compared> {
     columns.extend(
         episode.shown_color.clone().map(|own| ("shown_color", own, shown.unwrap_or_else(|| "none".to_owned()))),
     );
+    let distance = scene.start_distance().map_or("none".to_owned(), |distance| distance.to_string());
+    columns.extend(episode.start_distance.map(|own| ("start_distance", own.to_string(), distance)));
     columns.extend(episode.distractors.map(|own| ("distractors", own.to_string(), scene.others.len().to_string())));
     columns
 }

@@ -18,6 +18,7 @@ pub mod config;
 pub mod contact_sheet;
 pub mod distractor;
 pub mod floor;
+mod hand;
 pub mod label_image;
 pub mod model;
 pub mod passage;

@@ -21,7 +21,7 @@ use super::angle::{Heading, Quaternion, sine_cosine};
 use super::body::{Figure, Piece, Pose};
 use super::config::{LightsConfig, WorldConfig};
 use super::scene::{MOST_CUBES, MOST_OTHERS, Scene};
-use crate::experiment::spec::MOST_PANES;
+use crate::experiment::spec::{MOST_MARKS, MOST_PANES, Part};
 
 /// Humanoids of a room: the agent's own body, then the others.
 pub const AGENTS: usize = 1 + MOST_OTHERS;
@@ -34,6 +34,12 @@ pub const EYE_CAMERA: &str = "eye";
 
 /// The camera that sees through a pane: the eye's mirror image, or the eye in the second room.
 pub const BEYOND_CAMERA: &str = "beyond";
+
+/// The body that is the hand, and the beginning of the names of its shapes.
+pub const HAND: &str = "hand";
+
+/// The square mark on the front of a body that stands still.
+pub const PATCH: &str = "patch";
 
 /// The camera that sees the room from above.
 pub const TOP_CAMERA: &str = "top";
@@ -82,6 +88,8 @@ pub enum Item {
     Cube(usize),
     /// A mark of the scene.
     Mark(usize),
+    /// The hand of a reaching task.
+    Hand,
 }
 
 /// What a stage is seen by.
@@ -102,6 +110,8 @@ pub struct Moment {
     pub bodies: [Option<Figure>; BODIES],
     /// Where the camera beyond a pane is and faces.
     pub beyond: Option<Pose>,
+    /// Where the hand is, m, where there is one.
+    pub hand: Option<[f64; 3]>,
 }
 
 /// Why MuJoCo could not build the world.
@@ -121,6 +131,8 @@ pub struct Stage {
     look: Look,
     /// The index of the camera beyond panes among the bodies that are moved from outside.
     beyond: usize,
+    /// The index of the hand among them.
+    hand: usize,
     /// The step whose marks are shown.
     marks_at: u32,
 }
@@ -159,10 +171,13 @@ impl Stage {
                 (mocap, model.body_pos()[body])
             })
             .collect();
-        let beyond = model.name_to_id(MjtObjBase::mjOBJ_BODY, BEYOND_CAMERA).expect("the room has this body");
-        let beyond = usize::try_from(model.body_mocapid()[beyond]).expect("it is moved from outside");
+        let moved = |name: &str| {
+            let body = model.name_to_id(MjtObjBase::mjOBJ_BODY, name).expect("the room has this body");
+            usize::try_from(model.body_mocapid()[body]).expect("it is moved from outside")
+        };
+        let (beyond, hand) = (moved(BEYOND_CAMERA), moved(HAND));
         let model = Arc::new(model);
-        Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, marks_at: 1 }
+        Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, hand, marks_at: 1 }
     }
 
     /// Shows the marks that are there at a step.
@@ -231,6 +246,7 @@ impl Stage {
             self.data.mocap_pos_mut()[self.beyond] = [pose.x, pose.y, config.eye.height];
             self.data.mocap_quat_mut()[self.beyond] = pose.heading.rotation().0;
         }
+        self.data.mocap_pos_mut()[self.hand] = moment.hand.unwrap_or([0.0, 0.0, FAR_BELOW]);
         self.data.forward();
     }
 
@@ -263,8 +279,13 @@ fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
         let part = name.split_once("_mark_")?.1;
         scene.marks.iter().position(|mark| mark.wearer == wearer && mark.part.name() == part)
     };
+    let front = || scene.marks.iter().position(|mark| mark.part == Part::Front);
     if let Some(pane) = numbered("pane") {
         Item::Pane(pane)
+    } else if name == PATCH {
+        Item::Mark(front().unwrap_or(MOST_MARKS - 1))
+    } else if name.starts_with(HAND) {
+        Item::Hand
     } else if let Some(agent) = numbered("agent") {
         marked(agent).map_or(Item::Agent(agent), Item::Mark)
     } else if numbered("double").is_some() {
@@ -363,8 +384,9 @@ fn add_eyes(spec: &mut MjSpec, config: &WorldConfig) {
         let camera = spec.body_mut(body).expect("every model has this body").add_camera();
         camera.set_name(name).expect("no other camera has this name");
         *camera.pos_mut() = place;
-        // Right is -y, up is z.
-        *camera.quat_mut() = [0.5, 0.5, -0.5, -0.5];
+        // Right is -y, up is z; then down by its pitch, about y.
+        let level = Quaternion([0.5, 0.5, -0.5, -0.5]);
+        *camera.quat_mut() = if eye.pitch > 0.0 { Quaternion::about_y(eye.pitch).after(level).0 } else { level.0 };
         camera.set_fovy(eye.fovy);
     }
     let top = spec.world_body_mut().add_camera();

@@ -20,6 +20,9 @@ use crate::experiment::{balance, number_of};
 /// Places that are drawn for one thing before all starts anew.
 const ATTEMPTS: u32 = 400;
 
+/// How far from the mirror one stands who starts before it, m.
+pub(super) const BEFORE_MIRROR: f64 = 2.0;
+
 /// Drawings of a whole scene before giving up.
 const DRAWINGS: u32 = 2000;
 
@@ -57,8 +60,8 @@ impl Scene {
             others: &scene.others,
             start: scene.start,
         };
-        let panes::Extras { stated_color, panes, marks } = layout.extras(purpose, seed, run);
-        Ok(Self { seed, run, stated_color, panes, marks, ..scene })
+        let panes::Extras { stated_color, panes, marks, hand } = layout.extras(purpose, seed, run);
+        Ok(Self { seed, run, stated_color, panes, marks, hand, ..scene })
     }
 }
 
@@ -151,7 +154,11 @@ impl Drawing<'_> {
             start,
             cubes,
             others,
+            hand: None,
         };
+        if layout.start == Start::BeforeMirror {
+            return Some(scene);
+        }
         reach::is_solvable(self.config, &scene, &plan).then_some(scene)
     }
 
@@ -246,6 +253,10 @@ impl Drawing<'_> {
 
     /// A place with some room around it, and a heading: one from which the mirror is out of view where that is asked for.
     fn start(&mut self, mirror: MirrorPlace, plan: &FloorPlan, start: Start) -> Option<Pose> {
+        if start == Start::BeforeMirror {
+            let [x, y] = mirror.center(self.config);
+            return Some(Pose { x, y, heading: mirror.heading() }.ahead(-BEFORE_MIRROR));
+        }
         let spot = self.body_spot(plan, &[])?;
         let blind: Vec<Heading> = (0..HEADINGS)
             .map(Heading::new)

@@ -14,6 +14,7 @@ use super::body::Pose;
 use super::config::WorldConfig;
 use super::floor::{FloorPlan, Square};
 use crate::base::hash;
+use crate::base::names::names;
 use crate::base::palette::Color;
 use crate::experiment::spec::{PaneKind, Part};
 
@@ -57,6 +58,9 @@ pub struct Scene {
     pub cubes: Vec<Cube>,
     /// The other agents.
     pub others: Vec<Other>,
+    /// The hand that is to reach the mark on the front, where the task is that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hand: Option<HandStart>,
 }
 
 /// A mirror or window on a wall.
@@ -91,6 +95,44 @@ pub struct WornMark {
     pub from_t: u32,
     /// Whose body: 0 is the agent's own, 1 the first of the others.
     pub wearer: usize,
+    /// Where on the front, where it is a patch there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch: Option<Patch>,
+}
+
+/// A square on the front of a body that stands still.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Patch {
+    /// Of its middle from that of the body, to the left of the body where positive, mm.
+    pub aside_mm: i32,
+    /// Of its middle above the floor, mm.
+    pub height_mm: i32,
+    /// Of its sides, mm.
+    pub edge_mm: i32,
+}
+
+/// How a hand looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum HandShape {
+    Ball,
+    Block,
+}
+
+names!(HandShape { Ball: "ball", Block: "block" });
+
+/// A hand at the start of an episode. Its places are whole steps from the mark, so that distances are exact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct HandStart {
+    /// Of its paint.
+    pub color: Color,
+    /// How it looks.
+    pub shape: HandShape,
+    /// Half of its width, mm.
+    pub half_mm: i32,
+    /// From the mark, in steps: away from the camera, to the left of the picture, up.
+    pub from_mark: [i32; 3],
 }
 
 /// Where the mirror hangs.
@@ -158,6 +200,34 @@ impl MirrorPlace {
     }
 }
 
+/// How far before the axis of a body the middle of a patch is, mm.
+const FRONT_MM: i32 = 125;
+
+impl Patch {
+    /// Its middle in the frame of a body: ahead, to the left, up; m.
+    pub fn place(self) -> [f64; 3] {
+        [FRONT_MM, self.aside_mm, self.height_mm].map(|length| f64::from(length) / 1000.0)
+    }
+
+    /// Its middle in the room, on the front of a body that stands there, m.
+    pub fn center(self, body: Pose) -> [f64; 3] {
+        in_room(body, self.place())
+    }
+}
+
+/// A place in the frame of a body (ahead, to the left, up) as one of the room, m.
+pub(super) fn in_room(body: Pose, [ahead, left, up]: [f64; 3]) -> [f64; 3] {
+    let [x, y] = body.heading.direction();
+    [body.x + ahead * x - left * y, body.y + ahead * y + left * x, up]
+}
+
+impl HandStart {
+    /// Half of its width, m.
+    pub fn half(self) -> f64 {
+        f64::from(self.half_mm) / 1000.0
+    }
+}
+
 impl Cube {
     /// What it covers of the floor.
     pub fn square(&self) -> Square {
@@ -192,10 +262,33 @@ impl Scene {
     /// compared in is not part of it: the mirror, and what is stated.
     pub fn fingerprint(&self, config: &WorldConfig) -> String {
         let Self { body_color, start, cubes, others, .. } = self;
-        let parts = json!([SCENE_VERSION, config.room, body_color, start, cubes, others]);
+        let mut parts = json!([SCENE_VERSION, config.room, body_color, start, cubes, others]);
+        if let (Some(hand), Some(parts)) = (self.hand, parts.as_array_mut()) {
+            // The mark to be reached is what the hand's place is told from.
+            parts.extend([json!(hand), json!(self.marks)]);
+        }
         let mut hash = hash::of_bytes(parts.to_string().as_bytes());
         hash.truncate(FINGERPRINT_DIGITS);
         hash
+    }
+
+    /// The Manhattan distance from the hand to the mark at the start, mm; `None` where there is no hand.
+    pub fn start_distance(&self) -> Option<i32> {
+        let (task, hand) = (self.experiment.hand?, self.hand?);
+        let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
+        i32::try_from(steps * task.step_mm).ok()
+    }
+
+    /// Steps after which an episode ends by itself: those of the way to the mark and some more, at most as many as the
+    /// experiment says, where there is a hand; else the configuration's.
+    pub fn budget(&self, config: &WorldConfig) -> u32 {
+        match (self.experiment.hand, self.hand) {
+            (Some(task), Some(hand)) => {
+                let way: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
+                (way + task.extra_steps).min(self.experiment.steps.unwrap_or(u32::MAX))
+            }
+            _ => config.of(self.experiment).episode.steps,
+        }
     }
 
     /// What does not move, as a plan.

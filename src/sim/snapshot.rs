@@ -2,6 +2,7 @@
 
 use mujoco_rs::prelude::MjtGeomBase;
 
+use super::angle::Quaternion;
 use super::body::Piece;
 use super::model::{AGENTS, EYE_CAMERA, Item, Stage};
 use super::world::World;
@@ -79,11 +80,9 @@ fn frames(world: &World) -> Vec<Placed> {
     });
     let eye = &world.config().eye;
     let ahead = world.pose().ahead(eye.forward);
-    let eye = Placed {
-        name: EYE_CAMERA.to_owned(),
-        position: [ahead.x, ahead.y, eye.height],
-        rotation: world.pose().heading.rotation().0,
-    };
+    let level = world.pose().heading.rotation();
+    let rotation = if eye.pitch > 0.0 { level.after(Quaternion::about_y(eye.pitch)) } else { level };
+    let eye = Placed { name: EYE_CAMERA.to_owned(), position: [ahead.x, ahead.y, eye.height], rotation: rotation.0 };
     pieces.chain([eye]).collect()
 }
 

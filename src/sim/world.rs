@@ -9,6 +9,7 @@ use super::body::{Figure, Pose};
 use super::config::WorldConfig;
 use super::distractor::Distractor;
 use super::floor::FloorPlan;
+use super::hand::{self, Place};
 use super::label_image::LabelImage;
 use super::model::{AGENTS, BODIES, Look, ModelError, Moment, Paint, Stage};
 use super::passage;
@@ -38,6 +39,8 @@ pub struct World {
     t: u32,
     /// Everybody as they were, the latest last: as far back as the latest pane shows.
     past: VecDeque<Vec<Figure>>,
+    /// The hand's steps from the mark, the latest last, beside `past`; empty where there is no hand.
+    hand: VecDeque<[i32; 3]>,
     stage: Stage,
     /// Per pane, what is seen through it.
     beyond: Vec<Stage>,
@@ -60,6 +63,7 @@ impl World {
             doubles: scene.panes.iter().map(|pane| pane.double.as_ref().map(Distractor::new)).collect(),
             t: 1,
             past: VecDeque::new(),
+            hand: scene.hand.iter().map(|hand| hand.from_mark).collect(),
             labels: OnceCell::new(),
             config,
             scene,
@@ -137,15 +141,50 @@ impl World {
         self.labels.get_or_init(cast)
     }
 
-    /// Does what the agent decided, then lets the others move. No action, and `done`, is standing still.
+    /// The Manhattan distance from the hand to the mark, mm; `None` where there is no hand.
+    pub fn target_distance(&self) -> Option<i32> {
+        let place = Place::of(&self.scene, &self.config)?;
+        i32::try_from(place.distance_mm(*self.hand.back()?)).ok()
+    }
+
+    /// Whether the hand has reached the mark.
+    pub fn is_reached(&self) -> bool {
+        Place::of(&self.scene, &self.config)
+            .zip(self.hand.back())
+            .is_some_and(|(place, from_mark)| place.is_reached(*from_mark))
+    }
+
+    /// Where the hand is, m; `None` where there is none.
+    pub fn hand(&self) -> Option<[f64; 3]> {
+        self.hand_back(0)
+    }
+
+    /// Where the hand was so many steps ago; before there is such a past, at the start.
+    fn hand_back(&self, steps: u32) -> Option<[f64; 3]> {
+        let at = self.hand.len().saturating_sub(1 + steps as usize);
+        Some(Place::of(&self.scene, &self.config)?.center(*self.hand.get(at)?))
+    }
+
+    /// Moves the hand by a step, if nothing is in the way.
+    fn reach(&mut self, step: [i32; 3]) -> Moved {
+        let Some(from) = self.hand.back().copied() else { return Moved::default() };
+        let to = [0, 1, 2].map(|axis| from[axis].saturating_add(step[axis]));
+        let is_free = Place::of(&self.scene, &self.config).is_some_and(|place| place.is_free(to));
+        self.hand.push_back(if is_free { to } else { from });
+        Moved { bumped: !is_free }
+    }
+
+    /// Does what the agent decided, then lets the others move. No action, `done`, and what the agent of this experiment
+    /// cannot do is standing still.
     pub fn act(&mut self, action: Option<Action>) -> Moved {
         let step = self.config.body.step_length;
         let moved = match action {
+            _ if self.scene.hand.is_some() => self.reach(action.and_then(hand::step).unwrap_or_default()),
             Some(Action::MoveForward) => self.walk(step),
             Some(Action::MoveBackward) => self.walk(-step),
             Some(Action::TurnLeft) => self.turn(1),
             Some(Action::TurnRight) => self.turn(-1),
-            Some(Action::Done) | None => {
+            Some(_) | None => {
                 self.ego.stand();
                 Moved::default()
             }
@@ -221,6 +260,9 @@ impl World {
         while self.past.len() > latest + 1 {
             self.past.pop_front();
         }
+        while self.hand.len() > latest + 1 {
+            self.hand.pop_front();
+        }
         let direct = self.moment(Look::Direct);
         self.stage.show(&self.config, &self.scene, &direct);
         for pane in 0..self.beyond.len() {
@@ -249,11 +291,11 @@ impl World {
 
     /// What a look sees of the bodies. Those that a pane does not show are hidden on its stage.
     fn moment(&self, look: Look) -> Moment {
-        let (figures, t, beyond) = match look {
-            Look::Direct => (self.figures(), self.t, None),
+        let (figures, t, beyond, late) = match look {
+            Look::Direct => (self.figures(), self.t, None, 0),
             Look::Through(pane) => {
                 let late = self.scene.panes[pane].delay;
-                (self.figures_in(pane), self.t.saturating_sub(late).max(1), Some(self.eye_beyond(pane)))
+                (self.figures_in(pane), self.t.saturating_sub(late).max(1), Some(self.eye_beyond(pane)), late)
             }
         };
         let mut bodies = [None; BODIES];
@@ -261,7 +303,7 @@ impl World {
         if let Look::Through(pane) = look {
             bodies[AGENTS + pane] = self.double(pane);
         }
-        Moment { t, bodies, beyond }
+        Moment { t, bodies, beyond, hand: self.hand_back(late) }
     }
 
     /// How far the agent's body could still walk before it touches the candidate of a colour, m; `None` where there is

@@ -42,7 +42,7 @@ pub struct Episode {
 /// One timestep.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Step {
-    /// One of the five actions; `None` where the reply gave none.
+    /// What was done; `None` where the reply gave none.
     pub action: Option<Action>,
     /// The self-attribution: a colour, `unknown`, or `None` where the reply gave none.
     pub self_color: Option<String>,
@@ -54,7 +54,7 @@ pub struct Step {
     pub extra: Extra,
 }
 
-/// The five actions of the study.
+/// What an agent can do: the five actions of the study, and the six of a hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Action {
     /// One step forward.
@@ -67,11 +67,42 @@ pub enum Action {
     TurnRight,
     /// The decision: the episode is over for the agent.
     Done,
+    /// The hand one step up.
+    HandUp,
+    /// The hand one step down.
+    HandDown,
+    /// The hand one step to the left of the picture.
+    HandLeft,
+    /// The hand one step to the right of the picture.
+    HandRight,
+    /// The hand one step away from the camera.
+    HandForward,
+    /// The hand one step towards the camera.
+    HandBackward,
 }
 
 impl Action {
-    /// All five, in the order of the documentation.
-    pub const ALL: [Self; 5] = [Self::MoveForward, Self::MoveBackward, Self::TurnLeft, Self::TurnRight, Self::Done];
+    /// Those of a body that walks, in the order of the documentation.
+    pub const WALK: [Self; 5] = [Self::MoveForward, Self::MoveBackward, Self::TurnLeft, Self::TurnRight, Self::Done];
+
+    /// Those of a hand, in the order of their numbers in a prompt.
+    pub const HAND: [Self; 6] =
+        [Self::HandUp, Self::HandDown, Self::HandLeft, Self::HandRight, Self::HandForward, Self::HandBackward];
+
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::MoveForward,
+        Self::MoveBackward,
+        Self::TurnLeft,
+        Self::TurnRight,
+        Self::Done,
+        Self::HandUp,
+        Self::HandDown,
+        Self::HandLeft,
+        Self::HandRight,
+        Self::HandForward,
+        Self::HandBackward,
+    ];
 
     /// The name in the `action` column.
     pub const fn name(self) -> &'static str {
@@ -81,6 +112,12 @@ impl Action {
             Self::TurnLeft => "turn_left",
             Self::TurnRight => "turn_right",
             Self::Done => "done",
+            Self::HandUp => "hand_up",
+            Self::HandDown => "hand_down",
+            Self::HandLeft => "hand_left",
+            Self::HandRight => "hand_right",
+            Self::HandForward => "hand_forward",
+            Self::HandBackward => "hand_backward",
         }
     }
 

@@ -15,6 +15,7 @@ use crate::profile::{Profiles, chance_interval};
 use crate::recorded::{record_all, record_in, score};
 
 mod battery;
+mod reach;
 
 const ALL: [&str; 5] = ["E1", "E2", "E3", "E4", "E5"];
 const METRICS: [&str; 9] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "MGD", "SC", "AR_SC"];

@@ -9,7 +9,7 @@ use mirrorstats::trace::identification::normal_form;
 const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
 
 fn read(raw: &str) -> reply::Reading {
-    reply::read(raw, &Experiment::E1.reply, Ending::Whole)
+    reply::read(raw, &Experiment::E1, Ending::Whole)
 }
 
 #[test]
@@ -41,9 +41,9 @@ fn a_valid_reply_is_taken_as_it_is() {
 #[test]
 fn the_exploration_family_has_no_cube() {
     let without = GOOD.replace(r#" "selected_cube": "none","#, "");
-    let reading = reply::read(&without, &Experiment::E5.reply, Ending::Whole);
+    let reading = reply::read(&without, &Experiment::E5, Ending::Whole);
     assert_eq!((reading.status, reading.selected_cube), (Status::Ok, None));
-    assert_eq!(reply::read(GOOD, &Experiment::E5.reply, Ending::Whole).status, Status::SchemaInvalid);
+    assert_eq!(reply::read(GOOD, &Experiment::E5, Ending::Whole).status, Status::SchemaInvalid);
     assert_eq!(read(&without).status, Status::SchemaInvalid);
 }
 
@@ -217,9 +217,9 @@ fn what_is_not_valid_is_no_decision() {
 
 #[test]
 fn an_ending_counts_before_the_text() {
-    assert_eq!(reply::read(GOOD, &Experiment::E1.reply, Ending::Truncated).status, Status::Truncated);
-    assert_eq!(reply::read(GOOD, &Experiment::E1.reply, Ending::Refused).status, Status::Refusal);
-    assert_eq!(reply::read("", &Experiment::E1.reply, Ending::Truncated).status, Status::Truncated);
+    assert_eq!(reply::read(GOOD, &Experiment::E1, Ending::Truncated).status, Status::Truncated);
+    assert_eq!(reply::read(GOOD, &Experiment::E1, Ending::Refused).status, Status::Refusal);
+    assert_eq!(reply::read("", &Experiment::E1, Ending::Truncated).status, Status::Truncated);
 }
 
 #[test]

@@ -32,7 +32,7 @@ impl Pose {
             Some(Action::MoveBackward) => self.advance(-0.25),
             Some(Action::TurnLeft) => self.yaw = (self.yaw + 30.0) % 360.0,
             Some(Action::TurnRight) => self.yaw = (self.yaw + 330.0) % 360.0,
-            Some(Action::Done) | None => {}
+            _ => {}
         }
     }
 

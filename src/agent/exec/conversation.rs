@@ -80,7 +80,7 @@ impl Conversation {
 
     /// The reply in a text, read as that of a model.
     pub(in crate::agent) fn read(&self, text: String, usage: Usage) -> Reply {
-        reply::read(&text, &self.task.experiment.reply, Ending::Whole).into_reply(text, usage)
+        reply::read(&text, &self.task.experiment, Ending::Whole).into_reply(text, usage)
     }
 }
 

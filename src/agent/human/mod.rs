@@ -172,5 +172,5 @@ impl HumanAgent {
 /// A reply, read as that of a model.
 fn read(text: &str, task: &Task, latency_ms: i32) -> Reply {
     let usage = Usage { latency_ms: Some(latency_ms), ..Usage::default() };
-    reply::read(text, &task.experiment.reply, Ending::Whole).into_reply(text.to_owned(), usage)
+    reply::read(text, &task.experiment, Ending::Whole).into_reply(text.to_owned(), usage)
 }

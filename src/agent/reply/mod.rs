@@ -25,7 +25,8 @@ pub(in crate::agent) use surrogates::without_lone_surrogates;
 
 use super::{Reply, Status, Usage, Words, prompt};
 use crate::base::palette::Color;
-use crate::experiment::spec::ReplyKey;
+use crate::experiment::Spec;
+use crate::experiment::spec::{Actions, ReplyKey};
 use crate::trace::colors::spelling;
 use crate::trace::episode::Action;
 use crate::trace::identification;
@@ -104,8 +105,8 @@ impl Reading {
     }
 }
 
-/// Reads the text of a reply that should have these keys.
-pub fn read(raw: &str, keys: &[ReplyKey], ending: Ending) -> Reading {
+/// Reads the text of a reply that should have the keys and the actions of an experiment.
+pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reading {
     match ending {
         Ending::Refused => return Reading::without_decision(Status::Refusal, None),
         Ending::Truncated => return Reading::without_decision(Status::Truncated, None),
@@ -116,7 +117,7 @@ pub fn read(raw: &str, keys: &[ReplyKey], ending: Ending) -> Reading {
         Ok(found) => found,
         Err(fault) => return without_object(fault),
     };
-    match decision(&object, keys) {
+    match decision(&object, &experiment.reply, experiment.actions) {
         Ok(reading) if repairs.is_empty() => reading,
         Ok(reading) => Reading { status: Status::Repaired, repairs, ..reading },
         Err(fault) => Reading::without_decision(Status::SchemaInvalid, Some(fault)),
@@ -134,7 +135,7 @@ fn without_object(fault: NoObject) -> Reading {
 }
 
 /// The decision in an object that has exactly these keys.
-fn decision(object: &object::Object, keys: &[ReplyKey]) -> Result<Reading, String> {
+fn decision(object: &object::Object, keys: &[ReplyKey], actions: Actions) -> Result<Reading, String> {
     if let Some(key) = object.repeated_key() {
         return Err(format!("the key \"{key}\" stands twice"));
     }
@@ -148,8 +149,11 @@ fn decision(object: &object::Object, keys: &[ReplyKey]) -> Result<Reading, Strin
         Some(other) => Err(format!("\"{}\" is {}, expected a string", key.name(), kind(other))),
     };
     let action = text(ReplyKey::Action)?.unwrap_or_default();
-    let action = prompt::action(&action)
-        .ok_or_else(|| format!("\"action\" is \"{action}\", expected one of w, s, a, d, done"))?;
+    let known = prompt::actions(actions);
+    let action = prompt::action(&action).filter(|action| known.contains(action)).ok_or_else(|| {
+        let letters: Vec<&str> = known.iter().map(|action| prompt::letter(*action)).collect();
+        format!("\"action\" is \"{action}\", expected one of {}", letters.join(", "))
+    })?;
     let color = |key| text(key)?.map(|name| color_or_none(key, &name)).transpose();
     let selected_cube = color(ReplyKey::SelectedCube)?;
     let mark_report = color(ReplyKey::Mark)?;
@@ -220,10 +224,13 @@ pub fn structure_hash(keys: &[ReplyKey]) -> String {
 
 /// The JSON Schema of a reply for people, with descriptions and the values that are read. No agent gets it; see
 /// [`structure`].
-pub fn schema(title: &str, keys: &[ReplyKey]) -> Value {
+pub fn schema(title: &str, keys: &[ReplyKey], actions: Actions) -> Value {
     let description = |key: ReplyKey| match key {
         ReplyKey::ViewDescription => "What the image shows.",
         ReplyKey::Reasoning => "Why this action.",
+        ReplyKey::Action if actions == Actions::Hand => {
+            "The hand: 1 = up, 2 = down, 3 = left, 4 = right, 5 = away from the camera, 6 = towards the camera."
+        }
         ReplyKey::Action => {
             "w = forward, s = backward, a = left by 30 degrees, d = right by 30 degrees, done = task complete."
         }
@@ -236,7 +243,9 @@ pub fn schema(title: &str, keys: &[ReplyKey]) -> Value {
     for key in keys {
         let mut property = json!({ "type": "string", "description": description(*key) });
         match key {
-            ReplyKey::Action => property["enum"] = json!(["w", "s", "a", "d", "done"]),
+            ReplyKey::Action => {
+                property["enum"] = prompt::actions(actions).iter().map(|action| prompt::letter(*action)).collect();
+            }
             ReplyKey::SelectedCube | ReplyKey::Mark => {
                 let colors = Color::ALL.iter().map(|color| color.name());
                 property["enum"] = colors.chain(["none"]).collect();

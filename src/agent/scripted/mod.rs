@@ -7,6 +7,7 @@
 //! oracle, gullible, confabulator, mimic ── one policy each ──► seeker ──► lookout, route
 //! random, guesser, frozen                                     │
 //!                                                         knowledge ──► room, landmarks, reflection ──► agent::perception
+//! with a hand: oracle ──► reacher, mimic ──► chaser ──► hand_view ──► agent::perception
 //! ```
 //!
 //! Rule: a scripted agent perceives what a model would get and no more, the frame and the words around it, and is a function
@@ -14,10 +15,12 @@
 //! wall of a rectangular room) and its own body (where its eye is, how stout it is), but not where anything stands.
 
 pub mod chance;
+pub mod chaser;
 pub mod confabulator;
 pub mod frozen;
 pub mod guesser;
 pub mod gullible;
+pub mod hand_view;
 pub mod knowledge;
 pub mod landmarks;
 pub mod lookout;
@@ -25,6 +28,7 @@ pub mod mimic;
 pub mod oracle;
 pub mod policy;
 pub mod random;
+pub mod reacher;
 pub mod reflection;
 pub mod room;
 pub mod route;
@@ -83,9 +87,16 @@ impl Scripted {
         }
     }
 
-    /// The agent at the start of an episode.
+    /// Whether it plays where a hand is to reach a mark.
+    pub const fn has_hand(self) -> bool {
+        matches!(self, Self::Oracle | Self::Mimic | Self::Random | Self::Frozen)
+    }
+
+    /// The agent at the start of an episode. Where a hand is to reach a mark, `oracle` and `mimic` are other minds.
     pub fn agent(self, task: &Task) -> Box<dyn Agent> {
         let script: Box<dyn Script> = match self {
+            Self::Oracle if task.experiment.hand.is_some() => Box::new(reacher::Reacher::default()),
+            Self::Mimic if task.experiment.hand.is_some() => Box::new(chaser::Chaser),
             Self::Oracle => Box::new(seeker::Seeker::new(task, oracle::Oracle)),
             Self::Random => Box::new(random::Random::new(task)),
             Self::Guesser => Box::new(guesser::Guesser::new(task)),
@@ -112,6 +123,10 @@ impl crate::agent::Player for Scripted {
     }
 
     fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
+        if task.experiment.hand.is_some() && !self.has_hand() {
+            let message = format!("`{}` has no hand: use oracle, mimic, random or frozen", self.name());
+            return Err(crate::agent::Lost::because(message));
+        }
         Ok(Self::agent(*self, &task))
     }
 }
@@ -138,8 +153,8 @@ impl crate::agent::Player for Renamed {
         crate::agent::Player::looks(&self.script)
     }
 
-    fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
-        Ok(self.script.agent(&task))
+    fn agent(&self, task: Task, id: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
+        crate::agent::Player::agent(&self.script, task, id)
     }
 }
 
@@ -187,8 +202,8 @@ impl Agent for Puppet {
             status: Status::Ok,
             repairs: Vec::new(),
             action,
-            self_color: Some(name(claim, "unknown")),
             // Not every prompt has these keys.
+            self_color: self.experiment.asks_for_identification().then(|| name(claim, "unknown")),
             selected_cube: self.experiment.asks_for_cube().then(|| name(selected, "none")),
             mark_report: self.experiment.asks_for_mark().then(|| name(mark, "none")),
             words,

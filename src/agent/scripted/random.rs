@@ -19,7 +19,7 @@
 //! | MARK_REPORT | hardly ever |
 //! | MARK_FALSE | high: it mostly reports a colour at once |
 
-use crate::agent::{Observation, Task, Words};
+use crate::agent::{Observation, Task, Words, prompt};
 use crate::base::palette::Color;
 use crate::experiment::Experiment;
 use crate::trace::episode::Action;
@@ -50,7 +50,7 @@ impl Random {
 
 impl Script for Random {
     fn decide(&mut self, _: &Observation) -> Move {
-        let action = self.chance.pick(&Action::ALL);
+        let action = self.chance.pick(prompt::actions(self.experiment.actions));
         let claim = self.color_or_none();
         let selects = action == Some(Action::Done) && self.experiment.asks_for_cube();
         let selected = if selects { self.chance.pick(&Color::ALL) } else { None };

@@ -104,7 +104,8 @@ pub fn after(pose: Pose, action: Action, step: f64) -> Pose {
         Action::MoveBackward => Pose { place: pose.place.ahead(pose.heading, -step), ..pose },
         Action::TurnLeft => Pose { heading: pose.heading.left(), ..pose },
         Action::TurnRight => Pose { heading: pose.heading.right(), ..pose },
-        Action::Done => pose,
+        // A hand moves no body.
+        _ => pose,
     }
 }
 

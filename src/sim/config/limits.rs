@@ -30,6 +30,7 @@ fn ranges(config: &WorldConfig) -> Vec<Limit> {
         ("eye.forward", eye.forward, 0.12, 0.25),
         ("eye.height", eye.height, 1.4, 1.58),
         ("eye.fovy", eye.fovy, 30.0, 115.0),
+        ("eye.pitch", eye.pitch, 0.0, 0.0),
         ("eye.width", f64::from(eye.width), 16.0, 1920.0),
         ("eye.height_px", f64::from(eye.height_px), 12.0, 1440.0),
         ("eye.samples", f64::from(eye.samples), 0.0, 16.0),

@@ -18,7 +18,7 @@ use crate::base::budget::Limit;
 use crate::base::hash;
 use crate::base::input;
 use crate::experiment::Experiment;
-use crate::experiment::spec::{Cubes, Others};
+use crate::experiment::spec::{Camera, Cubes, Others};
 
 const DEFAULT: &str = include_str!("../../../assets/world/default.toml");
 
@@ -114,6 +114,9 @@ pub struct EyeConfig {
     pub height: f64,
     /// The vertical field of view, degrees.
     pub fovy: f64,
+    /// How far below the horizon it looks, degrees; only experiments whose camera is not the eye have it.
+    #[serde(default, skip_serializing_if = "is_level")]
+    pub pitch: f64,
     /// Pixels in a row.
     pub width: u32,
     /// Rows.
@@ -126,6 +129,11 @@ pub struct EyeConfig {
     pub stacks: u32,
     /// Divisions of a flat part.
     pub quads: u32,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+fn is_level(pitch: &f64) -> bool {
+    pitch.abs() <= 0.0
 }
 
 /// The light.
@@ -284,6 +292,13 @@ impl WorldConfig {
         if let Some(millimetres) = experiment.step_length_mm {
             world.body.step_length = metres(millimetres);
         }
+        if let Some(picture) = experiment.view {
+            (world.eye.width, world.eye.height_px) = (picture.width, picture.height);
+            world.eye.fovy = f64::from(picture.fovy);
+        }
+        if experiment.camera == Camera::Behind {
+            (world.eye.forward, world.eye.height, world.eye.pitch) = BEHIND;
+        }
         let Others { least, most, twin_percent, .. } = experiment.layout.others;
         put(&mut world.others.least, least);
         put(&mut world.others.most, most);
@@ -308,6 +323,10 @@ impl WorldConfig {
         self.eye.width as usize * self.eye.height_px as usize
     }
 }
+
+/// The camera behind the body: before its axis and above the floor, m, and below the horizon, degrees: the slope of the
+/// line from there to a point 1.7 m above where the body stands, 0.3 m down on 1.1 m ahead.
+const BEHIND: (f64, f64, f64) = (-1.1, 2.0, 15.255_118_703_057_775);
 
 /// A length in metres.
 pub fn metres(millimetres: u32) -> f64 {

@@ -5,7 +5,7 @@ use mujoco_rs::prelude::MjtObjBase;
 
 use super::super::angle::{Heading, Quaternion};
 use super::super::config::WorldConfig;
-use super::super::scene::{Cube, HungPane, Scene};
+use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
 use super::{AGENTS, Item, Look, group};
 use crate::base::palette::Color;
 use crate::experiment::spec::{MOST_MARKS, PaneKind};
@@ -44,7 +44,13 @@ pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, s
                 let color = own.and_then(|(_, pane)| pane.double).map(|double| double.color);
                 paint_body(model, geom, color, group::THINGS);
             }
-            Item::Mark(_) => model.geom_group_mut()[geom] = group::HIDDEN,
+            Item::Mark(at) => {
+                model.geom_group_mut()[geom] = group::HIDDEN;
+                if let Some(mark) = scene.marks.get(at) {
+                    put_patch(model, geom, scene, mark);
+                }
+            }
+            Item::Hand => put_hand(model, geom, scene.hand.as_ref().filter(|_| !is_window)),
         }
     }
 }
@@ -57,7 +63,7 @@ pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: 
     };
     for (geom, item) in items.iter().enumerate() {
         let Item::Mark(at) = *item else { continue };
-        let mark = &scene.marks[at];
+        let Some(mark) = scene.marks.get(at) else { continue };
         let is_there = mark.from_t <= t && agent_color(mark.wearer, scene, pane).is_some();
         model.geom_group_mut()[geom] = match (is_there, mark.wearer) {
             (false, _) => group::HIDDEN,
@@ -112,7 +118,8 @@ fn number(item: Item) -> usize {
         Item::Agent(agent) => 1 + agent,
         Item::Cube(cube) => 1 + AGENTS + cube,
         Item::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
-        Item::Double => 1 + AGENTS + MOST_CUBES + MOST_MARKS,
+        Item::Hand => 1 + AGENTS + MOST_CUBES + MOST_MARKS,
+        Item::Double => 2 + AGENTS + MOST_CUBES + MOST_MARKS,
     }
 }
 
@@ -137,6 +144,7 @@ pub fn labelled([red, green]: [u8; 2]) -> Option<Labelled> {
         _ if at < AGENTS => Item::Agent(at),
         _ if at < AGENTS + MOST_CUBES => Item::Cube(at - AGENTS),
         _ if at < AGENTS + MOST_CUBES + MOST_MARKS => Item::Mark(at - AGENTS - MOST_CUBES),
+        _ if at == AGENTS + MOST_CUBES + MOST_MARKS => Item::Hand,
         _ => Item::Double,
     }))
 }
@@ -188,6 +196,36 @@ fn put_cube(model: &mut MjModel, geom: usize, cube: Option<&Cube>) {
     // Of the sphere about it, by which a renderer leaves out what is not in view.
     model.geom_rbound_mut()[geom] = half * 2.0;
     model.geom_rgba_mut()[geom] = paint(cube.color.rgb());
+}
+
+/// Half of the depth of a patch, m.
+const HALF_PATCH: f64 = 0.004;
+
+/// Puts the mark on the front of the body that stands still; other marks are where the body's are.
+fn put_patch(model: &mut MjModel, geom: usize, scene: &Scene, mark: &WornMark) {
+    let Some(patch) = mark.patch else { return };
+    let half = f64::from(patch.edge_mm) / 2000.0;
+    model.geom_pos_mut()[geom] = patch.center(scene.start);
+    model.geom_quat_mut()[geom] = scene.start.heading.rotation().0;
+    model.geom_size_mut()[geom] = [HALF_PATCH, half, half];
+    model.geom_rbound_mut()[geom] = half * 2.0;
+}
+
+/// Shows the shape of the scene's hand.
+fn put_hand(model: &mut MjModel, geom: usize, hand: Option<&HandStart>) {
+    let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+    let Some(hand) = hand.filter(|hand| name.ends_with(hand.shape.name())) else {
+        model.geom_group_mut()[geom] = group::HIDDEN;
+        return;
+    };
+    let half = hand.half();
+    model.geom_group_mut()[geom] = group::THINGS;
+    model.geom_size_mut()[geom] = match hand.shape {
+        HandShape::Ball => [half, 0.0, 0.0],
+        HandShape::Block => [half; 3],
+    };
+    model.geom_rbound_mut()[geom] = half * 2.0;
+    model.geom_rgba_mut()[geom] = paint(hand.color.rgb());
 }
 
 /// Shows a part of a body in a colour; places for marks that the scene has not stay hidden.

@@ -6,15 +6,19 @@
 use super::super::angle::{HEADINGS, Heading};
 use super::super::body::Pose;
 use super::super::config::{WorldConfig, metres};
+use super::super::hand::Place;
 use super::super::rng::Rng;
-use super::super::scene::{Cube, HungPane, MirrorPlace, Other, WornMark, floor_plan};
+use super::super::scene::{Cube, HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, WornMark, floor_plan};
 use super::{Drawing, is_in_view};
 use crate::base::palette::Color;
 use crate::experiment::Experiment;
-use crate::experiment::spec::{BodyShown, Mark, MarkColor, Paint, Pane, PaneKind, Stated, Wall, Wearer};
+use crate::experiment::spec::{BodyShown, Hand, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer};
 
 /// Places that are drawn for a pane until one is out of view at the start.
 const PLACES: u32 = 40;
+
+/// Places that are drawn for a hand until one is free and as far from the mark as asked for.
+const STARTS: u32 = 2000;
 
 /// Apart from the layout's stream.
 const PURPOSE: u64 = 0x7061_6e65_7300;
@@ -36,6 +40,7 @@ pub(super) struct Extras {
     pub stated_color: Option<Color>,
     pub panes: Vec<HungPane>,
     pub marks: Vec<WornMark>,
+    pub hand: Option<HandStart>,
 }
 
 impl Layout<'_> {
@@ -61,7 +66,34 @@ impl Layout<'_> {
         for (at, mark) in (16_u64..).zip(&self.experiment.marks) {
             marks.extend(self.worn(*mark, &marks, &mut stream(at)));
         }
-        Extras { stated_color, panes, marks }
+        let hand = self.experiment.hand.and_then(|hand| self.hand(hand, &marks, &mut stream(32)));
+        Extras { stated_color, panes, marks, hand }
+    }
+
+    /// A hand that is neither of the body's colour nor of its mark's, and starts on the near side of the mirror, free of
+    /// the body.
+    fn hand(&self, task: Hand, marks: &[WornMark], chance: &mut Rng) -> Option<HandStart> {
+        let taken = |color: Color| color == self.body_color || marks.iter().any(|mark| mark.color == color);
+        let palette = &self.experiment.layout.palette;
+        let free: Vec<Color> = palette.iter().copied().filter(|color| !taken(*color)).collect();
+        let color = if free.is_empty() { chance.one_of(palette) } else { chance.one_of(&free) };
+        let shape = chance.one_of(&HandShape::ALL);
+        let half_mm = 10 * chance.between(4, 5);
+        let patch = marks.iter().find_map(|mark| mark.patch)?;
+        let draw = |chance: &mut Rng| HandStart {
+            color,
+            shape,
+            half_mm,
+            from_mark: [chance.between(2, 6), chance.between(-5, 5), chance.between(-4, 5)],
+        };
+        let fits = |hand: &HandStart| {
+            let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
+            let is_there = Place { task, patch, hand: *hand, config: self.config, body: self.start };
+            (task.least..=task.most).contains(&steps) && is_there.is_free(hand.from_mark)
+        };
+        let drawn = (0..STARTS).map(|_| draw(chance)).find(fits);
+        // Straight ahead of the mark there is always room, though not always for as many steps.
+        Some(drawn.unwrap_or_else(|| HandStart { from_mark: [2, 0, 0], ..draw(chance) }))
     }
 
     /// The colour of another candidate; any other one where there is none.
@@ -102,7 +134,8 @@ impl Layout<'_> {
         // A wide pane moves towards the middle of its wall, a high one to where it fits.
         let slack = (room.size / 2.0 - width / 2.0).max(0.0);
         let place = MirrorPlace { offset: place.offset.clamp(-slack, slack), ..place };
-        let center_height = mirror.center_height.clamp(height / 2.0, room.height - height / 2.0);
+        let center_height = pane.bottom_mm.map_or(mirror.center_height, |bottom| metres(bottom) + height / 2.0);
+        let center_height = center_height.clamp(height / 2.0, room.height - height / 2.0);
         let color = match pane.color {
             Paint::Own => self.body_color,
             Paint::Other => another,
@@ -159,6 +192,11 @@ impl Layout<'_> {
             MarkColor::Named(_) | MarkColor::Random if drawn.is_empty() => return None,
             MarkColor::Named(_) | MarkColor::Random => chance.one_of(drawn),
         };
-        Some(WornMark { part: mark.part, color, from_t: mark.from_t, wearer })
+        let patch = (mark.part == Part::Front).then(|| Patch {
+            aside_mm: 20 * chance.between(-2, 2),
+            height_mm: 50 * chance.between(19, 23),
+            edge_mm: 20 * chance.between(5, 8),
+        });
+        Some(WornMark { part: mark.part, color, from_t: mark.from_t, wearer, patch })
     }
 }

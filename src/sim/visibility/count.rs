@@ -36,6 +36,9 @@ pub struct Visibility {
     /// Of bodies that a pane alone shows: in place of the own one, or behind a window.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub double_px: u32,
+    /// The hand of a reaching task.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hand: Option<Sighting>,
     /// Each mark, in the order of the scene.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub marks: Vec<Sighting>,
@@ -104,6 +107,7 @@ pub(super) fn of_tally(tally: &[u32; 256], scene: &Scene) -> Visibility {
         cubes,
         mark_px: sum(|pane| pane.mark_px),
         double_px: sum(|pane| pane.double_px),
+        hand: scene.hand.map(|hand| counts.sighting(Item::Hand, hand.color)),
         marks,
         panes: if is_plain { Vec::new() } else { panes },
     }
@@ -148,7 +152,7 @@ impl Counts<'_> {
         let other_px = (1..=self.scene.others.len()).map(body).sum::<u32>();
         let cubes = (0..self.scene.cubes.len()).map(|at| through(Item::Cube(at))).sum::<u32>();
         PaneSighting {
-            px: through(Item::Room) + self_px + other_px + double_px + cubes,
+            px: through(Item::Room) + self_px + other_px + double_px + cubes + through(Item::Hand),
             self_px,
             other_px,
             double_px,

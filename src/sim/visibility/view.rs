@@ -17,8 +17,9 @@ pub enum Shown {
     Through(usize, Item),
 }
 
-/// Codes of what is seen directly, and of what is seen through each pane: the room, then bodies, cubes, marks, the double.
-const CODES: usize = 1 + AGENTS + MOST_CUBES + MOST_MARKS + 1;
+/// Codes of what is seen directly, and of what is seen through each pane: the room, then bodies, cubes, marks, the hand, the
+/// double.
+const CODES: usize = 1 + AGENTS + MOST_CUBES + MOST_MARKS + 2;
 
 impl Shown {
     /// One byte for it.
@@ -52,6 +53,7 @@ const fn index(item: Item) -> usize {
         Item::Agent(agent) => 1 + agent,
         Item::Cube(cube) => 1 + AGENTS + cube,
         Item::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
+        Item::Hand => CODES - 2,
         Item::Double => CODES - 1,
     }
 }
@@ -61,7 +63,8 @@ const fn of_index(at: usize) -> Item {
         0 => Item::Room,
         _ if at < 1 + AGENTS => Item::Agent(at - 1),
         _ if at < 1 + AGENTS + MOST_CUBES => Item::Cube(at - 1 - AGENTS),
-        _ if at < CODES - 1 => Item::Mark(at - 1 - AGENTS - MOST_CUBES),
+        _ if at < CODES - 2 => Item::Mark(at - 1 - AGENTS - MOST_CUBES),
+        _ if at == CODES - 2 => Item::Hand,
         _ => Item::Double,
     }
 }
@@ -111,11 +114,12 @@ impl View {
         let (sine, cosine) = sine_cosine(eye.fovy / 2.0);
         let tangent = sine / cosine;
         let wide = tangent * f64::from(eye.width) / f64::from(eye.height_px);
+        let (down, level) = if eye.pitch > 0.0 { sine_cosine(eye.pitch) } else { (0.0, 1.0) };
         Self {
             origin: [ahead.x, ahead.y, eye.height],
-            forward: [x, y, 0.0],
+            forward: [level * x, level * y, -down],
             right: [wide * y, -wide * x, 0.0],
-            up: [0.0, 0.0, tangent],
+            up: [tangent * down * x, tangent * down * y, tangent * level],
             width,
             height,
         }
@@ -213,7 +217,7 @@ mod tests {
 
     #[test]
     fn every_code_comes_back() {
-        let bodies = (0..AGENTS).map(Item::Agent).chain([Item::Room, Item::Double]);
+        let bodies = (0..AGENTS).map(Item::Agent).chain([Item::Room, Item::Hand, Item::Double]);
         let items: Vec<Item> =
             bodies.chain((0..MOST_CUBES).map(Item::Cube)).chain((0..MOST_MARKS).map(Item::Mark)).collect();
         let through = (0..MOST_PANES).flat_map(|pane| items.iter().map(move |item| Shown::Through(pane, *item)));

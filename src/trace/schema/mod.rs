@@ -22,8 +22,8 @@ pub(crate) use field_access::Value;
 pub const SCHEMA_VERSION: u32 = 2;
 
 /// The names that `action` takes.
-pub const ACTIONS: [&str; 5] = {
-    let mut names = [""; 5];
+pub const ACTIONS: [&str; 11] = {
+    let mut names = [""; 11];
     let mut i = 0;
     while i < names.len() {
         names[i] = Action::ALL[i].name();

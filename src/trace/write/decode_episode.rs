@@ -66,7 +66,7 @@ fn value_at(values: &ArrayRef, row: usize) -> Option<Value<'_>> {
 
 fn misfit(column: &Column, value: Option<Value<'_>>) -> NotAnEpisode {
     match (value, column.stored.kind()) {
-        (Some(Value::Text(name)), _) => fault(column, "one of the five actions", name),
+        (Some(Value::Text(name)), _) => fault(column, "a known action", name),
         (_, Kind::Bool) => fault(column, "true or false", "null"),
         (_, Kind::Int) => fault(column, "an integer", "none"),
         _ => fault(column, "a value", "none"),

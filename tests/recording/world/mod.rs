@@ -6,6 +6,7 @@ mod motion;
 mod paint;
 mod panes;
 mod poses;
+mod reach;
 mod scenes;
 mod switching;
 mod truth;

@@ -1,0 +1,166 @@
+//! The reaching task: where body, camera, mirror, mark and hand are, what stops the hand, and that only the mirror shows
+//! the mark.
+
+use mirrorstats::experiment::Experiment;
+use mirrorstats::sim::camera::LabelCamera;
+use mirrorstats::sim::config::WorldConfig;
+use mirrorstats::sim::model::Item;
+use mirrorstats::sim::scene::Scene;
+use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
+use mirrorstats::sim::world::World;
+use mirrorstats::trace::episode::Action;
+
+use crate::harness::need;
+
+fn named(name: &str) -> Experiment {
+    Experiment::parse(name).unwrap()
+}
+
+fn world(name: &str, seed: i32, run: i32) -> World {
+    let config = WorldConfig::default();
+    World::new(&config, Scene::draw(&config, named(name), seed, run).unwrap()).unwrap()
+}
+
+fn study() -> impl Iterator<Item = (i32, i32)> {
+    (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)))
+}
+
+#[test]
+fn the_camera_looks_over_the_head_of_a_body_two_metres_before_the_mirror() {
+    for (seed, run) in study() {
+        let world = world("reach-mirror", seed, run);
+        let (scene, config) = (world.scene(), world.config());
+        let pane = scene.panes[0];
+        assert!((pane.place.distance(scene.start.spot(), config) - 2.0).abs() < 1e-9);
+        assert!(pane.place.aside(scene.start.spot()).abs() < 1e-9);
+        assert_eq!(scene.start.heading, pane.place.heading());
+        assert_eq!((pane.width, pane.height, pane.center_height), (2.0, 2.0, 1.0));
+        let eye = world.snapshot().frames.into_iter().find(|frame| frame.name == "eye").unwrap();
+        let [x, y] = scene.start.heading.direction();
+        let behind = [scene.start.x - 1.1 * x, scene.start.y - 1.1 * y, 2.0];
+        assert!(eye.position.iter().zip(behind).all(|(found, expected)| (found - expected).abs() < 1e-9));
+        // Its line of sight meets the axis of the body at 1.7 m.
+        let drop = config.eye.pitch.to_radians().tan() * 1.1;
+        assert!((2.0 - drop - 1.7).abs() < 1e-9, "{drop}");
+    }
+}
+
+#[test]
+fn only_the_mirror_shows_the_mark_and_the_hand_shows_in_it() {
+    for (seed, run) in study() {
+        let visibility = world("reach-mirror", seed, run).visibility();
+        let mark = visibility.marks[0];
+        assert!(mark.direct_px == 0 && mark.mirror_px >= 30, "seed {seed}, run {run}: {mark:?}");
+        let hand = visibility.hand.unwrap();
+        assert!(hand.mirror_px >= 20, "seed {seed}, run {run}: {hand:?}");
+        let bare = world("reach-no-mirror", seed, run).visibility();
+        assert_eq!((bare.marks[0].direct_px, bare.marks[0].mirror_px, bare.mirror_px), (0, 0, 0));
+    }
+}
+
+#[test]
+fn the_census_is_what_is_drawn_and_what_mujocos_rays_meet() {
+    need::drawing();
+    let config = WorldConfig::default().of(named("reach-mirror"));
+    let mut eye = LabelCamera::new(&config, 640, 480).unwrap();
+    for run in 1..=2 {
+        let mut world = world("reach-mirror", 1, run);
+        world.act(Some(Action::HandUp));
+        let (cast, drawn) = (labels(&world, 640, 480), eye.labels(&world).unwrap());
+        for shown in [Shown::Direct(Item::Hand), Shown::Through(0, Item::Hand), Shown::Through(0, Item::Mark(0))] {
+            let count = |codes: &[u8]| codes.iter().filter(|code| **code == shown.code()).count();
+            let (cast, drawn) = (count(&cast.codes), count(&drawn.codes));
+            assert!(cast.abs_diff(drawn) <= 12 + cast / 8, "{shown:?}: {cast} cast, {drawn} drawn");
+        }
+        let (small, rays) = (labels(&world, 80, 60), labels_by_mujoco(&world, 80, 60).unwrap());
+        let differing = small.codes.iter().zip(&rays.codes).filter(|(one, other)| one != other).count();
+        assert!(differing <= 4, "{differing} pixels");
+    }
+}
+
+#[test]
+fn the_hand_moves_a_step_at_a_time_and_the_body_and_the_mirror_stop_it() {
+    let mut world = world("reach-mirror", 1, 1);
+    let mut distance = world.target_distance().unwrap();
+    let start = world.scene().start_distance().unwrap();
+    assert_eq!(distance, start);
+    assert_eq!(world.scene().budget(world.config()), u32::try_from(start / 100 + 10).unwrap());
+    for (action, axis, sign) in [(Action::HandUp, 2, 1.0), (Action::HandDown, 2, -1.0)] {
+        let before = world.hand().unwrap();
+        assert!(!world.act(Some(action)).bumped);
+        let after = world.hand().unwrap();
+        assert!((after[axis] - before[axis] - sign * 0.1).abs() < 1e-9);
+        let now = world.target_distance().unwrap();
+        assert_eq!((now - distance).abs(), 100);
+        distance = now;
+    }
+    // Away from the camera, into the mirror: stopped at its surface, and told.
+    let moved = (0..40).take_while(|_| !world.act(Some(Action::HandForward)).bumped).count();
+    assert!((10..20).contains(&moved), "{moved}");
+    let stopped = world.target_distance();
+    assert!(world.act(Some(Action::HandForward)).bumped);
+    assert_eq!(world.target_distance(), stopped);
+    // What a walking body does moves nothing here.
+    let pose = world.pose();
+    assert!(!world.act(Some(Action::MoveForward)).bumped);
+    assert!(!world.act(None).bumped);
+    assert_eq!((world.pose(), world.target_distance()), (pose, stopped));
+}
+
+#[test]
+fn the_mark_is_reached_by_whole_steps_and_never_entered() {
+    for (seed, run) in study() {
+        let mut world = world("reach-mirror", seed, run);
+        let [ahead, left, up] = world.scene().hand.unwrap().from_mark;
+        let way = |action: Action, steps: i32| std::iter::repeat_n(action, steps.unsigned_abs() as usize);
+        let sideways = if left > 0 { Action::HandRight } else { Action::HandLeft };
+        let height = if up > 0 { Action::HandDown } else { Action::HandUp };
+        for action in way(sideways, left).chain(way(height, up)).chain(way(Action::HandBackward, ahead - 1)) {
+            assert!(!world.is_reached());
+            assert!(!world.act(Some(action)).bumped, "seed {seed}, run {run}");
+        }
+        assert!(world.is_reached());
+        assert_eq!(world.target_distance(), Some(100));
+        assert!(world.act(Some(Action::HandBackward)).bumped, "the body is there");
+    }
+}
+
+#[test]
+fn arms_and_levels_have_the_same_scenes() {
+    let config = WorldConfig::default();
+    for (seed, run) in study() {
+        let draw = |name| Scene::draw(&config, named(name), seed, run).unwrap();
+        let all = [
+            "reach-scheme",
+            "reach-mirror",
+            "reach-hand",
+            "reach-bare",
+            "reach-no-mirror",
+            "reach-decoy",
+            "reach-late",
+        ];
+        let prints: Vec<String> = all.into_iter().map(|name| draw(name).fingerprint(&config)).collect();
+        assert!(prints.iter().all(|print| *print == prints[0]), "{prints:?}");
+        let hand = draw("reach-mirror").hand.unwrap();
+        let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
+        assert!((6..=12).contains(&steps), "{hand:?}");
+    }
+}
+
+#[test]
+fn a_late_mirror_shows_the_hand_as_it_was() {
+    let mut late = world("reach-late", 1, 1);
+    let hand = |world: &World| -> Vec<usize> {
+        let code = Shown::Through(0, Item::Hand).code();
+        let codes = world.labels().codes.iter().enumerate();
+        codes.filter(|(_, found)| **found == code).map(|(at, _)| at).collect()
+    };
+    let start = hand(&late);
+    assert!(!start.is_empty());
+    for step in 1..=3 {
+        late.act(Some(Action::HandUp));
+        assert_eq!(hand(&late), start, "step {step}");
+    }
+    late.act(Some(Action::HandUp));
+    assert_ne!(hand(&late), start);
+}

@@ -31,7 +31,7 @@ impl Random {
 
 /// How long a mutant may take: decoders of some hundred rows take less than a millisecond, and the library some seconds to
 /// skip a field that says it has 2^31 elements, which the program refuses before.
-const LONGEST: Duration = Duration::from_secs(120);
+const LONGEST: Duration = Duration::from_mins(2);
 
 /// Ends the campaign at a mutant that takes long, before memory ends.
 fn watch(under_way: &Mutex<(Instant, Vec<u8>)>) {

@@ -45,7 +45,7 @@ struct Asked {
 impl Asked {
     fn open(self) -> PyResult<mirrorstats::Study> {
         let lost = if self.lost_as_failure { LostAs::Failure } else { LostAs::Nothing };
-        let (definitions, filter) = (self.definitions, self.r#where);
+        let (definitions, filter) = (self.definitions.map(Into::into), self.r#where);
         let question = Question { definitions, filter, metrics: self.metrics, by: self.by, pool: self.pool, lost };
         let study = mirrorstats::Study::open(self.paths).map_err(error::of_study)?;
         let study = study.asked(question).map_err(error::of_study)?;
@@ -71,8 +71,8 @@ impl Study {
     }
 
     #[getter]
-    fn definitions(&self) -> &str {
-        self.inner.definitions_name()
+    fn definitions(&self) -> String {
+        self.inner.definitions_name().to_string_lossy().into_owned()
     }
 
     #[getter]
@@ -102,7 +102,8 @@ impl Study {
     #[pyo3(signature = (name, style))]
     fn table(&self, py: Python<'_>, name: &str, style: String) -> PyResult<ReportTable> {
         py.detach(|| {
-            let report = self.inner.report(&ReportOptions { style, figures: false }).map_err(error::of_study)?;
+            let report =
+                self.inner.report(&ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)?;
             Ok(ReportTable::new(report.table(name).map_err(error::of_study)?.clone()))
         })
     }
@@ -110,7 +111,8 @@ impl Study {
     #[pyo3(signature = (style))]
     fn tables(&self, py: Python<'_>, style: String) -> PyResult<Vec<ReportTable>> {
         py.detach(|| {
-            let report = self.inner.report(&ReportOptions { style, figures: false }).map_err(error::of_study)?;
+            let report =
+                self.inner.report(&ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)?;
             Ok(report.tables.into_iter().map(ReportTable::new).collect())
         })
     }
@@ -125,7 +127,7 @@ impl Study {
     #[pyo3(signature = (out, style, figures))]
     fn report(&self, py: Python<'_>, out: &str, style: String, figures: bool) -> PyResult<Answer> {
         let (written, notes) = py.detach(|| {
-            let options = ReportOptions { style, figures };
+            let options = ReportOptions { style: style.into(), figures };
             let out = Path::new(out);
             self.inner.check_folder(out, &options).map_err(error::of_study)?;
             let report = self.inner.report(&options).map_err(error::of_study)?;

@@ -54,7 +54,9 @@ pub fn explained(experiment: Experiment) -> String {
         Camera::Eye => None,
         Camera::Behind => Some("behind the body and above it, which looks over its head"),
     };
-    camera.into_iter().for_each(|words| line("camera", words.to_owned()));
+    if let Some(words) = camera {
+        line("camera", words.to_owned());
+    }
     if let Some(Picture { width, height, fovy }) = experiment.view {
         line("view", format!("{width} x {height} pixels, {fovy} degrees high"));
     }

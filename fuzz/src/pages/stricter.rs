@@ -42,6 +42,8 @@ pub enum Reason {
     /// A character of which one text has the first bytes and the next text the rest. The library looks at all texts of a
     /// delta-encoded page at once.
     Texts,
+    /// More than a file of its size may hold: a budget, which the library does not have.
+    Budget,
     /// Integers without a sign beyond the largest one of 64 bits with a sign: metrics cannot say them.
     LargeInteger,
 }
@@ -60,7 +62,7 @@ pub enum Depth {
 }
 
 /// What the program says it expected, its numbers left out; the reason that it is; how far the mutant came.
-const EXPECTED: [(&str, Reason, Depth); 23] = [
+const EXPECTED: [(&str, Reason, Depth); 25] = [
     ("a page header", Reason::HeaderOfOneMeaning, Depth::Header),
     ("a page header that has one meaning", Reason::HeaderOfOneMeaning, Depth::Header),
     ("a size that # bytes can hold", Reason::SizeOfPage, Depth::Header),
@@ -83,6 +85,8 @@ const EXPECTED: [(&str, Reason, Depth); 23] = [
     ("as many values as its levels say", Reason::ValuesOfPage, Depth::Values),
     ("the number of its values", Reason::HeaderOfDelta, Depth::Values),
     ("lengths from #", Reason::LengthsOfTexts, Depth::Values),
+    ("at most # bytes inflated from a file of its size", Reason::Budget, Depth::Header),
+    ("at most # bytes of texts in the rows of a file of its size", Reason::Budget, Depth::Values),
     ("a number up to #", Reason::LargeInteger, Depth::Values),
 ];
 

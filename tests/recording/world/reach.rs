@@ -68,7 +68,7 @@ fn the_census_is_what_is_drawn_and_what_mujocos_rays_meet() {
         world.act(Some(Action::HandUp));
         let (cast, drawn) = (labels(&world, 640, 480), eye.labels(&world).unwrap());
         for shown in [Shown::Direct(Item::Hand), Shown::Through(0, Item::Hand), Shown::Through(0, Item::Mark(0))] {
-            let count = |codes: &[u8]| codes.iter().filter(|code| **code == shown.code()).count();
+            let count = |codes: &[u8]| codes.iter().map(|code| u32::from(*code == shown.code())).sum::<u32>();
             let (cast, drawn) = (count(&cast.codes), count(&drawn.codes));
             assert!(cast.abs_diff(drawn) <= 12 + cast / 8, "{shown:?}: {cast} cast, {drawn} drawn");
         }

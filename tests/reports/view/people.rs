@@ -25,14 +25,14 @@ impl People {
         command.args(["record", "--agent", "human", "--model", "people", "--experiment", "E1", "--seeds", "1"]);
         command.args(["--out", "runs", "--human-port", "0", "--participants", codes]).args(more);
         let mut process = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-        let mut lines = BufReader::new(process.stderr.take().unwrap());
+        let mut output = BufReader::new(process.stderr.take().unwrap());
         let mut links = Vec::new();
         while links.len() < codes.split(',').count() {
             let mut line = String::new();
-            assert!(lines.read_line(&mut line).unwrap() > 0, "the recording ended before it told its links");
+            assert!(output.read_line(&mut line).unwrap() > 0, "the recording ended before it told its links");
             links.extend(line.trim().split_once(" plays at ").map(|(_, link)| link.to_owned()));
         }
-        Self { process: Running(process), links, _rest: lines }
+        Self { process: Running(process), links, _rest: output }
     }
 
     fn person(&self, at: usize) -> Person {

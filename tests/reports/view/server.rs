@@ -108,7 +108,7 @@ fn the_list_has_the_values_that_score_writes() {
             && score["TSA"] == 0
             && score["MCR"] == 1
     };
-    assert_eq!(some["total"].as_u64().unwrap() as usize, scores.iter().filter(is_wanted).count());
+    assert_eq!(some["total"], scores.iter().filter(is_wanted).count());
     let fault = server.get("/api/episodes?where=TSAA%20%3D%200");
     assert_eq!(fault.status, 400);
     assert!(fault.text().contains("TSA"), "{}", fault.text());

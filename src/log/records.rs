@@ -161,6 +161,7 @@ impl<R: Read + Seek> Records<R> {
     }
 
     /// The chunk that begins at a place, with its frame; `None` where no chunk does.
+    #[cfg(feature = "view")]
     pub(super) fn chunk_at(&mut self, at: u64) -> io::Result<Option<Vec<u8>>> {
         match self.frame(at)?.filter(|frame| frame.opcode == op::CHUNK) {
             Some(frame) => self.whole(at, frame).map(Some),

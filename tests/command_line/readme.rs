@@ -16,10 +16,15 @@ use crate::harness::need;
 use crate::harness::program::{PROGRAM, clean};
 
 /// Command lines that are not run, by how they begin, and why.
-const NOT_RUN: [(&str, &str); 9] = [
+const NOT_RUN: [(&str, &str); 14] = [
     ("make demo", "builds the program"),
     ("make test", "runs this test"),
     ("scripts/get-mujoco.sh", "downloads a library; `make test` runs it before"),
+    ("pip install ", "installs a wheel; `scripts/test-wheel.sh` does"),
+    ("mirrorstats report \"$(", "a command of the wheel; `scripts/test-wheel.sh` runs it"),
+    ("mirrorstats view runs  ", "serves until it is ended; `tests/reports/view` opens it"),
+    ("mirrorstats view runs --against", "serves until it is ended; `tests/reports/view` opens such a one"),
+    ("mirrorstats record --agent human", "waits for people; `tests/reports/view` plays"),
     ("cargo run ", "builds the program"),
     ("mirrorstats record --agent oracle --experiment two-mirrors", "takes minutes; `make calibrate` does as much"),
     ("mirrorstats score --engine spark", "needs a cluster; `tests/spark` starts one"),

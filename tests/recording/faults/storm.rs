@@ -30,23 +30,29 @@ fn record(home: &Path) -> Command {
 struct Started {
     child: Child,
     reads: bool,
+    /// Whether it goes on until it is killed.
+    serves: bool,
 }
 
 /// Starts a process that records or, one time in three, reads.
 fn start(home: &Path, at: usize, draws: &mut Draws) -> Started {
     let reads = at > 0 && draws.below(3) == 0;
+    let mut serves = false;
     let mut command = if reads {
         let words = [
             format!("score runs -o s{at}.csv"),
             format!("report runs --no-figures --out r{at}"),
             "info runs".to_owned(),
+            "view runs --no-open --port 0".to_owned(),
         ];
-        typed(home, &words[draws.below(3)])
+        let which = draws.below(if cfg!(feature = "view") { 4 } else { 3 });
+        serves = which == 3;
+        typed(home, &words[which])
     } else {
         record(home)
     };
     let said = fs::File::create(home.join(format!("said{at}"))).unwrap();
-    Started { child: command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(said).spawn().unwrap(), reads }
+    Started { child: command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(said).spawn().unwrap(), reads, serves }
 }
 
 /// Waits for the end of a process, which must come.
@@ -99,9 +105,9 @@ impl Bench {
             processes.push(start(home, at, &mut draws));
             sleep(Duration::from_millis(draws.below(40) as u64));
         }
-        // All but one in three are killed, each after a while.
+        // All but one in three are killed, each after a while, and all that serve.
         for process in &mut processes {
-            if draws.below(3) > 0 {
+            if draws.below(3) > 0 || process.serves {
                 sleep(Duration::from_millis(draws.below(50) as u64));
                 let _ = process.child.kill();
             }

@@ -121,8 +121,14 @@ fn ours(mutant: &Mutant) -> Result<ArrayRef, Refusal> {
             Err(refusal) => assert!(!is_whole, "the short cut reads what is refused: {refusal:?}"),
         }
     }
-    if whole.is_ok() {
-        column.verified().expect("what is read has headers and checksums that hold");
+    if whole.is_ok()
+        && let Err(refusal) = column.verified()
+    {
+        // A page behind the last row gives nothing, and only `validate` looks into it. The reference refuses any other page
+        // whose checksum does not hold.
+        let of_checksum =
+            refusal.expected.as_deref().is_some_and(|expected| expected.starts_with("bytes with the CRC-32 "));
+        assert!(of_checksum, "what is read has headers that hold: {refusal:?}");
     }
     whole
 }

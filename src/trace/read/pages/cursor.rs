@@ -267,9 +267,9 @@ impl Cursor {
             (Physical::BOOLEAN, Encoding::RLE) => Stored::Hybrid(Hybrid::new(prefixed(&values)?.0, 1, rows)?),
             (Physical::BOOLEAN, _) => return Err(Unsupported),
             (_, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) if self.dictionary.is_some() => {
-                // A page of nothing but nulls may have no width at all.
-                let (width, keys) = if values.is_empty() { (0, values) } else { (values[0], values.slice(1..)) };
-                Stored::Hybrid(Hybrid::new(keys, width, rows)?)
+                // A page of nothing but nulls may have no width at all: the library says whether it takes that.
+                let width = *values.first().ok_or(Unsupported)?;
+                Stored::Hybrid(Hybrid::new(values.slice(1..), width, rows)?)
             }
             _ => return Err(Unsupported),
         };

@@ -16,7 +16,7 @@ use crate::harness::need;
 use crate::harness::program::{PROGRAM, clean};
 
 /// Command lines that are not run, by how they begin, and why.
-const NOT_RUN: [(&str, &str); 14] = [
+const NOT_RUN: [(&str, &str); 16] = [
     ("make demo", "builds the program"),
     ("make test", "runs this test"),
     ("scripts/get-mujoco.sh", "downloads a library; `make test` runs it before"),
@@ -24,6 +24,14 @@ const NOT_RUN: [(&str, &str); 14] = [
     ("mirrorstats report \"$(", "a command of the wheel; `scripts/test-wheel.sh` runs it"),
     ("mirrorstats view runs  ", "serves until it is ended; `tests/reports/view` opens it"),
     ("mirrorstats view runs --against", "serves until it is ended; `tests/reports/view` opens such a one"),
+    (
+        "mirrorstats record --agent oracle --experiment E1 --out runs",
+        "takes a minute; `scripts/test-wheel.sh` does as much",
+    ),
+    (
+        "mirrorstats record --agent oracle --experiment reach-mirror",
+        "takes minutes; the calibration of agents does as much",
+    ),
     ("mirrorstats record --agent human", "waits for people; `tests/reports/view` plays"),
     ("cargo run ", "builds the program"),
     ("mirrorstats record --agent oracle --experiment two-mirrors", "takes minutes; `make calibrate` does as much"),

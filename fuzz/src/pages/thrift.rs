@@ -76,13 +76,13 @@ impl Header {
         let (mut at, mut last) = (0, 0);
         loop {
             let (field, wire) = field(data, &mut at, last)?;
-            // The library takes these fields by their numbers: an integer of another width is read the same.
+            // The library takes these fields by their numbers: whatever type stands with it, an integer is read.
             match (field, wire) {
                 (_, 0) => return Some((header, at)),
-                (1, 3..=6) => header.kind = read_varint(data, &mut at)?,
-                (2, 3..=6) => header.whole = read_varint(data, &mut at)?,
-                (3, 3..=6) => header.stored = read_varint(data, &mut at)?,
-                (4, 3..=6) => header.crc = Some(read_varint(data, &mut at)?),
+                (1, _) => header.kind = read_varint(data, &mut at)?,
+                (2, _) => header.whole = read_varint(data, &mut at)?,
+                (3, _) => header.stored = read_varint(data, &mut at)?,
+                (4, _) => header.crc = Some(read_varint(data, &mut at)?),
                 (5..=8, 12) => header.read_own(data, &mut at)?,
                 _ => skip(data, &mut at, wire, 0)?,
             }

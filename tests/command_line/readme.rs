@@ -106,8 +106,10 @@ fn output_of(command: &str, folder: &Path) -> String {
     format!("{out}{said}{code}")
 }
 
-/// Without what is another one each time: how long a recording took.
+/// Without what is another one each time: how long a recording took, and how far it was meanwhile.
 fn lasting(output: &str) -> String {
+    let progress = Regex::new(r"(?m)^[0-9]+ of [0-9]+ episodes?, .* a second.*\n").unwrap();
+    let output = &progress.replace_all(output, "");
     let took = Regex::new(r"in [0-9.]+ m?s( \([^)]*\))?").unwrap();
     let shares = Regex::new(r"(?m)^time: .*$").unwrap();
     shares.replace_all(&took.replace_all(output, "in [a time]"), "time: [shares]").into_owned()

@@ -90,6 +90,23 @@ impl Header {
         }
     }
 
+    /// The checksum that a header declares, whatever stands behind it: the library goes on where [`Header::read`] gives up.
+    pub fn checksum(data: &[u8]) -> Option<i64> {
+        let (mut at, mut last) = (0, 0);
+        loop {
+            let (field, wire) = field(data, &mut at, last)?;
+            match (field, wire) {
+                (_, 0) | (5.., _) => return None,
+                (4, _) => return read_varint(data, &mut at),
+                (1..=3, _) => {
+                    read_varint(data, &mut at)?;
+                }
+                _ => skip(data, &mut at, wire, 0)?,
+            }
+            last = field;
+        }
+    }
+
     fn read_own(&mut self, data: &[u8], at: &mut usize) -> Option<()> {
         let mut last = 0;
         loop {

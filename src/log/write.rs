@@ -86,6 +86,8 @@ pub struct EpisodeLog {
     out: Writer<Out>,
     channels: Channels,
     sequence: u32,
+    /// Whether each step ends a chunk.
+    is_read_meanwhile: bool,
 }
 
 type Out = BufWriter<NewFile>;
@@ -108,7 +110,7 @@ impl EpisodeLog {
         let file = NewFile::create(path).map_err(LogError::io("write", path))?;
         let mut out = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
         let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
-        let mut log = Self { path: path.to_owned(), out, channels, sequence: 0 };
+        let mut log = Self { path: path.to_owned(), out, channels, sequence: 0, is_read_meanwhile: true };
         let channel = log.channels.episode;
         // What its rows hash to is not known before its end, and stands there.
         let head = Episode { episode_hash: None, ..head.clone() };
@@ -146,7 +148,13 @@ impl EpisodeLog {
     pub fn decided(&mut self, time: u64, row: &Decision) -> Result<(), LogError> {
         let channel = self.channels.decision;
         self.json(channel, time, row)?;
-        self.flush()
+        if self.is_read_meanwhile { self.flush() } else { Ok(()) }
+    }
+
+    /// The same in chunks of many steps, which take less room, for a log that nobody reads before it has ended.
+    #[must_use]
+    pub fn in_large_chunks(self) -> Self {
+        Self { is_read_meanwhile: false, ..self }
     }
 
     /// Ends the chunk of a step, so that others can read it while the episode goes on.

@@ -51,6 +51,12 @@ impl Log {
         Ok(Self { seed, run, repetition, file })
     }
 
+    /// The same for a log that nobody reads before it has ended: it takes less room.
+    #[must_use]
+    pub fn in_large_chunks(self) -> Self {
+        Self { file: self.file.in_large_chunks(), ..self }
+    }
+
     /// Adds what is seen before a step.
     ///
     /// # Errors

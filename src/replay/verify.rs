@@ -164,7 +164,7 @@ impl Player<'_> {
         save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
     ) -> Result<(Option<Divergence>, Counts), E> {
         let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
-        let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode));
+        let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
         let mut log = log.transpose().map_err(unwritten)?;
         let mut counts = Counts::default();
         let divergence = again(&self.trace.recipe, self.eye, episode, |t, world, visibility, step| {

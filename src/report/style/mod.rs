@@ -1,7 +1,7 @@
 //! Presentation as data: which tables there are, their columns and order, how a cell prints, what is emphasised.
 //!
 //! Rule: a style changes how a number looks, never the number. Styles are TOML, checked against the catalog
-//! before anything prints. `default` and `paper` are built in; any other name is a file. [`read`] reads them.
+//! before anything prints. `default` and `paper` are built in; any other name is a file. `read.rs` reads them.
 
 mod read;
 pub mod shape;

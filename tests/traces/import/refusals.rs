@@ -29,7 +29,8 @@ fn check(values: Value, expected: &str, found: &str, help: &str) {
 }
 
 const SEE: &str = "`mirrorstats schema step` prints what a step may hold";
-const ACTIONS: &str = "one of move_forward, move_backward, turn_left, turn_right, done, or null";
+const ACTIONS: &str = "one of move_forward, move_backward, turn_left, turn_right, done, hand_up, hand_down, \
+     hand_left, hand_right, hand_forward, hand_backward, or null";
 
 #[test]
 fn a_value_of_another_type_or_out_of_range() {

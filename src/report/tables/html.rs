@@ -4,8 +4,9 @@
 
 use std::fmt::Write as _;
 
+use super::marked_up;
 use crate::base::escape::visible;
-use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, Table, Value};
+use crate::report::table::{Cell, Column, Row, Table};
 
 /// How numbers stand.
 const NUMBER: &str = " style=\"text-align: right; white-space: nowrap\"";
@@ -51,19 +52,7 @@ fn push_row(text: &mut String, row: &Row, table: &Table) {
 
 /// Numbers need no escaping, only the style's word for undefined does.
 fn spell(cell: &Cell, table: &Table) -> String {
-    let (estimate, detail) = cell.value.parts(&escape(&table.undefined));
-    let mark = if cell.is_marked { DAGGER.to_string() } else { String::new() };
-    let is_whole = matches!(cell.value, Value::MeanSe { .. });
-    let (inside, after) = match detail {
-        Some(detail) if is_whole => (format!("{estimate} {detail}"), mark),
-        Some(detail) => (estimate, format!("{mark} {detail}")),
-        None => (estimate, mark),
-    };
-    match cell.emphasis {
-        Emphasis::Plain => format!("{inside}{after}"),
-        Emphasis::Bold => format!("<b>{inside}</b>{after}"),
-        Emphasis::Underline => format!("<u>{inside}</u>{after}"),
-    }
+    marked_up(cell, &escape(&table.undefined), ["<b>", "</b>"], ["<u>", "</u>"])
 }
 
 /// Text in which nothing is markup, nor mathematics to a notebook.

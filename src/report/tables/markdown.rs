@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use unicode_width::UnicodeWidthStr;
 
+use super::marked_up;
 use crate::base::escape::visible;
-use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
+use crate::report::table::{Cell, Column, Row, RowGroup, Table};
 
 /// The whole table with its caption above.
 pub fn render(table: &Table) -> String {
@@ -68,19 +69,7 @@ fn cells(row: &Row, table: &Table) -> Vec<String> {
 
 /// Numbers need no escaping, only the style's word for undefined does.
 fn spell(cell: &Cell, table: &Table) -> String {
-    let (estimate, detail) = cell.value.parts(&escape(&table.undefined));
-    let mark = if cell.is_marked { DAGGER.to_string() } else { String::new() };
-    let is_whole = matches!(cell.value, Value::MeanSe { .. });
-    let (inside, after) = match detail {
-        Some(detail) if is_whole => (format!("{estimate} {detail}"), mark),
-        Some(detail) => (estimate, format!("{mark} {detail}")),
-        None => (estimate, mark),
-    };
-    match cell.emphasis {
-        Emphasis::Plain => format!("{inside}{after}"),
-        Emphasis::Bold => format!("**{inside}**{after}"),
-        Emphasis::Underline => format!("<ins>{inside}</ins>{after}"),
-    }
+    marked_up(cell, &escape(&table.undefined), ["**", "**"], ["<ins>", "</ins>"])
 }
 
 /// Text in which nothing is markup, a link, a mention or mathematics.

@@ -5,8 +5,7 @@
 
 use super::body::Pose;
 use super::config::{WorldConfig, metres};
-use super::placement::BEFORE_MIRROR;
-use super::scene::{HandStart, Patch, Scene, in_room};
+use super::scene::{BEFORE_MIRROR, HandStart, Patch, Scene, in_room};
 use crate::experiment::spec::{Hand, Part};
 use crate::trace::episode::Action;
 

@@ -12,16 +12,13 @@ use super::body::Pose;
 use super::config::{WorldConfig, metres};
 use super::floor::{FloorPlan, distance};
 use super::rng::Rng;
-use super::scene::{Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
+use super::scene::{BEFORE_MIRROR, Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
 use crate::base::palette::Color;
 use crate::experiment::spec::{Colors, Cubes, Start, Wall};
 use crate::experiment::{balance, number_of};
 
 /// Places that are drawn for one thing before all starts anew.
 const ATTEMPTS: u32 = 400;
-
-/// How far from the mirror one stands who starts before it, m.
-pub(super) const BEFORE_MIRROR: f64 = 2.0;
 
 /// Drawings of a whole scene before giving up.
 const DRAWINGS: u32 = 2000;

@@ -26,6 +26,9 @@ pub const SCENE_VERSION: u32 = 2;
 /// Digits of the fingerprint of a scene: enough for any study.
 const FINGERPRINT_DIGITS: usize = 16;
 
+/// How far from the mirror one stands who starts before it, m.
+pub(super) const BEFORE_MIRROR: f64 = 2.0;
+
 /// The most other agents that a world holds.
 pub const MOST_OTHERS: usize = 6;
 

@@ -47,7 +47,8 @@ export async function sight(episode) {
   const map = make("figure", { class: "above" });
   const places = { show: () => {} };
   let at = 1;
-  if (!episode.frames) shown.replaceChildren(make("p", { class: "quiet missing" }, "No frames: they are in no log among the files that were opened."));
+  const missing = episode.log_fault ? `No frames: ${episode.log_fault}` : "No frames: they are in no log among the files that were opened.";
+  if (!episode.frames) shown.replaceChildren(make("p", { class: "quiet missing" }, missing));
   if (episode.log) {
     ask("map", new URLSearchParams({ id: episode.id }))
       .then((told) => told, () => ({ shapes: [], steps: [] }))

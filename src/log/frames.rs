@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use mcap::records::Record;
 use serde::Serialize;
 
-use super::chunk::{Budgets, Unpacked, inside};
+use super::chunk::{Budgets, inside};
 use super::error::LogError;
 use super::message::EpisodeMessage;
 use super::read::{Event, event, png};
@@ -98,14 +98,8 @@ impl LogIndex {
     pub fn step(&self, episode_id: &str, time: u64) -> Result<Option<Moment>, LogError> {
         let mut records = records(&self.path)?;
         for chunk in self.chunks.iter().filter(|chunk| (chunk.first..=chunk.last).contains(&time)) {
-            let bytes = records.chunk_at(chunk.at).map_err(LogError::io("read", &self.path))?;
-            let bytes = bytes.ok_or_else(|| self.damaged("its index names a chunk that is not there"))?;
-            let budgets = Budgets::new(records.bytes());
-            let messages = || inside(&bytes, &budgets).map_err(|fault| self.damaged(&fault));
-            if self.is_of_another(messages()?, episode_id) {
-                continue;
-            }
-            if let Some(moment) = moment(messages()?, &self.topics, time) {
+            let messages = self.messages(&mut records, chunk, episode_id)?;
+            if let Some(moment) = moment(messages, &self.topics, time) {
                 return Ok(Some(moment));
             }
         }
@@ -121,14 +115,7 @@ impl LogIndex {
         let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(found) };
         let mut records = records(&self.path)?;
         for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
-            let bytes = records.chunk_at(chunk.at).map_err(LogError::io("read", &self.path))?;
-            let bytes = bytes.ok_or_else(|| self.damaged("its index names a chunk that is not there"))?;
-            let budgets = Budgets::new(records.bytes());
-            let messages = || inside(&bytes, &budgets).map_err(|fault| self.damaged(&fault));
-            if self.is_of_another(messages()?, episode_id) {
-                continue;
-            }
-            for record in messages()? {
+            for record in self.messages(&mut records, chunk, episode_id)? {
                 if let Record::Message { header, data } = record
                     && times.contains(&header.log_time)
                     && self.is_of(header.channel_id, topic::SCENE)
@@ -140,13 +127,28 @@ impl LogIndex {
         Ok(found)
     }
 
+    /// The records of a chunk; none where it is of other episodes.
+    fn messages(
+        &self,
+        records: &mut Records<BufReader<File>>,
+        chunk: &Chunk,
+        episode_id: &str,
+    ) -> Result<Vec<Record<'static>>, LogError> {
+        let bytes = records.chunk_at(chunk.at).map_err(LogError::io("read", &self.path))?;
+        let bytes = bytes.ok_or_else(|| self.damaged("its index names a chunk that is not there"))?;
+        let unpacked = inside(&bytes, &Budgets::new(records.bytes())).map_err(|fault| self.damaged(&fault))?;
+        let messages: Vec<Record<'static>> = unpacked.collect();
+        Ok(if self.is_of_another(&messages, episode_id) { Vec::new() } else { messages })
+    }
+
     /// Whether the episodes that begin in a chunk are all others. In a chunk where none begins it is not known, and the time
     /// tells.
-    fn is_of_another(&self, messages: Unpacked, episode_id: &str) -> bool {
+    fn is_of_another(&self, messages: &[Record<'static>], episode_id: &str) -> bool {
         let begun: Vec<bool> = messages
+            .iter()
             .filter_map(|record| match record {
                 Record::Message { header, data } if self.is_of(header.channel_id, topic::EPISODE) => {
-                    match event(topic::EPISODE, &data) {
+                    match event(topic::EPISODE, data.as_ref()) {
                         Ok(Event::Episode(EpisodeMessage::Begin(head))) => Some(head.episode_id == episode_id),
                         _ => None,
                     }
@@ -246,7 +248,11 @@ fn each_message(path: &Path, mut give: impl FnMut(&str, u64, &[u8])) -> Result<(
     Ok(())
 }
 
-fn moment(messages: Unpacked, topics: &BTreeMap<u16, String>, time: u64) -> Option<Moment> {
+fn moment(
+    messages: impl IntoIterator<Item = Record<'static>>,
+    topics: &BTreeMap<u16, String>,
+    time: u64,
+) -> Option<Moment> {
     let mut found: Option<Moment> = None;
     for record in messages {
         if let Record::Message { header, data } = record

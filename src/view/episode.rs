@@ -7,6 +7,7 @@ use super::filter::{Query, number, required};
 use super::list;
 use super::snapshot::{Opened, Scored, Snapshot};
 use crate::base::escape::visible;
+use crate::log::frames::Moment;
 use crate::replay::moments::moments;
 use crate::score::evidence::{Evidence, MetricEvidence, ranges};
 use crate::study::Question;
@@ -26,19 +27,35 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     Ok(told)
 }
 
-/// An episode without its place in a list, its texts cut to so many characters.
+/// An episode without its place in a list, its texts cut to so many characters. A log that cannot be read keeps nothing else
+/// from being shown.
 pub(super) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Result<Value, ViewError> {
+    match snapshot.moment(opened, 1) {
+        Ok(first) => described(snapshot, opened, longest, first.as_ref()),
+        Err(error) => {
+            let mut told = described(snapshot, opened, longest, None)?;
+            told["log_fault"] = error.words().into();
+            Ok(told)
+        }
+    }
+}
+
+/// An episode without its place in a list; `first` is what its log has of its first step.
+pub(super) fn described(
+    snapshot: &Snapshot,
+    opened: &Opened,
+    longest: usize,
+    first: Option<&Moment>,
+) -> Result<Value, ViewError> {
     let episode = &opened.episode;
     let (metrics, against) = scores(snapshot, opened)?;
-    // A damaged log is told by its frames, and keeps nothing else from being shown.
-    let first = snapshot.moment(opened, 1).unwrap_or_default();
     let marks = moments(episode).into_iter().map(|(t, moment)| json!({"t": t, "title": moment.title()}));
     Ok(json!({
         "id": episode.episode_id,
         "name": visible(&episode.episode_id),
         "length": episode.steps.len(),
         "running": opened.running.is_some(),
-        "frames": first.as_ref().is_some_and(|moment| moment.frame.is_some()),
+        "frames": first.is_some_and(|moment| moment.frame.is_some()),
         "log": first.is_some(),
         "lost": is_lost(snapshot, &episode.episode_id),
         "constants": constants(episode, longest),

@@ -1,8 +1,10 @@
 //! Why something cannot be shown.
 
 use std::error::Error as _;
+use std::io;
+use std::path::PathBuf;
 
-use crate::base::escape::visible_lines;
+use crate::base::escape::{visible, visible_lines};
 use crate::log::LogError;
 use crate::study::StudyError;
 use crate::trace::error::TraceError;
@@ -17,6 +19,8 @@ pub enum ViewError {
     Trace(#[from] TraceError),
     #[error(transparent)]
     Log(#[from] LogError),
+    #[error("cannot list the folder `{}`: {source}", visible(&folder.to_string_lossy()))]
+    Folder { folder: PathBuf, source: io::Error },
     #[error("{0}")]
     Absent(String),
     #[error("{0}")]

@@ -93,7 +93,9 @@ pub fn write(view: &View, folder: &Path) -> Result<usize, ViewError> {
 /// An episode, its map and its frames.
 fn add_episode(files: &mut Files, snapshot: &Snapshot, at: usize, id: &str) -> Result<(), ViewError> {
     let opened = snapshot.episode(id)?;
-    let mut told = episode::about(snapshot, &opened, usize::MAX)?;
+    // The page of the server tells of a log that cannot be read; a copy is not made without its frames.
+    let first = snapshot.moment(&opened, 1)?;
+    let mut told = episode::described(snapshot, &opened, usize::MAX, first.as_ref())?;
     told["siblings"] = list::siblings(snapshot, id).into();
     files.part(&format!("episode-{at}"), &told)?;
     if told["log"] != true {

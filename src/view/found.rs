@@ -35,14 +35,14 @@ impl Found {
     /// Looks for the files.
     ///
     /// # Errors
-    /// An argument that names nothing.
+    /// An argument that names nothing; a folder that cannot be listed.
     pub fn of(runs: &[OsString]) -> Result<Self, ViewError> {
         let mut found = Self::default();
         let (mut folders, mut named) = (BTreeSet::new(), Vec::new());
         for argument in runs {
             let path = Path::new(argument);
             if path.is_dir() {
-                folders.extend(folders_below(path));
+                folders.extend(folders_below(path)?);
             }
             if is_log(path) {
                 found.logs.push(path.to_owned());
@@ -51,7 +51,7 @@ impl Found {
             }
         }
         for folder in &folders {
-            found.look_into(folder);
+            found.look_into(folder)?;
         }
         found.traces = found.traces(&named)?;
         let beside: BTreeSet<PathBuf> = found.traces.iter().map(|trace| trace.path.with_extension("mcap")).collect();
@@ -76,9 +76,9 @@ impl Found {
         }
     }
 
-    fn look_into(&mut self, folder: &Path) {
-        self.logs.extend(files(folder).into_iter().filter(|path| is_log(path)));
-        for path in files(&folder.join(PARTS)) {
+    fn look_into(&mut self, folder: &Path) -> Result<(), ViewError> {
+        self.logs.extend(files(folder)?.into_iter().filter(|path| is_log(path)));
+        for path in files(&folder.join(PARTS))? {
             match path.extension().and_then(|ending| ending.to_str()) {
                 Some("parquet") => self.parts.push(Input::new(path)),
                 Some("mcap") if path.with_extension("parquet").is_file() => self.logs.push(path),
@@ -87,6 +87,7 @@ impl Found {
                 _ => {}
             }
         }
+        Ok(())
     }
 
     /// The state of every file, to be held against a later one. A file that grows under way is told apart.
@@ -104,24 +105,30 @@ pub(super) fn stamp(path: &Path) -> Stamp {
 }
 
 /// The folder and those in it, but for names that programs keep for themselves; links are not followed.
-fn folders_below(folder: &Path) -> Vec<PathBuf> {
+fn folders_below(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
     let mut all = vec![folder.to_owned()];
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    for entry in entries {
-        let name = entry.file_name();
-        let is_own = name.to_string_lossy().starts_with(['.', '_']);
-        if !is_own && entry.file_type().is_ok_and(|kind| kind.is_dir()) {
-            all.extend(folders_below(&entry.path()));
+    for path in entries(folder)? {
+        let is_own = path.file_name().is_some_and(|name| name.to_string_lossy().starts_with(['.', '_']));
+        if !is_own && path.is_dir() && !path.is_symlink() {
+            all.extend(folders_below(&path)?);
         }
     }
-    all
+    Ok(all)
 }
 
-fn files(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(|path| path.is_file()).collect();
-    files.sort();
-    files
+fn files(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
+    Ok(entries(folder)?.into_iter().filter(|path| path.is_file()).collect())
+}
+
+/// What a folder holds, sorted; nothing where it is gone, as the folder of parts is once a recording has ended.
+fn entries(folder: &Path) -> Result<Vec<PathBuf>, ViewError> {
+    let listed = fs::read_dir(folder).and_then(|all| all.map(|entry| Ok(entry?.path())).collect());
+    let mut paths: Vec<PathBuf> = match listed {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
+        listed => listed.map_err(|source| ViewError::Folder { folder: folder.to_owned(), source })?,
+    };
+    paths.sort();
+    Ok(paths)
 }
 
 fn is_log(path: &Path) -> bool {

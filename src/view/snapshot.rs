@@ -8,6 +8,7 @@ use super::Options;
 use super::error::ViewError;
 use super::found::{Found, Stamp};
 use crate::base::escape::visible;
+use crate::log::LogError;
 use crate::log::frames::{self, LogIndex, Moment, Shape};
 use crate::study::{Outputs, Question, Results, Study};
 use crate::trace::episode::Episode;
@@ -168,7 +169,8 @@ impl Snapshot {
         if let Some(log) = &opened.running {
             return Ok(frames::unfinished_step(log, time)?);
         }
-        for index in self.logs_of(opened) {
+        for log in self.logs_of(opened) {
+            let Some(index) = self.index(log)? else { continue };
             if let Some(moment) = index.step(&opened.episode.episode_id, time)? {
                 return Ok(Some(moment));
             }
@@ -190,7 +192,8 @@ impl Snapshot {
             return Ok(named(frames::unfinished_shapes(log)?));
         }
         let wanted: BTreeSet<u64> = times.keys().copied().collect();
-        for index in self.logs_of(opened) {
+        for log in self.logs_of(opened) {
+            let Some(index) = self.index(log)? else { continue };
             let found = index.shapes(&opened.episode.episode_id, &wanted)?;
             if !found.is_empty() {
                 return Ok(named(found));
@@ -200,25 +203,28 @@ impl Snapshot {
     }
 
     /// The logs where an episode may be: the one beside its trace, then those that were named.
-    fn logs_of<'a>(&'a self, opened: &'a Opened) -> impl Iterator<Item = Arc<LogIndex>> + 'a {
+    fn logs_of(&self, opened: &Opened) -> impl Iterator<Item = &PathBuf> {
         let beside = opened.input.as_ref().map(|input| input.path.with_extension("mcap"));
         let own = self.logs.iter().find(|log| Some(*log) == beside.as_ref());
-        let others = self.logs.iter().filter(move |_| own.is_none());
-        own.into_iter().chain(others).filter_map(|log| self.index(log))
+        let others = if own.is_none() { self.logs.as_slice() } else { &[] };
+        own.into_iter().chain(others)
     }
 
-    /// The index of a log, read once; `None` where it cannot be read.
-    fn index(&self, log: &Path) -> Option<Arc<LogIndex>> {
+    /// The index of a log, read once; `None` where it has none, or is no log of a recording.
+    fn index(&self, log: &Path) -> Result<Option<Arc<LogIndex>>, LogError> {
         let mut indices = self.indices.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(index) = indices.get(log) {
-            return index.clone();
+            return Ok(index.clone());
         }
         if indices.len() >= KEPT_INDICES {
             indices.clear();
         }
-        let index = LogIndex::open(log).ok().flatten().map(Arc::new);
+        let index = match LogIndex::open(log) {
+            Err(LogError::Foreign { .. }) => None,
+            opened => opened?.map(Arc::new),
+        };
         indices.insert(log.to_owned(), index.clone());
-        index
+        Ok(index)
     }
 }
 

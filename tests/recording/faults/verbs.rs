@@ -57,6 +57,8 @@ const VERBS: &[Verb] = &[
         "replay a.parquet --recompute-visibility -o v.parquet",
         &["v.parquet"],
     ),
+    #[cfg(feature = "view")]
+    verb("view b.parquet --export page", "view a.parquet --export page", &["page"]),
     #[cfg(feature = "polars")]
     verb("query SELECT*FROM(steps) b.parquet -o q.csv", "query SELECT*FROM(steps) a.parquet -o q.csv", &["q.csv"]),
     #[cfg(feature = "polars")]
@@ -176,7 +178,8 @@ impl<'a> Case<'a> {
 fn command(home: &Path, words: &str) -> Command {
     let mut command = typed(home, words);
     // One thread makes the same calls each time.
-    if ["score", "report", "rescore", "sensitivity", "renormalize"].contains(&words.split(' ').next().unwrap()) {
+    if ["score", "report", "rescore", "sensitivity", "renormalize", "view"].contains(&words.split(' ').next().unwrap())
+    {
         command.args(["--threads", "1"]);
     }
     command

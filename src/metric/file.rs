@@ -27,6 +27,7 @@ use indexmap::IndexMap;
 use super::catalog::{Better, StandardError};
 use super::columns::{Column, Level, Type};
 use super::fault::{Fault, Faults, Place, Source};
+use super::include::{Includes, Kind};
 use super::keys::{Keys, key_count, parse_toml};
 use super::origin::Written;
 use crate::base::budget::Limit;
@@ -156,9 +157,12 @@ pub fn read_source(name: String, source: Source, folder: Option<&Path>) -> Resul
 const LARGEST: Limit = Limit::new("bytes of a definition file", 1 << 20);
 /// Keys of a file, tables included.
 const MOST_KEYS: Limit = Limit::new("keys in a definition file", 10_000);
-/// Includes are followed each time they are met, for what comes later replaces what came before: files that include two
-/// others each would be read without end.
-const MOST_INCLUDES: Limit = Limit::new("includes, those of included files counted", 256);
+/// How definition files include others.
+const INCLUDED: Kind = Kind {
+    name: "definition file",
+    check: "mirrorstats definitions check FILE",
+    most: Limit::new("includes, those of included files counted", 256),
+};
 
 /// A definition file's text, and where it is.
 struct DefinitionFile {
@@ -183,12 +187,7 @@ fn find(name: Option<&str>, path: &Path) -> io::Result<DefinitionFile> {
 struct Reading {
     document: Document,
     faults: Vec<Fault>,
-    /// The files being read, for includes that lead back: their names and places.
-    open: Vec<(String, Option<PathBuf>)>,
-    /// Includes that were followed.
-    includes: u64,
-    /// What was said of includes: names of files and places, and nothing of what the files say.
-    of_includes: Vec<String>,
+    includes: Includes,
 }
 
 impl Reading {
@@ -197,9 +196,7 @@ impl Reading {
         let mut reading = Self {
             document: Document { name, ..Document::default() },
             faults: Vec::new(),
-            open: Vec::new(),
-            includes: 0,
-            of_includes: Vec::new(),
+            includes: Includes::new(INCLUDED),
         };
         reading.file(file);
         if reading.faults.is_empty() { Ok(reading.document) } else { Err(Faults(reading.faults).in_order().into()) }
@@ -216,7 +213,7 @@ impl Reading {
             self.faults.push(Fault::new(Place { source, span: 0..0 }, exceeded.to_string()));
             return;
         }
-        self.open.push((source.name.clone(), file.place));
+        self.includes.enter(&source.name, file.place);
         let mut root = Keys::new(&source, table.get_ref(), "a definition file");
         if let Some(includes) = root.texts("include", &mut self.faults) {
             for (name, place) in includes {
@@ -231,66 +228,25 @@ impl Reading {
         self.experiments(&mut root);
         self.metrics(&mut root);
         root.refuse_the_rest(&mut self.faults);
-        self.open.pop();
+        self.includes.leave();
     }
 
     fn include(&mut self, name: &str, place: Place, folder: Option<&Path>) {
-        let path = folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
-        self.includes += 1;
-        if let Err(exceeded) = MOST_INCLUDES.check(self.includes) {
-            // Once is enough.
-            if MOST_INCLUDES.check(self.includes - 1).is_ok() {
-                self.of_include(Fault::new(place, exceeded.to_string()));
-            }
-            return;
-        }
+        let Self { includes, faults, .. } = self;
+        let Some(path) = includes.follow(name, &place, folder, faults) else { return };
         match find(Some(name), &path) {
-            Ok(file) if self.is_open(&file) => {
-                let names = self.open.iter().map(|(name, _)| name).chain([&file.source.name]);
-                let chain = names.map(String::as_str).collect::<Vec<_>>().join(" -> ");
-                self.of_include(Fault::new(place, format!("the include leads back to itself: {chain}")));
+            Ok(file) if includes.leads_back(&file.source.name, file.place.as_deref(), &place, faults) => {}
+            Ok(file) => {
+                let before = faults.len();
+                self.file(file);
+                self.includes.conceal(before, place, &mut self.faults);
             }
-            Ok(file) => self.included(file, place),
             Err(error) => {
                 let help = format!("a path is relative to this file; {}", built_in_help(name));
                 let message = format!("cannot read the definition file `{}`: {error}", path.display());
-                self.of_include(Fault::new(place, message).help(help));
+                includes.tell(Fault::new(place, message).help(help), faults);
             }
         }
-    }
-
-    /// Reads an included file. What is no definition file may be a secret: of its faults the first is told, and by its
-    /// place alone.
-    fn included(&mut self, file: DefinitionFile, place: Place) {
-        let before = self.faults.len();
-        self.file(file);
-        let Some(first) = self.faults.get(before).cloned() else { return };
-        self.faults.truncate(before);
-        let message = if self.of_includes.contains(&first.message) {
-            first.message
-        } else {
-            let (line, column) = first.line_and_column();
-            let name = &first.place.source.name;
-            format!(
-                "the included file `{name}` is no definition file: it cannot be read from line {line}, column {column} on"
-            )
-        };
-        let help =
-            "expected TOML with the keys of a definition file; `mirrorstats definitions check FILE` shows the line";
-        self.of_include(Fault::new(place, message).help(help));
-    }
-
-    /// A fault that says nothing of what an included file says.
-    fn of_include(&mut self, fault: Fault) {
-        self.of_includes.push(fault.message.clone());
-        self.faults.push(fault);
-    }
-
-    fn is_open(&self, file: &DefinitionFile) -> bool {
-        self.open.iter().any(|(name, place)| match (place, &file.place) {
-            (Some(open), Some(place)) => open == place,
-            _ => *name == file.source.name,
-        })
     }
 
     fn columns(&mut self, root: &mut Keys) {

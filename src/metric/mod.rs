@@ -18,6 +18,7 @@ pub mod fault;
 pub mod file;
 mod functions;
 pub mod implied;
+pub(crate) mod include;
 pub(crate) mod keys;
 pub mod names;
 pub mod origin;

@@ -19,14 +19,19 @@ use crate::base::suggest::{hint, nearest};
 use crate::base::{hash, input};
 use crate::metric::catalog::Better;
 use crate::metric::fault::{Fault, Faults, Place, Source};
+use crate::metric::include::{Includes, Kind};
 use crate::metric::keys::{Keys, key_count, parse_toml};
 
 /// A style is written by hand.
 const LARGEST: Limit = Limit::new("bytes of a style", 1 << 20);
 /// Keys of a file, tables included.
 const MOST_KEYS: Limit = Limit::new("keys in a style", 10_000);
-/// Includes are followed each time they are met.
-const MOST_INCLUDES: Limit = Limit::new("includes of a style, those of included files counted", 32);
+/// How styles include others.
+const INCLUDED: Kind = Kind {
+    name: "style",
+    check: "mirrorstats style check FILE",
+    most: Limit::new("includes of a style, those of included files counted", 32),
+};
 /// Digits behind the point.
 const MOST_DECIMALS: u32 = crate::base::number::MOST_PLACES;
 
@@ -68,7 +73,7 @@ pub(super) fn read(path: &Path) -> Result<Read, StyleError> {
         source: Arc::new(Source { name: file.source.name.clone(), text: file.source.text.clone() }),
         span: 0..0,
     };
-    let mut reading = Reading::default();
+    let mut reading = Reading::new();
     reading.file(file);
     reading.finish(&whole).map_err(|faults| StyleError::Faults(Faults(faults).in_order()))
 }
@@ -97,7 +102,6 @@ struct TableDraft {
     place: Option<Place>,
 }
 
-#[derive(Default)]
 struct Reading {
     row_order: Option<Vec<String>>,
     undefined: Option<String>,
@@ -107,15 +111,26 @@ struct Reading {
     table: IndexMap<String, TableDraft>,
     named: Vec<(String, Place)>,
     faults: Vec<Fault>,
-    /// The files being read, for includes that lead back: their names and places.
-    open: Vec<(String, Option<PathBuf>)>,
-    includes: u64,
-    /// What was said of includes: names of files and places, and nothing of what the files say.
-    of_includes: Vec<String>,
+    includes: Includes,
     hashes: Vec<String>,
 }
 
 impl Reading {
+    fn new() -> Self {
+        Self {
+            row_order: None,
+            undefined: None,
+            emphasis_note: None,
+            print: PrintSheet::default(),
+            column: IndexMap::new(),
+            table: IndexMap::new(),
+            named: Vec::new(),
+            faults: Vec::new(),
+            includes: Includes::new(INCLUDED),
+            hashes: Vec::new(),
+        }
+    }
+
     fn finish(mut self, whole: &Place) -> Result<Read, Vec<Fault>> {
         if self.faults.is_empty() && !self.table.contains_key(MAIN_TABLE) {
             let message = format!("there is no table `{MAIN_TABLE}`: every report needs one");
@@ -165,7 +180,7 @@ impl Reading {
             self.faults.push(Fault::new(Place { source, span: 0..0 }, exceeded.to_string()));
             return;
         }
-        self.open.push((source.name.clone(), file.place));
+        self.includes.enter(&source.name, file.place);
         let mut root = Keys::new(&source, table.get_ref(), "a style");
         for (name, place) in root.texts("include", &mut self.faults).unwrap_or_default() {
             self.include(&name, place, file.folder.as_deref());
@@ -177,7 +192,7 @@ impl Reading {
             self.named.truncate(before);
         }
         root.refuse_the_rest(&mut self.faults);
-        self.open.pop();
+        self.includes.leave();
     }
 
     fn contents(&mut self, root: &mut Keys) {
@@ -201,22 +216,15 @@ impl Reading {
     }
 
     fn include(&mut self, name: &str, place: Place, folder: Option<&Path>) {
-        let path = folder.map_or_else(|| PathBuf::from(name), |folder| folder.join(name));
-        self.includes += 1;
-        if let Err(exceeded) = MOST_INCLUDES.check(self.includes) {
-            // Once is enough.
-            if MOST_INCLUDES.check(self.includes - 1).is_ok() {
-                self.of_include(Fault::new(place, exceeded.to_string()));
-            }
-            return;
-        }
+        let Self { includes, faults, .. } = self;
+        let Some(path) = includes.follow(name, &place, folder, faults) else { return };
         match find(Path::new(name), &path) {
-            Ok(file) if self.is_open(&file) => {
-                let names = self.open.iter().map(|(name, _)| name).chain([&file.source.name]);
-                let chain = names.map(String::as_str).collect::<Vec<_>>().join(" -> ");
-                self.of_include(Fault::new(place, format!("the include leads back to itself: {chain}")));
+            Ok(file) if includes.leads_back(&file.source.name, file.place.as_deref(), &place, faults) => {}
+            Ok(file) => {
+                let before = faults.len();
+                self.file(file);
+                self.includes.conceal(before, place, &mut self.faults);
             }
-            Ok(file) => self.included(file, place),
             Err(error) => {
                 let names = BUILT_IN.map(|(name, _)| name);
                 let help = match nearest(name, names) {
@@ -224,39 +232,9 @@ impl Reading {
                     None => format!("a path is relative to this file; built-in styles are {}", names.join(", ")),
                 };
                 let message = format!("cannot read the style `{}`: {error}", path.display());
-                self.of_include(Fault::new(place, message).help(help));
+                includes.tell(Fault::new(place, message).help(help), faults);
             }
         }
-    }
-
-    /// Reads an included file; of its faults the first is told, and by its place alone.
-    fn included(&mut self, file: StyleFile, place: Place) {
-        let before = self.faults.len();
-        self.file(file);
-        let Some(first) = self.faults.get(before).cloned() else { return };
-        self.faults.truncate(before);
-        let message = if self.of_includes.contains(&first.message) {
-            first.message
-        } else {
-            let (line, column) = first.line_and_column();
-            let name = &first.place.source.name;
-            format!("the included file `{name}` is no style: it cannot be read from line {line}, column {column} on")
-        };
-        let help = "expected TOML with the keys of a style; `mirrorstats style check FILE` shows the line";
-        self.of_include(Fault::new(place, message).help(help));
-    }
-
-    /// A fault that says nothing of what an included file says.
-    fn of_include(&mut self, fault: Fault) {
-        self.of_includes.push(fault.message.clone());
-        self.faults.push(fault);
-    }
-
-    fn is_open(&self, file: &StyleFile) -> bool {
-        self.open.iter().any(|(name, place)| match (place, &file.place) {
-            (Some(open), Some(place)) => open == place,
-            _ => *name == file.source.name,
-        })
     }
 }
 

@@ -10,13 +10,20 @@ import sys
 
 from inspect_ai import Task, eval
 from inspect_ai.dataset import MemoryDataset, Sample
-from inspect_ai.model import ChatMessageUser, ContentImage, ContentText, get_model
+from inspect_ai.model import ChatMessageUser, ContentImage, ContentText, ModelOutput, ModelUsage, get_model
 from inspect_ai.scorer import includes
 from inspect_ai.solver import Generate, TaskState, generate, solver
 
 SAMPLES = 10_000
 EPISODES = 20
 STEPS = 100
+
+
+def answered(_input, _tools, _choice, _config):
+    """An answer that says what it used: the mock model would fetch an encoding to count it."""
+    output = ModelOutput.from_content(model="mockllm", content="I turn left to look around.")
+    output.usage = ModelUsage(input_tokens=1000, output_tokens=10, total_tokens=1010)
+    return output
 
 
 @solver
@@ -42,11 +49,14 @@ def main():
         "data:image/png;base64," + base64.b64encode(file.read_bytes()).decode() for file in sorted(folder.glob("*.png"))
     ]
     assert len(pictures) >= STEPS, f"{folder}: {STEPS} PNG files are needed, found {len(pictures)}"
-    model = get_model("mockllm/model")
+    model = get_model("mockllm/model", custom_outputs=answered)
     dataset = lambda count: MemoryDataset([Sample(input=f"Question {n + 1}", target="answer") for n in range(count)])
     common = {"model": model, "display": "none", "score": True}
-    eval(Task(dataset(SAMPLES), generate(), includes(), name="list"), log_dir=str(out / "list"), **common)
-    eval(Task(dataset(EPISODES), steps(pictures), includes(), name="steps"), log_dir=str(out / "steps"), **common)
+    tasks = {"list": (SAMPLES, generate()), "steps": (EPISODES, steps(pictures))}
+    for name, (count, plan) in tasks.items():
+        [log] = eval(Task(dataset=dataset(count), solver=plan, scorer=includes(), name=name), log_dir=str(out / name), **common)
+        assert log.status == "success", f"{name}: {log.error.message}"
 
 
-main()
+if __name__ == "__main__":
+    main()

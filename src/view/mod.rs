@@ -75,6 +75,11 @@ impl View {
         self.newest().episodes()
     }
 
+    /// Whether an episode is there, whole or under way.
+    pub fn has_episode(&self, id: &str) -> bool {
+        self.newest().has(id)
+    }
+
     fn newest(&self) -> Arc<Snapshot> {
         Arc::clone(&self.newest.read().unwrap_or_else(PoisonError::into_inner))
     }

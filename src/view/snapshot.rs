@@ -129,6 +129,12 @@ impl Snapshot {
         self.scored.as_ref().map_or(0, |scored| scored.results.episodes.len())
     }
 
+    /// Whether an episode is there, whole or under way.
+    pub fn has(&self, id: &str) -> bool {
+        self.scored.as_ref().is_some_and(|scored| scored.rows.contains_key(id))
+            || self.running.iter().any(|running| running.episode.episode_id == id)
+    }
+
     /// The episodes with their scores.
     ///
     /// # Errors

@@ -144,6 +144,8 @@ function timeline(episode, jump) {
   const marks = episode.marks.map(({ t, title }) => {
     const button = make("button", { type: "button", class: "moment", "data-t": t, title: `${title}, t = ${t}` }, title);
     button.style.left = place(t);
+    // Those at the ends stay within the line.
+    button.style.translate = `-${place(t)}`;
     button.addEventListener("click", () => jump(t));
     return button;
   });

@@ -51,5 +51,5 @@ pub(super) fn heading(statistics: Option<&Statistics>) -> Json {
     let note = visible(&statistics.design_note);
     let mut letters = note.chars();
     let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
-    json!({ "design": format!("{first}{}.", letters.as_str()), "confidence": percent(statistics.confidence) })
+    json!({ "design": format!("{first}{}.", letters.as_str()), "confidence": percent(statistics.confidence).replace(' ', "\u{a0}") })
 }

@@ -21,6 +21,15 @@ const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; s
                       img-src 'self' data:; font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
                       frame-ancestors 'none'";
 
+/// What every page begins and ends with.
+const PAGE: &str = include_str!("../../assets/web/page.html");
+
+/// A page with this title, style sheet and `<body>`, all of them the program's own words.
+pub fn page(title: &str, style: &str, body: &str) -> String {
+    let parts = [("<!-- title -->", title), ("<!-- style -->", style), ("<!-- body -->", body.trim_end())];
+    parts.into_iter().fold(PAGE.to_owned(), |page, (mark, text)| page.replace(mark, text))
+}
+
 /// The headers of each answer.
 const HEADERS: [(HeaderName, &str); 7] = [
     (header::CONTENT_SECURITY_POLICY, POLICY),

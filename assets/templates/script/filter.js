@@ -24,7 +24,8 @@ function startFilters(results) {
     };
     const counts = results.map((table) => table.filter(isWanted));
     const rows = results[0]?.rows.length ?? 0;
-    shown.textContent = counts[0] === rows ? `all ${rows} rows` : `${counts[0]} of ${rows} rows`;
+    if (rows === 1) shown.textContent = `${counts[0]} of 1 row`;
+    else shown.textContent = counts[0] === rows ? `all ${rows} rows` : `${counts[0]} of ${rows} rows`;
     remember({ ...Object.fromEntries(wanted.map(({ column, names }) => [column, names])), search: search.value.trim(), groups: grouped.checked ? null : "no" });
     const left = (results[0]?.rows ?? []).filter((row) => !row.hidden).map(({ dataset }) => dataset);
     document.dispatchEvent(new CustomEvent("rows", { detail: { isAll: counts[0] === rows, rows: left } }));

@@ -63,9 +63,12 @@ export async function sight(episode) {
     places.show = show;
     show(at);
   }
-  image.addEventListener("error", () => {
+  const caption = make("figcaption", {}, episode.rendered ? "Rendered again from the trace, which has no log." : "");
+  if (episode.frames) shown.append(caption);
+  image.addEventListener("error", async () => {
     shown.dataset.missing = "yes";
     image.alt = "No frame of this step.";
+    if (!isCopy) caption.textContent = await fetch(image.src).then((response) => response.text(), () => image.alt);
   });
   const ahead = new Map();
   async function fetchAhead(t) {

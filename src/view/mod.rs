@@ -23,6 +23,8 @@ mod live;
 mod map;
 mod overview;
 mod page;
+#[cfg(feature = "sim")]
+mod rendered;
 pub mod routes;
 mod snapshot;
 

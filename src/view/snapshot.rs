@@ -37,6 +37,8 @@ pub(super) struct Snapshot {
     pub stamps: Vec<Stamp>,
     logs: Vec<PathBuf>,
     indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
+    #[cfg(feature = "sim")]
+    rendered: Arc<super::rendered::Rendered>,
 }
 
 /// Episodes with their scores.
@@ -91,8 +93,18 @@ impl Snapshot {
                  a trace of a log"
             )));
         }
-        let (options, indices) = (options.clone(), Mutex::default());
-        Ok(Self { generation, options, scored, running, unreadable, stamps, logs: found.logs, indices })
+        Ok(Self {
+            generation,
+            options: options.clone(),
+            scored,
+            running,
+            unreadable,
+            stamps,
+            logs: found.logs,
+            indices: Mutex::default(),
+            #[cfg(feature = "sim")]
+            rendered: Arc::default(),
+        })
     }
 
     /// The same with the episodes under way as they are now.
@@ -107,6 +119,8 @@ impl Snapshot {
             stamps: self.stamps.clone(),
             logs: self.logs.clone(),
             indices: Mutex::default(),
+            #[cfg(feature = "sim")]
+            rendered: Arc::clone(&self.rendered),
         }
     }
 
@@ -187,6 +201,53 @@ impl Snapshot {
             }
         }
         Ok(None)
+    }
+
+    /// The frame of a step, PNG: out of a log, or rendered again where no log has it and the program can.
+    ///
+    /// # Errors
+    /// A log that cannot be read; an episode that cannot be replayed.
+    pub fn frame(&self, opened: &Opened, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
+        if let Some(frame) = self.moment(opened, t)?.and_then(|moment| moment.frame) {
+            return Ok(Some(frame));
+        }
+        self.rendered(opened, t)
+    }
+
+    #[cfg(feature = "sim")]
+    fn rendered(&self, opened: &Opened, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
+        if !self.renders(opened) {
+            return Ok(None);
+        }
+        self.rendered.frame(self.recording(opened).as_ref(), &opened.episode, t)
+    }
+
+    #[cfg(not(feature = "sim"))]
+    #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as it is where there is a world")]
+    fn rendered(&self, _: &Opened, _: usize) -> Result<Option<Vec<u8>>, ViewError> {
+        Ok(None)
+    }
+
+    /// Whether frames of an episode can be rendered again: its trace says how its world was made.
+    #[cfg(feature = "sim")]
+    pub fn renders(&self, opened: &Opened) -> bool {
+        opened.running.is_none() && crate::replay::frames::is_recipe(self.recording(opened).as_ref())
+    }
+
+    /// Whether frames of an episode can be rendered again: without a world none can.
+    #[cfg(not(feature = "sim"))]
+    #[expect(clippy::unused_self, reason = "as it is where there is a world")]
+    pub fn renders(&self, _: &Opened) -> bool {
+        false
+    }
+
+    /// What the trace of an episode says of how it was recorded.
+    #[cfg(feature = "sim")]
+    fn recording(&self, opened: &Opened) -> Option<serde_json::Value> {
+        let scored = self.scored.as_ref()?;
+        let place = scored.places.get(&opened.episode.episode_id)?;
+        let file = scored.study.traces().ok()?.files().get(place.file)?;
+        serde_json::from_str(file.metadata_value(crate::trace::schema::RECORDING_KEY)?).ok()
     }
 
     /// The shapes of each step, by its t; nothing where there is no log.

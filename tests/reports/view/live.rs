@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Stdio;
 
-use crate::harness::files::write_small_world;
+use crate::harness::files::{fixture, write_small_world};
 use crate::harness::need;
 use crate::harness::program::{Running, program, wait_for};
 use crate::html::browser::Browser;
@@ -116,5 +116,25 @@ fn soak_a_recording_appears_and_grows_and_ends() {
     until(&mut browser, "document.querySelectorAll('.metric').length > 0");
     assert_eq!(browser.value(length), 25);
     assert_eq!(server.get("/api/live").json()["running"], serde_json::json!([]));
+    browser.close();
+}
+
+#[test]
+fn frames_of_a_trace_without_a_log_are_rendered_again() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(fixture("recorded").join("E1-guesser.parquet"), folder.path().join("alone.parquet")).unwrap();
+    let server = Server::start(folder.path(), &["alone.parquet"]);
+    let told = server.get("/api/episode?id=E1/guesser/s1/r1").json();
+    assert_eq!((&told["frames"], &told["rendered"], &told["log"]), (&true.into(), &true.into(), &false.into()));
+    let last = told["length"].as_u64().unwrap();
+    for t in [1, last] {
+        let frame = server.get(&format!("/api/frame?id=E1/guesser/s1/r1&t={t}"));
+        assert!(frame.status == 200 && frame.body.starts_with(b"\x89PNG"), "{t}: {}", frame.status);
+    }
+    assert_eq!(server.get(&format!("/api/frame?id=E1/guesser/s1/r1&t={}", last + 1)).status, 404);
+    let mut browser = Browser::at(&format!("{}?view=episode&id=E1/guesser/s1/r1", server.link));
+    until(&mut browser, "document.querySelector('img.frame')?.naturalWidth > 0");
+    assert!(browser.text("document.querySelector('.sight figcaption').textContent").starts_with("Rendered again"));
     browser.close();
 }

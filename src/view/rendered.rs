@@ -1,7 +1,7 @@
 //! Frames of episodes without a log, rendered again by a replay: some steps at a time, the last ones kept.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use serde_json::Value;
 
@@ -16,7 +16,7 @@ const TOGETHER: usize = 16;
 const KEPT: usize = 16;
 
 /// Frames by t.
-type Block = Arc<BTreeMap<i32, Vec<u8>>>;
+type Block = BTreeMap<i32, Vec<u8>>;
 
 /// What was rendered last.
 #[derive(Debug, Default)]
@@ -34,19 +34,16 @@ impl Rendered {
         };
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let key = (episode.episode_id.clone(), block);
-        let frames = match kept.get(&key) {
-            Some(frames) => Arc::clone(frames),
-            None => {
-                let first = i32::try_from(block * TOGETHER + 1).unwrap_or(i32::MAX);
-                let last = i32::try_from((block + 1) * TOGETHER).unwrap_or(i32::MAX);
-                let frames = Arc::new(frames(recording, episode, &(first..=last)).map_err(Box::new)?);
-                if kept.len() >= KEPT {
-                    kept.clear();
-                }
-                kept.insert(key, Arc::clone(&frames));
-                frames
+        if !kept.contains_key(&key) {
+            let first = i32::try_from(block * TOGETHER + 1).unwrap_or(i32::MAX);
+            let last = i32::try_from((block + 1) * TOGETHER).unwrap_or(i32::MAX);
+            let rendered = frames(recording, episode, &(first..=last)).map_err(Box::new)?;
+            if kept.len() >= KEPT {
+                kept.clear();
             }
-        };
-        Ok(i32::try_from(t).ok().and_then(|t| frames.get(&t).cloned()))
+            kept.insert(key.clone(), rendered);
+        }
+        let frames = kept.get(&key);
+        Ok(i32::try_from(t).ok().and_then(|t| frames?.get(&t).cloned()))
     }
 }

@@ -211,34 +211,21 @@ impl Snapshot {
         if let Some(frame) = self.moment(opened, t)?.and_then(|moment| moment.frame) {
             return Ok(Some(frame));
         }
-        self.rendered(opened, t)
-    }
-
-    #[cfg(feature = "sim")]
-    fn rendered(&self, opened: &Opened, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
-        if !self.renders(opened) {
-            return Ok(None);
+        #[cfg(feature = "sim")]
+        if self.renders(opened) {
+            return self.rendered.frame(self.recording(opened).as_ref(), &opened.episode, t);
         }
-        self.rendered.frame(self.recording(opened).as_ref(), &opened.episode, t)
-    }
-
-    #[cfg(not(feature = "sim"))]
-    #[expect(clippy::unused_self, clippy::unnecessary_wraps, reason = "as it is where there is a world")]
-    fn rendered(&self, _: &Opened, _: usize) -> Result<Option<Vec<u8>>, ViewError> {
         Ok(None)
     }
 
-    /// Whether frames of an episode can be rendered again: its trace says how its world was made.
-    #[cfg(feature = "sim")]
+    /// Whether frames of an episode can be rendered again: its trace says how its world was made, and this build has worlds.
     pub fn renders(&self, opened: &Opened) -> bool {
-        opened.running.is_none() && crate::replay::frames::is_recipe(self.recording(opened).as_ref())
-    }
-
-    /// Whether frames of an episode can be rendered again: without a world none can.
-    #[cfg(not(feature = "sim"))]
-    #[expect(clippy::unused_self, reason = "as it is where there is a world")]
-    pub fn renders(&self, _: &Opened) -> bool {
-        false
+        let is_whole = self.scored.is_some() && opened.running.is_none();
+        #[cfg(feature = "sim")]
+        let has_world = crate::replay::frames::is_recipe(self.recording(opened).as_ref());
+        #[cfg(not(feature = "sim"))]
+        let has_world = false;
+        is_whole && has_world
     }
 
     /// What the trace of an episode says of how it was recorded.

@@ -67,7 +67,7 @@ function chosen({ rows, ...list }, query) {
   const wanted = ["experiment", "model", "condition"].map((column) => [column, query.getAll(column)]);
   const words = (query.get("search") ?? "").toLowerCase();
   const isWanted = (row) =>
-    wanted.every(([column, values]) => values.length === 0 || values.includes(row[column])) &&
+    wanted.every(([column, values]) => values.length === 0 || values.includes((row.keys ?? row)[column])) &&
     (row.id.toLowerCase().includes(words) || row.model.toLowerCase().includes(words));
   const kept = rows.filter(isWanted);
   const sort = query.get("sort");

@@ -63,9 +63,12 @@ export async function sight(episode) {
     places.show = show;
     show(at);
   }
-  image.addEventListener("error", () => {
+  const caption = make("figcaption", {}, episode.rendered ? "Rendered again from the trace, which has no log." : "");
+  if (episode.frames) shown.append(caption);
+  image.addEventListener("error", async () => {
     shown.dataset.missing = "yes";
     image.alt = "No frame of this step.";
+    if (!isCopy) caption.textContent = await fetch(image.src).then((response) => response.text(), () => image.alt);
   });
   const ahead = new Map();
   async function fetchAhead(t) {
@@ -144,6 +147,8 @@ function timeline(episode, jump) {
   const marks = episode.marks.map(({ t, title }) => {
     const button = make("button", { type: "button", class: "moment", "data-t": t, title: `${title}, t = ${t}` }, title);
     button.style.left = place(t);
+    // Those at the ends stay within the line.
+    button.style.translate = `-${place(t)}`;
     button.addEventListener("click", () => jump(t));
     return button;
   });

@@ -47,12 +47,20 @@ class Rows {
       : new URLSearchParams({ view: "compare", a: pick, b: row.id });
     const cells = this.columns.map(({ key, metric, kind }) => {
       const value = metric === undefined ? row[key] : row.values[metric];
-      return make("span", { class: kind, role: "cell" }, value === null ? "--" : String(value));
+      const text = value === null ? "--" : String(value);
+      const long = { id: true, name: true }[kind] ? text : null;
+      return make("span", { class: kind, role: "cell", title: long }, kind === "id" ? parted(text) : text);
     });
     const element = make("a", { href: link(next), role: "row", "aria-rowindex": at + 2, "data-id": row.id }, cells);
     element.style.top = `${at * ROW}px`;
     return element;
   }
+}
+
+/** An id whose end stays in view where there is no room: seed and run tell its neighbours apart. */
+function parted(id) {
+  const at = id.lastIndexOf("/", id.lastIndexOf("/") - 1);
+  return at < 0 ? [make("span", { class: "cut" }, id)] : [make("span", { class: "cut" }, id.slice(0, at)), make("span", {}, id.slice(at))];
 }
 
 function header(columns) {

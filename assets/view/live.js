@@ -13,8 +13,9 @@ export function watch({ changed, heard }) {
     try {
       if (document.visibilityState === "visible") {
         const told = await ask("live");
-        const words = told.running.length > 0 ? `${told.running.length} under way${told.rate === null ? "" : `, ${told.rate} steps a second`}` : "";
-        status.textContent = told.fault === null ? words : `shown as it was before: ${told.fault}`;
+        const words = [...told.unreadable];
+        if (told.running.length > 0) words.unshift(`${told.running.length} under way${told.rate === null ? "" : `, ${told.rate} steps a second`}`);
+        status.textContent = told.fault === null ? words.join("; ") : `shown as it was before: ${told.fault}`;
         heard(told);
         if (generation !== null && told.generation !== generation) await changed(told);
         generation = told.generation;

@@ -1,7 +1,7 @@
 // The report, live: tables whose cells lead to their episodes; figures and statistics when they are opened.
 import { all, counted, make, notice, one, parsed } from "./dom.js";
 import { ask, isCopy } from "./data.js";
-import { changed, filtered, link, query } from "./state.js";
+import { changed, filtered, go, link, query } from "./state.js";
 import { filterLine, groupQuery } from "./filters.js";
 
 /** What the server is asked for: the filters alone. */
@@ -38,10 +38,15 @@ function linkCells(table, { by, groups }) {
 }
 
 /** In a copy nobody computes: rows of values that are not chosen are hidden. */
-function hideRows(sections) {
-  const now = query();
+function hideRows(sections, { choices }) {
+  // Rows have names as they are spelled.
+  const named = (column) => {
+    const { values = [] } = choices.find((choice) => choice.column === column) ?? {};
+    return query().getAll(column).map((wanted) => values.find(({ value }) => value === wanted)?.name ?? wanted);
+  };
+  const wanted = { experiment: named("experiment"), model: named("model") };
   for (const row of all(".results tbody tr[data-group]", sections)) {
-    const is = (column) => now.getAll(column).length === 0 || now.getAll(column).includes(row.dataset[column]);
+    const is = (column) => wanted[column].length === 0 || wanted[column].includes(row.dataset[column]);
     row.hidden = !is("experiment") || !is("model");
   }
 }
@@ -54,11 +59,22 @@ function makeSorted(table) {
     button.addEventListener("click", () => {
       const was = head.getAttribute("aria-sort");
       const way = was === null ? head.dataset.first : was === head.dataset.first ? (was === "ascending" ? "descending" : "ascending") : null;
-      for (const other of all("thead th", table)) other.removeAttribute("aria-sort");
-      if (way !== null) head.setAttribute("aria-sort", way);
-      for (const body of all("tbody", table)) order(body, head.dataset.metric, way);
+      sort(table, head, way);
+      const others = query().getAll("tables").filter((text) => !text.startsWith(`${table.dataset.table}:`));
+      go(changed({ tables: way === null ? others : [...others, `${table.dataset.table}:${way}:${head.dataset.metric}`] }), { replace: true });
     });
   }
+  for (const text of query().getAll("tables")) {
+    const [name, way, ...metric] = text.split(":");
+    const head = all("thead th[data-metric]", table).find(({ dataset }) => dataset.metric === metric.join(":"));
+    if (name === table.dataset.table && head !== undefined && ["ascending", "descending"].includes(way)) sort(table, head, way);
+  }
+}
+
+function sort(table, head, way) {
+  for (const other of all("thead th", table)) other.removeAttribute("aria-sort");
+  if (way !== null) head.setAttribute("aria-sort", way);
+  for (const body of all("tbody", table)) order(body, head.dataset.metric, way);
 }
 
 function order(body, metric, way) {
@@ -73,6 +89,15 @@ function order(body, metric, way) {
     return sign * (Number(left) - Number(right));
   });
   body.append(...rows);
+}
+
+/** Headers stay in view: at the top of the window, or of a box that scrolls because its table is wider. */
+function keepHeads(box) {
+  const look = () => {
+    box.classList.remove("wide", "fits");
+    box.classList.add(box.scrollWidth > box.clientWidth + 1 ? "wide" : "fits");
+  };
+  new ResizeObserver(look).observe(box);
 }
 
 /** A section that is asked for when it is opened. */
@@ -126,11 +151,12 @@ export async function overview(content, study) {
   }
   const nodes = told.sections.flatMap(parsed);
   sections.append(...nodes);
-  if (isCopy) hideRows(sections);
+  if (isCopy) hideRows(sections, study);
   for (const table of all("table.results", sections)) {
     linkCells(table, told);
     makeSorted(table);
   }
+  for (const box of all(".scroll", sections)) keepHeads(box);
   const tables = one("#tables", sections);
   tables?.after(later("Figures", "figures"), later("Statistics", "statistics"));
 }

@@ -3,6 +3,7 @@
 //! Rule: a page of another site must not be able to ask, whatever name it has resolved to this address. So the names in
 //! `Host` and `Origin` are checked on every request, and where other machines can ask, a token too.
 
+use std::fmt::Write as _;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Arc;
 
@@ -19,6 +20,15 @@ use tokio::net::TcpListener;
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; style-src-attr 'unsafe-inline'; \
                       img-src 'self' data:; font-src 'self' data:; connect-src 'self'; base-uri 'none'; form-action 'none'; \
                       frame-ancestors 'none'";
+
+/// What every page begins and ends with.
+const PAGE: &str = include_str!("../../assets/web/page.html");
+
+/// A page with this title, style sheet and `<body>`, all of them the program's own words.
+pub fn page(title: &str, style: &str, body: &str) -> String {
+    let parts = [("<!-- title -->", title), ("<!-- style -->", style), ("<!-- body -->", body.trim_end())];
+    parts.into_iter().fold(PAGE.to_owned(), |page, (mark, text)| page.replace(mark, text))
+}
 
 /// The headers of each answer.
 const HEADERS: [(HeaderName, &str); 7] = [
@@ -64,6 +74,13 @@ impl Guard {
         };
         let token = self.token.as_ref().map_or_else(String::new, |token| format!("?token={token}"));
         format!("http://{host}:{}/{token}", self.address.port())
+    }
+
+    /// The same with a query behind it.
+    pub fn link_with(&self, query: &[(&str, &str)]) -> String {
+        let link = self.link();
+        let query: Vec<String> = query.iter().map(|(key, value)| format!("{key}={}", percent_encoded(value))).collect();
+        format!("{link}{}{}", if link.contains('?') { '&' } else { '?' }, query.join("&"))
     }
 
     /// Whether a request may be answered; what to say otherwise.
@@ -138,6 +155,18 @@ impl Guard {
         token_of(query)?;
         HeaderValue::from_str(&format!("{}={token}; HttpOnly; SameSite=Strict; Path=/", self.cookie())).ok()
     }
+}
+
+/// A value of a query: what RFC 3986 reserves or does not know is written as its bytes.
+fn percent_encoded(value: &str) -> String {
+    value.bytes().fold(String::new(), |mut text, byte| {
+        if byte.is_ascii_alphanumeric() || b"-_.~/".contains(&byte) {
+            text.push(char::from(byte));
+        } else {
+            let _ = write!(text, "%{byte:02X}");
+        }
+        text
+    })
 }
 
 fn token_of(query: &str) -> Option<&str> {
@@ -266,6 +295,8 @@ mod tests {
             Some(403)
         );
         assert_eq!(guard.link(), "http://lab.example:7000/?token=0123456789abcdef");
+        let query = [("view", "episode"), ("id", "E1/a b&c=é/s1/r1")];
+        assert_eq!(guard.link_with(&query), format!("{}&view=episode&id=E1/a%20b%26c%3D%C3%A9/s1/r1", guard.link()));
         assert!(check_token(token).is_ok());
         assert!(check_token("short").is_err() && check_token("with a space in it").is_err());
     }

@@ -2,8 +2,9 @@
 //!
 //! | file | what it knows |
 //! |---|---|
-//! | `verify` | traces held against a replay; their frames, log and counts anew (feature `sim`, as the next three) |
+//! | `verify` | traces held against a replay; their frames, log and counts anew (feature `sim`, as the next four) |
 //! | `film_strip` | an episode as a row of frames |
+//! | `frames` | frames of an episode rendered again, some steps at a time |
 //! | `again` | a trace's worlds built anew, its actions repeated, every row held against what comes of it |
 //! | `log` | what an episode's log is told, step by step, by a recording or a replay |
 //! | [`moments`] | which steps of an episode tell its story |
@@ -18,6 +19,8 @@ pub mod divergence;
 pub mod error;
 #[cfg(feature = "sim")]
 pub mod film_strip;
+#[cfg(feature = "sim")]
+pub mod frames;
 #[cfg(feature = "sim")]
 pub mod log;
 pub mod moments;

@@ -79,6 +79,7 @@ impl Study {
             figures: &figures,
             statistics: statistics.as_ref(),
             quality: quality.as_ref(),
+            recordings: None,
         };
         let sections = html::sections(&page, names)?;
         Ok(Overview { sections, episodes: results.episodes.len(), by: cells.by.clone(), groups: groups(&cells) })

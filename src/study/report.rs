@@ -7,11 +7,11 @@ use super::error::StudyError;
 use super::figure_inputs::{Drawings, FigureInputs};
 use super::losses::Counted;
 use super::results::{Outputs, Results};
-use super::{LostAs, Study, scores};
+use super::{LostAs, Source, Study, scores};
 use crate::base::suggest::hint;
 use crate::figures::FigureName;
 use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
-use crate::report::html::{self, Figure, Page};
+use crate::report::html::{self, Figure, Page, Recordings};
 use crate::report::layout;
 use crate::report::quality::{self, QualityTable};
 use crate::report::statistics::{Options, Statistics};
@@ -61,6 +61,8 @@ pub struct Report {
     pub notes: Vec<String>,
     pub(super) style: Style,
     threads: NonZeroUsize,
+    /// What the episodes are of, for the commands on the page.
+    recordings: Option<Recordings>,
     /// Figures and the page.
     illustrations: Vec<OutputFile>,
     /// The files that it is made from, none of which it may replace.
@@ -107,13 +109,36 @@ impl Study {
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
         let notes = self.notes(&results, &lost);
         let (illustrations, read) = (Vec::new(), self.files_read(Some(&options.style)));
-        let threads = self.threads;
-        let mut report =
-            Report { results, all, cells, tables, quality, manifest, notes, style, threads, illustrations, read };
+        let (threads, recordings) = (self.threads, self.recordings(&manifest));
+        let mut report = Report {
+            results,
+            all,
+            cells,
+            tables,
+            quality,
+            manifest,
+            notes,
+            style,
+            threads,
+            recordings,
+            illustrations,
+            read,
+        };
         if let Some(statistics) = &statistics {
             report.illustrate(statistics)?;
         }
         Ok(report)
+    }
+
+    /// What names the same recordings to other commands; none of scores.
+    fn recordings(&self, manifest: &Manifest) -> Option<Recordings> {
+        let Source::Traces(_) = &self.source else { return None };
+        // As a manifest names files: by no absolute path.
+        let named = |path: &PathBuf| bundle::Input::new(path, String::new(), 0).path;
+        Some(Recordings {
+            paths: manifest.inputs.iter().map(|input| input.path.clone()).collect(),
+            definitions: self.question.definitions.as_ref().map(named),
+        })
     }
 
     /// What a reader of the tables must know of the data, one sentence each.
@@ -242,6 +267,7 @@ impl Report {
             figures: &figures,
             statistics: Some(statistics),
             quality: self.quality.as_ref(),
+            recordings: self.recordings.as_ref(),
         })?)
     }
 }

@@ -46,6 +46,5 @@ pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<An
 fn frame(snapshot: &Snapshot, query: &Query) -> Result<Vec<u8>, ViewError> {
     let opened = snapshot.episode(required(query, "id")?)?;
     let t = number(query, "t")?.unwrap_or(1);
-    let moment = snapshot.moment(&opened, t)?;
-    moment.and_then(|moment| moment.frame).ok_or_else(|| ViewError::Absent(format!("no frame of t = {t}")))
+    snapshot.frame(&opened, t)?.ok_or_else(|| ViewError::Absent(format!("no frame of t = {t}")))
 }

@@ -30,14 +30,18 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
 /// An episode without its place in a list, its texts cut to so many characters. A log that cannot be read keeps nothing else
 /// from being shown.
 pub(super) fn about(snapshot: &Snapshot, opened: &Opened, longest: usize) -> Result<Value, ViewError> {
-    match snapshot.moment(opened, 1) {
-        Ok(first) => described(snapshot, opened, longest, first.as_ref()),
-        Err(error) => {
-            let mut told = described(snapshot, opened, longest, None)?;
-            told["log_fault"] = error.words().into();
-            Ok(told)
-        }
+    let (first, fault) = match snapshot.moment(opened, 1) {
+        Ok(first) => (first, None),
+        Err(error) => (None, Some(error.words())),
+    };
+    let mut told = described(snapshot, opened, longest, first.as_ref())?;
+    if let Some(fault) = fault {
+        told["log_fault"] = fault.into();
+    } else if told["frames"] == false && snapshot.renders(opened) {
+        told["frames"] = true.into();
+        told["rendered"] = true.into();
     }
+    Ok(told)
 }
 
 /// An episode without its place in a list; `first` is what its log has of its first step.

@@ -21,6 +21,9 @@ pub enum ViewError {
     Log(#[from] LogError),
     #[error("cannot list the folder `{}`: {source}", visible(&folder.to_string_lossy()))]
     Folder { folder: PathBuf, source: io::Error },
+    #[cfg(feature = "sim")]
+    #[error("no frames: {0}")]
+    Replay(#[from] Box<crate::replay::error::ReplayError>),
     #[error("{0}")]
     Absent(String),
     #[error("{0}")]

@@ -69,8 +69,15 @@ impl Found {
         match resolve(named, io::empty()) {
             Ok(traces) => Ok(traces),
             Err(_) if !self.parts.is_empty() || !self.unfinished.is_empty() => {
-                let some = named.iter().filter_map(|name| resolve(std::slice::from_ref(name), io::empty()).ok());
-                Ok(some.flatten().collect())
+                let mut some = Vec::new();
+                for name in named {
+                    match resolve(std::slice::from_ref(name), io::empty()) {
+                        Ok(traces) => some.extend(traces),
+                        Err(_) if Path::new(name).is_dir() => {}
+                        Err(error) => return Err(error.into()),
+                    }
+                }
+                Ok(some)
             }
             Err(error) => Err(error.into()),
         }

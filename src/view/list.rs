@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 use serde_json::{Value, json};
 
 use super::error::ViewError;
-use super::filter::{Filter, Query, condition_of, number, value};
+use super::filter::{COLUMNS, Filter, Query, condition_of, number, value};
 use super::snapshot::Snapshot;
 use crate::base::escape::visible;
 use crate::score::table::{EpisodeTable, MetricColumn};
@@ -31,14 +31,24 @@ pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewEr
     }))
 }
 
-/// The whole list, for a copy.
+/// The whole list, for a copy. Rows whose names are spelled have what filters ask for beside it, under `keys`.
 pub(super) fn everything(snapshot: &Snapshot) -> Result<Value, ViewError> {
     let table = &snapshot.table()?.results.episodes;
     Ok(json!({
         "metrics": table.metrics.iter().map(|metric| visible(&metric.name)).collect::<Vec<_>>(),
         "has_conditions": table.has_conditions(),
-        "rows": (0..table.len()).map(|row| told(table, row)).collect::<Vec<_>>(),
+        "rows": (0..table.len()).map(|row| with_keys(table, row)).collect::<Vec<_>>(),
     }))
+}
+
+fn with_keys(table: &EpisodeTable, row: usize) -> Value {
+    let mut told = told(table, row);
+    let (key, condition) = (table.keys.get(row), condition_of(table, row));
+    let keys = json!({"experiment": key.experiment, "model": key.model, "condition": condition});
+    if COLUMNS.iter().any(|column| told[column] != keys[column]) {
+        told["keys"] = keys;
+    }
+    told
 }
 
 /// The ids before and behind an episode in the same list.

@@ -48,16 +48,24 @@ impl View {
             "running": running,
             "rate": watch.rate().map(|rate| fixed(Some(rate), 1)),
             "fault": watch.fault,
+            "unreadable": snapshot.unreadable,
         })
     }
 
     fn look(&self, watch: &mut Watch) {
         let old = self.newest();
-        let Ok(found) = Found::of(&self.options.runs) else { return };
+        let found = match Found::of(&self.options.runs) {
+            Ok(found) => found,
+            Err(error) => {
+                watch.fault = Some(error.words());
+                return;
+            }
+        };
         let is_same = found.stamps() == old.stamps;
         let growing: Vec<_> = found.unfinished.iter().map(|path| stamp(path).0).collect();
         let known: Vec<_> = old.running.iter().map(|running| running.log.clone()).collect();
         if is_same && growing.is_empty() && known.is_empty() {
+            watch.fault = None;
             return;
         }
         let newer = if is_same { Ok(old.grown(&found)) } else { Snapshot::open(&self.options, old.generation + 1) };

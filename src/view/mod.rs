@@ -23,6 +23,8 @@ mod live;
 mod map;
 mod overview;
 mod page;
+#[cfg(feature = "sim")]
+mod rendered;
 pub mod routes;
 mod snapshot;
 
@@ -73,6 +75,11 @@ impl View {
     /// How many episodes are there.
     pub fn episodes(&self) -> usize {
         self.newest().episodes()
+    }
+
+    /// Whether an episode is there, whole or under way.
+    pub fn has_episode(&self, id: &str) -> bool {
+        self.newest().has(id)
     }
 
     fn newest(&self) -> Arc<Snapshot> {

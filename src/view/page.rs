@@ -3,10 +3,11 @@
 //! Rule: a module imports by whole lines at its top and exports by a word before a declaration, so that all of them make one
 //! classic script by leaving these out: from a disk browsers load no modules.
 
+use crate::base::web;
 use crate::report::html;
 
-/// The document.
-const DOCUMENT: &str = include_str!("../../assets/view/index.html");
+/// What the document shows.
+const BODY: &str = include_str!("../../assets/view/body.html");
 
 /// The style of the application; that of reports comes before it.
 const STYLE: &str = include_str!("../../assets/view/view.css");
@@ -41,7 +42,7 @@ pub(super) fn file(name: &str) -> Option<(String, &'static str)> {
 
 /// The document that loads this script.
 pub(super) fn document(script: &str) -> String {
-    DOCUMENT.replace("<!-- script -->", script)
+    web::page("mirrorstats view", "assets/view.css", &BODY.replace("<!-- script -->", script))
 }
 
 /// The style sheet of the page.

@@ -1,6 +1,7 @@
 //! The state of recordings at one time: their episodes, scored, and where each is.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -30,10 +31,14 @@ pub(super) struct Snapshot {
     pub scored: Option<Arc<Scored>>,
     /// Episodes under way, by their logs.
     pub running: Vec<Running>,
+    /// Why others that are under way cannot be shown.
+    pub unreadable: Vec<String>,
     /// The state of the files.
     pub stamps: Vec<Stamp>,
     logs: Vec<PathBuf>,
     indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
+    #[cfg(feature = "sim")]
+    rendered: Arc<super::rendered::Rendered>,
 }
 
 /// Episodes with their scores.
@@ -80,7 +85,7 @@ impl Snapshot {
         let found = Found::of(&options.runs)?;
         let stamps = found.stamps();
         let scored = Self::scored(options, &found)?.map(Arc::new);
-        let running = running(&found, scored.as_deref());
+        let (running, unreadable) = running(&found, scored.as_deref());
         if scored.is_none() && running.is_empty() {
             let runs = options.runs.iter().map(|run| visible(&run.to_string_lossy())).collect::<Vec<_>>().join(", ");
             return Err(ViewError::Absent(format!(
@@ -88,20 +93,34 @@ impl Snapshot {
                  a trace of a log"
             )));
         }
-        let (options, indices) = (options.clone(), Mutex::default());
-        Ok(Self { generation, options, scored, running, stamps, logs: found.logs, indices })
+        Ok(Self {
+            generation,
+            options: options.clone(),
+            scored,
+            running,
+            unreadable,
+            stamps,
+            logs: found.logs,
+            indices: Mutex::default(),
+            #[cfg(feature = "sim")]
+            rendered: Arc::default(),
+        })
     }
 
     /// The same with the episodes under way as they are now.
     pub fn grown(&self, found: &Found) -> Self {
+        let (running, unreadable) = running(found, self.scored.as_deref());
         Self {
             generation: self.generation + 1,
             options: self.options.clone(),
             scored: self.scored.clone(),
-            running: running(found, self.scored.as_deref()),
+            running,
+            unreadable,
             stamps: self.stamps.clone(),
             logs: self.logs.clone(),
             indices: Mutex::default(),
+            #[cfg(feature = "sim")]
+            rendered: Arc::clone(&self.rendered),
         }
     }
 
@@ -127,6 +146,12 @@ impl Snapshot {
     /// How many episodes are whole.
     pub fn episodes(&self) -> usize {
         self.scored.as_ref().map_or(0, |scored| scored.results.episodes.len())
+    }
+
+    /// Whether an episode is there, whole or under way.
+    pub fn has(&self, id: &str) -> bool {
+        self.scored.as_ref().is_some_and(|scored| scored.rows.contains_key(id))
+            || self.running.iter().any(|running| running.episode.episode_id == id)
     }
 
     /// The episodes with their scores.
@@ -156,7 +181,7 @@ impl Snapshot {
         // What there is by now, not what there was: it grows.
         let own = self.running.iter().find(|running| running.episode.episode_id == id);
         let own = own.ok_or_else(|| ViewError::Absent(format!("no episode `{id}`")))?;
-        let now = frames::unfinished(&own.log).ok().flatten().map_or_else(|| own.episode.clone(), |log| log.episode);
+        let now = unfinished(&own.log)?.unwrap_or_else(|| own.episode.clone());
         Ok(Opened { episode: now, running: Some(own.log.clone()), input: None })
     }
 
@@ -176,6 +201,40 @@ impl Snapshot {
             }
         }
         Ok(None)
+    }
+
+    /// The frame of a step, PNG: out of a log, or rendered again where no log has it and the program can.
+    ///
+    /// # Errors
+    /// A log that cannot be read; an episode that cannot be replayed.
+    pub fn frame(&self, opened: &Opened, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
+        if let Some(frame) = self.moment(opened, t)?.and_then(|moment| moment.frame) {
+            return Ok(Some(frame));
+        }
+        #[cfg(feature = "sim")]
+        if self.renders(opened) {
+            return self.rendered.frame(self.recording(opened).as_ref(), &opened.episode, t);
+        }
+        Ok(None)
+    }
+
+    /// Whether frames of an episode can be rendered again: its trace says how its world was made, and this build has worlds.
+    pub fn renders(&self, opened: &Opened) -> bool {
+        let is_whole = self.scored.is_some() && opened.running.is_none();
+        #[cfg(feature = "sim")]
+        let has_world = crate::replay::frames::is_recipe(self.recording(opened).as_ref());
+        #[cfg(not(feature = "sim"))]
+        let has_world = false;
+        is_whole && has_world
+    }
+
+    /// What the trace of an episode says of how it was recorded.
+    #[cfg(feature = "sim")]
+    fn recording(&self, opened: &Opened) -> Option<serde_json::Value> {
+        let scored = self.scored.as_ref()?;
+        let place = scored.places.get(&opened.episode.episode_id)?;
+        let file = scored.study.traces().ok()?.files().get(place.file)?;
+        serde_json::from_str(file.metadata_value(crate::trace::schema::RECORDING_KEY)?).ok()
     }
 
     /// The shapes of each step, by its t; nothing where there is no log.
@@ -250,15 +309,26 @@ fn time_of(episode: &Episode, t: usize) -> Option<u64> {
     u64::try_from(step.extra.frame_time?).ok()
 }
 
-/// The episodes under way; one that is whole by now is none of them.
-fn running(found: &Found, scored: Option<&Scored>) -> Vec<Running> {
-    let read = |log: &PathBuf| {
-        let episode = frames::unfinished(log).ok().flatten()?.episode;
-        let is_whole = scored.is_some_and(|scored| scored.rows.contains_key(&episode.episode_id));
-        (!is_whole).then(|| Running { log: log.clone(), episode })
-    };
-    let mut running: Vec<Running> = found.unfinished.iter().filter_map(read).collect();
+/// What is there of a log under way; nothing where it has been taken over into a trace meanwhile.
+fn unfinished(log: &Path) -> Result<Option<Episode>, LogError> {
+    match frames::unfinished(log) {
+        Err(LogError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
+        read => Ok(read?.map(|found| found.episode)),
+    }
+}
+
+/// The episodes under way, and why some cannot be read; one that is whole by now is none of them.
+fn running(found: &Found, scored: Option<&Scored>) -> (Vec<Running>, Vec<String>) {
+    let (mut running, mut unreadable) = (Vec::new(), Vec::new());
+    for log in &found.unfinished {
+        match unfinished(log) {
+            Ok(Some(episode)) => running.push(Running { log: log.clone(), episode }),
+            Ok(None) => {}
+            Err(error) => unreadable.push(ViewError::from(error).words()),
+        }
+    }
+    running.retain(|running| scored.is_none_or(|scored| !scored.rows.contains_key(&running.episode.episode_id)));
     running.sort_by(|a, b| a.episode.episode_id.cmp(&b.episode.episode_id));
     running.dedup_by(|a, b| a.episode.episode_id == b.episode.episode_id);
-    running
+    (running, unreadable)
 }

@@ -77,6 +77,7 @@ fn current() -> Vec<(&'static str, Value)> {
     ];
     #[cfg(feature = "sim")]
     schemas.extend([
+        ("participants-remove", json!(schema_for!(mirrorstats::record::participants::Removed))),
         ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
         ("census", json!(schema_for!(mirrorstats::sim::visibility::Visibility))),
         ("replay", json!(schema_for!(mirrorstats::replay::verify::ReplayAnswer))),
@@ -130,7 +131,17 @@ fn replies_are_described_as_the_files_say() {
 #[test]
 fn the_folder_holds_nothing_else() {
     // Their types are there with the feature `sim` alone, their files always.
-    let of_worlds = ["census", "exec-message", "lost", "record", "record-forecast", "replay", "scene", "world-config"];
+    let of_worlds = [
+        "census",
+        "exec-message",
+        "lost",
+        "participants-remove",
+        "record",
+        "record-forecast",
+        "replay",
+        "scene",
+        "world-config",
+    ];
     let names = current().into_iter().map(|(name, _)| name).chain(of_worlds);
     let expected: std::collections::BTreeSet<String> = names.map(|name| format!("{name}.schema.json")).collect();
     let found =

@@ -1,4 +1,4 @@
-// Figures: their size, and their values by keyboard.
+// Figures: their size, their values by keyboard, and which of their marks the filters leave.
 
 const ZOOM = 1.25;
 
@@ -14,7 +14,31 @@ function startFigure(figure) {
     sheet.classList.toggle("zoomed", way !== "fit");
     picture.style.width = way === "fit" ? "" : `${way === "in" ? width * ZOOM : width / ZOOM}px`;
   });
+  makeRoving(zoom, () => [all("button", zoom)]);
   readable(sheet, all(".mark", sheet));
+}
+
+/** Marks of rows that are filtered out fade; a figure keeps its axes, so that what is left stays where it is. */
+function startFading() {
+  const marks = all(".sheet .mark").map((mark) => ({ mark, names: namesOf(mark) }));
+  document.addEventListener("rows", ({ detail: { isAll, rows } }) => {
+    const isLeft = ({ experiments, model }) => experiments.every((experiment) => rows.some((row) => isOf(row, experiment, model)));
+    for (const { mark, names } of marks) mark.classList.toggle("off", !isAll && !isLeft(names));
+  });
+}
+
+/** Whether a row may be what a mark shows, as far as both say. */
+function isOf(row, experiment, model) {
+  const isModel = [row.model, undefined].includes(model) || row.model === undefined || model.startsWith(`${row.model} [`);
+  return isModel && ([row.experiment, undefined].includes(experiment) || row.experiment === undefined);
+}
+
+/** The experiments and the model that a mark is of; lines say it in their title alone: `E1 → E2 · GPT 5.1`. */
+function namesOf(mark) {
+  const { experiment, model } = mark.dataset;
+  if (experiment !== undefined || model !== undefined) return { experiments: [experiment], model };
+  const [head, ...rest] = (mark.querySelector(":scope > title")?.textContent ?? "").split(" · ");
+  return rest.length === 0 ? { experiments: [undefined] } : { experiments: head.split(" → "), model: rest.join(" · ") };
 }
 
 /** Lets the arrow keys go through the marks of a figure. */

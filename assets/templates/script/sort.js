@@ -9,9 +9,11 @@ function compare(left, right) {
 /**
  * Makes headers sort the rows of `bodies()`: first, the other way, as it was.
  *
- * `keyOf(head)` gives the function from a row to its number or text, null where there is none.
+ * `keyOf(head)` gives the function from a row to its number or text, null where there is none. `heard(head, way)` hears of
+ * each change, without a way where the rows are as they were. Gives `arrange()`, for rows that have moved, and
+ * `sort(head, way)`.
  */
-function makeSortable(heads, bodies, keyOf) {
+function makeSortable(heads, bodies, keyOf, heard = () => {}) {
   let sorted = null;
   const original = new Map();
   const ways = (head) => (head.dataset.first === "descending" ? ["descending", "ascending"] : ["ascending", "descending"]);
@@ -36,10 +38,15 @@ function makeSortable(heads, bodies, keyOf) {
 
   function turn(head) {
     const [first, second] = ways(head);
-    if (sorted?.head !== head) sorted = { head, way: first };
-    else sorted = sorted.way === first ? { head, way: second } : null;
+    const way = sorted?.head !== head ? first : sorted.way === first ? second : null;
+    sort(head, way);
+    heard(head, way);
+  }
+
+  function sort(head, way) {
+    sorted = way === null ? null : { head, way };
     for (const other of heads) other.removeAttribute("aria-sort");
-    if (sorted !== null) head.setAttribute("aria-sort", sorted.way);
+    if (sorted !== null) head.setAttribute("aria-sort", way);
     arrange();
   }
 
@@ -49,7 +56,9 @@ function makeSortable(heads, bodies, keyOf) {
     head.append(button);
   }
   arrange();
-  return arrange;
+  const row = heads[0]?.parentElement;
+  if (row) makeRoving(row, () => [heads.filter((head) => !head.hidden).map((head) => head.querySelector("button"))]);
+  return { arrange, sort };
 }
 
 /** The value of a metric in a row of results. */
@@ -75,7 +84,18 @@ class Results {
       if (dataset.by === "group") return (row) => this.groups.indexOf(this.home.get(row));
       return (row) => row.querySelector("th").textContent;
     };
-    this.arrange = makeSortable(all("thead th", table), () => this.bodies(), keyOf);
+    const heads = all("thead th", table);
+    const nameOf = ({ dataset }) => dataset.metric ?? dataset.by;
+    const { arrange, sort } = makeSortable(heads, () => this.bodies(), keyOf, (head, way) => {
+      const others = query().getAll("sort").filter((text) => !text.startsWith(`${table.dataset.table}:`));
+      remember({ sort: way === null ? others : [...others, `${table.dataset.table}:${way}:${nameOf(head)}`] });
+    });
+    this.arrange = arrange;
+    for (const text of query().getAll("sort")) {
+      const [name, way, ...rest] = text.split(":");
+      const head = heads.find((head) => nameOf(head) === rest.join(":"));
+      if (name === table.dataset.table && head !== undefined && ["ascending", "descending"].includes(way)) sort(head, way);
+    }
   }
 
   bodies() {

@@ -16,6 +16,16 @@ function startTheme() {
   show();
 }
 
+/** Headers stay in view: at the top of the window, or of a box that scrolls because its table is wider. */
+function keepHeads(box) {
+  const look = () => {
+    box.classList.remove("wide", "fits");
+    box.classList.add(box.scrollWidth > box.clientWidth + 1 ? "wide" : "fits");
+  };
+  new ResizeObserver(look).observe(box);
+  look();
+}
+
 /** What is folded away on the screen is not on paper. */
 function startPrinting() {
   const folded = [];
@@ -36,6 +46,11 @@ startPrinting();
 startTips();
 const results = all("table.results").map((table) => new Results(table));
 for (const table of all("table.results")) new Grid(table, openEpisodes);
+startFading();
+startPair();
 startFilters(results);
 for (const hint of all(".hint")) hint.hidden = false;
 for (const figure of all("figure")) if (figure.querySelector("svg") !== null) startFigure(figure);
+for (const links of all("nav")) makeRoving(links, () => [all("a:not([hidden])", links)]);
+for (const box of all(".scroll")) keepHeads(box);
+recallEpisodes();

@@ -10,7 +10,7 @@ use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, Query, State};
 use axum::http::{StatusCode, header};
-use axum::response::{IntoResponse as _, Response};
+use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -18,7 +18,7 @@ use serde_json::{Map, Value, json};
 use super::hub::Hub;
 use crate::base::web::{self, Guard};
 
-const DOCUMENT: &str = include_str!("../../../assets/player/index.html");
+const BODY: &str = include_str!("../../../assets/player/body.html");
 const STYLE: &str = include_str!("../../../assets/player/player.css");
 const SCRIPT: &str = include_str!("../../../assets/player/player.js");
 
@@ -54,7 +54,7 @@ pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Res
 
 fn routes(hub: Arc<Hub>) -> Router {
     Router::new()
-        .route("/", get(|| async { file(DOCUMENT, "text/html; charset=utf-8") }))
+        .route("/", get(|| async { file(web::page("Mirror room", "player.css", BODY), "text/html; charset=utf-8") }))
         .route("/player.css", get(|| async { file(STYLE, "text/css; charset=utf-8") }))
         .route("/player.js", get(|| async { file(SCRIPT, "text/javascript; charset=utf-8") }))
         .route("/state", get(state))
@@ -67,7 +67,7 @@ fn routes(hub: Arc<Hub>) -> Router {
         .with_state(hub)
 }
 
-fn file(text: &'static str, kind: &'static str) -> Response {
+fn file(text: impl IntoResponse, kind: &'static str) -> Response {
     ([(header::CONTENT_TYPE, kind)], text).into_response()
 }
 

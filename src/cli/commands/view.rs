@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
+use crate::base::escape::visible;
 use crate::base::web::{Guard, check_token};
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::outcome::{Failure, Outcome};
@@ -27,6 +28,9 @@ pub struct ViewArgs {
     /// How episodes are grouped into cells.
     #[command(flatten)]
     grouping: GroupingArgs,
+    /// Open at this episode, such as E1/oracle/s1/r1
+    #[arg(long, value_name = "EPISODE")]
+    episode: Option<String>,
     /// Other definitions, to show what they change: a name or a TOML file
     #[arg(long, value_name = "NAME|FILE")]
     against: Option<PathBuf>,
@@ -46,7 +50,7 @@ pub struct ViewArgs {
     #[arg(long)]
     no_open: bool,
     /// Write the page and all that it shows into this folder instead
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "token", "no_open"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "token", "no_open", "episode"])]
     export: Option<PathBuf>,
     /// How many threads to use.
     #[command(flatten)]
@@ -66,6 +70,12 @@ impl ViewArgs {
             style: self.style.clone(),
             threads: self.threads.count(),
         })?;
+        if let Some(id) = self.episode.as_ref().filter(|id| !view.has_episode(id)) {
+            return Err(Failure::input(format!(
+                "--episode: expected the id of an episode in these recordings, found `{}`\n  help: `mirrorstats info --episodes` lists them",
+                visible(id)
+            )));
+        }
         if let Some(folder) = &self.export {
             let written = export::write(&view, folder)?;
             output::say(&format!("{written} files; open {}", folder.join("index.html").display()));
@@ -82,7 +92,10 @@ impl ViewArgs {
         };
         let (listener, address) = routes::bind(host, self.port).map_err(taken)?;
         let guard = Guard::new(address, self.host.as_deref(), self.token.as_deref());
-        let link = guard.link();
+        let link = self
+            .episode
+            .as_deref()
+            .map_or_else(|| guard.link(), |id| guard.link_with(&[("view", "episode"), ("id", id)]));
         writeln!(io::stdout(), "{link}")?;
         io::stdout().flush()?;
         output::say(&format!("{} episodes; Ctrl-C ends it", view.episodes()));

@@ -1,4 +1,4 @@
-//! What the page's script reads: metrics, groups and episodes as JSON inside a `<script>` element.
+//! What the page's script reads: metrics, groups, episodes and tests as JSON inside a `<script>` element.
 //!
 //! Rule: the JSON has no `<`, `>` or `&`, so nothing in it can end the element or begin a comment. Integers that
 //! JavaScript would round are strings.
@@ -8,11 +8,11 @@ use std::collections::BTreeMap;
 use serde::{Serialize, Serializer};
 use serde_json::Value as Json;
 
-use super::HtmlError;
+use super::command::{Recordings, quoted};
 use super::filter::shown;
+use super::pair::pairs;
+use super::{HtmlError, Page};
 use crate::base::escape::visible;
-use crate::score::table::EpisodeTable;
-use crate::stats::cell::Cells;
 use crate::stats::group::membership;
 
 /// The largest integer below which JavaScript knows every other one.
@@ -26,12 +26,18 @@ struct Embedded<'a> {
     /// What each group of episodes is called: `E1 · GPT 5.1`.
     groups: Vec<String>,
     episodes: Episodes,
+    /// What looks into an episode: before its id, and behind it.
+    commands: Json,
+    /// Every two models against each other.
+    pairs: Json,
 }
 
 /// The episode table by column.
 #[derive(Debug, Serialize)]
 struct Episodes {
     id: Vec<String>,
+    /// The id as a word of a shell, where it is not one itself.
+    word: BTreeMap<usize, String>,
     seed: Vec<i32>,
     run: Vec<i32>,
     group: Vec<usize>,
@@ -56,12 +62,8 @@ impl Serialize for Integer {
 ///
 /// # Errors
 /// When the episodes cannot be grouped as the cells are.
-pub(super) fn json(
-    episodes: &EpisodeTable,
-    cells: &Cells,
-    metrics: &[Json],
-    undefined: &str,
-) -> Result<String, HtmlError> {
+pub(super) fn json(page: &Page<'_>, metrics: &[Json], undefined: &str) -> Result<String, HtmlError> {
+    let Page { episodes, cells, .. } = *page;
     let label = |key: &[_]| key.iter().map(|value| shown(value, undefined)).collect::<Vec<_>>().join(" · ");
     let undefined = visible(undefined);
     let embedded = Embedded {
@@ -70,6 +72,9 @@ pub(super) fn json(
         groups: cells.groups.iter().map(|group| label(&group.key)).collect(),
         episodes: Episodes {
             id: episodes.keys.iter().map(|key| visible(key.episode_id)).collect(),
+            word: (episodes.keys.iter().enumerate())
+                .filter_map(|(at, key)| Some((at, quoted(key.episode_id)?)))
+                .collect(),
             seed: episodes.keys.iter().map(|key| key.seed).collect(),
             run: episodes.keys.iter().map(|key| key.run).collect(),
             group: membership(episodes, &cells.by)?,
@@ -79,6 +84,8 @@ pub(super) fn json(
                 .map(|column| (visible(&column.name), column.iter().map(|value| value.map(Integer)).collect()))
                 .collect(),
         },
+        commands: page.recordings.map_or_else(|| Json::Array(Vec::new()), Recordings::commands),
+        pairs: pairs(page.statistics),
     };
     let json =
         serde_json::to_string(&embedded).expect("strings, integers and maps with names as keys have a JSON text");

@@ -32,7 +32,7 @@ impl Filters {
         }
         let filter = |(key, values): (usize, Vec<KeyValue>)| {
             let values: Vec<String> = values.iter().map(|value| shown(value, undefined)).collect();
-            json!({ "key": key, "heading": visible(&heading(&cells.by[key])), "values": values })
+            json!({ "key": key, "column": visible(&cells.by[key]), "heading": visible(&heading(&cells.by[key])), "values": values })
         };
         let several = values.into_iter().enumerate().filter(|(_, values)| values.len() > 1);
         Self { filters: several.map(filter).collect(), places }

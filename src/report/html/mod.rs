@@ -1,23 +1,25 @@
 //! `report.html`: tables, figures and provenance of a report as one page that needs nothing but itself.
 //!
 //! ```text
-//! page.rs ──► cell.rs, filter.rs, definitions.rs                template.rs
+//! page.rs ──► cell.rs, filter.rs, definitions.rs, command.rs    template.rs
 //! (the whole   (what the templates say, as text)            ──► (assets/templates: markup,
-//!  page)        embedded.rs (episodes as JSON for the script)    style and script become one)
+//!  page)        embedded.rs, pair.rs (JSON for the script)        style and script become one)
 //! ```
 //!
 //! Rule: numbers arrive here finished; a cell's attributes carry the text of `cells.csv`. Names from traces are text:
 //! templates escape them, and what acts on a reader is spelled out first ([`visible`]). The page forbids itself every
-//! request and every script but its own. It is complete without its script; the script adds sorting, filters,
-//! values on hover and the episodes behind a cell.
+//! request and every script but its own. It is complete without its script; the script adds sorting, filters, search,
+//! values on hover, the episodes behind a cell, and two models beside each other. What is chosen stands in the address.
 //!
 //! [`visible`]: crate::base::escape
 
 mod cell;
+mod command;
 mod definitions;
 mod embedded;
 mod filter;
 mod page;
+mod pair;
 mod template;
 
 use crate::report::bundle::Manifest;
@@ -27,6 +29,8 @@ use crate::report::table::Table;
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
 use crate::stats::group::GroupError;
+
+pub use command::Recordings;
 
 /// What the page is made of.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +49,8 @@ pub struct Page<'a> {
     pub statistics: Option<&'a Statistics>,
     /// What became of the replies; none leaves the section out.
     pub quality: Option<&'a QualityTable>,
+    /// What the episodes are of; none where no command looks into them, as into scores.
+    pub recordings: Option<&'a Recordings>,
 }
 
 /// A figure to set into the page.

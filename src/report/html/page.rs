@@ -9,7 +9,7 @@ use serde_json::{Value as Json, json};
 use super::cell::cell;
 use super::filter::{Filters, shown};
 use super::template::markup;
-use super::{Figure, HtmlError, Page, definitions, embedded};
+use super::{Figure, HtmlError, Page, definitions, embedded, pair};
 use crate::base::escape::visible;
 use crate::figures;
 use crate::metric::catalog::{Better, Metric};
@@ -37,7 +37,7 @@ pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
     let catalog = &page.cells.catalog;
     let filters = Filters::of(page.tables, page.cells, undefined);
     let metrics = definitions::metrics(catalog);
-    let data = embedded::json(page.episodes, page.cells, &metrics, undefined)?;
+    let data = embedded::json(page, &metrics, undefined)?;
     let tables = page.tables.iter().map(|of| table(of, page.cells, &filters)).collect::<Result<Vec<_>, _>>()?;
     Ok(context! {
         font => markup(&figures::font_style_sheet()),
@@ -45,6 +45,7 @@ pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
         filters => Serde(filters.filters),
         tables => Serde(tables),
         figures => page.figures.iter().map(figure).collect::<Vec<_>>(),
+        pair => Serde(pair::heading(page.statistics)),
         statistics => Serde(page.statistics.map(statistics)),
         quality => Serde(page.quality.map(quality)),
         metrics => Serde(metrics),

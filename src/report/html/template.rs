@@ -10,11 +10,12 @@ use crate::base::hash::integrity_of_bytes;
 
 const PAGE: &str = "page.html";
 
-const TEMPLATES: [(&str, &str); 8] = [
+const TEMPLATES: [(&str, &str); 9] = [
     (PAGE, include_str!("../../../assets/templates/page.html")),
     ("header.html", include_str!("../../../assets/templates/header.html")),
     ("tables.html", include_str!("../../../assets/templates/tables.html")),
     ("figures.html", include_str!("../../../assets/templates/figures.html")),
+    ("pair.html", include_str!("../../../assets/templates/pair.html")),
     ("statistics.html", include_str!("../../../assets/templates/statistics.html")),
     ("quality.html", include_str!("../../../assets/templates/quality.html")),
     ("definitions.html", include_str!("../../../assets/templates/definitions.html")),
@@ -32,12 +33,15 @@ pub(super) const STYLE: &str = concat!(
 const SCRIPT: &str = concat!(
     "(() => {\n\"use strict\";\n",
     include_str!("../../../assets/templates/script/page.js"),
+    include_str!("../../../assets/templates/script/address.js"),
+    include_str!("../../../assets/templates/script/roving.js"),
     include_str!("../../../assets/templates/script/tip.js"),
     include_str!("../../../assets/templates/script/sort.js"),
     include_str!("../../../assets/templates/script/filter.js"),
     include_str!("../../../assets/templates/script/grid.js"),
     include_str!("../../../assets/templates/script/episodes.js"),
     include_str!("../../../assets/templates/script/figures.js"),
+    include_str!("../../../assets/templates/script/pair.js"),
     include_str!("../../../assets/templates/script/start.js"),
     "})();\n",
 );

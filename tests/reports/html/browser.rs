@@ -55,11 +55,20 @@ impl Browser {
 
     /// The same after these commands.
     pub fn open_with(html: &str, before: &[(&str, Value)]) -> Self {
+        Self::open_from_disk(html, "", before)
+    }
+
+    /// Opens `html` from disk with a query in its address.
+    pub fn open_at(html: &str, query: &str) -> Self {
+        Self::open_from_disk(html, query, &[])
+    }
+
+    fn open_from_disk(html: &str, query: &str, before: &[(&str, Value)]) -> Self {
         let mut browser = Self::start(&need::browser());
         let file = browser.home.path().join("report.html");
         std::fs::write(&file, html).unwrap();
         let page = format!("file://{}", file.display());
-        browser.visit(&page, &page, before);
+        browser.visit(&format!("{page}{query}"), &page, before);
         browser
     }
 

@@ -5,6 +5,8 @@ use std::collections::BTreeSet;
 use mirrorstats::score::table::MetricColumn;
 use serde_json::json;
 
+use crate::harness::files::fixture;
+use crate::harness::program::{Answer, PROGRAM, run};
 use crate::html::browser::Browser;
 use crate::html::scored::{PAPER, Report};
 
@@ -85,5 +87,51 @@ fn without_its_script_the_page_is_whole() {
     let controls = "[...document.querySelectorAll('#theme, #filters, .hint, .zoom')].some((c) => c.checkVisibility())";
     assert!(!browser.holds(controls), "nothing to press that does nothing");
     browser.send("Emulation.setScriptExecutionDisabled", &json!({"value": false}));
+    browser.close();
+}
+
+#[test]
+fn a_row_has_the_command_that_looks_into_its_episode() {
+    let folder = tempfile::tempdir().unwrap();
+    let traces = folder.path().join("my runs");
+    std::fs::create_dir(&traces).unwrap();
+    for name in ["E1-gpt-5-1.parquet", "E1-gemma4-26b.parquet"] {
+        std::fs::copy(fixture("paper").join(name), traces.join(name)).unwrap();
+    }
+    let definitions = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/definitions/inclusive.toml");
+    std::fs::copy(definitions, folder.path().join("inclusive.toml")).unwrap();
+    run(folder.path(), &["report", "my runs", "--definitions", "inclusive.toml", "--out", "out"]).done();
+    let page = std::fs::read_to_string(folder.path().join("out/report.html")).unwrap();
+    assert!(!page.contains(folder.path().to_str().unwrap()), "no absolute path");
+    let mut browser = Browser::open(&page);
+    browser.click("#table-main tr[data-model='GPT 5.1'] td[data-metric='TTD']");
+    let commands = "[...document.querySelectorAll('#episodes tbody button.copy')].map((b) => b.dataset.command)";
+    let explaining = browser.texts(commands);
+    assert_eq!(explaining.len(), 21);
+    let expected = "mirrorstats score 'my runs/E1-gemma4-26b.parquet' 'my runs/E1-gpt-5-1.parquet' --definitions inclusive.toml \
+                    --explain E1/gpt-5-1/s1/r1";
+    assert_eq!(explaining[0], expected);
+    let run_by_shell = |command: &str| {
+        let own = command.replacen("mirrorstats", PROGRAM, 1);
+        let output = std::process::Command::new("bash").args(["-c", &own]).current_dir(folder.path()).output().unwrap();
+        Answer::from(output)
+    };
+    assert!(run_by_shell(&explaining[0]).done().starts_with("E1/gpt-5-1/s1/r1: "));
+    let told = "(() => { const c = document.getElementById('command'); c.value = '1'; c.dispatchEvent(new Event('change')); \
+        return document.getElementById('command-line').textContent; })()";
+    assert!(browser.text(told).ends_with(" --definitions inclusive.toml --episode E1/gpt-5-1/s1/r1"));
+    browser.point_at("#episodes tbody tr:nth-of-type(3) th");
+    assert!(browser.text("document.getElementById('command-line').textContent").ends_with("/s1/r3"));
+    browser.click("#episodes tbody tr:nth-of-type(2) button.copy");
+    assert!(browser.holds("new Promise((done) => setTimeout(() => done(true), 200))"));
+    let said = browser.text("document.querySelector('#episodes .said').textContent");
+    assert!(said.starts_with("Copied") || said.starts_with("Selected"), "{said}");
+    browser.close();
+    // Scores have no steps to look into.
+    run(folder.path(), &["report", "out/episodes.parquet", "--out", "again"]).done();
+    let page = std::fs::read_to_string(folder.path().join("again/report.html")).unwrap();
+    let mut browser = Browser::open(&page);
+    browser.click("#table-main tr[data-model='GPT 5.1'] td[data-metric='TTD']");
+    assert!(browser.holds("document.querySelector('#episodes .copy, #command') === null"));
     browser.close();
 }

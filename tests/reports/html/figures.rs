@@ -1,5 +1,7 @@
 //! Figures in the page: values on hover and by keyboard, and their size.
 
+use serde_json::json;
+
 use crate::html::browser::Browser;
 use crate::html::scored::PAPER_PAGE;
 
@@ -61,5 +63,60 @@ fn a_figure_grows_and_fits_again() {
     assert!(browser.value(width).as_f64().unwrap() < before);
     browser.click("#figure-spider [data-zoom=fit]");
     assert!((browser.value(width).as_f64().unwrap() - before).abs() < 1.0);
+    browser.close();
+}
+
+/// How many marks of a figure are left and how many fade, of those where an expression over `mark` holds.
+fn left(browser: &mut Browser, figure: &str, is_counted: &str) -> (u64, u64) {
+    let marks = format!("[...document.querySelectorAll('#figure-{figure} .mark')].filter((mark) => {is_counted})");
+    let off = browser.value(&format!("{marks}.filter((mark) => mark.matches('.off')).length")).as_u64().unwrap();
+    (browser.value(&format!("{marks}.length")).as_u64().unwrap() - off, off)
+}
+
+#[test]
+fn figures_show_what_the_filters_leave() {
+    let mut browser = Browser::open_at(&PAPER_PAGE, "?experiment=E1&experiment=E2&model=GPT+5.1");
+    let of_gpt = "mark.dataset.model === 'GPT 5.1'";
+    let wanted = format!("{of_gpt} && ['E1', 'E2'].includes(mark.dataset.experiment)");
+    for figure in ["spider", "heatmap", "scatter", "intervals", "slopes", "decision-curve"] {
+        let (shown, faded) = left(&mut browser, figure, &wanted);
+        assert!(shown > 0 && faded == 0, "{figure}");
+        let others = format!("mark.dataset.model !== undefined && !({wanted})");
+        let (shown, faded) = left(&mut browser, figure, &others);
+        assert!(shown == 0 && faded > 0, "{figure}: {shown} of other rows");
+    }
+    // Lines say in their title what they are of, and go with their points.
+    let line = "mark.dataset.model === undefined && mark.dataset.experiment === undefined";
+    assert_eq!(left(&mut browser, "spider", line), (2, 38));
+    assert_eq!(left(&mut browser, "slopes", line).0, 1, "from E1 to E2");
+    browser.click("#filters button[type=reset]");
+    assert!(browser.holds("new Promise((done) => setTimeout(() => done(true)))"));
+    assert!(browser.holds("document.querySelector('.mark.off') === null"));
+    browser.close();
+}
+
+#[test]
+fn figures_are_dark_in_the_dark_and_light_on_paper() {
+    let mut browser = Browser::open(&PAPER_PAGE);
+    let look = "(() => { const sheet = document.querySelector('#figure-heatmap .sheet'); \
+        return [getComputedStyle(sheet).backgroundColor, getComputedStyle(sheet.querySelector('svg')).filter.split('(')[0]].join(' '); })()";
+    let system = |scheme: &str| json!({"features": [{"name": "prefers-color-scheme", "value": scheme}]});
+    for (scheme, theme, expected) in [
+        ("light", "", "rgb(255, 255, 255) none"),
+        ("dark", "", "rgb(20, 20, 20) invert"),
+        ("dark", "light", "rgb(255, 255, 255) none"),
+        ("light", "dark", "rgb(20, 20, 20) invert"),
+    ] {
+        browser.send("Emulation.setEmulatedMedia", &system(scheme));
+        let set = if theme.is_empty() {
+            "delete document.documentElement.dataset.theme".to_owned()
+        } else {
+            format!("document.documentElement.dataset.theme = '{theme}'")
+        };
+        browser.value(&set);
+        assert_eq!(browser.text(look), expected, "{scheme} {theme}");
+    }
+    browser.send("Emulation.setEmulatedMedia", &json!({"media": "print", "features": []}));
+    assert_eq!(browser.text(look), "rgb(255, 255, 255) none");
     browser.close();
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use mirrorstats::stats::cell::KeyValue;
 
 use crate::html::browser::Browser;
-use crate::html::scored::Report;
+use crate::html::scored::{PAPER_PAGE, Report};
 
 /// The rows on show of the main table: experiment, model and the mean of TSA, in order.
 const ROWS: &str = "[...document.querySelectorAll('#table-main tbody tr[data-group]')].filter((r) => r.checkVisibility()) \
@@ -199,5 +199,100 @@ fn the_keyboard_alone_is_enough() {
     assert_eq!(browser.text(place), "TSA|Claude Sonnet 4.6|E1", "closing leads back");
     browser.press("Tab");
     assert!(!browser.holds("document.activeElement.closest('#table-main td') !== null"), "a table is one stop");
+    browser.close();
+}
+
+/// Presses Tab until an expression holds, at most ten times in all.
+fn tabs(browser: &mut Browser, so_far: usize, until: &str) -> usize {
+    for pressed in so_far + 1..=10 {
+        browser.press("Tab");
+        if browser.holds(until) {
+            return pressed;
+        }
+    }
+    let at = browser.text("document.activeElement.outerHTML.slice(0, 200)");
+    panic!("{until} is not reached within ten tabs, but {at}")
+}
+
+#[test]
+fn everything_is_within_ten_tabs() {
+    let mut browser = Browser::open(&PAPER_PAGE);
+    for goal in [
+        "#filters input[type=search]",
+        "#filters fieldset input",
+        "#table-main th button",
+        "#table-main td[data-metric]",
+    ] {
+        browser.value("document.activeElement.blur()");
+        browser.send("Page.reload", &serde_json::json!({}));
+        assert!(browser.holds("new Promise((done) => setTimeout(() => done(true), 300))"));
+        tabs(&mut browser, 0, &format!("document.activeElement.matches('{goal}')"));
+    }
+    browser.close();
+    let links = "[...document.querySelectorAll('.top nav a')].map((a) => a.hash)";
+    let mut browser = Browser::open(&PAPER_PAGE);
+    let sections = browser.texts(links);
+    assert_eq!(sections.len(), 6);
+    browser.close();
+    for (at, goal) in [
+        (1, "#figure-decision-curve .sheet"),
+        (2, "#pair select"),
+        (3, "#statistics summary"),
+        (5, "#provenance summary"),
+    ] {
+        let mut browser = Browser::open(&PAPER_PAGE);
+        let mut pressed = tabs(&mut browser, 0, "document.activeElement.matches('.top nav a')");
+        for _ in 0..at {
+            browser.press("ArrowRight");
+        }
+        browser.press("Enter");
+        if goal.starts_with("#figure-") {
+            pressed = tabs(&mut browser, pressed, "document.activeElement.matches('.contents a')");
+            browser.press("End");
+            browser.press("Enter");
+        }
+        tabs(&mut browser, pressed, &format!("document.activeElement.matches('{goal}')"));
+        browser.close();
+    }
+}
+
+#[test]
+fn arrows_go_through_the_filters_line_by_line() {
+    let mut browser = Browser::open(&Report::bare().render().unwrap());
+    browser.value("document.querySelector('#filters fieldset input').focus()");
+    let label = "document.activeElement.parentElement.textContent.trim()";
+    for (key, expected) in [
+        ("ArrowRight", "E2"),
+        ("ArrowDown", "GPT 5.1"),
+        ("ArrowUp", "E2"),
+        ("Home", "E1"),
+        ("ArrowLeft", "E1"),
+        ("ArrowDown", "Claude Sonnet 4.6"),
+        ("ArrowDown", "Keep groups together"),
+    ] {
+        browser.press(key);
+        assert_eq!(browser.text(label), expected, "{key}");
+    }
+    browser.press("ArrowUp");
+    browser.press(" ");
+    assert_eq!(browser.text("document.getElementById('shown').textContent"), "5 of 40 rows");
+    browser.close();
+}
+
+#[test]
+fn headers_stay_in_view() {
+    let mut browser = Browser::open(&PAPER_PAGE);
+    let top = "document.querySelector('#table-main thead th').getBoundingClientRect().top";
+    for width in [1600, 1280, 700, 390] {
+        let size = serde_json::json!({"width": width, "height": 700, "deviceScaleFactor": 1, "mobile": false});
+        browser.send("Emulation.setDeviceMetricsOverride", &size);
+        assert!(
+            browser
+                .holds("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
+        );
+        browser.value("document.querySelector('#table-main tbody:last-of-type tr:last-of-type td').scrollIntoView({block: 'center'})");
+        let top = browser.value(top).as_f64().unwrap();
+        assert!((-1.0..500.0).contains(&top), "{width}: {top}");
+    }
     browser.close();
 }

@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use mirrorstats::figures::{self, FigureName};
 use mirrorstats::report::bundle::{Input, Manifest};
-use mirrorstats::report::html::{self, Figure, HtmlError, Page};
+use mirrorstats::report::html::{self, Figure, HtmlError, Page, Recordings};
 use mirrorstats::report::layout;
 use mirrorstats::report::statistics::{Options, Statistics};
 use mirrorstats::report::style::Style;
@@ -37,6 +37,7 @@ pub struct Report {
     pub tables: Vec<Table>,
     pub manifest: Manifest,
     pub statistics: Option<Statistics>,
+    pub recordings: Recordings,
     /// Name, title, caption and picture.
     pub figures: Vec<(FigureName, String)>,
 }
@@ -51,7 +52,9 @@ impl Report {
         let input = |name: &str| Input::new(Path::new(name), "0".repeat(64), 1234);
         let inputs = vec![input("traces/a.parquet"), input("traces/b.parquet")];
         let manifest = Manifest::new(&cells, &style, 1, None, inputs);
-        Self { episodes, cells, tables, manifest, statistics: None, figures: Vec::new() }
+        let paths = manifest.inputs.iter().map(|input| input.path.clone()).collect();
+        let recordings = Recordings { paths, definitions: None };
+        Self { episodes, cells, tables, manifest, statistics: None, recordings, figures: Vec::new() }
     }
 
     /// The tables of the bundled traces alone.
@@ -81,6 +84,7 @@ impl Report {
             figures: &figures,
             statistics: self.statistics.as_ref(),
             quality: None,
+            recordings: Some(&self.recordings),
         })
     }
 }

@@ -1,8 +1,9 @@
 //! A recording that goes on, looked at.
 
+use std::path::Path;
 use std::process::Stdio;
 
-use crate::harness::files::write_small_world;
+use crate::harness::files::{fixture, write_small_world};
 use crate::harness::need;
 use crate::harness::program::{Running, program, wait_for};
 use crate::html::browser::Browser;
@@ -15,6 +16,63 @@ for line in sys.stdin:
     if json.loads(line)["kind"] == "observation":
         time.sleep(PAUSE)
         print(json.dumps({"view-description": "", "reasoning": "", "action": "a", "summary": "", "selected_cube": "none", "identification": "unknown"}))'"#;
+
+/// An agent that turns, and waits before each step until the file `allowed` has its number.
+const WAITING: &str = r#"exec:python3 -u -c 'import sys, time, json
+step = 0
+for line in sys.stdin:
+    if json.loads(line)["kind"] == "observation":
+        step += 1
+        while int(open("allowed").read() or 0) < step: time.sleep(0.02)
+        print(json.dumps({"view-description": "", "reasoning": "", "action": "a", "summary": "", "selected_cube": "none", "identification": "unknown"}))'"#;
+
+/// Lets the agent go on to a step; written aside, so that it never reads half a number.
+fn allow(folder: &Path, step: u32) {
+    std::fs::write(folder.join("next"), step.to_string()).unwrap();
+    std::fs::rename(folder.join("next"), folder.join("allowed")).unwrap();
+}
+
+#[test]
+fn pages_that_are_open_grow_with_the_recording() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    write_small_world(here, "episode.steps = 25\n");
+    let record = |runs: &str| {
+        let mut command = program(here);
+        command.args(["record", "--agent", WAITING, "--model", "turner", "--experiment", "E1", "--seeds", "1"]);
+        command.args(["--runs", runs, "--out", "runs", "--config", "small.toml"]);
+        Running(command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap())
+    };
+    allow(here, 25);
+    assert!(record("1").0.wait().unwrap().success());
+    let server = Server::start(here, &["runs"]);
+    let mut list = Browser::at(&format!("{}?view=episodes", server.link));
+    until(&mut list, "document.querySelectorAll('.list .rows a').length === 1");
+    allow(here, 2);
+    let mut recording = record("2");
+    until(&mut list, "document.querySelector('#live').textContent.startsWith('1 under way')");
+    let mut episode = Browser::at(&format!("{}?view=episode&id=E1/turner/s1/r2", server.link));
+    let length = |steps: u32| format!("document.querySelector('#length')?.textContent === '{steps}'");
+    until(&mut episode, &length(2));
+    until(&mut episode, "document.querySelector('img.frame')?.naturalWidth > 0");
+    assert!(episode.holds("document.querySelector('.state').textContent === 'under way'"));
+    allow(here, 4);
+    until(&mut episode, &length(4));
+    until(&mut episode, "document.querySelector('.clock').textContent === 't = 4 of 4'");
+    assert!(
+        list.holds("document.querySelectorAll('.list .rows a').length === 1"),
+        "an episode under way is not scored"
+    );
+    allow(here, 25);
+    assert!(recording.0.wait().unwrap().success());
+    until(&mut episode, &length(25));
+    until(&mut episode, "document.querySelectorAll('.metric').length > 0");
+    until(&mut list, "document.querySelectorAll('.list .rows a').length === 2");
+    assert!(list.text("document.querySelector('#count').textContent").starts_with("2 episodes"));
+    episode.close();
+    list.close();
+}
 
 #[test]
 #[ignore = "soak: a recording in slow motion, looked at"]
@@ -58,5 +116,25 @@ fn soak_a_recording_appears_and_grows_and_ends() {
     until(&mut browser, "document.querySelectorAll('.metric').length > 0");
     assert_eq!(browser.value(length), 25);
     assert_eq!(server.get("/api/live").json()["running"], serde_json::json!([]));
+    browser.close();
+}
+
+#[test]
+fn frames_of_a_trace_without_a_log_are_rendered_again() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::copy(fixture("recorded").join("E1-guesser.parquet"), folder.path().join("alone.parquet")).unwrap();
+    let server = Server::start(folder.path(), &["alone.parquet"]);
+    let told = server.get("/api/episode?id=E1/guesser/s1/r1").json();
+    assert_eq!((&told["frames"], &told["rendered"], &told["log"]), (&true.into(), &true.into(), &false.into()));
+    let last = told["length"].as_u64().unwrap();
+    for t in [1, last] {
+        let frame = server.get(&format!("/api/frame?id=E1/guesser/s1/r1&t={t}"));
+        assert!(frame.status == 200 && frame.body.starts_with(b"\x89PNG"), "{t}: {}", frame.status);
+    }
+    assert_eq!(server.get(&format!("/api/frame?id=E1/guesser/s1/r1&t={}", last + 1)).status, 404);
+    let mut browser = Browser::at(&format!("{}?view=episode&id=E1/guesser/s1/r1", server.link));
+    until(&mut browser, "document.querySelector('img.frame')?.naturalWidth > 0");
+    assert!(browser.text("document.querySelector('.sight figcaption').textContent").starts_with("Rendered again"));
     browser.close();
 }

@@ -1,6 +1,7 @@
 //! `mirrorstats view`: the server as a process, its page in a browser, and its copy from a disk.
 
 mod copy;
+mod hostile;
 #[cfg(feature = "sim")]
 mod live;
 mod pages;

@@ -1,5 +1,6 @@
 //! What a reader does with the page.
 
+use crate::harness::program::run;
 use crate::html::browser::Browser;
 use crate::view::{PAPER, RECORDED, Server};
 
@@ -81,4 +82,38 @@ fn every_flip_of_other_definitions_leads_to_its_episode() {
     browser.click("#flips tbody a");
     until(&mut browser, "document.querySelector('.metric .flipped')");
     browser.close();
+}
+
+#[test]
+fn the_order_of_a_table_is_in_the_address() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[PAPER]);
+    let mut browser = Browser::at(&server.link);
+    until(&mut browser, "document.querySelector('#table-main th[data-metric=TTD] button')");
+    browser.click("#table-main th[data-metric=TTD] button");
+    let address = browser.text("location.href");
+    assert!(address.ends_with("?tables=main%3Aascending%3ATTD"), "{address}");
+    let means = "[...document.querySelectorAll('#table-main tbody:nth-of-type(1) td[data-metric=TTD]')].map((c) => c.dataset.mean)";
+    let sorted = browser.texts(means);
+    assert!(sorted.iter().map(|mean| mean.parse::<f64>().unwrap()).is_sorted(), "{sorted:?}");
+    let mut again = Browser::at(&address);
+    until(&mut again, "document.querySelector('#table-main th[aria-sort]')");
+    assert_eq!(again.texts(means), sorted);
+    // The list has an order of its own.
+    again.click("#tabs a:nth-of-type(2)");
+    until(&mut again, "document.querySelector('.list .rows a')");
+    again.close();
+    browser.close();
+}
+
+#[test]
+fn a_link_to_an_episode_is_printed_and_opened() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED, "--episode", "E1/guesser/s1/r2"]);
+    assert!(server.link.ends_with("/?view=episode&id=E1/guesser/s1/r2"), "{}", server.link);
+    let mut browser = Browser::at(&server.link);
+    until(&mut browser, "document.querySelector('h1').textContent === 'E1/guesser/s1/r2'");
+    browser.close();
+    let refused = run(folder.path(), &["view", RECORDED, "--episode", "E1/nobody/s1/r1"]).refused();
+    assert!(refused.contains("`E1/nobody/s1/r1`") && refused.contains("info --episodes"), "{refused}");
 }

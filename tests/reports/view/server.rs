@@ -1,5 +1,8 @@
 //! What the server answers, and to whom.
 
+use std::path::Path;
+
+use crate::harness::program::wait_for;
 use crate::view::{PAPER, RECORDED, Server};
 
 #[test]
@@ -132,4 +135,39 @@ fn an_episode_is_explained_as_score_explains_it() {
     assert_eq!(server.get(&format!("/api/frame?id={id}&t=100000")).status, 404);
     let map = server.get(&format!("/api/map?id={id}")).json();
     assert_eq!(map["steps"].as_array().unwrap().len() as u64, told["length"].as_u64().unwrap());
+}
+
+/// A folder in which an episode is under way: a log where recordings write, and no trace.
+fn begun(folder: &Path) {
+    std::fs::create_dir_all(folder.join("runs/.parts")).unwrap();
+    std::fs::copy(Path::new(RECORDED).join("E1-guesser.mcap"), folder.join("runs/.parts/log")).unwrap();
+}
+
+#[test]
+fn a_name_that_is_nothing_is_told_beside_a_recording_that_has_begun() {
+    let folder = tempfile::tempdir().unwrap();
+    begun(folder.path());
+    let server = Server::start(folder.path(), &["runs"]);
+    assert_eq!(server.get("/api/live").json()["running"].as_array().unwrap().len(), 1);
+    let refused =
+        crate::harness::program::run(folder.path(), &["view", "--no-open", "--port", "0", "runs", "nosuch.parquet"]);
+    assert!(refused.refused().contains("nosuch.parquet"));
+}
+
+#[test]
+fn a_folder_that_is_gone_is_told_and_the_page_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let runs = folder.path().join("runs");
+    std::fs::create_dir(&runs).unwrap();
+    let trace = Path::new(RECORDED).join("E1-oracle.parquet");
+    std::fs::copy(&trace, runs.join("E1-oracle.parquet")).unwrap();
+    let server = Server::start(folder.path(), &["runs"]);
+    assert!(server.get("/api/live").json()["fault"].is_null());
+    let fault = || server.get("/api/live").json()["fault"].as_str().map(str::to_owned);
+    std::fs::rename(&runs, folder.path().join("away")).unwrap();
+    let words = wait_for("the fault", fault);
+    assert!(words.contains("runs"), "{words}");
+    assert_eq!(server.get("/api/episodes").json()["total"], 2);
+    std::fs::rename(folder.path().join("away"), &runs).unwrap();
+    wait_for("no fault", || fault().is_none().then_some(()));
 }

@@ -3,6 +3,7 @@
 //! Rule: text from traces is shown, never obeyed ([`visible`]).
 
 mod grid;
+pub mod pairs;
 pub mod sequential;
 mod tables;
 
@@ -163,7 +164,7 @@ fn section(text: &mut String, title: &str, rows: &Grid, width: Option<usize>) {
     }
 }
 
-fn percent(confidence: f64) -> String {
+pub(in crate::report) fn percent(confidence: f64) -> String {
     let text = fixed(Some(confidence * 100.0), 3);
     format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
 }

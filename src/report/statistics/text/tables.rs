@@ -110,14 +110,7 @@ pub(super) fn conditions(statistics: &Statistics, shown: Shown) -> Grid {
 
 /// The test, the counts, the difference with its interval, and the p values of a comparison.
 fn compared(found: &Comparison) -> Vec<String> {
-    let (test, places) = match found.method {
-        Method::Mcnemar => ("McNemar", 3),
-        Method::Fisher => ("Fisher", 3),
-        Method::RestrictedMeanPaired => ("restricted means, pairs", 2),
-        Method::RestrictedMean => ("restricted means", 2),
-        Method::StudentPaired => ("Student's t, pairs", 2),
-        Method::Welch => ("Welch's t", 2),
-    };
+    let (test, places) = method(found.method);
     let [m, n] = found.n;
     let counts = match (found.pairs, found.successes) {
         (Some(pairs), _) => format!("{}:{} of {m} pairs", pairs.first_only, pairs.second_only),
@@ -129,6 +122,18 @@ fn compared(found: &Comparison) -> Vec<String> {
     line.push(held(found.interval, found.withheld, places));
     line.extend([found.p, found.mid_p, found.p_adjusted, found.p_tarone].map(p_value));
     line
+}
+
+/// What a test is called, and how many decimals its difference has.
+pub(super) const fn method(method: Method) -> (&'static str, usize) {
+    match method {
+        Method::Mcnemar => ("McNemar", 3),
+        Method::Fisher => ("Fisher", 3),
+        Method::RestrictedMeanPaired => ("restricted means, pairs", 2),
+        Method::RestrictedMean => ("restricted means", 2),
+        Method::StudentPaired => ("Student's t, pairs", 2),
+        Method::Welch => ("Welch's t", 2),
+    }
 }
 
 /// Two models over all experiments: all of them where `is_full`, else those that are told apart.
@@ -259,7 +264,7 @@ fn plain(interval: Option<Interval>, places: usize) -> String {
 }
 
 /// An interval, or why there is none.
-fn held(interval: Option<Interval>, withheld: Option<Withheld>, places: usize) -> String {
+pub(super) fn held(interval: Option<Interval>, withheld: Option<Withheld>, places: usize) -> String {
     match (interval, withheld) {
         (None, Some(Withheld::TooFew { fewest })) => format!("{UNDEFINED} (n < {fewest})"),
         (None, Some(Withheld::NoSpread)) => format!("{UNDEFINED} (no spread)"),

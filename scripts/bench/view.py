@@ -106,7 +106,7 @@ def own_round(page, data, program, found):
     page.evaluate(LOADED, rows)
     open_first = "document.querySelector('a[role=row][data-id]').click()"
     found("an episode of 100 steps with frames", page.evaluate(TIMED, [open_first, frame]))
-    press = "document.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}))"
+    press = "document.body.dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowRight', bubbles: true}))"
     for step in range(2, 22):
         shown = f"(() => {{ const i = document.querySelector('img.frame'); return i.alt.endsWith('= {step}') && i.complete && i.naturalWidth > 0 }})()"
         found("next frame", page.evaluate(TIMED, [press, shown]))

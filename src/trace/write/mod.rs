@@ -68,6 +68,7 @@ impl OptionalColumns {
             "participant" => agent.get("human").is_some(),
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             "shown_color" => shows_another_color(&experiment["mirror"]),
+            "start_distance" | "target_distance" => experiment["hand"].is_object(),
             _ => !OF_OTHER_TASKS.contains(&name),
         };
         Self(Self::all().0.into_iter().filter(|column| is_given(column.name)).collect())

@@ -3,7 +3,7 @@
 use mirrorstats::agent::scripted::Scripted;
 use mirrorstats::sim::Experiment;
 
-use super::{episodes, profiles};
+use super::{episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum};
 
 const WITH_MIRROR: [&str; 3] = ["reach-mirror", "reach-decoy", "reach-late"];
@@ -66,7 +66,7 @@ fn twenty_one_episodes_of_reaching_show_the_predicted_profiles() {
     let all = experiments(&[&ARMS[..], &LEVELS[..]].concat());
     let plan: Vec<_> = AGENTS.into_iter().flat_map(|agent| episodes(agent, &all, 3, 7)).collect();
     let profiles = profiles(&plan, "reach");
-    println!("{}", profiles.markdown(&METRICS));
+    write_table("Reaching a mark", &profiles.markdown(&METRICS));
     check_logic(&profiles);
     let shown = Shown(&profiles);
     for experiment in ["reach-mirror", "reach-decoy"].into_iter().chain(LEVELS) {

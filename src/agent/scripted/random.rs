@@ -13,11 +13,11 @@
 //! | metric in the battery | |
 //! |---|---|
 //! | TSA | 1/10, and hardly ever in the mark test: it is done before the mark appears |
-//! | DECOY_CLAIM | 1/10 |
-//! | WINDOW_CLAIM | about 1/3: five claims, each of one of eleven |
+//! | `DECOY_CLAIM` | 1/10 |
+//! | `WINDOW_CLAIM` | about 1/3: five claims, each of one of eleven |
 //! | MCR in `window` | 0 |
-//! | MARK_REPORT | hardly ever |
-//! | MARK_FALSE | high: it mostly reports a colour at once |
+//! | `MARK_REPORT` | hardly ever |
+//! | `MARK_FALSE` | high: it mostly reports a colour at once |
 //!
 //! Where a hand is to reach a mark, each of the six moves is as likely, so that it learns nothing from any arm or level:
 //!

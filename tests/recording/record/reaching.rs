@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::recordings::Bench;
 use crate::harness::files::assert_same;
 use crate::harness::need;
-use crate::harness::program::{run, succeeds};
+use crate::harness::program::{run, stderr, succeeds};
 use crate::harness::traces::{episodes, recording, rows};
 
 /// The scenes of the built-in experiments through a smaller eye; `more` are further keys and tables.
@@ -139,4 +139,18 @@ fn levels_and_arms_are_pairs_and_stand_in_one_report() {
     let before = bench.files("runs");
     bench.recorded("runs", &format!("{words} --agent frozen"));
     assert_same(&bench.files("runs"), &before);
+}
+
+#[test]
+fn a_script_without_a_hand_is_refused_before_anything_is_made() {
+    let bench = Bench::new();
+    let refused =
+        bench.record("runs", "--experiment E1,reach-bare --seeds 1 --runs 1 --agent guesser").output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    let said = stderr(&refused);
+    assert!(
+        said.contains("`guesser` has no hand, which `reach-bare` asks for; scripted agents that have one: oracle, "),
+        "{said}"
+    );
+    assert!(!bench.path("runs").exists());
 }

@@ -1,8 +1,12 @@
 // A person in the agent's place: the frame, the words and the reply of a model, and nothing else.
 
 const LINK = new URLSearchParams(location.search).get("p") ?? "";
-const ACTIONS = [["w", "Forward"], ["s", "Backward"], ["a", "Turn left"], ["d", "Turn right"], ["done", "Done"]];
-const KEYS = { w: "w", s: "s", a: "a", d: "d", ArrowUp: "w", ArrowDown: "s", ArrowLeft: "a", ArrowRight: "d" };
+const WORDS = {
+  w: "Forward", s: "Backward", a: "Turn left", d: "Turn right", done: "Done",
+  1: "Hand up", 2: "Hand down", 3: "Hand left", 4: "Hand right", 5: "Hand forward", 6: "Hand backward",
+};
+// Arrows walk and turn, or move a hand in the picture; the other keys are the letters and numbers themselves.
+const ARROWS = { ArrowUp: ["w", "1"], ArrowDown: ["s", "2"], ArrowLeft: ["a", "3"], ArrowRight: ["d", "4"] };
 const TITLES = {
   "view-description": "What you see (may stay empty)",
   reasoning: "Why (may stay empty)",
@@ -71,7 +75,7 @@ function field(key, colors) {
 }
 
 function play(told) {
-  const { phase, number, t, system, user, keys, colors } = told;
+  const { phase, number, t, system, user, keys, actions: letters, colors } = told;
   const form = make("form", {});
   let sent = false;
   const reply = async (action) => {
@@ -84,13 +88,14 @@ function play(told) {
     await send("reply", { number, reply: values });
     turn();
   };
-  const actions = ACTIONS.map(([action, words]) => button(action === "done" ? words : `${words} (${action})`, () => reply(action), { "data-action": action }));
+  const actions = letters.map((action) => button(action === "done" ? WORDS[action] : `${WORDS[action]} (${action})`, () => reply(action), { "data-action": action }));
   const fields = keys.filter((key) => key !== "action").map((key) => field(key, colors));
   const order = ["identification", "selected_cube", "mark"];
   fields.sort((a, b) => order.indexOf(b.lastChild.name) - order.indexOf(a.lastChild.name));
   form.append(make("div", { class: "actions", role: "group", "aria-label": "What you do" }, ...actions), ...fields, button("Take a break", () => send("pause").then(show), { id: "pause" }));
   form.addEventListener("submit", (event) => event.preventDefault());
   form.reply = reply;
+  form.letters = letters;
   const image = make("img", { src: address("frame", { n: number }), alt: "What you see", width: 640, height: 480 });
   const words = make("details", {}, make("summary", {}, "The task, as it was said at the beginning"), make("pre", {}, system));
   words.open = t === 1;
@@ -125,9 +130,11 @@ async function turn() {
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || event.repeat || event.target.matches("input, select, textarea")) return;
   const form = content.querySelector("form");
-  if (!(event.key in KEYS) || form === null) return;
+  if (form === null) return;
+  const action = form.letters.find((letter) => letter !== "done" && (letter === event.key || ARROWS[event.key]?.includes(letter)));
+  if (action === undefined) return;
   event.preventDefault();
-  form.reply(KEYS[event.key]);
+  form.reply(action);
 });
 
 turn();

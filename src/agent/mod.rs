@@ -60,11 +60,24 @@ pub struct Observation {
     pub bumped: bool,
     /// The step before: what was done, and the summary of the last reply that gave a decision; `None` at t = 1.
     pub history: Option<(Option<Action>, Option<String>)>,
+    /// All steps before, the first one first; a prompt may tell them all.
+    pub past: Arc<Vec<Past>>,
     /// What the eye sees.
     pub frame: Arc<Frame>,
     /// The vertical field of view of the frame, degrees: 110 in the study. For scripted agents alone: models and programs
     /// are not told.
     pub fov_y: f64,
+}
+
+/// A step that is over.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Past {
+    /// What was decided; `None` where the reply gave no decision.
+    pub action: Option<Action>,
+    /// The move was stopped.
+    pub bumped: bool,
+    /// The summary of its reply.
+    pub thought: Option<String>,
 }
 
 /// What an agent answered, and how that was got.

@@ -2,9 +2,9 @@
 //!
 //! Rule: the same task and observation give the same words, and [`Prompt::hash`] changes with any word of them.
 
-use minijinja::{Environment, Error, UndefinedBehavior, context};
+use minijinja::{Environment, Error, UndefinedBehavior, Value, context};
 
-use super::{Observation, Task};
+use super::{Observation, Past, Task};
 use crate::base::number::Decimal;
 use crate::experiment::Experiment;
 use crate::experiment::spec::Actions;
@@ -59,6 +59,7 @@ impl Prompt {
                 first => history.is_none(),
                 action => history.and_then(|(action, _)| action.map(letter)),
                 thought => history.and_then(|(_, thought)| thought.as_deref().map(one_line)),
+                steps => observation.past.iter().map(step).collect::<Vec<_>>(),
             },
         )?;
         let position_text = self.fill(
@@ -86,7 +87,7 @@ impl Prompt {
         Ok(Rendered { system, user })
     }
 
-    fn fill(&self, name: &str, values: minijinja::Value) -> Result<String, Error> {
+    fn fill(&self, name: &str, values: Value) -> Result<String, Error> {
         self.environment.get_template(name)?.render(values).map(|text| text.trim_end().to_owned())
     }
 }
@@ -126,6 +127,16 @@ pub const fn actions(of: Actions) -> &'static [Action] {
     match of {
         Actions::Walk => &Action::WALK,
         Actions::Hand => &Action::HAND,
+    }
+}
+
+/// A step that is over, for a template.
+fn step(past: &Past) -> Value {
+    context! {
+        action => past.action.map(letter),
+        name => past.action.map(Action::name),
+        bumped => past.bumped,
+        thought => past.thought.as_deref().map(one_line),
     }
 }
 

@@ -47,6 +47,10 @@ pub fn explained(experiment: Experiment) -> String {
     line("prompt", format!("{}{stated}", visible(&experiment.prompt)));
     let keys: Vec<&str> = experiment.reply.iter().map(|key| key.name()).collect();
     line("reply", keys.join(", "));
+    if !experiment.absent.is_empty() {
+        let columns: Vec<&str> = experiment.absent.iter().map(|column| column.name()).collect();
+        line("absent", format!("{}: of no meaning here, and in no trace", columns.join(", ")));
+    }
     if let Some(hand) = experiment.hand {
         line("hand", self::hand(hand));
     }

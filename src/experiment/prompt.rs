@@ -4,9 +4,11 @@
 //! |---|---|---|
 //! | `system.txt` | the system prompt | `stated_color` |
 //! | `user.txt` | the user prompt | `history_text`, `position_text`, `bumped`, `warning_if_bumped_wall`, `remaining`, `budget` |
-//! | `history.txt` | the step before | `first`, `action`, `thought` |
+//! | `history.txt` | the step before, or all of them | `first`, `action`, `thought`, `steps` |
 //! | `position.txt` | pose and budget | `x`, `y`, `yaw`, `remaining`, `budget` |
 //! | `warning.txt` | the last move was stopped | none |
+//!
+//! Each of `steps`, the first one first, has `action`, `name`, `bumped` and `thought`.
 //!
 //! The first two are a prompt's own; the other three are shared by all, unless a folder has its own.
 //! The templates of the paper's two prompts are word for word (appendix, "Prompt Templates"). The three of the dynamic
@@ -34,7 +36,7 @@ pub type Template = (String, String);
 const NAMES: [(&str, &[&str]); 5] = [
     ("system", &["stated_color"]),
     ("user", &["history_text", "position_text", "bumped", "warning_if_bumped_wall", "remaining", "budget"]),
-    ("history", &["first", "action", "thought"]),
+    ("history", &["first", "action", "thought", "steps"]),
     ("position", &["x", "y", "yaw", "remaining", "budget"]),
     ("warning", &[]),
 ];
@@ -43,26 +45,20 @@ const NAMES: [(&str, &[&str]); 5] = [
 const OWN: [&str; 2] = ["system", "user"];
 
 macro_rules! folder {
-    ($name:literal) => {
-        (
-            $name,
-            [
-                include_str!(concat!("../../assets/prompts/", $name, "/system.txt")),
-                include_str!(concat!("../../assets/prompts/", $name, "/user.txt")),
-            ],
-        )
+    ($name:literal: $($template:literal),+) => {
+        ($name, &[$(($template, include_str!(concat!("../../assets/prompts/", $name, "/", $template, ".txt")))),+])
     };
 }
 
-/// The built-in folders, with their own two templates.
-const BUILT_IN: [(&str, [&str; 2]); 7] = [
-    folder!("cube-selection"),
-    folder!("exploration"),
-    folder!("mark"),
-    folder!("reach-scheme"),
-    folder!("reach-mirror"),
-    folder!("reach-hand"),
-    folder!("reach-bare"),
+/// The built-in folders, with the templates that are their own.
+const BUILT_IN: [(&str, &[(&str, &str)]); 7] = [
+    folder!("cube-selection": "system", "user"),
+    folder!("exploration": "system", "user"),
+    folder!("mark": "system", "user"),
+    folder!("reach-scheme": "system", "user", "history"),
+    folder!("reach-mirror": "system", "user", "history"),
+    folder!("reach-hand": "system", "user", "history"),
+    folder!("reach-bare": "system", "user", "history"),
 ];
 
 /// The three that they share.
@@ -89,8 +85,7 @@ impl Templates {
     /// The built-in prompt of this name.
     pub fn built_in(name: &str) -> Option<Self> {
         let (_, own) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
-        let own: Vec<Template> =
-            OWN.into_iter().zip(*own).map(|(name, text)| (name.to_owned(), text.to_owned())).collect();
+        let own: Vec<Template> = own.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect();
         Some(Self::of(&own))
     }
 

@@ -8,8 +8,8 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::spec::{
-    Actions, Behavior, BodyShown, Camera, Colors, Decision, MarkColor, Paint, PaneKind, Part, ReplyKey, Start, Stated,
-    Truth, Wall, Wearer,
+    AbsentColumn, Actions, Behavior, BodyShown, Camera, Colors, Decision, MarkColor, Paint, PaneKind, Part, ReplyKey,
+    Start, Stated, Truth, Wall, Wearer,
 };
 use crate::base::palette::Color;
 use crate::base::ratio::Ratio;
@@ -56,6 +56,9 @@ pub struct ExperimentTable {
     /// The column that holds what the decision should name; `body_color` if absent, `mark_color` for `mark_report`,
     /// `start_distance` for `target_distance`.
     pub truth: Option<Truth>,
+    /// Columns that have no meaning for the task, and that its traces do not have; none if absent. A column that a key of
+    /// the reply fills has one.
+    pub absent: Option<Vec<AbsentColumn>>,
     /// What the prompt states of the body's colour; `none` if absent.
     pub stated_color: Option<Stated>,
     /// The keys of a reply, in the order of the prompt; those that the decision needs if absent.

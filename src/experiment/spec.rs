@@ -1,11 +1,17 @@
 //! What an experiment is, checked: every value is in its range and fits the others.
 
+mod marks;
+mod panes;
+
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::base::names::names;
 use crate::base::palette::Color;
+
+pub use marks::{Mark, MarkColor, Part, Wearer};
+pub use panes::{BodyShown, Paint, Pane, PaneKind};
 
 /// The most glass panes (mirrors and windows) in a room.
 pub const MOST_PANES: usize = 4;
@@ -70,6 +76,31 @@ pub struct Spec {
     /// The size and the angle of the picture; the world's if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<Picture>,
+    /// Columns that have no meaning for the task: its traces have none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub absent: Vec<AbsentColumn>,
+}
+
+/// A column that traces have unless their experiments say that it has no meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AbsentColumn {
+    /// The self-attribution: where no reply says who the agent takes itself for.
+    SelfColor,
+    /// The cube that is chosen: where there is none to choose.
+    SelectedCube,
+}
+
+names!(AbsentColumn { SelfColor: "self_color", SelectedCube: "selected_cube" });
+
+impl AbsentColumn {
+    /// The key of a reply that would fill it.
+    pub const fn key(self) -> ReplyKey {
+        match self {
+            Self::SelfColor => ReplyKey::Identification,
+            Self::SelectedCube => ReplyKey::SelectedCube,
+        }
+    }
 }
 
 /// A hand that floats freely, a step at a time, and what it takes to reach the mark.
@@ -360,154 +391,6 @@ pub enum Camera {
 }
 
 names!(Camera { Eye: "eye", Behind: "behind" });
-
-/// A mirror, or something in a mirror's place.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Pane {
-    /// What it shows.
-    pub kind: PaneKind,
-    /// Steps by which it is late.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub delay: u32,
-    /// The colour of the body that it shows.
-    #[serde(default, skip_serializing_if = "Paint::is_own")]
-    pub color: Paint,
-    /// Whose motion the body that it shows has.
-    #[serde(default, skip_serializing_if = "BodyShown::is_own")]
-    pub body: BodyShown,
-    /// Where it hangs.
-    #[serde(default)]
-    pub wall: Wall,
-    /// Along the wall, mm; the world's if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub width_mm: Option<u32>,
-    /// mm; the world's if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub height_mm: Option<u32>,
-    /// Its lower edge above the floor, mm; about the world's height of centres if absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub bottom_mm: Option<u32>,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-const fn is_zero(value: &u32) -> bool {
-    *value == 0
-}
-
-/// What a pane shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum PaneKind {
-    /// The room, as it is.
-    Mirror,
-    /// The room, as it was some steps ago.
-    Delayed,
-    /// The room, with the own body in another colour or with another body in its place.
-    Decoy,
-    /// A second room like the first, without cubes and others, where one body walks about.
-    Window,
-}
-
-names!(PaneKind { Mirror: "mirror", Delayed: "delayed", Decoy: "decoy", Window: "window" });
-
-/// The colour of something, in terms of the own body.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Paint {
-    /// The own body's.
-    #[default]
-    Own,
-    /// Another: that of another candidate where there are candidates.
-    Other,
-    /// This one.
-    #[serde(untagged)]
-    Named(Color),
-}
-
-impl Paint {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-    const fn is_own(&self) -> bool {
-        matches!(self, Self::Own)
-    }
-}
-
-/// Whose motion a body has that a decoy shows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum BodyShown {
-    /// The agent's own.
-    #[default]
-    Own,
-    /// Its own: it walks about, whatever the agent does.
-    Independent,
-}
-
-names!(BodyShown { Own: "own", Independent: "independent" });
-
-impl BodyShown {
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
-    const fn is_own(&self) -> bool {
-        matches!(self, Self::Own)
-    }
-}
-
-/// A mark on a body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Mark {
-    /// Where on the body.
-    pub part: Part,
-    /// Of its paint.
-    pub color: MarkColor,
-    /// The first step that shows it.
-    pub from_t: u32,
-    /// Who wears it.
-    #[serde(default)]
-    pub on: Wearer,
-}
-
-/// Where on a body a mark is. No direct view reaches any of these on one's own body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Part {
-    /// The top of the head.
-    Head,
-    /// Between the shoulders, behind.
-    Back,
-    /// The chest.
-    Chest,
-    /// A square patch somewhere on the front, of a body that stands still; its place and its size are drawn.
-    Front,
-}
-
-names!(Part { Head: "head", Back: "back", Chest: "chest", Front: "front" });
-
-/// The colour of a mark.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum MarkColor {
-    /// Drawn: never that of its wearer.
-    Random,
-    /// This one; another one where its wearer has this colour.
-    #[serde(untagged)]
-    Named(Color),
-}
-
-/// Who wears a mark.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Wearer {
-    /// The agent itself: to be reported.
-    #[default]
-    #[serde(rename = "self")]
-    Own,
-    /// The first of the others: not to be reported.
-    #[serde(rename = "other")]
-    Other,
-}
-
-names!(Wearer { Own: "self", Other: "other" });
 
 impl Spec {
     /// Whether there are cubes of which one is to be selected.

@@ -1,16 +1,17 @@
 //! One `[experiment.NAME]` table, key by key.
 
 mod hand;
+mod panes;
 
 use std::path::Path;
 
 use indexmap::IndexMap;
 
-use super::limits::{LATEST, LONGEST_NAME, MOST_CUBES, MOST_OTHERS, MOST_STEPS};
+use super::limits::{LONGEST_NAME, MOST_CUBES, MOST_OTHERS, MOST_STEPS};
 use super::prompt::Templates;
 use super::spec::{
-    Actions, Behavior, BodyShown, Camera, Colors, Cubes, Decision, Layout, MOST_MARKS, MOST_PANES, Mark, MarkColor,
-    Others, Paint, Pane, PaneKind, Part, ReplyKey, Spec, Start, Stated, Truth, Wall, Wearer,
+    AbsentColumn, Actions, Behavior, Camera, Colors, Cubes, Decision, Layout, MOST_MARKS, Mark, MarkColor, Others,
+    Part, ReplyKey, Spec, Start, Stated, Truth, Wall, Wearer,
 };
 use super::{Known, built_in_names};
 use crate::base::palette::Color;
@@ -57,7 +58,7 @@ pub(super) fn read(
     let reference =
         keys.table("reference", faults).map(|levels| levels.each(|levels, metric| levels.ratios(metric, faults)));
     let cubes_place = keys.value_place("cubes").unwrap_or_else(|| place.clone());
-    let panes = panes(&mut keys, faults);
+    let panes = panes::panes(&mut keys, faults);
     let first_wall = panes.first().map_or(Wall::Random, |pane| pane.wall);
     let (scenes, layout) = scenes(name, &mut keys, first_wall, beside, faults);
     let decision_place = keys.value_place("decision").unwrap_or_else(|| place.clone());
@@ -80,6 +81,7 @@ pub(super) fn read(
     let stated_place = keys.value_place("stated_color").unwrap_or_else(|| place.clone());
     let stated_color = keys.choice("stated_color", &pairs(Stated::ALL, Stated::name), faults).unwrap_or_default();
     let reply = reply(&mut keys, decision, faults);
+    let absent = absent(&mut keys, &reply, faults);
     let (prompt, templates) = prompt(&mut keys, place, beside, faults);
     let own_actions = if hand.is_some() { Actions::Hand } else { Actions::Walk };
     let actions = keys.choice("actions", &pairs(Actions::ALL, Actions::name), faults).unwrap_or(own_actions);
@@ -114,6 +116,7 @@ pub(super) fn read(
         marks,
         hand,
         view,
+        absent,
     };
     relations(&spec, [&decision_place, &stated_place, &marks_place], faults);
     hand::relations(&spec, &hand_place, faults);
@@ -124,11 +127,11 @@ pub(super) fn read(
     })
 }
 
-pub(super) fn pairs<T: Copy, const N: usize>(all: [T; N], name: impl Fn(T) -> &'static str) -> Vec<(&'static str, T)> {
+fn pairs<T: Copy, const N: usize>(all: [T; N], name: impl Fn(T) -> &'static str) -> Vec<(&'static str, T)> {
     all.into_iter().map(|one| (name(one), one)).collect()
 }
 
-pub(super) fn missing(place: &Place, key: &str, example: &str) -> Fault {
+fn missing(place: &Place, key: &str, example: &str) -> Fault {
     Fault::new(place.clone(), format!("the experiment has no `{key}`")).help(format!("add `{key} = {example}`"))
 }
 
@@ -142,7 +145,7 @@ fn texts_of(reference: IndexMap<String, (Vec<Ratio>, Place)>) -> IndexMap<String
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "lengths are checked to be small")]
-pub(super) fn millimetres(metres: f64) -> u32 {
+fn millimetres(metres: f64) -> u32 {
     (metres * 1000.0).round() as u32
 }
 
@@ -285,7 +288,7 @@ fn cubes(keys: &mut Keys<'_>, palette: usize, faults: &mut Vec<Fault>) -> Option
     cubes
 }
 
-pub(super) fn in_order(least: Option<&(u32, Place)>, most: Option<&(u32, Place)>, faults: &mut Vec<Fault>) {
+fn in_order(least: Option<&(u32, Place)>, most: Option<&(u32, Place)>, faults: &mut Vec<Fault>) {
     if let (Some((least, place)), Some((most, _))) = (least, most)
         && least > most
     {
@@ -341,6 +344,31 @@ fn reply(keys: &mut Keys<'_>, decision: Decision, faults: &mut Vec<Fault>) -> Ve
     reply
 }
 
+/// Columns that the traces do not have; a reply that fills one of them gives it a meaning.
+fn absent(keys: &mut Keys<'_>, reply: &[ReplyKey], faults: &mut Vec<Fault>) -> Vec<AbsentColumn> {
+    let mut absent = Vec::new();
+    for (name, place) in keys.texts("absent", faults).unwrap_or_default() {
+        match AbsentColumn::named(&name) {
+            None => {
+                let known = AbsentColumn::ALL.map(AbsentColumn::name);
+                let near = nearest(&name, known).map(|near| format!("did you mean `{near}`?"));
+                let message = format!("no column `{name}` that may be absent: expected some of {}", known.join(", "));
+                faults.push(Fault::new(place, message).help_if(near));
+            }
+            Some(column) if absent.contains(&column) => {
+                faults.push(Fault::new(place, format!("`{name}` stands twice")));
+            }
+            Some(column) if reply.contains(&column.key()) => {
+                let message = format!("a reply has `{}`, which fills the column `{name}`", column.key().name());
+                faults.push(Fault::new(place, message).help("leave the column in, or the key out of `reply`"));
+            }
+            Some(column) => absent.push(column),
+        }
+    }
+    absent.sort();
+    absent
+}
+
 fn prompt(keys: &mut Keys<'_>, place: &Place, beside: &Beside<'_>, faults: &mut Vec<Fault>) -> (String, Templates) {
     let Some((name, at)) = keys.text("prompt", faults) else {
         faults.push(missing(place, "prompt", "\"cube-selection\""));
@@ -362,98 +390,6 @@ fn prompt(keys: &mut Keys<'_>, place: &Place, beside: &Beside<'_>, faults: &mut 
                 format!("a prompt is built in ({}), or a folder with system.txt and user.txt{near}", names.join(", "));
             faults.push(Fault::new(at, why).help(help));
             Default::default()
-        }
-    }
-}
-
-fn panes(keys: &mut Keys<'_>, faults: &mut Vec<Fault>) -> Vec<Pane> {
-    let mut panes: Vec<Pane> = Vec::new();
-    for (place, keys) in keys.list("mirror", MOST_PANES, faults).unwrap_or_default() {
-        let Some(pane) = pane(&place, keys, faults) else { continue };
-        if pane.wall == Wall::Opposite && panes.is_empty() {
-            let message = "the first mirror is across from no other";
-            faults.push(Fault::new(place.clone(), message).help("use `wall = \"random\"`"));
-        }
-        if let Some(message) = quarrel(&panes, pane.wall) {
-            faults.push(Fault::new(place.clone(), message).help("use `wall = \"random\"`"));
-        }
-        panes.push(pane);
-    }
-    panes
-}
-
-/// Why a mirror cannot be on a wall beside those before it.
-fn quarrel(before: &[Pane], wall: Wall) -> Option<&'static str> {
-    let first = before.first()?.wall.quarter();
-    let across = first.map(|quarter| (quarter + 2) % 4);
-    let quarter = |wall: Wall| if wall == Wall::Opposite { across } else { wall.quarter() };
-    match wall {
-        Wall::Random => None,
-        Wall::Opposite if before.iter().any(|pane| pane.wall == Wall::Opposite) => Some("two mirrors on one wall"),
-        Wall::Opposite | Wall::East | Wall::North | Wall::West | Wall::South => {
-            let own = quarter(wall);
-            if own.is_some() && before.iter().any(|pane| quarter(pane.wall) == own) {
-                Some("two mirrors on one wall")
-            } else if first.is_none() && wall != Wall::Opposite {
-                Some("the wall of the first mirror is drawn, and could be this one")
-            } else {
-                None
-            }
-        }
-    }
-}
-
-fn pane(place: &Place, mut keys: Keys<'_>, faults: &mut Vec<Fault>) -> Option<Pane> {
-    let before = faults.len();
-    let kind = keys.choice("kind", &pairs(PaneKind::ALL, PaneKind::name), faults).unwrap_or(PaneKind::Mirror);
-    let least = u32::from(kind == PaneKind::Delayed);
-    let delay = keys.count("delay", [least, LATEST], faults);
-    let color = keys.text("color", faults);
-    let body_place = keys.value_place("body");
-    let body = keys.choice("body", &pairs(BodyShown::ALL, BodyShown::name), faults).unwrap_or_default();
-    let wall = keys.choice("wall", &pairs(Wall::ALL, Wall::name), faults).unwrap_or_default();
-    let width_mm = keys.length("width", [0.5, 10.0], faults).map(|(width, _)| millimetres(width));
-    let height_mm = keys.length("height", [0.5, 5.0], faults).map(|(height, _)| millimetres(height));
-    let bottom_mm = keys.length("bottom", [0.0, 3.0], faults).map(|(bottom, _)| millimetres(bottom));
-    keys.refuse_the_rest(faults);
-    let misplaced =
-        |key: &str, place: Place| Fault::new(place, format!("a mirror of the kind `{}` has no `{key}`", kind.name()));
-    match (&delay, kind) {
-        (None, PaneKind::Delayed) => faults.push(missing(place, "delay", "5")),
-        (Some((_, at)), PaneKind::Window) => faults.push(misplaced("delay", at.clone())),
-        _ => {}
-    }
-    let shows_a_body = matches!(kind, PaneKind::Decoy | PaneKind::Window);
-    let color = match color {
-        None if shows_a_body && body == BodyShown::Own => Paint::Other,
-        None => Paint::Own,
-        Some((_, at)) if !shows_a_body => {
-            faults.push(misplaced("color", at));
-            Paint::Own
-        }
-        Some((name, at)) => paint(&name, at, faults),
-    };
-    if let Some(at) = body_place.filter(|_| kind != PaneKind::Decoy) {
-        faults.push(misplaced("body", at));
-    }
-    if kind == PaneKind::Decoy && body == BodyShown::Own && color == Paint::Own {
-        let fault = Fault::new(place.clone(), "a decoy of the own body in its own colour is a mirror");
-        faults.push(fault.help("use `color = \"other\"` or `body = \"independent\"`"));
-    }
-    let delay = delay.map(|(delay, _)| delay).unwrap_or_default();
-    // A mirror that is late is a late mirror, by whichever key it says so.
-    let kind = if kind == PaneKind::Mirror && delay > 0 { PaneKind::Delayed } else { kind };
-    (faults.len() == before).then_some(Pane { kind, delay, color, body, wall, width_mm, height_mm, bottom_mm })
-}
-
-fn paint(name: &str, place: Place, faults: &mut Vec<Fault>) -> Paint {
-    match (name, Color::named(name)) {
-        ("own", _) => Paint::Own,
-        ("other", _) => Paint::Other,
-        (_, Some(color)) => Paint::Named(color),
-        (_, None) => {
-            faults.push(no_color(name, place).help("or `own`, or `other`"));
-            Paint::Own
         }
     }
 }

@@ -102,6 +102,7 @@ fn what_fits_only_together_is_held_against_each_other() {
             of("mark = [{ part = \"head\" }, { part = \"head\" }]"),
             of("others = { least = 3, most = 2 }"),
             of("palette = [\"red\", \"red\"]"),
+            of("absent = [\"self_colour\", \"selected_cube\", \"t\"]"),
         ]
         .map(|faults| faults.join("; "))
         .join("\n")

@@ -47,7 +47,7 @@ pub fn film_strip(title: &str, stills: &[Still]) -> Figure {
         bottom = bottom.max(draw(&mut sheet, still, left, y));
         left += WIDTH + GAP;
     }
-    Figure::new(sheet, bottom + MARGIN, title, &described(stills))
+    Figure::new(sheet, bottom + MARGIN, title, described(stills))
 }
 
 /// Draws a step from its upper left corner; gives its lower edge.

@@ -1,4 +1,4 @@
-//! `intervals`: each model's TSA with its 95 % interval, counts and the level of chance, per experiment.
+//! `intervals`: each model's success (TSA, or the first rate) with its 95 % interval, counts and the level of chance, per experiment.
 
 use super::kit::{
     Align, Arrangement, FULL_WIDTH, Frame, MARGIN, Mark, Member, NAME_ROOM, PALETTE, Panels, Plot, Sheet, Stroke,
@@ -9,7 +9,6 @@ use super::{Drawn, FigureError, FigureName, Scene};
 use crate::base::number;
 use crate::stats::interval::{self, Interval};
 
-const METRIC: &str = "TSA";
 const CONFIDENCE: f64 = 0.95;
 const ROW: f64 = 18.0;
 const MOST_COLUMNS: usize = 5;
@@ -20,7 +19,7 @@ const AXIS_BELOW: f64 = 28.0;
 /// Draws it.
 pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     let Scene { matrix, roster } = scene;
-    let metric = matrix.metric(FigureName::Intervals, METRIC)?;
+    let metric = matrix.success(FigureName::Intervals)?;
     let (labels, label_width) = tiles::row_labels(&roster.names(), NAME_ROOM);
     let left = MARGIN + label_width + 22.0;
     let room = FULL_WIDTH - MARGIN - left;
@@ -62,7 +61,7 @@ fn counts(reading: Reading) -> String {
 
 fn signs(scene: Scene<'_>, metric: MetricId<'_>) -> Vec<(Swatch, String)> {
     let matrix = scene.matrix;
-    let mut signs = vec![(Swatch::None, format!("{METRIC} with its Wilson 95 % interval"))];
+    let mut signs = vec![(Swatch::None, format!("{} with its Wilson 95 % interval", metric.name))];
     if matrix.experiments.iter().any(|e| matrix.chance(e, metric).is_some()) {
         signs.push((Swatch::Rule(chance_rule()), "chance level".to_owned()));
     }

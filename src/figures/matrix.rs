@@ -9,6 +9,9 @@ use crate::metric::catalog::{Better, Kind, Metric};
 use crate::stats::cell::{Cells, Group, KeyValue};
 use crate::stats::moments::Moments;
 
+/// The metric of success in the paper.
+pub const SUCCESS: &str = "TSA";
+
 /// What a cell says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reading {
@@ -124,6 +127,15 @@ impl<'a> Matrix<'a> {
             metric: name.to_owned(),
             known: self.cells.metrics.join(", "),
         })
+    }
+
+    /// Whether a task was solved: TSA, or the first rate of definitions that have no TSA.
+    ///
+    /// # Errors
+    /// When the definitions have no rate.
+    pub fn success(&self, figure: FigureName) -> Result<MetricId<'a>, FigureError> {
+        let first = self.metrics().into_iter().find(|metric| metric.metric.kind == Kind::Rate);
+        self.metric(figure, SUCCESS).or_else(|error| first.ok_or(error))
     }
 
     /// All metrics in the order of the cells.

@@ -38,7 +38,7 @@ use crate::score::timeline::Timeline;
 use crate::stats::cell::Cells;
 use e5_outcomes::Outcomes;
 use kit::{Roster, Sheet};
-use matrix::Matrix;
+use matrix::{Matrix, SUCCESS};
 
 /// What figures are drawn from.
 #[derive(Clone, Copy, Debug)]
@@ -93,7 +93,11 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
             gaze::draw(scene, input.timelines.ok_or_else(|| missing("the steps of each episode"))?)
         }
     };
-    Ok(Figure::new(sheet, height, name.title(), name.caption()))
+    let caption = match name {
+        FigureName::Intervals | FigureName::Slopes => name.caption().replace(SUCCESS, matrix.success(name)?.name),
+        _ => name.caption().to_owned(),
+    };
+    Ok(Figure::new(sheet, height, name.title(), caption))
 }
 
 /// What every figure is drawn from.

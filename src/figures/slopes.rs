@@ -1,4 +1,4 @@
-//! `slopes`: each model's TSA from the first experiment to each other one.
+//! `slopes`: each model's success (TSA, or the first rate) from the first experiment to each other one.
 
 use super::kit::{
     Align, Arrangement, FULL_WIDTH, Frame, Legend, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Swatch, dodge,
@@ -8,7 +8,6 @@ use super::matrix::MetricId;
 use super::missing::Strip;
 use super::{Drawn, FigureError, FigureName, Scene};
 
-const METRIC: &str = "TSA";
 const MOST_COLUMNS: usize = 4;
 const PLOT_HEIGHT: f64 = 210.0;
 const AXIS_ROOM: f64 = 30.0;
@@ -17,7 +16,7 @@ const GAP: f64 = 22.0;
 /// Draws it.
 pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     let Scene { matrix, roster } = scene;
-    let metric = matrix.metric(FigureName::Slopes, METRIC)?;
+    let metric = matrix.success(FigureName::Slopes)?;
     let (first, others) = match matrix.experiments.as_slice() {
         [first, others @ ..] if !others.is_empty() => (*first, others),
         found => return Err(FigureError::OneExperiment { found: found.join(", ") }),
@@ -34,7 +33,7 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     let mut sheet = panels.sheet(FULL_WIDTH);
     for (at, ((other, body), strips)) in others.iter().zip(&panels.bodies).zip(&strips).enumerate() {
         let plot = Plot::new(Frame { height: PLOT_HEIGHT, ..*body }, 0.0..1.0, -0.03..1.03);
-        axis(&mut sheet, &plot, at % columns);
+        axis(&mut sheet, &plot, at % columns, metric.name);
         Pair { scene, metric, plot, experiments: [first, other] }.draw(&mut sheet);
         let top = body.top + PLOT_HEIGHT + label_room();
         strips[0].draw(&mut sheet, (body.left, top));
@@ -51,10 +50,10 @@ fn label_room() -> f64 {
 }
 
 /// Grid lines in every column, numbers and the title in the first.
-fn axis(sheet: &mut Sheet, plot: &Plot, column: usize) {
+fn axis(sheet: &mut Sheet, plot: &Plot, column: usize, title: &str) {
     let mut ticks = rate_ticks();
     if column == 0 {
-        plot.y_title(sheet, METRIC, 24.0);
+        plot.y_title(sheet, title, 24.0);
     } else {
         for tick in &mut ticks {
             tick.text.clear();

@@ -65,6 +65,9 @@ pub enum Kind {
     Quantity,
 }
 
+/// The unit of shares that are whole numbers, so that they are exact: parts per million.
+pub const PPM: &str = "ppm";
+
 impl Kind {
     /// The unit where a definition names none.
     pub const fn default_unit(self) -> &'static str {

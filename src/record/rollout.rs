@@ -12,7 +12,7 @@ use super::error::RecordError;
 use super::plan::{Key, Subject};
 use super::shares::Shares;
 use crate::agent::reply::Repair;
-use crate::agent::{Agent, Observation, Reply, Task};
+use crate::agent::{Agent, Observation, Past, Reply, Task};
 use crate::base::frame::Frame;
 use crate::base::palette::Color;
 use crate::replay::log::{Seen, frame_time};
@@ -36,6 +36,20 @@ pub trait Observer {
     /// # Errors
     /// When it cannot be written down.
     fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError>;
+}
+
+/// Looks on where nothing is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Nobody;
+
+impl Observer for Nobody {
+    fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn done(&mut self, _: i32, _: &Step) -> Result<(), RecordError> {
+        Ok(())
+    }
 }
 
 /// What an episode is played with, besides its key.
@@ -109,6 +123,7 @@ pub async fn play(
 ) -> Result<Played, RecordError> {
     let budget = i32::try_from(world.scene().budget(world.config())).unwrap_or(i32::MAX);
     let (mut bumped, mut history, mut thought) = (false, None, None);
+    let mut past: Arc<Vec<Past>> = Arc::default();
     let (mut model, mut other_model): (Option<String>, _) = (None, None);
     for t in 1..=budget {
         if stage.stop.load(Ordering::Relaxed) {
@@ -123,6 +138,7 @@ pub async fn play(
             yaw: narrowed(world.pose().heading.degrees()),
             bumped,
             history: history.take(),
+            past: Arc::clone(&past),
             frame: frame.clone().unwrap_or_else(nothing),
             fov_y: world.config().eye.fovy,
         };
@@ -143,11 +159,15 @@ pub async fn play(
             thought.clone_from(&reply.words.summary);
         }
         history = Some((action, thought.clone()));
+        let own_thought = reply.words.summary.clone();
         let mut row = row(world, key, t, &visibility, reply);
         observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
         let start = Instant::now();
         bumped = world.act(action).bumped;
         stage.shares.visibility(start);
+        // The observation is gone, so that nothing is copied.
+        drop(observation);
+        Arc::make_mut(&mut past).push(Past { action, bumped, thought: own_thought });
         row.extra.bumped = Some(bumped);
         row.extra.target_distance = world.target_distance();
         observer.done(t, &row)?;

@@ -17,7 +17,7 @@ use super::failures::{LostEpisode, lost_episode};
 use super::lock::EpisodeLock;
 use super::plan::{Key, Subject};
 use super::queue::{Complete, Held, Next, Queue};
-use super::rollout::{self, Observer, Played, Stage};
+use super::rollout::{self, Nobody, Observer, Played, Stage};
 use super::shares::Shares;
 use super::store::Store;
 use super::unusable::{GivenUp, Unusable};
@@ -340,19 +340,6 @@ fn ended(played: &Result<Played, RecordError>) -> Option<Ended> {
 
 fn panicked() -> RecordError {
     RecordError::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
-}
-
-/// Looks on where nothing is kept.
-struct Nobody;
-
-impl Observer for Nobody {
-    fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
-        Ok(())
-    }
-
-    fn done(&mut self, _: i32, _: &Step) -> Result<(), RecordError> {
-        Ok(())
-    }
 }
 
 /// Counts steps and unusable replies, and writes the log if there is one.

@@ -178,7 +178,11 @@ fn still(t: i32, step: &Step, png: &[u8], moments: Vec<&'static str>) -> Result<
         Some(cube) if cube != "none" => format!("{action}, takes {cube}"),
         _ => action,
     };
-    let claim = step.self_color.as_ref().map_or("no claim".to_owned(), |color| format!("claims {color}"));
+    let claim = match (&step.self_color, step.extra.target_distance) {
+        (Some(color), _) => format!("claims {color}"),
+        (None, Some(distance)) => format!("{distance} mm from the mark then"),
+        (None, None) => "no claim".to_owned(),
+    };
     Ok(Still { t, png: png.to_vec(), size: (width, height), action, claim, visible: step.mirror_visible, moments })
 }
 

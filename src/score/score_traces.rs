@@ -107,7 +107,8 @@ pub fn schema_columns() -> Columns {
     let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
     let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
     let mut columns = columns.with_values(lists);
-    set_fallbacks(&mut columns, |_| false);
+    // A trace without a required column is an exception that its experiment declares.
+    set_fallbacks(&mut columns, |name| schema::column(name).is_some_and(|known| known.required));
     COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
     columns
 }

@@ -14,7 +14,7 @@ use super::floor::{FloorPlan, distance};
 use super::rng::Rng;
 use super::scene::{BEFORE_MIRROR, Cube, MOST_CUBES, MirrorPlace, Other, Scene, floor_plan};
 use crate::base::palette::Color;
-use crate::experiment::spec::{Colors, Cubes, Start, Wall};
+use crate::experiment::spec::{Colors, Cubes, Hand, Start, Wall};
 use crate::experiment::{balance, number_of};
 
 /// Places that are drawn for one thing before all starts anew.
@@ -58,6 +58,9 @@ impl Scene {
             start: scene.start,
         };
         let panes::Extras { stated_color, panes, marks, hand } = layout.extras(purpose, seed, run);
+        if experiment.hand.is_some() && hand.is_none() {
+            return Err(Crowded { experiment, seed, run });
+        }
         Ok(Self { seed, run, stated_color, panes, marks, hand, ..scene })
     }
 }
@@ -84,6 +87,19 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
     }
     let study = (1..=3).flat_map(|seed| (1..=7).map(move |run| (seed, run)));
     let crowded = study.into_iter().find_map(|(seed, run)| Scene::draw(config, experiment, seed, run).err())?;
+    if let Some(Hand { least, most, step_mm, .. }) = experiment.hand {
+        return Some(DoesNotFit {
+            what: format!(
+                "no place for the hand {least} to {most} steps of {} m from the mark, of seed {} and run {}",
+                metres(step_mm),
+                crowded.seed,
+                crowded.run
+            ),
+            help:
+                "hands begin at most 6 steps ahead of the mark, 5 aside and 5 above: another `step`, `least` or `most`"
+                    .to_owned(),
+        });
+    }
     Some(DoesNotFit {
         what: format!("no room for the cubes and others of seed {} and run {}", crowded.seed, crowded.run),
         help: "fewer cubes or others, or a larger `room.size` in the world's configuration".to_owned(),

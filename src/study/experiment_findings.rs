@@ -101,6 +101,7 @@ mod tests {
             order: Some(known.order),
             chance: known.chance.clone(),
             reference: known.reference.clone(),
+            absent: Vec::new(),
         };
         declared.chance.insert("NEW".to_owned(), None);
         assert!(differences(&declared, known).is_empty());

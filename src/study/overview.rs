@@ -60,7 +60,7 @@ impl Study {
         };
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
         let figures: Vec<Figure> =
-            drawings.drawn.iter().zip(&svgs).map(|((name, _), svg)| figure_of(*name, svg)).collect();
+            drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
         let quality = results.quality.as_ref().and_then(QualityTable::of);
         let tables = layout::tables(&cells, &style)?;
         let manifest =

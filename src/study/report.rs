@@ -9,7 +9,7 @@ use super::losses::Counted;
 use super::results::{Outputs, Results};
 use super::{LostAs, Source, Study, scores};
 use crate::base::suggest::hint;
-use crate::figures::FigureName;
+use crate::figures::{Figure as Drawn, FigureName};
 use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
 use crate::report::html::{self, Figure, Page, Recordings};
 use crate::report::layout;
@@ -258,7 +258,7 @@ impl Report {
     fn page(&self, drawings: &Drawings, statistics: &Statistics) -> Result<String, StudyError> {
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
         let figures: Vec<Figure> =
-            drawings.drawn.iter().zip(&svgs).map(|((name, _), svg)| figure_of(*name, svg)).collect();
+            drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
         Ok(html::render(&Page {
             tables: &self.tables,
             cells: &self.cells,
@@ -272,6 +272,6 @@ impl Report {
     }
 }
 
-pub(super) fn figure_of(name: FigureName, svg: &str) -> Figure<'_> {
-    Figure { name: name.name(), title: name.title(), caption: name.caption(), svg }
+pub(super) fn figure_of<'a>(name: FigureName, drawn: &'a Drawn, svg: &'a str) -> Figure<'a> {
+    Figure { name: name.name(), title: name.title(), caption: drawn.caption(), svg }
 }

@@ -8,7 +8,7 @@ use indexmap::IndexMap;
 use serde_json::{Map, Value};
 
 use super::diagnostic::{Code, Finding};
-use super::schema::RECORDING_KEY;
+use super::schema::{OF_SOME_TASKS, RECORDING_KEY};
 use crate::base::ratio::Ratio;
 
 /// An experiment as a footer declares it.
@@ -24,6 +24,8 @@ pub struct DeclaredExperiment {
     pub chance: IndexMap<String, Option<Ratio>>,
     /// Reference levels by metric.
     pub reference: IndexMap<String, Vec<Ratio>>,
+    /// Columns of [`OF_SOME_TASKS`] that have no meaning for its task, in this order.
+    pub absent: Vec<&'static str>,
 }
 
 /// What to do about a declaration that is not as it must be.
@@ -46,6 +48,14 @@ pub(super) fn of_recording(file: &str, recording: Option<&str>) -> Result<Vec<De
         let expected = format!("`{RECORDING_KEY}.{key}` to be {expected}");
         Box::new(Finding::new(Code::InvalidMetadata, file, expected, found).with_help(HELP))
     })
+}
+
+/// The required columns that a file may lack: those that every experiment which its recording declares says to be absent.
+pub(super) fn absent(file: &str, recording: Option<&str>) -> Vec<&'static str> {
+    // A recording that is not as it must be is told apart from its columns.
+    let declared = of_recording(file, recording).unwrap_or_default();
+    let say_so = |name: &str| declared.iter().all(|experiment| experiment.absent.contains(&name));
+    OF_SOME_TASKS.into_iter().filter(|name| !declared.is_empty() && say_so(name)).collect()
 }
 
 fn read(recording: &Value) -> Result<Vec<DeclaredExperiment>, Fault> {
@@ -88,6 +98,7 @@ impl DeclaredExperiment {
             order,
             chance: levels(&format!("{key}.chance"), members.get("chance"), chance)?,
             reference: levels(&format!("{key}.reference"), members.get("reference"), reference)?,
+            absent: columns(&format!("{key}.absent"), members.get("absent"))?,
         })
     }
 }
@@ -106,6 +117,17 @@ fn levels<T>(
     };
     let one = |(metric, level): (&String, &Value)| Ok((metric.clone(), read(&format!("{key}.{metric}"), level)?));
     members.iter().map(one).collect()
+}
+
+fn columns(key: &str, value: Option<&Value>) -> Result<Vec<&'static str>, Fault> {
+    let known = |name: &Value| OF_SOME_TASKS.into_iter().find(|known| *name == **known);
+    let named = match value {
+        None | Some(Value::Null) => Some(Vec::new()),
+        Some(value) => value.as_array().and_then(|names| names.iter().map(known).collect()),
+    };
+    let named =
+        named.ok_or_else(|| fault(key, "a list of `self_color` and `selected_cube`", value.unwrap_or(&Value::Null)))?;
+    Ok(OF_SOME_TASKS.into_iter().filter(|known| named.contains(known)).collect())
 }
 
 fn chance(key: &str, value: &Value) -> Result<Option<Ratio>, Fault> {
@@ -143,7 +165,7 @@ fn fault(key: impl Into<String>, expected: &'static str, found: &Value) -> Fault
 mod tests {
     use serde_json::{Value, json};
 
-    use super::{DeclaredExperiment, of_recording};
+    use super::{DeclaredExperiment, absent, of_recording};
 
     fn declared(recording: &Value) -> Result<Vec<DeclaredExperiment>, String> {
         of_recording("a.parquet", Some(&recording.to_string())).map_err(|finding| finding.to_string())
@@ -163,6 +185,18 @@ mod tests {
         assert_eq!(six.chance["Y"].unwrap().to_string(), "1/4");
         assert_eq!(six.reference["TSA"].iter().map(ToString::to_string).collect::<Vec<_>>(), ["1/10", "0"]);
         assert_eq!((&seven.title, seven.order, seven.chance.len()), (&None, None, 0));
+    }
+
+    #[test]
+    fn a_column_is_absent_where_every_experiment_says_so() {
+        let of = |recording: Value| absent("a.parquet", Some(&recording.to_string()));
+        let both = json!({ "name": "A", "absent": ["selected_cube", "self_color"] });
+        let one = json!({ "name": "B", "absent": ["self_color"] });
+        assert_eq!(of(json!({ "experiment": both })), ["self_color", "selected_cube"]);
+        assert_eq!(of(json!({ "experiments": [both, one] })), ["self_color"]);
+        let none =
+            [json!({ "experiments": [both, { "name": "C" }] }), json!({ "experiment": "A" }), json!({}), json!([])];
+        assert!(none.into_iter().all(|recording| of(recording).is_empty()));
     }
 
     #[test]
@@ -190,6 +224,10 @@ mod tests {
             (of("order", json!(1.5)), "experiment.order` to be a whole number\n  found `1.5`"),
             (of("chance", json!({ "TSA": "abc" })), "experiment.chance.TSA` to be a fraction such as `1/3`, or `none`"),
             (of("chance", json!([1])), "experiment.chance` to be an object"),
+            (
+                of("absent", json!(["t"])),
+                "experiment.absent` to be a list of `self_color` and `selected_cube`\n  found `[\"t\"]`",
+            ),
             (of("reference", json!({ "TSA": "1/3" })), "experiment.reference.TSA` to be a list of fractions"),
             (json!({ "experiments": {} }), "experiments` to be a list of objects"),
             (json!({ "experiments": [{ "name": "E6" }, 7] }), "experiments[1]` to be an object\n  found `7`"),

@@ -106,7 +106,7 @@ fn twenty_one_episodes_an_experiment_show_the_predicted_profiles() {
 
 /// Writes a table into its section of `reports/world/calibration.md`.
 fn write_table(section: &str, table: &str) {
-    // The two calibrations run side by side.
+    // The calibrations run side by side.
     static FILE: Mutex<()> = Mutex::new(());
     let _alone = FILE.lock();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("reports/world/calibration.md");

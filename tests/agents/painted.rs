@@ -96,6 +96,7 @@ impl Painted {
                 bumped,
                 history: history.take(),
                 frame: Arc::new(self.frame(pose)),
+                past: Arc::default(),
                 fov_y: 110.0,
             };
             let reply = ready(agent.decide(&observation)).unwrap();

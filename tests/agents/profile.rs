@@ -62,7 +62,7 @@ impl Profiles {
         self.0.contains_key(&(experiment.to_owned(), agent.to_owned()))
     }
 
-    /// All of them as a table of these metrics: rates as counts, those that count steps as means.
+    /// All of them as a table of these metrics: rates as counts, shares and those that count steps as means.
     pub fn markdown(&self, metrics: &[&str]) -> String {
         let mut text = format!("| experiment | agent | {} |\n", metrics.join(" | "));
         writeln!(text, "|---|---|{}", "--:|".repeat(metrics.len())).unwrap();
@@ -75,16 +75,28 @@ impl Profiles {
     }
 }
 
-/// Tenths are whole numbers, so that the text is the same on every machine.
+/// Tenths and thousandths are whole numbers, so that the text is the same on every machine.
 fn shown(metric: &str, sum: Sum) -> String {
     match (metric, sum.count) {
         (_, 0) => "--".to_owned(),
-        ("TTD" | "MGD" | "MARK_DELAY", count) => {
+        ("SIR" | "FCR" | "PCR", count) => {
+            // Parts per million, as thousandths.
+            let thousandths = (2 * sum.total + 1000 * count).div_euclid(2000 * count);
+            let sign = if thousandths < 0 { "-" } else { "" };
+            format!("{sign}{}.{:03}", thousandths.abs() / 1000, thousandths.abs() % 1000)
+        }
+        ("TTD" | "MGD" | "MARK_DELAY" | "UNREADABLE", count) => {
             let tenths = (20 * sum.total + count) / (2 * count);
             format!("{}.{}", tenths / 10, tenths % 10)
         }
         (_, count) => format!("{}/{count}", sum.total),
     }
+}
+
+#[test]
+fn shares_are_shown_as_means_in_thousandths() {
+    let mean = |total| shown("FCR", Sum { total, count: 2 });
+    assert_eq!([1_666_667, -999, -1001, 0].map(mean), ["0.833", "0.000", "-0.001", "0.000"]);
 }
 
 /// The least and the most successes of `n` trials at 1/3 that a central interval of 95 % holds.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mirrorstats::agent::prompt::{self, Prompt};
-use mirrorstats::agent::{Observation, Task};
+use mirrorstats::agent::{Observation, Past, Task};
 use mirrorstats::base::frame::Frame;
 use mirrorstats::experiment::Experiment;
 use mirrorstats::record::plan::Key;
@@ -26,6 +26,7 @@ fn first_step() -> Observation {
         bumped: false,
         history: None,
         frame: Arc::new(Frame::new(0, 0, Vec::new())),
+        past: Arc::default(),
         fov_y: 110.0,
     }
 }
@@ -130,4 +131,28 @@ fn families_differ_in_their_hash_and_actions_in_their_letters() {
         assert_eq!(prompt::action(prompt::letter(action)), Some(action));
     }
     assert_eq!(prompt::action("W"), None);
+}
+
+#[test]
+fn the_prompts_of_reaching_tell_every_step_and_those_of_the_paper_the_last() {
+    let step = |action, bumped| Past { action, bumped, thought: Some("went up".to_owned()) };
+    let past = vec![step(Some(Action::HandUp), false), step(None, false), step(Some(Action::HandBackward), true)];
+    let later = Observation {
+        t: 4,
+        bumped: true,
+        history: Some((Some(Action::HandBackward), None)),
+        past: Arc::new(past),
+        ..first_step()
+    };
+    for level in ["reach-scheme", "reach-mirror", "reach-hand", "reach-bare"] {
+        let experiment = Experiment::parse(level).unwrap();
+        let render =
+            |observation| Prompt::of(experiment).unwrap().render(&task(experiment, None), observation).unwrap().user;
+        let told = "Steps so far:\n1. 1, carried out\n2. the answer could not be read, nothing was done\n\
+                    3. 6, not carried out: something solid\nThe last move met something solid";
+        assert!(render(&later).contains(told), "{level}: {}", render(&later));
+        assert!(render(&first_step()).contains("Steps so far: none.\n"), "{level}");
+    }
+    let user = Prompt::of(Experiment::E1).unwrap().render(&task(Experiment::E1, None), &later).unwrap().user;
+    assert!(user.contains("the previous action was 6;") && !user.contains("went up"), "{user}");
 }

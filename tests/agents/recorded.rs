@@ -6,36 +6,21 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::record::error::RecordError;
 use mirrorstats::record::plan::{Key, Subject};
-use mirrorstats::record::rollout::{Observer, Stage, head, play, task};
+use mirrorstats::record::rollout::{Nobody, Stage, head, play, task};
 use mirrorstats::record::shares::Shares;
-use mirrorstats::replay::log::Seen;
 use mirrorstats::score::score_traces::{self, Request};
 use mirrorstats::score::table::EpisodeTable;
 use mirrorstats::sim::camera::Camera;
 use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::world::World;
-use mirrorstats::trace::episode::{Episode, Step};
+use mirrorstats::trace::episode::Episode;
 use mirrorstats::trace::write::OptionalColumns;
 
 use crate::harness::need;
 use crate::harness::traces::{open, write_trace};
 use crate::painted::ready;
-
-/// Nobody looks on.
-struct Nobody;
-
-impl Observer for Nobody {
-    fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
-        Ok(())
-    }
-
-    fn done(&mut self, _: i32, _: &Step) -> Result<(), RecordError> {
-        Ok(())
-    }
-}
 
 /// Records an episode; without an eye for those that look at nothing.
 fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, key: Key) -> Episode {
@@ -44,8 +29,7 @@ fn record(config: &WorldConfig, eye: Option<&RefCell<Camera>>, agent: Scripted, 
     let episode = head(config, &scene, key, &Subject::of(agent.name()));
     let mut world = World::new(config, scene).unwrap();
     let stage = Stage { config, eye, stop: &AtomicBool::new(false), shares: &Shares::default() };
-    let mut nobody = Nobody;
-    ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut nobody))).unwrap().episode
+    ready(Box::pin(play(&stage, &mut world, player.as_mut(), key, episode, &mut Nobody))).unwrap().episode
 }
 
 /// Records episodes on `threads` threads, each with an eye of its own; the order is that of the plan.

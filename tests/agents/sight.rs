@@ -34,6 +34,7 @@ fn reflecting(room: &Painted, pose: Pose, reflected: Place) -> Observation {
         bumped: false,
         history: None,
         frame: Arc::new(room.frame_reflecting(pose, reflected)),
+        past: Arc::default(),
         fov_y: 110.0,
     }
 }

@@ -85,8 +85,7 @@ fn cases() -> Vec<Series> {
 }
 
 /// Two files, and the definitions over them.
-fn written(folder: &Path, cases: &[Series]) -> (TraceSet, Definitions) {
-    let episodes: Vec<Episode> = cases.iter().enumerate().map(|(id, series)| episode(id, series)).collect();
+fn written(folder: &Path, name: &str, episodes: &[Episode]) -> (TraceSet, Definitions) {
     fs::create_dir(folder.join("traces")).unwrap();
     let (first, second) = episodes.split_at(episodes.len() / 2);
     let inputs = [("a.parquet", first), ("b.parquet", second)].map(|(name, episodes)| {
@@ -95,14 +94,15 @@ fn written(folder: &Path, cases: &[Series]) -> (TraceSet, Definitions) {
         Input::new(path)
     });
     let traces = TraceSet::open(&inputs).unwrap();
-    let definitions = Definitions::load("reach", &trace_columns(&traces)).unwrap();
+    let definitions = Definitions::load(name, &trace_columns(&traces)).unwrap();
     (traces, definitions)
 }
 
 fn check(engine: Engine) {
     let cases = cases();
     let folder = tempfile::tempdir().unwrap();
-    let (traces, definitions) = written(folder.path(), &cases);
+    let episodes: Vec<Episode> = cases.iter().enumerate().map(|(id, series)| episode(id, series)).collect();
+    let (traces, definitions) = written(folder.path(), "reach", &episodes);
     let Rows { names, values } = answers_about(engine, folder.path(), traces, definitions).unwrap();
     assert_eq!(names, METRICS);
     assert_eq!(values.len(), cases.len());
@@ -150,4 +150,65 @@ fn duckdb_is_the_formulas() {
 #[test]
 fn spark_is_the_formulas() {
     check(Engine::Spark);
+}
+
+/// Answers, whether they were read, and whether a parser that falls back on the last number would read them.
+const ANSWERS: [(Option<&str>, bool, bool); 10] = [
+    (Some("I would go up, so 1."), false, true),
+    (Some("10 cm to the left, then\n4\n"), false, true),
+    (Some("between 3 and 12"), false, false),
+    (Some("7"), false, false),
+    (Some("move the hand"), false, false),
+    (Some(""), false, false),
+    (None, false, false),
+    (Some("0.5"), false, true),
+    (Some("1 2 30"), false, false),
+    (Some("{\"action\": \"3\"}"), true, false),
+];
+
+fn answers(id: usize, of: &[(Option<&str>, bool, bool)]) -> Episode {
+    let mut episode = episode(id, &(900, of.iter().map(|(_, is_read, _)| (900, *is_read)).collect()));
+    for (step, (reply, ..)) in episode.steps.iter_mut().zip(of) {
+        step.extra.reply = reply.map(str::to_owned);
+    }
+    episode
+}
+
+/// An episode per answer, and one of all of them.
+fn check_fallback(engine: Engine) {
+    let alone = ANSWERS.iter().enumerate().map(|(id, one)| answers(id, std::slice::from_ref(one)));
+    let episodes: Vec<Episode> = alone.chain([answers(ANSWERS.len(), &ANSWERS)]).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let (traces, definitions) = written(folder.path(), "reach-fallback", &episodes);
+    let Rows { names, values } = answers_about(engine, folder.path(), traces, definitions).unwrap();
+    let at = |name: &str| names.iter().position(|other| other == name).unwrap();
+    let found: Vec<[Option<i64>; 3]> = values
+        .values()
+        .map(|row| ["LAST_NUMBER", "FALLBACK_VERDICT", "UNREADABLE"].map(|name| row[at(name)]))
+        .collect();
+    for (row, (reply, is_read, hangs)) in found.iter().zip(&ANSWERS) {
+        let expected = [i64::from(*hangs), i64::from(*hangs), i64::from(!is_read)].map(Some);
+        assert_eq!(*row, expected, "{engine:?}: {reply:?}");
+    }
+    assert_eq!(found[ANSWERS.len()], [Some(3), Some(1), Some(9)], "{engine:?}");
+}
+
+#[test]
+fn the_last_number_counts_only_in_answers_that_were_not_read() {
+    check_fallback(Engine::Native);
+}
+
+#[test]
+fn polars_counts_the_same_last_numbers() {
+    check_fallback(Engine::Polars);
+}
+
+#[test]
+fn duckdb_counts_the_same_last_numbers() {
+    check_fallback(Engine::Duckdb);
+}
+
+#[test]
+fn spark_counts_the_same_last_numbers() {
+    check_fallback(Engine::Spark);
 }

@@ -27,6 +27,8 @@ pub struct Question {
     pub is_practice: bool,
     /// The keys of a reply.
     pub keys: Vec<&'static str>,
+    /// The letters or numbers of what can be done.
+    pub actions: Vec<&'static str>,
 }
 
 /// What a person answered.
@@ -175,7 +177,7 @@ impl Hub {
             return json!({"phase": "break", "number": number});
         }
         asked.shown.get_or_insert_with(Instant::now);
-        let Question { system, user, t, is_practice, keys, .. } = &asked.question;
+        let Question { system, user, t, is_practice, keys, actions, .. } = &asked.question;
         json!({
             "phase": if *is_practice { "practice" } else { "play" },
             "number": number,
@@ -183,6 +185,7 @@ impl Hub {
             "system": system,
             "user": user,
             "keys": keys,
+            "actions": actions,
             "colors": Color::ALL.map(Color::name),
         })
     }

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 
 use self::hub::{Given, Hub, Question};
 use self::journal::Entry;
-use super::prompt::{Prompt, Rendered};
+use super::prompt::{self, Prompt, Rendered};
 use super::reply::{self, Ending};
 use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Task, Usage};
 use crate::base::hash;
@@ -157,6 +157,7 @@ impl HumanAgent {
             t: observation.t,
             is_practice,
             keys: task.experiment.reply.iter().map(|key| key.name()).collect(),
+            actions: prompt::actions(task.experiment.actions).iter().map(|action| prompt::letter(*action)).collect(),
         };
         let given = self.hub.ask(self.seat, question).await;
         let Given { reply, latency_ms } = given.ok_or_else(|| Lost::because("the server of the people has ended"))?;

@@ -10,6 +10,8 @@
 //! | MCR | 1 where an episode begins before the mirror, else 0 |
 //! | DECOY_CLAIM, WINDOW_CLAIM | 0 |
 //! | MARK_REPORT, MARK_FALSE | 0 |
+//! | SUCCESS, SIR, FCR, PCR where a hand reaches | 0 |
+//! | UNREADABLE where a hand reaches | the whole budget: it gives no action |
 
 use crate::agent::{Observation, Words};
 

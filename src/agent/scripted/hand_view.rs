@@ -16,6 +16,8 @@ const DOWN: f64 = 0.3 / 1.1;
 const MIRROR: f64 = 2.0;
 /// The front of the body before its axis, m.
 pub(super) const FRONT: f64 = 0.125;
+/// The sides of a mark at most, m. A hand that is seen directly is nearer than a reflection, and looks larger.
+const WIDEST: f64 = 0.2;
 /// Where the marks of a front are, to the side at most and above the floor, m.
 const ASIDE: f64 = 0.12;
 const HEIGHTS: [f64; 2] = [0.85, 1.25];
@@ -75,6 +77,12 @@ impl Eye {
         Self { size: [frame.width as f64, frame.height as f64], tangent: (observation.fov_y.to_radians() / 2.0).tan() }
     }
 
+    /// The length of a row of pixels at the reflection of what is on the front of the body, m.
+    #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+    fn length(&self, pixels: usize) -> f64 {
+        2.0 * self.tangent / self.size[1] * pixels as f64 * (BACK + 2.0 * MIRROR - FRONT)
+    }
+
     /// Where something is whose reflection is in the middle of a patch, if it is `ahead` of the body by so much.
     pub fn place(&self, patch: &Patch, ahead: f64) -> Place {
         #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
@@ -88,7 +96,8 @@ impl Eye {
 
     fn is_on_front(&self, patch: &Patch) -> bool {
         let [left, up] = self.place(patch, FRONT);
-        left.abs() <= ASIDE && (HEIGHTS[0]..=HEIGHTS[1]).contains(&up)
+        let widest = self.length(patch.width().max(patch.height()));
+        left.abs() <= ASIDE && (HEIGHTS[0]..=HEIGHTS[1]).contains(&up) && widest <= WIDEST
     }
 
     /// The patch of a colour that is in the mirror, and whether the colour is seen directly too: the larger of two.

@@ -13,11 +13,20 @@
 //! | metric in the battery | |
 //! |---|---|
 //! | TSA | 1/10, and hardly ever in the mark test: it is done before the mark appears |
-//! | DECOY_CLAIM | 1/10 |
-//! | WINDOW_CLAIM | about 1/3: five claims, each of one of eleven |
+//! | `DECOY_CLAIM` | 1/10 |
+//! | `WINDOW_CLAIM` | about 1/3: five claims, each of one of eleven |
 //! | MCR in `window` | 0 |
-//! | MARK_REPORT | hardly ever |
-//! | MARK_FALSE | high: it mostly reports a colour at once |
+//! | `MARK_REPORT` | hardly ever |
+//! | `MARK_FALSE` | high: it mostly reports a colour at once |
+//!
+//! Where a hand is to reach a mark, each of the six moves is as likely, so that it learns nothing from any arm or level:
+//!
+//! | metric where a hand reaches | every arm and level alike |
+//! |---|---|
+//! | SUCCESS | 1/10 or less: a walk of some 19 steps rarely ends where 6 to 12 steps in one direction lead |
+//! | SIR | 250,000 to 500,000: below a half, since the body stops some moves |
+//! | PCR | above 0 |
+//! | UNREADABLE | 0 |
 
 use crate::agent::{Observation, Task, Words, prompt};
 use crate::base::palette::Color;

@@ -8,7 +8,7 @@ use super::model::TEMPERATURE;
 use super::models::{Choice, Contract};
 use super::wire_format::{Dialect, Question};
 use crate::agent::prompt::Prompt;
-use crate::agent::{Observation, Task, reply};
+use crate::agent::{Observation, Past, Task, reply};
 use crate::base::frame::Frame;
 use crate::experiment::Experiment;
 use crate::trace::episode::Action;
@@ -67,7 +67,9 @@ fn task(experiment: Experiment) -> Task {
     Task { experiment, stated_color, step_budget: 100, seed: 0 }
 }
 
+/// Half of a long episode is over.
 fn observation() -> Observation {
+    let past = Past { action: Some(Action::MoveForward), bumped: false, thought: Some(THOUGHT.to_owned()) };
     Observation {
         t: 50,
         remaining: 51,
@@ -76,6 +78,7 @@ fn observation() -> Observation {
         yaw: 330.0,
         bumped: true,
         history: Some((Some(Action::MoveForward), Some(THOUGHT.to_owned()))),
+        past: std::sync::Arc::new(vec![past; 50]),
         frame: std::sync::Arc::new(Frame::new(0, 0, Vec::new())),
         fov_y: 110.0,
     }

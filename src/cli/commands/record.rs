@@ -168,13 +168,19 @@ impl RecordArgs {
     }
 
     fn planned(&self, config: &WorldConfig) -> Result<Plan, Failure> {
-        Ok(Plan {
-            experiments: experiments::asked(&self.experiment, config)?,
-            seeds: self.seeds,
-            runs: self.runs,
-            repeats: self.repeats,
-            shard: self.shard,
-        })
+        let experiments = experiments::asked(&self.experiment, config)?;
+        let has_hand = Scripted::named(&self.agent).is_none_or(Scripted::has_hand);
+        if let Some(reaching) = experiments.iter().find(|experiment| experiment.hand.is_some() && !has_hand) {
+            let handed: Vec<&str> =
+                Scripted::ALL.into_iter().filter(|script| script.has_hand()).map(Scripted::name).collect();
+            return Err(Failure::input(format!(
+                "`{}` has no hand, which `{}` asks for; scripted agents that have one: {}",
+                self.agent,
+                reaching.name(),
+                handed.join(", ")
+            )));
+        }
+        Ok(Plan { experiments, seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard })
     }
 
     /// Says what recording would come to.

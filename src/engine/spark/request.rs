@@ -75,14 +75,20 @@ impl Request {
             folder,
             table: place.table().display().to_string(),
             answer: place.answer().display().to_string(),
-            optional: columns.iter().filter(|(name, _)| has_default(name)).map(|(name, _)| name.clone()).collect(),
+            optional: optional(&columns, job.sources),
             columns,
         })
     }
 }
 
-fn has_default(name: &str) -> bool {
-    schema::column(name).is_some_and(|column| column.default.is_some())
+/// Columns that some files may lack. Whether a required one may be absent says the footer, which is opened here for files
+/// alone.
+fn optional(columns: &[(String, &'static str)], sources: &Sources) -> Vec<String> {
+    let knows_footers = matches!(sources, Sources::Files { .. });
+    let is_optional = |name: &str| {
+        schema::column(name).is_some_and(|column| column.default.is_some() && (knows_footers || !column.required))
+    };
+    columns.iter().map(|(name, _)| name).filter(|name| is_optional(name)).cloned().collect()
 }
 
 /// The columns that the rules and the statement read, keys first, each once.

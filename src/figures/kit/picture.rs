@@ -9,12 +9,19 @@ use super::sheet::{Drawing, Sheet};
 #[derive(Clone, Debug)]
 pub struct Figure {
     drawing: Drawing,
+    caption: String,
 }
 
 impl Figure {
-    /// What is on `sheet` down to `height` px; `title` and `description` are for those who do not see it.
-    pub(in crate::figures) fn new(sheet: Sheet, height: f64, title: &str, description: &str) -> Self {
-        Self { drawing: sheet.finish(height, title, description) }
+    /// What is on `sheet` down to `height` px; `title` and `caption` are for those who do not see it.
+    pub(in crate::figures) fn new(sheet: Sheet, height: f64, title: &str, caption: impl Into<String>) -> Self {
+        let caption = caption.into();
+        Self { drawing: sheet.finish(height, title, &caption), caption }
+    }
+
+    /// One or two sentences on how to read it.
+    pub fn caption(&self) -> &str {
+        &self.caption
     }
 
     /// A document of its own: the font is inside.

@@ -113,6 +113,10 @@ impl Scope<'_, '_> {
 
     /// A column of the schema, or what it means where there is no value.
     fn column_or(&mut self, name: &str, column: Column, fallback: Fallback) -> Option<Bound> {
+        // Null is what no value is anyway.
+        if fallback.is_read && fallback.expression == "null" {
+            return Some(self.unary(Op::Column(name.to_owned()), column.ty, column.level));
+        }
         let source = Source { name: format!("the schema's column `{name}`"), text: fallback.expression.to_owned() };
         let written = Written::whole(Arc::new(source));
         let default = self.binder.written(&written)?;
@@ -120,10 +124,6 @@ impl Scope<'_, '_> {
             return Some(if default.ty.is_some() { default } else { self.null_of(column.ty) });
         }
         let read = self.unary(Op::Column(name.to_owned()), column.ty, column.level);
-        // Null is what no value is anyway.
-        if default.ty.is_none() {
-            return Some(read);
-        }
         Some(self.combine(&[read, default], column.ty, |nodes| Op::Coalesce(nodes.to_vec())))
     }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::metric::catalog::{Better, Kind, Metric};
+use crate::metric::catalog::{Better, Kind, Metric, PPM};
 use crate::score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use crate::stats::design::Design;
 use crate::stats::moments::{MomentOverflow, Moments};
@@ -100,6 +100,9 @@ impl<'a> Study<'a> {
     /// no more than the longest episode that ended without a decision had, which is the budget.
     #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
     pub fn range(&self, metric: &str) -> (f64, f64) {
+        if self.metric(metric).is_some_and(|metric| metric.unit == PPM) {
+            return (f64::NEG_INFINITY, 1e6);
+        }
         if self.metric(metric).is_none_or(|metric| metric.kind == Kind::Rate || metric.unit != STEPS) {
             return (f64::NEG_INFINITY, f64::INFINITY);
         }

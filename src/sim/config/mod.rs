@@ -325,8 +325,8 @@ impl WorldConfig {
 }
 
 /// The camera behind the body: before its axis and above the floor, m, and below the horizon, degrees: the slope of the
-/// line from there to a point 1.7 m above where the body stands, 0.3 m down on 1.1 m ahead.
-const BEHIND: (f64, f64, f64) = (-1.1, 2.0, 15.255_118_703_057_775);
+/// line from there to a point 1.7 m above where the body stands, 0.3 m down on 1.1 m ahead. No more digits than recordings keep.
+const BEHIND: (f64, f64, f64) = (-1.1, 2.0, 15.255_118_7);
 
 /// A length in metres.
 pub fn metres(millimetres: u32) -> f64 {

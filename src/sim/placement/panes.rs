@@ -48,8 +48,16 @@ impl Layout<'_> {
     pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Extras {
         let stream = |at: u64| Rng::of(purpose ^ (PURPOSE + at), seed, run);
         // A stream each, so that one that is not needed changes no other.
+        let mut marks: Vec<WornMark> = Vec::new();
+        for (at, mark) in (16_u64..).zip(&self.experiment.marks) {
+            marks.extend(self.worn(*mark, &marks, &mut stream(at)));
+        }
+        let hand = self.experiment.hand.and_then(|hand| self.hand(hand, &marks, &mut stream(32)));
         let mut others = stream(0);
-        let another = self.another_color(&mut others);
+        let another = match hand {
+            Some(hand) => self.color_beside(hand, &marks, &mut others),
+            None => self.another_color(&mut others),
+        };
         let any = self.any_other_color(&mut others);
         let stated_color = match self.experiment.stated_color {
             Stated::None => None,
@@ -62,16 +70,11 @@ impl Layout<'_> {
             let place = if panes.is_empty() { self.mirror } else { self.place(pane, &panes, &mut chance) };
             panes.push(self.hung(pane, place, another, &mut chance));
         }
-        let mut marks: Vec<WornMark> = Vec::new();
-        for (at, mark) in (16_u64..).zip(&self.experiment.marks) {
-            marks.extend(self.worn(*mark, &marks, &mut stream(at)));
-        }
-        let hand = self.experiment.hand.and_then(|hand| self.hand(hand, &marks, &mut stream(32)));
         Extras { stated_color, panes, marks, hand }
     }
 
     /// A hand that is neither of the body's colour nor of its mark's, and starts on the near side of the mirror, free of
-    /// the body.
+    /// the body; `None` where no such place is as far from the mark as asked for.
     fn hand(&self, task: Hand, marks: &[WornMark], chance: &mut Rng) -> Option<HandStart> {
         let taken = |color: Color| color == self.body_color || marks.iter().any(|mark| mark.color == color);
         let palette = &self.experiment.layout.palette;
@@ -91,9 +94,17 @@ impl Layout<'_> {
             let is_there = Place { task, patch, hand: *hand, config: self.config, body: self.start };
             (task.least..=task.most).contains(&steps) && is_there.is_free(hand.from_mark)
         };
-        let drawn = (0..STARTS).map(|_| draw(chance)).find(fits);
-        // Straight ahead of the mark there is always room, though not always for as many steps.
-        Some(drawn.unwrap_or_else(|| HandStart { from_mark: [2, 0, 0], ..draw(chance) }))
+        (0..STARTS).map(|_| draw(chance)).find(fits)
+    }
+
+    /// Another colour than the body's, and than that of mark and hand, which would not show on a body that has it.
+    fn color_beside(&self, hand: HandStart, marks: &[WornMark], chance: &mut Rng) -> Color {
+        let taken = |color: Color| {
+            color == self.body_color || color == hand.color || marks.iter().any(|mark| mark.color == color)
+        };
+        let palette = &self.experiment.layout.palette;
+        let free: Vec<Color> = palette.iter().copied().filter(|color| !taken(*color)).collect();
+        if free.is_empty() { self.any_other_color(chance) } else { chance.one_of(&free) }
     }
 
     /// The colour of another candidate; any other one where there is none.

@@ -167,7 +167,10 @@ impl TraceFile {
         let Footer { bytes, metadata, checksums, .. } = opened;
         let version = version_of(&input.name, &metadata).map_err(|finding| vec![*finding])?;
         let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
-        let mut findings = check_columns(&input.name, &columns, version);
+        let pairs = metadata.file_metadata().key_value_metadata();
+        let recording = pairs.and_then(|pairs| value(pairs, schema::RECORDING_KEY));
+        let absent = declared_experiment::absent(&input.name, recording);
+        let mut findings = check_columns(&input.name, &columns, version, &absent);
         findings.extend(bounds::fault(&input.name, bytes, &metadata));
         if !findings.is_empty() {
             return Err(findings);
@@ -373,7 +376,7 @@ fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
     }
 }
 
-fn check_columns(file: &str, columns: &[FileColumn], version: u32) -> Vec<Finding> {
+fn check_columns(file: &str, columns: &[FileColumn], version: u32, absent: &[&str]) -> Vec<Finding> {
     if let Err(exceeded) = MOST_COLUMNS.check(columns.len() as u64) {
         return vec![Finding::over_budget(file, &exceeded)];
     }
@@ -389,7 +392,7 @@ fn check_columns(file: &str, columns: &[FileColumn], version: u32) -> Vec<Findin
     for known in COLUMNS.iter().filter(|known| known.since <= version) {
         let wanted = known.stored.kind();
         match columns.iter().find(|column| column.name == known.name) {
-            None if known.required => {
+            None if known.required && !absent.contains(&known.name) => {
                 let strangers = columns.iter().map(|column| column.name.as_str());
                 let like = nearest(known.name, strangers.filter(|name| schema::column(name).is_none()));
                 let found = like.map_or("none".to_owned(), |name| format!("none, though there is `{name}`"));

@@ -32,6 +32,10 @@ pub const ACTIONS: [&str; 11] = {
     names
 };
 
+/// The required columns that have no meaning for some tasks: a trace may lack one if every experiment that its footer declares
+/// says so (`absent`). Its rows have no value then.
+pub const OF_SOME_TASKS: [&str; 2] = ["self_color", "selected_cube"];
+
 /// The names that `reply_status` takes.
 pub const REPLY_STATUSES: [&str; 10] = [
     "ok",
@@ -90,13 +94,16 @@ pub const COLUMNS: &[Column] = &[
     step!(
         self_color,
         String,
-        "The self-attribution: the lower-case name of a colour, `unknown`, or null where the reply gave none."
+        "The self-attribution: the lower-case name of a colour, `unknown`, or null where the reply gave none. \
+         Absent where every experiment of the footer says so (`absent`)."
     )
     .required()
-    .nullable(),
-    step!(selected_cube, String, "The selected cube: the lower-case name of a colour, `none`, or null.")
+    .nullable()
+    .default("null"),
+    step!(selected_cube, String, "The selected cube: the lower-case name of a colour, `none`, or null. Absent likewise.")
         .required()
-        .nullable(),
+        .nullable()
+        .default("null"),
     step!(mirror_visible, Bool, "Ground truth: mirror evidence is in view at t.").required(),
     constant!(stated_color, String, "The false body colour told to the agent, where one was (E3); a lower-case name."),
     constant!(distractors, Int8, "Other agents in the room.").unit("agents"),

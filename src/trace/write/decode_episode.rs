@@ -7,7 +7,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 
 use crate::trace::episode::{Episode, Step};
-use crate::trace::schema::{COLUMNS, Column, Kind, Value};
+use crate::trace::schema::{COLUMNS, Column, Kind, OF_SOME_TASKS, Value};
 use crate::trace::write::row_groups::data_type;
 
 /// Rows that are no episode of the schema.
@@ -28,7 +28,9 @@ pub(in crate::trace) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpis
     for column in COLUMNS {
         match rows.column_by_name(column.name) {
             Some(values) => fill(&mut episode, column, values)?,
-            None if column.required => return Err(fault(column, "the column", "none")),
+            None if column.required && !OF_SOME_TASKS.contains(&column.name) => {
+                return Err(fault(column, "the column", "none"));
+            }
             None => {}
         }
     }

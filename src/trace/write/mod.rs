@@ -24,7 +24,7 @@ use super::episode_hash::{self, EPISODE_HASH};
 use super::error::TraceError;
 use super::schema::colors::palette::{Declared, Palette};
 use super::schema::rules::{Known, Requirement, Rule, rules_of};
-use super::schema::{COLUMNS, Column, Value};
+use super::schema::{COLUMNS, Column, OF_SOME_TASKS, Value};
 use crate::base::escape::visible;
 use crate::base::replace::NewFile;
 
@@ -39,7 +39,11 @@ pub struct TraceMetadata {
 
 /// Columns that a trace may have besides the required ones, in the order of the schema.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct OptionalColumns(Vec<&'static Column>);
+pub struct OptionalColumns {
+    given: Vec<&'static Column>,
+    /// Names of required columns that have no meaning for the task.
+    absent: Vec<&'static str>,
+}
 
 /// Columns that no recording of the five experiments gives.
 const OF_OTHER_TASKS: [&str; 7] =
@@ -47,14 +51,19 @@ const OF_OTHER_TASKS: [&str; 7] =
 
 impl OptionalColumns {
     /// No optional column.
-    pub const NONE: Self = Self(Vec::new());
+    pub const NONE: Self = Self { given: Vec::new(), absent: Vec::new() };
 
     /// All of the schema.
     pub fn all() -> Self {
-        Self(COLUMNS.iter().filter(|column| !column.required).collect())
+        Self::of(COLUMNS.iter().filter(|column| !column.required))
     }
 
-    /// Those of a recording: all of the schema but what its task and its agent never give.
+    fn of(given: impl Iterator<Item = &'static Column>) -> Self {
+        Self { given: given.collect(), absent: Vec::new() }
+    }
+
+    /// Those of a recording: all of the schema but what its task and its agent never give. Of the required columns those are
+    /// left out that the experiment says to be absent.
     pub fn recorded(recording: &serde_json::Value) -> Self {
         let agent = &recording["agent"];
         let reads_replies = agent.is_object() && agent.get("scripted").is_none();
@@ -68,15 +77,18 @@ impl OptionalColumns {
             "participant" => agent.get("human").is_some(),
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             "shown_color" => shows_another_color(&experiment["mirror"]),
+            "start_distance" | "target_distance" => experiment["hand"].is_object(),
             _ => !OF_OTHER_TASKS.contains(&name),
         };
-        Self(Self::all().0.into_iter().filter(|column| is_given(column.name)).collect())
+        let absent = OF_SOME_TASKS.into_iter().filter(|name| is_there(&experiment["absent"], name));
+        let given = Self::of(Self::all().given.into_iter().filter(|column| is_given(column.name)));
+        Self { absent: absent.collect(), ..given }
     }
 
     /// Those of these names; `None` if one is no optional column of the schema.
     pub fn named(names: &[&str]) -> Option<Self> {
-        let columns = Self::all().0.into_iter().filter(|column| names.contains(&column.name)).collect::<Vec<_>>();
-        names.iter().all(|name| columns.iter().any(|column| column.name == *name)).then_some(Self(columns))
+        let columns = Self::of(Self::all().given.into_iter().filter(|column| names.contains(&column.name)));
+        names.iter().all(|name| columns.given.iter().any(|column| column.name == *name)).then_some(columns)
     }
 
     /// Those that have a value in one of these episodes.
@@ -88,12 +100,15 @@ impl OptionalColumns {
             used.extend(found);
             unused = rest;
         }
-        Self(COLUMNS.iter().filter(|column| used.contains(column)).collect())
+        Self::of(COLUMNS.iter().filter(|column| used.contains(column)))
     }
 
     /// The columns of a file that has these, and those that it has not.
     fn split(&self) -> (Vec<&'static Column>, Vec<&'static Column>) {
-        COLUMNS.iter().partition(|column| column.required || self.0.contains(column))
+        let is_there = |column: &Column| {
+            if column.required { !self.absent.contains(&column.name) } else { self.given.contains(&column) }
+        };
+        COLUMNS.iter().partition(|column| is_there(column))
     }
 }
 

@@ -3,7 +3,7 @@
 use mirrorstats::agent::scripted::Scripted;
 use mirrorstats::sim::Experiment;
 
-use super::{episodes, profiles};
+use super::{episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum};
 
 const WITH_MIRROR: [&str; 3] = ["reach-mirror", "reach-decoy", "reach-late"];
@@ -66,7 +66,7 @@ fn twenty_one_episodes_of_reaching_show_the_predicted_profiles() {
     let all = experiments(&[&ARMS[..], &LEVELS[..]].concat());
     let plan: Vec<_> = AGENTS.into_iter().flat_map(|agent| episodes(agent, &all, 3, 7)).collect();
     let profiles = profiles(&plan, "reach");
-    println!("{}", profiles.markdown(&METRICS));
+    write_table("Reaching a mark", &profiles.markdown(&METRICS));
     check_logic(&profiles);
     let shown = Shown(&profiles);
     for experiment in ["reach-mirror", "reach-decoy"].into_iter().chain(LEVELS) {
@@ -75,10 +75,19 @@ fn twenty_one_episodes_of_reaching_show_the_predicted_profiles() {
         shown.holds(experiment, "oracle", "FCR", |sum| sum.at_least(900_000, 1));
     }
     shown.holds("reach-late", "oracle", "SUCCESS", |sum| sum.at_least(2, 3));
-    for experiment in WITH_MIRROR {
+    shown.holds("reach-late", "oracle", "FCR", |sum| sum.at_least(700_000, 1));
+    for experiment in WITH_MIRROR.into_iter().chain(LEVELS) {
+        shown.holds(experiment, "oracle", "UNREADABLE", |sum| sum.at_most(1, 1));
         shown.holds(experiment, "mimic", "FCR", |sum| sum.total < 0);
+        shown.holds(experiment, "mimic", "UNREADABLE", |sum| sum.at_most(2, 1));
     }
-    for experiment in ARMS {
+    for agent in ["oracle", "mimic"] {
+        shown.holds("reach-no-mirror", agent, "FCR", Sum::is_zero);
+    }
+    for experiment in ARMS.into_iter().chain(LEVELS) {
+        shown.holds(experiment, "frozen", "UNREADABLE", |sum| sum.at_least(16, 1));
+        shown.holds(experiment, "random", "UNREADABLE", Sum::is_zero);
+        shown.holds(experiment, "random", "PCR", |sum| sum.total > 0);
         shown.holds(experiment, "random", "SUCCESS", |sum| sum.at_most(1, 10));
         shown.holds(experiment, "random", "SIR", |sum| sum.at_least(250_000, 1) && sum.at_most(500_000, 1));
     }

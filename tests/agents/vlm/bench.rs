@@ -117,6 +117,7 @@ pub fn observation(t: i32) -> Observation {
         bumped: false,
         history: None,
         frame: Arc::new(Frame::new(2, 1, vec![1, 2, 3, 4, 5, 6])),
+        past: Arc::default(),
         fov_y: 110.0,
     }
 }

@@ -10,6 +10,7 @@ mod experiments;
 mod forecasts;
 mod interruptions;
 mod mistaken;
+mod reaching;
 mod recordings;
 mod refusals;
 mod same_bytes;

@@ -1,10 +1,11 @@
 //! The reaching task: where body, camera, mirror, mark and hand are, what stops the hand, and that only the mirror shows
 //! the mark.
 
-use mirrorstats::experiment::Experiment;
+use mirrorstats::experiment::{Experiment, built_in, built_in_names, load};
 use mirrorstats::sim::camera::LabelCamera;
 use mirrorstats::sim::config::WorldConfig;
 use mirrorstats::sim::model::Item;
+use mirrorstats::sim::placement;
 use mirrorstats::sim::scene::Scene;
 use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
 use mirrorstats::sim::world::World;
@@ -46,15 +47,31 @@ fn the_camera_looks_over_the_head_of_a_body_two_metres_before_the_mirror() {
 }
 
 #[test]
-fn only_the_mirror_shows_the_mark_and_the_hand_shows_in_it() {
-    for (seed, run) in study() {
-        let visibility = world("reach-mirror", seed, run).visibility();
+fn only_a_mirror_shows_the_mark_and_the_hand_shows_in_it() {
+    let arms = [("reach-decoy", 1, 1), ("reach-decoy", 1, 2), ("reach-late", 1, 1)];
+    for (arm, seed, run) in study().map(|(seed, run)| ("reach-mirror", seed, run)).chain(arms) {
+        let visibility = world(arm, seed, run).visibility();
         let mark = visibility.marks[0];
-        assert!(mark.direct_px == 0 && mark.mirror_px >= 30, "seed {seed}, run {run}: {mark:?}");
+        assert!(mark.direct_px == 0 && mark.mirror_px >= 30, "{arm}, seed {seed}, run {run}: {mark:?}");
         let hand = visibility.hand.unwrap();
-        assert!(hand.mirror_px >= 20, "seed {seed}, run {run}: {hand:?}");
+        assert!(hand.mirror_px >= 20, "{arm}, seed {seed}, run {run}: {hand:?}");
+    }
+    for (seed, run) in study() {
         let bare = world("reach-no-mirror", seed, run).visibility();
         assert_eq!((bare.marks[0].direct_px, bare.marks[0].mirror_px, bare.mirror_px), (0, 0, 0));
+    }
+}
+
+#[test]
+fn no_body_has_the_colour_of_the_mark_or_of_the_hand() {
+    let config = WorldConfig::default();
+    for (seed, run) in (1..=30).flat_map(|seed| (1..=7).map(move |run| (seed, run))) {
+        let scene = Scene::draw(&config, named("reach-decoy"), seed, run).unwrap();
+        let [mark, hand] = [scene.marks[0].color, scene.hand.unwrap().color];
+        assert_ne!(mark, hand);
+        for body in [scene.body_color, scene.panes[0].paint.unwrap()] {
+            assert!(body != mark && body != hand, "seed {seed}, run {run}: {scene:?}");
+        }
     }
 }
 
@@ -130,16 +147,9 @@ fn arms_and_levels_have_the_same_scenes() {
     let config = WorldConfig::default();
     for (seed, run) in study() {
         let draw = |name| Scene::draw(&config, named(name), seed, run).unwrap();
-        let all = [
-            "reach-scheme",
-            "reach-mirror",
-            "reach-hand",
-            "reach-bare",
-            "reach-no-mirror",
-            "reach-decoy",
-            "reach-late",
-        ];
-        let prints: Vec<String> = all.into_iter().map(|name| draw(name).fingerprint(&config)).collect();
+        let all = built_in_names().into_iter().filter(|name| name.starts_with("reach-"));
+        let prints: Vec<String> = all.map(|name| draw(name).fingerprint(&config)).collect();
+        assert_eq!(prints.len(), 7, "four levels, and three further arms");
         assert!(prints.iter().all(|print| *print == prints[0]), "{prints:?}");
         let hand = draw("reach-mirror").hand.unwrap();
         let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
@@ -163,4 +173,21 @@ fn a_late_mirror_shows_the_hand_as_it_was() {
     }
     late.act(Some(Action::HandUp));
     assert_ne!(hand(&late), start);
+}
+
+#[test]
+fn a_hand_that_has_no_place_so_far_from_the_mark_is_a_fault_of_its_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = built_in("reach-scheme").unwrap().replace("reach-scheme", "far").replace("most = 12", "most = 40");
+    let read = |least: u32| {
+        let path = folder.path().join("far.toml");
+        let text =
+            text.replace("least = 6", &format!("least = {least}")).replace("\"far\"\ncubes", "\"reach-scheme\"\ncubes");
+        std::fs::write(&path, text).unwrap();
+        let experiment = load::load(&path).unwrap()[0].experiment;
+        placement::crowded(&WorldConfig::default(), experiment)
+    };
+    assert_eq!(read(8), None);
+    let fault = read(20).unwrap();
+    assert!(fault.what.starts_with("no place for the hand 20 to 40 steps of 0.1 m from the mark"), "{fault:?}");
 }

@@ -21,8 +21,12 @@ struct People {
 
 impl People {
     fn start(folder: &Path, codes: &str, more: &[&str]) -> Self {
+        Self::start_in(folder, "E1", codes, more)
+    }
+
+    fn start_in(folder: &Path, experiment: &str, codes: &str, more: &[&str]) -> Self {
         let mut command = program(folder);
-        command.args(["record", "--agent", "human", "--model", "people", "--experiment", "E1", "--seeds", "1"]);
+        command.args(["record", "--agent", "human", "--model", "people", "--experiment", experiment, "--seeds", "1"]);
         command.args(["--out", "runs", "--human-port", "0", "--participants", codes]).args(more);
         let mut process = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
         let mut output = BufReader::new(process.stderr.take().unwrap());
@@ -198,4 +202,17 @@ fn the_page_is_played_by_keys() {
     browser.complaints();
     drop(browser);
     assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
+}
+
+#[test]
+fn people_are_offered_what_the_task_lets_them_do() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    for (experiment, actions) in
+        [("E1", json!(["w", "s", "a", "d", "done"])), ("reach-mirror", json!(["1", "2", "3", "4", "5", "6"]))]
+    {
+        let people = People::start_in(folder.path(), experiment, "p01", &["--runs", "1"]);
+        let told = people.person(0).state(&["practice"]);
+        assert_eq!(told["actions"], actions, "{experiment}");
+    }
 }

@@ -9,7 +9,10 @@ const PLAY = 250;
 const WORDS = [["view_description", "What it says it sees"], ["reasoning", "Reasoning"], ["identification", "How it says it is"], ["summary", "Notes for the next step"], ["reply", "The whole reply"]];
 const FACTS = ["action", "self_color", "selected_cube", "mark_report", "reply_status", "reply_repair", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 const TRUTH = ["mirror_visible", "mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_mark_px", "mark_color", "bumped", "cube_distance", "target_distance", "pose_x", "pose_y", "pose_yaw"];
-const LETTERS = { move_forward: "w", move_backward: "s", turn_left: "a", turn_right: "d", done: "●" };
+const ACTIONS = {
+  move_forward: "--accent", move_backward: "--strip", turn_left: "--firm", turn_right: "--quiet", done: "--ink",
+  hand_forward: "--accent", hand_backward: "--strip", hand_left: "--firm", hand_right: "--quiet", hand_up: "--ink", hand_down: "--rule",
+};
 
 export const valueAt = (episode, name, t) => episode.steps[name]?.values[t - 1] ?? null;
 const constant = (episode, name) => episode.constants.find((column) => column.name === name)?.value ?? null;
@@ -102,7 +105,9 @@ function strips(episode, jump) {
   add("Mirror evidence", values("mirror_visible"), (seen) => (seen ? "--accent" : null), (_, at) => (self === null ? 1 : 0.35 + (0.65 * (self[at] ?? 0)) / most));
   add("Claim", values("self_color"), (claim) => (claim === null ? null : claim === "unknown" ? "--firm" : claim));
   add("Cube", values("selected_cube"), (cube) => (cube === null ? null : cube === "none" ? "--rule" : cube));
-  add("Action", values("action"), (action) => ({ move_forward: "--accent", move_backward: "--strip", turn_left: "--firm", turn_right: "--quiet", done: "--ink" })[action] ?? null, (action) => (action?.startsWith("turn") ? 0.5 : 1));
+  add("Action", values("action"), (action) => ACTIONS[action] ?? null, (action) => (action?.startsWith("turn") ? 0.5 : 1));
+  const distance = values("target_distance");
+  if (distance !== null) add("Distance", distance, (mm) => (mm === null ? null : "--firm"), (mm) => (mm ?? 0) / largest(distance));
   add("Bumped", values("bumped"), (bumped) => (bumped ? "--warn" : null));
   add("Reply", values("reply_status"), (status) => (status === null ? null : status === "ok" ? "--strip" : status === "repaired" ? "--firm" : "--warn"));
   const latency = values("latency_ms");

@@ -57,7 +57,7 @@ impl Player for Human {
             "view": {
                 "frame": "the frame of a model, drawn as large as the window allows",
                 "words": "the system prompt and the user prompt of a model",
-                "history": "one step: the action and the summary",
+                "history": "what the prompt tells of the steps before: action and summary of the last one, or every action where a hand reaches",
                 "position": true,
                 "remaining_steps": true,
             },

@@ -7,7 +7,7 @@ use super::error::StudyError;
 use super::figure_inputs::{Drawings, FigureInputs};
 use super::losses::Counted;
 use super::results::{Outputs, Results};
-use super::{LostAs, Source, Study, scores};
+use super::{DEFAULT_DEFINITIONS, LostAs, Source, Study, scores};
 use crate::base::suggest::hint;
 use crate::figures::{Figure as Drawn, FigureName};
 use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
@@ -137,7 +137,7 @@ impl Study {
         let named = |path: &PathBuf| bundle::Input::new(path, String::new(), 0).path;
         Some(Recordings {
             paths: manifest.inputs.iter().map(|input| input.path.clone()).collect(),
-            definitions: self.question.definitions.as_ref().map(named),
+            definitions: self.question.definitions.as_ref().map(named).filter(|name| name != DEFAULT_DEFINITIONS),
         })
     }
 

@@ -12,7 +12,8 @@ export PATH="$tools:$PATH"
 wheels=$target/wheels
 build() {
   rm -rf "$wheels"
-  (cd python && maturin build --profile wheel --zig --compatibility manylinux_2_28 --auditwheel skip --strip --out "$wheels") >&2
+  (cd python && maturin build --profile wheel --zig --compatibility manylinux_2_28 --auditwheel skip --strip \
+    --compression-level 9 --out "$wheels") >&2
   wheel=$(echo "$wheels"/mirrorstats-*.whl)
 }
 scripts/wheel-parts.sh

@@ -6,6 +6,7 @@ use std::thread;
 use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsError as Inner};
 use polars::sql::SQLContext;
 
+use crate::base::budget::Exceeded;
 use crate::metric::sql::LoweringError;
 use crate::score::score_traces::ScoreError;
 use crate::trace::catch_panic::contained_on_all_threads;
@@ -41,6 +42,9 @@ pub enum PolarsError {
         /// The value found.
         value: i64,
     },
+    /// More episodes than Polars can hold for files of their size.
+    #[error("{0}\n  help: without `--engine polars` they are scored in a tenth of the memory")]
+    OverBudget(#[from] Exceeded),
     /// Nobody reads the answer any more.
     #[error("the reader of the answer is gone")]
     ReaderGone,

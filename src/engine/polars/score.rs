@@ -8,6 +8,7 @@ use polars::sql::SQLContext;
 
 use super::frame::{self, FrameColumn};
 use super::run::{self, PolarsError};
+use crate::base::budget::{Exceeded, Limit};
 use crate::metric::catalog::Kind;
 use crate::metric::definitions::Definitions;
 use crate::metric::overflow::may_overflow;
@@ -16,7 +17,7 @@ use crate::metric::sql::{self, Dialect};
 use crate::score::builder::TableBuilder;
 use crate::score::score_traces::unscored;
 use crate::score::table::{EpisodeKey, EpisodeTable, Header, MetricColumn};
-use crate::trace::open::TraceSet;
+use crate::trace::open::{TraceFile, TraceSet};
 use crate::trace::scan::EPISODE_COLUMNS;
 use crate::trace::schema;
 
@@ -35,12 +36,18 @@ pub fn score(
 ) -> Result<EpisodeTable, PolarsError> {
     let statement = sql::lower(&definitions.plan, Dialect::Polars)?;
     let episodes = unscored(traces, definitions, labels, threads)?;
+    check_size(episodes.len() as u64, traces.files().iter().map(TraceFile::bytes).sum())?;
     let steps = frame::steps(traces, &columns(traces, definitions))?;
     check_overflow(traces, definitions, &steps)?;
     let rows = answer(&steps, &statement)?;
     let metrics = metrics(definitions, &rows)?;
     check_rates(definitions, &metrics)?;
     Ok(table(&episodes, &keys(&rows)?, &metrics))
+}
+
+/// Polars takes some 1.2 KB for each episode: a small file with very many would take memory out of all proportion to it.
+fn check_size(episodes: u64, bytes: u64) -> Result<(), Exceeded> {
+    Limit::new("episodes for Polars in files of their size", 300_000).and_beyond(1 << 20, 1, bytes).check(episodes)
 }
 
 /// The columns that the statement reads.
@@ -61,7 +68,7 @@ fn columns(traces: &TraceSet, definitions: &Definitions) -> Vec<FrameColumn> {
 fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFrame) -> Result<(), PolarsError> {
     let plan = &definitions.plan;
     let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
-    let rows = traces.files().iter().map(crate::trace::open::TraceFile::rows).sum();
+    let rows = traces.files().iter().map(TraceFile::rows).sum();
     let suspects = may_overflow(plan, &needed, rows, |name| schema::column(name)?.stored.range());
     let overflow = |node| Err(PolarsError::Overflow { metric: user_of(definitions, node) });
     if let Some(certain) = suspects.iter().find(|suspect| suspect.certain) {
@@ -167,4 +174,18 @@ fn texts(rows: &DataFrame, name: &str) -> Result<Vec<Option<String>>, PolarsErro
 
 fn lost(what: &str) -> PolarsError {
     PolarsError::Failed(format!("{what} is not in its answer"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_size;
+
+    #[test]
+    fn episodes_are_bounded_by_the_size_of_their_files() {
+        for (episodes, bytes) in [(300_000, 57_000), (1_300_000, 1 << 20 | 1_000_000), (2_000_000, 80_000_000)] {
+            assert_eq!(check_size(episodes, bytes), Ok(()));
+        }
+        let refused = check_size(1_000_000, 57_000).unwrap_err().to_string();
+        assert!(refused.contains("at most 300000 episodes for Polars"), "{refused}");
+    }
 }

@@ -116,6 +116,8 @@ impl Provider {
         at_once: usize,
     ) -> Result<Self, SetupError> {
         let url = address(base_url, &dialect.path(model)).map_err(|fault| fault.without(secret.as_ref()))?;
+        // Fails where the process has one already, which then serves as well.
+        let _ = rustls::crypto::ring::default_provider().install_default();
         let client = Client::builder()
             .default_headers(headers(dialect, secret.as_ref())?)
             .connect_timeout(patience.connect_timeout)

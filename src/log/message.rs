@@ -98,10 +98,22 @@ impl Decision {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
     use serde_json::json;
 
     use super::{Decision, Episode, Step};
+    use crate::trace::episode::Extra;
     use crate::trace::schema::COLUMNS;
+
+    proptest! {
+        #[test]
+        fn numbers_come_back_to_the_last_bit(cost in 0.0..10.0_f64, x in -5.0..5.0_f32) {
+            let extra = Extra { cost_usd: Some(cost), pose_x: Some(x), ..Extra::default() };
+            let row = Decision::of(1, &Step { extra, ..Step::default() });
+            prop_assert_eq!(Decision::parse(json!(row).to_string().as_bytes()).unwrap(), row.clone());
+            prop_assert_eq!(Decision::parse(&serde_json::to_vec(&row).unwrap()).unwrap(), row);
+        }
+    }
 
     #[test]
     fn messages_have_the_columns_of_the_table_as_keys() {

@@ -181,7 +181,7 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         },
     )?;
     let cells = tally.cells();
-    let pairs: BTreeSet<SeedRun> = cells.values().flat_map(|pairs| pairs.keys()).copied().collect();
+    let pairs = distinct(cells.values().flatten().map(|(pair, _)| *pair));
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
     let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
@@ -197,11 +197,19 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         columns: columns(set),
         episode_list: listed,
         files,
-        seeds: pairs.iter().map(|pair| pair.seed).collect::<BTreeSet<_>>().into_iter().collect(),
-        runs: pairs.iter().map(|pair| pair.run).collect::<BTreeSet<_>>().into_iter().collect(),
+        seeds: distinct(pairs.iter().map(|pair| pair.seed)),
+        runs: distinct(pairs.iter().map(|pair| pair.run)),
         models: models.into_iter().collect(),
         experiments: experiments.into_iter().collect(),
     })
+}
+
+/// Each value once, ascending.
+fn distinct<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
+    let mut values: Vec<T> = values.collect();
+    values.sort_unstable();
+    values.dedup();
+    values
 }
 
 /// The episodes of a batch: experiments and models by their place among the distinct ones.
@@ -273,8 +281,8 @@ struct Tally {
     episodes: Vec<Vec<SeedRun>>,
 }
 
-/// How often each experiment with each model has each seed and run.
-type Cells = BTreeMap<(String, String), BTreeMap<SeedRun, u64>>;
+/// How often each experiment with each model has each seed and run, ascending.
+type Cells = BTreeMap<(String, String), Vec<(SeedRun, u64)>>;
 
 impl Tally {
     fn add(&mut self, Keys { file, cells, episodes }: Keys) {
@@ -304,21 +312,17 @@ impl Tally {
     }
 }
 
-fn coverage(
-    cells: &Cells,
-    pairs: &BTreeSet<SeedRun>,
-    experiments: &BTreeSet<String>,
-    models: &BTreeSet<String>,
-) -> Vec<Cell> {
-    let none = BTreeMap::new();
+fn coverage(cells: &Cells, pairs: &[SeedRun], experiments: &BTreeSet<String>, models: &BTreeSet<String>) -> Vec<Cell> {
     let cell = |experiment: &String, model: &String| {
-        let have = cells.get(&(experiment.clone(), model.clone())).unwrap_or(&none);
+        let have = cells.get(&(experiment.clone(), model.clone())).map_or(&[][..], Vec::as_slice);
+        // Both ascend: one pass tells what is missing.
+        let mut rest = have.iter().map(|(pair, _)| pair).peekable();
         Cell {
             experiment: experiment.clone(),
             model: model.clone(),
-            episodes: have.values().sum(),
-            missing: pairs.iter().filter(|pair| !have.contains_key(pair)).copied().collect(),
-            repeated: have.iter().filter(|(_, count)| **count > 1).map(|(pair, _)| *pair).collect(),
+            episodes: have.iter().map(|(_, count)| count).sum(),
+            missing: pairs.iter().filter(|pair| rest.next_if_eq(pair).is_none()).copied().collect(),
+            repeated: have.iter().filter(|(_, count)| *count > 1).map(|(pair, _)| *pair).collect(),
         }
     };
     experiments.iter().flat_map(|e| models.iter().map(move |m| cell(e, m))).collect()

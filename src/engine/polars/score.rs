@@ -182,7 +182,7 @@ mod tests {
 
     #[test]
     fn episodes_are_bounded_by_the_size_of_their_files() {
-        for (episodes, bytes) in [(300_000, 57_000), (1_300_000, 1 << 20 | 1_000_000), (2_000_000, 80_000_000)] {
+        for (episodes, bytes) in [(300_000, 57_000), (1_300_000, (1 << 20) + 1_000_000), (2_000_000, 80_000_000)] {
             assert_eq!(check_size(episodes, bytes), Ok(()));
         }
         let refused = check_size(1_000_000, 57_000).unwrap_err().to_string();

@@ -104,6 +104,13 @@ fn unpacked(
     mut give: impl FnMut(u8, &[u8]),
 ) -> Result<(), String> {
     budgets.unpack(chunk).map_err(|exceeded| exceeded.to_string())?;
+    if let Some(mut whole) = before_overrun(chunk) {
+        while let Some((opcode, data, rest)) = first_record(whole) {
+            give(opcode, data);
+            whole = rest;
+        }
+        return Err("a record is longer than what is left of its chunk".to_owned());
+    }
     let options = options.with_skip_start_magic(true).with_skip_end_magic(true);
     let mut reader = LinearReader::new_with_options(options.with_record_length_limit(size_unpacked(chunk)));
     let mut rest = chunk;
@@ -125,10 +132,66 @@ fn unpacked(
     Ok(())
 }
 
+/// The whole records of a chunk that is not compressed, if the one behind them says that it is longer than what is left.
+///
+/// The library subtracts such a length from what is left and does not compare them before, which panics in builds that
+/// check for overflow. A chunk that is cut off is left to the library.
+fn before_overrun(chunk: &[u8]) -> Option<&[u8]> {
+    // Behind the frame stand two times, a size and a checksum; then the name of the compression, empty where there is none.
+    let (length, records) = chunk.get(FRAME + 28..)?.strip_prefix(&[0; 4])?.split_first_chunk::<8>()?;
+    let (mut left, mut at) = (u64::from_le_bytes(*length), 0_usize);
+    while left > 0 {
+        let [_, size @ ..] = *records.get(at..)?.first_chunk::<FRAME>()?;
+        let size = u64::from_le_bytes(size).saturating_add(FRAME as u64);
+        let Some(fewer) = left.checked_sub(size) else { return records.get(..at) };
+        (left, at) = (fewer, at.checked_add(usize::try_from(size).ok()?)?);
+    }
+    None
+}
+
+/// The first of some records, and those behind it: schemas, channels and messages that can be read, up to one that cannot.
+fn first_record(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+    let ([opcode, length @ ..], behind) = records.split_first_chunk::<FRAME>()?;
+    let (data, rest) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+    let is_known = matches!(*opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE);
+    parsed(*opcode, data).ok().filter(|_| is_known).map(|_| (*opcode, data, rest))
+}
+
 /// The size that the header of a chunk gives for what is in it, as far as any chunk may be that large.
 fn size_unpacked(chunk: &[u8]) -> usize {
     // Behind the frame stand two times of 8 bytes each.
     let size = chunk.get(FRAME + 16..FRAME + 24).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);
     // The library holds the header of the chunk against the same limit.
     size.and_then(|size| usize::try_from(size).ok()).map_or(LONGEST, |size| size.clamp(1 << 16, LONGEST))
+}
+
+#[cfg(test)]
+mod tests {
+    use mcap::records::op;
+
+    use super::{Budgets, FRAME, before_overrun, inside};
+
+    fn record(opcode: u8, length: u64, data: &[u8]) -> Vec<u8> {
+        [&[opcode][..], &length.to_le_bytes(), data].concat()
+    }
+
+    fn chunk(records: &[u8]) -> Vec<u8> {
+        let size = (records.len() as u64).to_le_bytes();
+        let data = [&[0; 16][..], &size, &[0; 4], &[0; 4], &size, records].concat();
+        record(op::CHUNK, data.len() as u64, &data)
+    }
+
+    #[test]
+    fn a_record_that_is_longer_than_its_chunk_is_refused() {
+        let first = record(0x7f, 2, &[1, 2]);
+        for length in [4, 5, u64::MAX] {
+            let chunk = chunk(&[first.clone(), record(0x7f, length, &[1, 2, 3])].concat());
+            assert_eq!(before_overrun(&chunk), Some(&first[..]), "{length}");
+            let refused = inside(&chunk, &Budgets::new(chunk.len() as u64)).unwrap_err();
+            assert_eq!(refused, "a record is longer than what is left of its chunk");
+        }
+        let whole = chunk(&[first.clone(), record(0x7f, 3, &[1, 2, 3])].concat());
+        assert!((0..=whole.len()).all(|cut| before_overrun(&whole[..cut]).is_none()));
+        assert_eq!(whole.len(), FRAME + 40 + first.len() + FRAME + 3);
+    }
 }

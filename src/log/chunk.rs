@@ -64,9 +64,7 @@ impl Iterator for Unpacked {
     type Item = Record<'static>;
 
     fn next(&mut self) -> Option<Self::Item> {
-        let (frame, rest) = self.bytes.get(self.at..)?.split_first_chunk::<FRAME>()?;
-        let [opcode, length @ ..] = *frame;
-        let data = rest.get(..usize::try_from(u64::from_le_bytes(length)).ok()?)?;
+        let (opcode, data, _) = first_record(self.bytes.get(self.at..)?)?;
         self.at += FRAME + data.len();
         parsed(opcode, data).ok().map(Record::into_owned)
     }
@@ -104,9 +102,16 @@ fn unpacked(
     mut give: impl FnMut(u8, &[u8]),
 ) -> Result<(), String> {
     budgets.unpack(chunk).map_err(|exceeded| exceeded.to_string())?;
+    let mut check_and_give = |opcode, data: &[u8]| {
+        if matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+            parsed(opcode, data)?;
+            give(opcode, data);
+        }
+        Ok::<_, String>(())
+    };
     if let Some(mut whole) = before_overrun(chunk) {
         while let Some((opcode, data, rest)) = first_record(whole) {
-            give(opcode, data);
+            check_and_give(opcode, data)?;
             whole = rest;
         }
         return Err("a record is longer than what is left of its chunk".to_owned());
@@ -122,11 +127,7 @@ fn unpacked(
                 reader.notify_read(now.len());
                 rest = later;
             }
-            LinearReadEvent::Record { data, opcode: opcode @ (op::SCHEMA | op::CHANNEL | op::MESSAGE) } => {
-                parsed(opcode, data)?;
-                give(opcode, data);
-            }
-            LinearReadEvent::Record { .. } => {}
+            LinearReadEvent::Record { data, opcode } => check_and_give(opcode, data)?,
         }
     }
     Ok(())
@@ -149,12 +150,11 @@ fn before_overrun(chunk: &[u8]) -> Option<&[u8]> {
     None
 }
 
-/// The first of some records, and those behind it: schemas, channels and messages that can be read, up to one that cannot.
+/// The opcode and the bytes of the first of some records, and the records behind it.
 fn first_record(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
     let ([opcode, length @ ..], behind) = records.split_first_chunk::<FRAME>()?;
     let (data, rest) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
-    let is_known = matches!(*opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE);
-    parsed(*opcode, data).ok().filter(|_| is_known).map(|_| (*opcode, data, rest))
+    Some((*opcode, data, rest))
 }
 
 /// The size that the header of a chunk gives for what is in it, as far as any chunk may be that large.

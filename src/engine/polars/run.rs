@@ -43,7 +43,7 @@ pub enum PolarsError {
         value: i64,
     },
     /// More episodes than Polars can hold for files of their size.
-    #[error("{0}\n  help: without `--engine polars` they are scored in a tenth of the memory")]
+    #[error("{0}\n  help: without `--engine polars` they are scored in less memory")]
     OverBudget(#[from] Exceeded),
     /// Nobody reads the answer any more.
     #[error("the reader of the answer is gone")]

@@ -107,7 +107,9 @@ impl Store {
         match &self.held {
             Held::File(file) => {
                 let mut file = file;
-                let mut bytes = Vec::new();
+                // All of it in one call; what a footer claims beyond that grows as it is read.
+                let most = usize::try_from(LARGEST).unwrap_or(usize::MAX);
+                let mut bytes = Vec::with_capacity(length.min(most));
                 file.seek(SeekFrom::Start(start))?;
                 file.take(length as u64).read_to_end(&mut bytes)?;
                 Ok(bytes.into())

@@ -23,7 +23,7 @@ pub(super) struct Header {
     /// What only a page of version 2 declares; the levels, in bytes, are not compressed.
     nulls: usize,
     rows: usize,
-    levels: usize,
+    pub(super) levels: usize,
     is_plain: bool,
 }
 
@@ -137,6 +137,11 @@ impl Header {
     /// Whether the page is stored as it is.
     fn is_stored_plain(&self, about: &About) -> bool {
         about.codec == Compression::UNCOMPRESSED || (self.kind == Kind::DataV2 && self.is_plain)
+    }
+
+    /// Whether the page, but for its levels, is a Zstandard frame.
+    pub(super) fn is_zstd(&self, about: &About) -> bool {
+        matches!(about.codec, Compression::ZSTD(_)) && !self.is_stored_plain(about)
     }
 
     fn dictionary_fault(&self, about: &About) -> Option<(String, String)> {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use parquet::basic::Compression;
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::Result;
 use parquet::file::serialized_reader::SerializedPageReader;
@@ -25,7 +26,14 @@ impl Pages {
     /// The pages of a column, for a decoder that checks what they hold.
     pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
         let stored = Arc::new(Verified::new(store, place, slot)?);
-        let inner = SerializedPageReader::new(Arc::clone(&stored), place.chunk(), place.rows(), None)?;
+        let inner = match place.chunk().compression() {
+            // They come decompressed.
+            Compression::ZSTD(_) => {
+                let chunk = place.chunk().clone().into_builder().set_compression(Compression::UNCOMPRESSED).build()?;
+                SerializedPageReader::new(Arc::clone(&stored), &chunk, place.rows(), None)?
+            }
+            _ => SerializedPageReader::new(Arc::clone(&stored), place.chunk(), place.rows(), None)?,
+        };
         Ok(Self { stored, inner, next: None, contents: None })
     }
 

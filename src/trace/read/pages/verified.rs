@@ -16,6 +16,7 @@ use parquet::file::reader::{ChunkReader, Length};
 use super::bytes::{Place, Store};
 use super::error::{FaultSlot, PageFault, Part};
 use super::header::{About, Header, Kind};
+use super::zstd;
 use crate::base::budget::Exceeded;
 use crate::trace::diagnostic::Code;
 use crate::trace::read::thrift;
@@ -219,7 +220,17 @@ impl ChunkReader for Verified {
         self.enter(start).map(|(header, _)| header.reader())
     }
 
+    /// The bytes of the page under way, decompressed if [`zstd`] does that.
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
-        self.body(start, length)
+        let stored = self.body(start, length)?;
+        let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        match &progress.page {
+            Some((offset, header)) if header.is_zstd(&self.about) => {
+                zstd::inflated(&stored, header.levels, header.whole)
+                    .map(Bytes::from)
+                    .map_err(|found| self.fault(*offset, "a page that zstd decompresses to its size", found))
+            }
+            _ => Ok(stored),
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! The order of an episode table: a permutation, found by sorting small integers.
 
 use std::cmp::Ordering;
+use std::ops::{BitOr, BitXor, Shl, Shr};
 
 use arrow::array::Array as _;
 
@@ -17,15 +18,30 @@ pub(super) fn order(keys: &EpisodeKeys) -> Option<Vec<u32>> {
     (!order.is_sorted()).then_some(order)
 }
 
-fn sorted<N: Ord + Copy + Into<u128> + TryFrom<u128>>(rows: &Rows<'_>) -> Vec<u32> {
-    let number = |row| N::try_from(rows.number(row)).ok().expect("the bits of the number are counted");
-    let mut numbers: Vec<N> = (0..rows.keys.len()).map(number).collect();
+/// What the keys of a row are put into.
+trait Number:
+    Ord
+    + Copy
+    + From<u32>
+    + TryInto<u32>
+    + BitOr<Output = Self>
+    + BitXor<Output = Self>
+    + Shl<u32, Output = Self>
+    + Shr<u32, Output = Self>
+{
+}
+
+impl Number for u64 {}
+impl Number for u128 {}
+
+fn sorted<N: Number>(rows: &Rows<'_>) -> Vec<u32> {
+    let mut numbers: Vec<N> = (0..narrow(rows.keys.len())).map(|row| rows.number(row)).collect();
     // With the row in the lowest bits, no two numbers are equal, and rows that differ in their ids alone are together.
     numbers.sort_unstable();
-    let mask = (1 << rows.row_bits) - 1;
-    let row = |number: &N| u32::try_from((*number).into() & mask).expect("a row has 32 bits at most");
-    let mut order: Vec<u32> = numbers.iter().map(row).collect();
-    sort_equal(rows.keys, &mut order, |at| numbers[at].into() >> rows.row_bits);
+    let key = |number: N| number >> rows.row_bits;
+    let row = |number: &N| (*number ^ (key(*number) << rows.row_bits)).try_into().ok();
+    let mut order: Vec<u32> = numbers.iter().map(|number| row(number).expect("a row has 32 bits at most")).collect();
+    sort_equal(rows.keys, &mut order, |at| key(numbers[at]));
     order
 }
 
@@ -37,7 +53,7 @@ fn compared(keys: &EpisodeKeys) -> Vec<u32> {
 }
 
 /// Puts rows with equal experiment, model, seed and run into the order of their ids.
-fn sort_equal(keys: &EpisodeKeys, order: &mut [u32], key: impl Fn(usize) -> u128) {
+fn sort_equal<N: Eq>(keys: &EpisodeKeys, order: &mut [u32], key: impl Fn(usize) -> N) {
     let mut start = 0;
     for end in 1..=order.len() {
         if end == order.len() || key(end) != key(start) {
@@ -75,14 +91,14 @@ impl<'a> Rows<'a> {
         Self { keys, experiments, models, seed, run, model_bits, row_bits, bits }
     }
 
-    fn number(&self, row: usize) -> u128 {
-        let Self { keys, .. } = self;
-        let rank = |ranks: &[u32], column: &TextColumn| u128::from(ranks[column.codes.value(row) as usize]);
+    fn number<N: Number>(&self, row: u32) -> N {
+        let (Self { keys, .. }, at) = (self, row as usize);
+        let rank = |ranks: &[u32], column: &TextColumn| N::from(ranks[column.codes.value(at) as usize]);
         let mut number = rank(&self.experiments, &keys.experiment);
         number = number << self.model_bits | rank(&self.models, &keys.model);
-        number = number << self.seed.bits | self.seed.offset(keys.seed.value(row));
-        number = number << self.run.bits | self.run.offset(keys.run.value(row));
-        number << self.row_bits | row as u128
+        number = number << self.seed.bits | self.seed.offset(keys.seed.value(at)).into();
+        number = number << self.run.bits | self.run.offset(keys.run.value(at)).into();
+        number << self.row_bits | row.into()
     }
 }
 
@@ -100,8 +116,8 @@ impl Span {
         Self { smallest, bits: i64::BITS - width.leading_zeros() }
     }
 
-    fn offset(&self, value: i32) -> u128 {
-        u128::from(value.abs_diff(self.smallest))
+    fn offset(&self, value: i32) -> u32 {
+        value.abs_diff(self.smallest)
     }
 }
 

@@ -202,6 +202,19 @@ impl EpisodeKeys {
         }
     }
 
+    /// Whether other columns have the same key in each row; says no where equal keys are held in two ways.
+    pub fn has_keys_of(&self, other: &Self) -> bool {
+        let is_same = |of: fn(&Self) -> &TextColumn| {
+            let (a, b) = (of(self), of(other));
+            a.codes == b.codes && a.texts == b.texts
+        };
+        self.seed == other.seed
+            && self.run == other.run
+            && is_same(|keys| &keys.experiment)
+            && is_same(|keys| &keys.model)
+            && is_same(|keys| &keys.episode_id)
+    }
+
     /// The experiment of each row.
     pub fn experiments(&self) -> &TextColumn {
         &self.experiment
@@ -309,6 +322,13 @@ impl TextColumn {
         self.codes.is_valid(row).then(|| self.codes.value(row) as usize)
     }
 
+    /// The bytes of the longest text; 0 where there is none.
+    pub(super) fn longest(&self) -> usize {
+        let offsets = self.texts.value_offsets().windows(2);
+        let longest = offsets.map(|ends| ends[1] - ends[0]).max().unwrap_or_default();
+        usize::try_from(longest).unwrap_or_default()
+    }
+
     /// The texts of all rows.
     pub fn iter(&self) -> impl Iterator<Item = Option<&str>> {
         (0..self.len()).map(|row| self.get(row))
@@ -345,6 +365,15 @@ impl MetricColumn {
     /// The values of all rows.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Option<i64>> + Clone {
         (0..self.array().len()).map(|row| self.get(row))
+    }
+
+    /// Whether another column has the same value in each row; says no where equal values are held in two ways.
+    pub fn has_values_of(&self, other: &Self) -> bool {
+        match (&self.values, &other.values) {
+            (MetricValues::Bools(a), MetricValues::Bools(b)) => a == b,
+            (MetricValues::Ints(a), MetricValues::Ints(b)) => a == b,
+            _ => false,
+        }
     }
 
     /// How many values of these rows are 0, and how many are 1, where all of them are truth values.

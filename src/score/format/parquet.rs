@@ -1,7 +1,6 @@
 //! The episode table as Parquet, the definitions in its footer.
 
 use std::io::Write;
-use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use arrow::array::{Array, ArrayRef, AsArray as _, Int64Array, RecordBatch, StringArray};
@@ -25,7 +24,7 @@ use super::partition::Partition;
 use crate::metric::catalog::Catalog;
 use crate::score::builder::TableBuilder;
 use crate::score::columns;
-use crate::score::table::{EpisodeTable, Header, KeyRef};
+use crate::score::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use crate::trace::catch_panic::contained;
 use crate::trace::checksums::{self, CREATED_BY, Held};
 use crate::trace::declared::Declared;
@@ -74,9 +73,9 @@ fn metadata(file: &impl ChunkReader) -> Option<ParquetMetaData> {
 
 /// Rows after which a row group is closed: what is encoded and not yet written stays small.
 const ROW_GROUP_ROWS: usize = 64 * 1024;
-/// Rows that are gathered before they are encoded.
+/// Rows that are encoded at a time.
 const GATHERED_ROWS: usize = 4 * 1024;
-/// Bytes of a column's texts that are gathered at most, one row more or less: an array holds 2 GiB.
+/// Bytes of a column's texts that are encoded at a time, or one text: a page holds 2 GiB.
 const GATHERED_TEXT: usize = 256 << 20;
 
 /// A column of a row group, to be encoded.
@@ -134,18 +133,12 @@ impl Encoder<'_> {
         let field = self.schema.field(job.column);
         let start = job.group * ROW_GROUP_ROWS;
         let end = self.table.len().min(start + ROW_GROUP_ROWS);
-        for first in (start..end).step_by(GATHERED_ROWS) {
-            let mut rows = first..end.min(first + GATHERED_ROWS);
-            while !rows.is_empty() {
-                let some = rows.start..self.until(job.column, &rows);
-                rows.start = some.end;
-                for leaf in compute_leaves(
-                    field,
-                    &columns::values(self.table, job.column, some).map_err(|error| failed(&error))?,
-                )? {
-                    writer.write(&leaf)?;
-                }
-            }
+        let longest = columns::texts(self.table, job.column).map_or(0, TextColumn::longest);
+        let at_a_time = (GATHERED_TEXT / longest.max(1)).clamp(1, GATHERED_ROWS);
+        for first in (start..end).step_by(at_a_time) {
+            let rows = first..end.min(first + at_a_time);
+            let values = columns::coded_values(self.table, job.column, rows).map_err(|error| failed(&error))?;
+            compute_leaves(field, &values)?.iter().try_for_each(|leaf| writer.write(leaf))?;
         }
         Ok(writer.close()?)
     }
@@ -157,17 +150,6 @@ impl Encoder<'_> {
             *writers = self.factory.create_column_writers(job.group)?.into_iter().map(Some).collect();
         }
         writers[job.column].take().ok_or_else(|| ParquetError::General("the column is encoded already".into()))
-    }
-
-    /// The end of as many of these rows as may be gathered: a dictionary holds a text once, and an array each time.
-    fn until(&self, column: usize, rows: &Range<usize>) -> usize {
-        let Some(texts) = columns::texts(self.table, column) else { return rows.end };
-        let mut bytes = 0;
-        let full = |row: &usize| {
-            bytes += texts.get(*row).map_or(0, str::len);
-            bytes >= GATHERED_TEXT
-        };
-        rows.clone().find(full).map_or(rows.end, |row| row + 1)
     }
 }
 

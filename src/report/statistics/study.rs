@@ -28,6 +28,7 @@ pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
+    ranges: BTreeMap<&'a str, (f64, f64)>,
 }
 
 /// The blocks of one experiment.
@@ -61,7 +62,7 @@ impl<'a> Study<'a> {
             }
         }
         let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
-        Ok(Self { table, design, experiments })
+        Ok(Self { table, design, experiments, ranges: ranges(table) })
     }
 
     pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {
@@ -98,28 +99,32 @@ impl<'a> Study<'a> {
 
     /// The least and the largest mean that a metric can have, as far as that is known: steps are never negative, and
     /// no more than the longest episode that ended without a decision had, which is the budget.
-    #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
     pub fn range(&self, metric: &str) -> (f64, f64) {
-        if self.metric(metric).is_some_and(|metric| metric.unit == PPM) {
-            return (f64::NEG_INFINITY, 1e6);
-        }
-        if self.metric(metric).is_none_or(|metric| metric.kind == Kind::Rate || metric.unit != STEPS) {
-            return (f64::NEG_INFINITY, f64::INFINITY);
-        }
-        let longest = CENSORED.iter().filter_map(|(duration, finished)| {
-            let (duration, finished) = (self.column(duration)?, self.column(finished)?);
-            duration
-                .iter()
-                .zip(finished.iter())
-                .filter(|(_, finished)| finished.is_none())
-                .filter_map(|(steps, _)| steps)
-                .max()
-        });
-        let all = self.column(metric).and_then(|column| column.iter().flatten().max());
-        // A metric that exceeds it counts something else than the steps of one episode.
-        let budget = longest.max().filter(|&budget| all.is_none_or(|most| most <= budget));
-        (0.0, budget.map_or(f64::INFINITY, |budget| budget as f64))
+        self.ranges.get(metric).copied().unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
     }
+}
+
+/// The [`Study::range`] of each metric of a table; each takes a pass over all episodes.
+#[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
+fn ranges(table: &EpisodeTable) -> BTreeMap<&str, (f64, f64)> {
+    let column = |name: &str| table.metrics.iter().find(|column| column.name == name);
+    let longest = CENSORED.iter().filter_map(|(duration, finished)| {
+        let (duration, finished) = (column(duration)?, column(finished)?);
+        let unfinished = duration.iter().zip(finished.iter()).filter(|(_, finished)| finished.is_none());
+        unfinished.filter_map(|(steps, _)| steps).max()
+    });
+    let longest = longest.max();
+    let range = |column: &MetricColumn| match table.catalog.metric.get(&column.name) {
+        Some(metric) if metric.unit == PPM => (f64::NEG_INFINITY, 1e6),
+        Some(metric) if metric.kind != Kind::Rate && metric.unit == STEPS => {
+            let most = column.iter().flatten().max();
+            // A metric that exceeds it counts something else than the steps of one episode.
+            let budget = longest.filter(|&budget| most.is_none_or(|most| most <= budget));
+            (0.0, budget.map_or(f64::INFINITY, |budget| budget as f64))
+        }
+        _ => (f64::NEG_INFINITY, f64::INFINITY),
+    };
+    table.metrics.iter().map(|column| (column.name.as_str(), range(column))).collect()
 }
 
 impl<'a> Block<'a> {

@@ -207,7 +207,8 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
 /// Each value once, ascending.
 fn distinct<T: Ord>(values: impl Iterator<Item = T>) -> Vec<T> {
     let mut values: Vec<T> = values.collect();
-    values.sort_unstable();
+    // Stable, as it takes stretches that ascend for what they are.
+    values.sort();
     values.dedup();
     values
 }

@@ -1,9 +1,10 @@
 //! The pages of Parquet files: verified as they are stored, and decoded without expanding rows where encodings allow it.
 //!
 //! `bytes` reads, `header` and `verified` check headers and checksums before anything is decoded; `zstd` decompresses the
-//! usual codec, the Parquet library the others. Then either of two decodes. `cursor` is the fast one: what traces are mostly made of is stored as runs and as keys into small
-//! dictionaries, so a column that is constant in an episode stays runs, truth values stay bits, texts stay keys. `library`
-//! is the Parquet library, on pages whose levels and keys `contents` checked before.
+//! usual codec, the Parquet library the others. Then either of two decodes. `cursor` is the fast one: what traces are mostly
+//! made of is stored as runs and as keys into small dictionaries, so a column that is constant in an episode stays runs,
+//! truth values stay bits, texts stay keys. `library` is the Parquet library, on pages whose levels and keys `contents`
+//! checked before.
 //!
 //! Rule: `cursor` is a short cut and nothing more. Whatever it does not expect, be it another encoding or damage, is
 //! [`Unsupported`], and the library's path decodes the column or says what is wrong with it.

@@ -463,6 +463,13 @@ mod tests {
     }
 
     #[test]
+    fn equal_columns_of_other_episodes_flip() {
+        let changes = changes(&table(RATE, 0, &[Some(1), Some(0)]), &table(RATE, 1, &[Some(1), Some(0)]));
+        let [flip] = &changes.flips[..] else { panic!("{:?}", changes.flips) };
+        assert_eq!((flip.episode.run, flip.value.before, flip.value.after), (1, Some(0), Some(1)));
+    }
+
+    #[test]
     fn metrics_of_one_side_alone_are_told() {
         let mut other = table(RATE, 0, &[Some(1)]);
         other.metrics[0].name = "S".into();

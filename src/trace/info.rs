@@ -226,7 +226,8 @@ impl Keys {
     fn of(batch: &EpisodeBatch) -> Self {
         let [experiments, models] = ["experiment", "model"].map(|name| texts_of(batch, name));
         let [seeds, runs] = ["seed", "run"].map(|name| integers_of(batch, name));
-        let (mut cells, mut known) = (Vec::new(), HashMap::new());
+        // A batch has few cells: to find one among them takes less than to hash it.
+        let (mut cells, mut known) = (Vec::new(), BTreeMap::new());
         let episode = |row: usize| {
             let cell = *known.entry((experiments.key(row), models.key(row))).or_insert_with(|| {
                 cells.push((text(experiments, row), text(models, row)));

@@ -108,7 +108,8 @@ function openEpisodes(cell) {
   remember({ cell: metric, of: data.groups[group] });
   panel.addEventListener("close", () => {
     remember({ cell: null, of: null });
-    cell.focus();
+    // This comes a moment after the panel is gone: whoever went on with Tab meanwhile stays where they are.
+    if (document.activeElement === document.body) cell.focus();
   }, { once: true });
   panel.showModal();
   panel.scrollTop = 0;

@@ -202,6 +202,28 @@ fn the_keyboard_alone_is_enough() {
     browser.close();
 }
 
+#[test]
+fn a_closed_panel_takes_the_focus_from_nobody() {
+    let report = Report::bare();
+    let mut browser = Browser::open(&report.render().unwrap());
+    // The browser tells of the end of a panel later than it ends it: somebody may have gone on by then.
+    let goes_on = "new Promise((done) => { \
+        const panel = document.getElementById('episodes'); \
+        document.querySelector('#table-main td[data-metric]').click(); \
+        panel.addEventListener('close', () => setTimeout(() => done(document.activeElement.tagName))); \
+        panel.close(); \
+        document.querySelector('#filters input[type=search]').focus(); })";
+    assert_eq!(browser.text(goes_on), "INPUT");
+    let ends = "new Promise((done) => { \
+        const panel = document.getElementById('episodes'); \
+        document.querySelector('#table-main td[data-metric]').click(); \
+        panel.addEventListener('close', () => setTimeout(() => done(document.activeElement.dataset.metric))); \
+        panel.close(); \
+        document.activeElement.blur(); })";
+    assert_eq!(browser.text(ends), "TSA", "and where nothing has it, it is back at the cell");
+    browser.close();
+}
+
 /// Presses Tab until an expression holds, at most ten times in all.
 fn tabs(browser: &mut Browser, so_far: usize, until: &str) -> usize {
     for pressed in so_far + 1..=10 {

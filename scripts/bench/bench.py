@@ -85,7 +85,7 @@ def machine():
 def versions(program):
     from importlib import metadata
 
-    found = [subprocess.run([program, "--version"], capture_output=True, text=True).stdout.strip()]
+    found = [subprocess.run([program, "--version"], capture_output=True, text=True).stdout.splitlines()[0]]
     for name in ("duckdb", "polars", "pandas", "pyarrow"):
         try:
             found.append(f"{name} {metadata.version(name)}")

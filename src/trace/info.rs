@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io;
 use std::num::NonZeroUsize;
+use std::sync::{Mutex, PoisonError};
 
 use arrow::array::{ArrayRef, AsArray as _, DictionaryArray};
 use arrow::datatypes::{Int32Type, Int64Type};
@@ -169,19 +170,18 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
             Ok(())
         },
     )?;
-    let mut files = Vec::with_capacity(set.files().len());
-    let counted: Vec<(&TraceFile, u64)> = set.files().iter().zip(tally.files.iter().copied()).collect();
-    in_order(
-        threads,
-        &counted,
-        |(file, episodes)| about(file, *episodes),
-        |about| {
-            files.push(about?);
-            Ok::<_, TraceError>(())
-        },
-    )?;
-    let cells = tally.cells();
-    let pairs = distinct(cells.values().flatten().map(|(pair, _)| *pair));
+    let (mut files, mut grid) = (Vec::with_capacity(set.files().len()), Grid::default());
+    let counts = std::mem::take(&mut tally.files);
+    let files_left = set.files().iter().zip(counts).map(|(file, episodes)| Rest::File(file, episodes));
+    let rest: Vec<Rest<'_>> = std::iter::once(Rest::Grid(Mutex::new(tally))).chain(files_left).collect();
+    in_order(threads, &rest, Rest::done, |done| {
+        match done {
+            Done::Grid(found) => grid = found,
+            Done::File(about) => files.push(about?),
+        }
+        Ok::<_, TraceError>(())
+    })?;
+    let Grid { cells, pairs } = grid;
     let names = |of: fn(&(String, String)) -> &String| cells.keys().map(of).cloned().collect::<BTreeSet<_>>();
     let (experiments, models) = (names(|(experiment, _)| experiment), names(|(_, model)| model));
     let asked = experiments.len().saturating_mul(models.len()).saturating_mul(pairs.len());
@@ -202,6 +202,28 @@ pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<I
         models: models.into_iter().collect(),
         experiments: experiments.into_iter().collect(),
     })
+}
+
+/// What is left when all steps are read: sorting takes as long as hashing the files, so that both are done at once.
+enum Rest<'a> {
+    Grid(Mutex<Tally>),
+    File(&'a TraceFile, u64),
+}
+
+enum Done {
+    Grid(Grid),
+    File(Result<FileInfo, TraceError>),
+}
+
+impl Rest<'_> {
+    fn done(&self) -> Done {
+        match self {
+            Self::Grid(tally) => {
+                Done::Grid(std::mem::take(&mut *tally.lock().unwrap_or_else(PoisonError::into_inner)).grid())
+            }
+            Self::File(file, episodes) => Done::File(about(file, *episodes)),
+        }
+    }
 }
 
 /// Each value once, ascending.
@@ -286,6 +308,13 @@ struct Tally {
 /// How often each experiment with each model has each seed and run, ascending.
 type Cells = BTreeMap<(String, String), Vec<(SeedRun, u64)>>;
 
+/// The cells, and the seeds and runs of all of them.
+#[derive(Default)]
+struct Grid {
+    cells: Cells,
+    pairs: Vec<SeedRun>,
+}
+
 impl Tally {
     fn add(&mut self, Keys { file, cells, episodes }: Keys) {
         self.files[file] += episodes.len() as u64;
@@ -302,7 +331,7 @@ impl Tally {
         })
     }
 
-    fn cells(self) -> Cells {
+    fn grid(self) -> Grid {
         let Self { places, mut episodes, .. } = self;
         let mut counted = |place: usize| {
             let mut pairs = std::mem::take(&mut episodes[place]);
@@ -310,7 +339,9 @@ impl Tally {
             let same = pairs.chunk_by(|a, b| a == b);
             same.map(|same| (same[0], same.len() as u64)).collect()
         };
-        places.into_iter().map(|(cell, place)| (cell, counted(place))).collect()
+        let cells: Cells = places.into_iter().map(|(cell, place)| (cell, counted(place))).collect();
+        let pairs = distinct(cells.values().flatten().map(|(pair, _)| *pair));
+        Grid { cells, pairs }
     }
 }
 

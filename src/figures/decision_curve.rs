@@ -67,8 +67,7 @@ fn endings(episodes: &EpisodeTable) -> Result<BTreeMap<(&str, &str), Vec<Duratio
 
 fn column<'a>(episodes: &'a EpisodeTable, name: &str) -> Result<&'a MetricColumn, FigureError> {
     let known = || episodes.metrics.iter().map(|metric| metric.name.as_str()).collect::<Vec<_>>().join(", ");
-    let found = episodes.metrics.iter().find(|metric| metric.name == name);
-    found.ok_or_else(|| FigureError::UnknownMetric {
+    episodes.metric(name).ok_or_else(|| FigureError::UnknownMetric {
         figure: FigureName::DecisionCurve,
         metric: name.to_owned(),
         known: known(),

@@ -48,7 +48,7 @@ impl Outcomes {
     /// which has a value per episode of the table, is true.
     pub fn of(episodes: &EpisodeTable, answered: &[bool]) -> Option<Self> {
         let experiment = open_experiment(episodes)?;
-        let success = episodes.metrics.iter().find(|metric| metric.name == SUCCESS)?;
+        let success = episodes.metric(SUCCESS)?;
         let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
         let all = episodes.keys.iter().zip(success.iter()).zip(answered);
         for ((key, value), answered) in all.filter(|((key, _), _)| key.experiment == experiment) {

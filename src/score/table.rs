@@ -147,6 +147,11 @@ impl EpisodeTable {
         self.labels.iter().find(|label| label.name == name).map(|label| &label.values)
     }
 
+    /// The metric of this name, if the table has it.
+    pub fn metric(&self, name: &str) -> Option<&MetricColumn> {
+        self.metrics.iter().find(|metric| metric.name == name)
+    }
+
     /// The number of episodes.
     pub fn len(&self) -> usize {
         self.keys.len()

@@ -3,19 +3,21 @@
 //! Rule: integers are compared, never floats. An episode is the same in both if its whole key is; what only one
 //! scoring has (metrics, episodes, cells) is told and never stands for a zero.
 
-use std::cmp::Ordering;
+mod aligned;
+
 use std::collections::{BTreeMap, BTreeSet};
 
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use self::aligned::Aligned;
 use super::cell::{Cells, Group, KeyValue};
 use super::group::{GroupError, group};
 use super::moments::Moments;
 use crate::metric::catalog::{Catalog, Kind};
 use crate::score::evidence::Evidence;
-use crate::score::table::{EpisodeKey, EpisodeKeys, EpisodeTable, KeyRef, MetricColumn};
+use crate::score::table::{EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
 
 /// A value of the scoring before, and the one after.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
@@ -257,57 +259,12 @@ fn rewritten(before: &EpisodeTable, after: &EpisodeTable) -> Vec<Rewritten> {
     found
 }
 
-/// The rows of two tables by their keys; both are in the order of them.
-#[derive(Default)]
-struct Aligned {
-    /// Rows with the same key.
-    both: Vec<Pair<usize>>,
-    only_before: Vec<usize>,
-    only_after: Vec<usize>,
-}
-
-impl Aligned {
-    fn of(before: &EpisodeKeys, after: &EpisodeKeys) -> Self {
-        let mut aligned = Self::default();
-        if before.has_keys_of(after) {
-            // One scan scored both: no key is read. Comparing them one by one takes a third of a diff.
-            aligned.both.extend((0..before.len()).map(|row| Pair { before: row, after: row }));
-            return aligned;
-        }
-        let (mut old, mut new) = (0, 0);
-        while old < before.len() && new < after.len() {
-            let order = before.get(old).cmp(&after.get(new));
-            match order {
-                Ordering::Less => aligned.only_before.push(old),
-                Ordering::Greater => aligned.only_after.push(new),
-                Ordering::Equal => aligned.both.push(Pair { before: old, after: new }),
-            }
-            old += usize::from(order.is_le());
-            new += usize::from(order.is_ge());
-        }
-        aligned.only_before.extend(old..before.len());
-        aligned.only_after.extend(new..after.len());
-        aligned
-    }
-
-    fn overlap(&self, before: &EpisodeTable, after: &EpisodeTable) -> Overlap<EpisodeName> {
-        let names = |rows: &[usize], table: &EpisodeTable| -> Vec<EpisodeName> {
-            rows.iter().map(|row| EpisodeName::from(table.keys.get(*row))).collect()
-        };
-        Overlap {
-            both: self.both.len() as u64,
-            only_before: names(&self.only_before, before),
-            only_after: names(&self.only_after, after),
-        }
-    }
-}
-
 fn flips(before: &EpisodeTable, after: &EpisodeTable, both: &[Pair<usize>]) -> Vec<Flip> {
     let mut found = Vec::new();
     let in_place = both.iter().all(|rows| rows.before == rows.after);
     for new in &after.metrics {
         let may_flip = |old: &&MetricColumn| !(in_place && old.has_values_of(new));
-        let Some(old) = column(before, &new.name).filter(may_flip) else { continue };
+        let Some(old) = before.metric(&new.name).filter(may_flip) else { continue };
         for rows in both {
             let value = Pair { before: old.get(rows.before), after: new.get(rows.after) };
             if value.before != value.after {
@@ -317,10 +274,6 @@ fn flips(before: &EpisodeTable, after: &EpisodeTable, both: &[Pair<usize>]) -> V
         }
     }
     found
-}
-
-fn column<'t>(table: &'t EpisodeTable, name: &str) -> Option<&'t MetricColumn> {
-    table.metrics.iter().find(|metric| metric.name == name)
 }
 
 fn deciding(flip: &Flip, value: Option<i64>, evidence: &BTreeMap<String, Evidence>) -> Option<Vec<i64>> {

@@ -67,7 +67,7 @@ pub fn column_values(table: &EpisodeTable, name: &str) -> Option<BTreeSet<KeyVal
     if let Some(column) = column(table, name) {
         return Some(column.ranks(table).values.into_iter().collect());
     }
-    let metric = table.metrics.iter().find(|metric| metric.name == name)?;
+    let metric = table.metric(name)?;
     Some(metric.iter().map(|value| value.map_or(KeyValue::Missing, KeyValue::Int)).collect())
 }
 

@@ -89,7 +89,7 @@ fn sorted(snapshot: &Snapshot, query: &Query) -> Result<Vec<usize>, ViewError> {
     let down = value(query, "order") == Some("descending");
     let turned = |ordering: Ordering| if down { ordering.reverse() } else { ordering };
     let Some(name) = value(query, "sort") else { return Ok(rows) };
-    if let Some(metric) = table.metrics.iter().find(|metric| metric.name == name) {
+    if let Some(metric) = table.metric(name) {
         rows.sort_by(|a, b| match (metric.get(*a), metric.get(*b)) {
             (None, None) => Ordering::Equal,
             (None, Some(_)) => Ordering::Greater,

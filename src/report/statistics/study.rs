@@ -75,7 +75,7 @@ impl<'a> Study<'a> {
     }
 
     pub fn column(&self, metric: &str) -> Option<&'a MetricColumn> {
-        self.table.metrics.iter().find(|column| column.name == metric)
+        self.table.metric(metric)
     }
 
     /// The metrics of 0 and 1.
@@ -107,9 +107,8 @@ impl<'a> Study<'a> {
 /// The [`Study::range`] of each metric of a table; each takes a pass over all episodes.
 #[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
 fn ranges(table: &EpisodeTable) -> BTreeMap<&str, (f64, f64)> {
-    let column = |name: &str| table.metrics.iter().find(|column| column.name == name);
     let longest = CENSORED.iter().filter_map(|(duration, finished)| {
-        let (duration, finished) = (column(duration)?, column(finished)?);
+        let (duration, finished) = (table.metric(duration)?, table.metric(finished)?);
         let unfinished = duration.iter().zip(finished.iter()).filter(|(_, finished)| finished.is_none());
         unfinished.filter_map(|(steps, _)| steps).max()
     });

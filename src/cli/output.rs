@@ -12,6 +12,9 @@ use serde::Serialize;
 use super::outcome::{Failure, Outcome};
 use crate::base::escape::visible_lines;
 use crate::base::replace::{self, NewFile};
+use crate::trace::checksums::stale_note;
+use crate::trace::inputs::Input;
+use crate::trace::open::TraceFile;
 
 /// Prints an answer, as text for people or as JSON for programs.
 ///
@@ -46,6 +49,12 @@ pub fn notes(notes: &[String]) {
     for words in notes {
         note(words);
     }
+}
+
+/// Says which of these traces have checksums of another file.
+pub fn note_stale_checksums(inputs: &[Input]) {
+    let files: Vec<TraceFile> = inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect();
+    notes(stale_note(&files).as_slice());
 }
 
 /// Says how a command went on standard error. With standard error closed there is nobody to tell, and the work goes on.

@@ -4,6 +4,7 @@ use std::io;
 
 use super::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
 use super::outcome::Failure;
+use super::output;
 use crate::metric::fault::Faults;
 use crate::study::{LostAs, Question, Study, StudyError, resolve};
 use crate::trace::inputs::Input;
@@ -22,7 +23,9 @@ impl TraceArgs {
     /// # Errors
     /// As [`TraceArgs::inputs`]; the first fault of a footer.
     pub fn open(&self) -> Result<Study, Failure> {
-        Ok(Study::of(self.inputs()?)?.threads(self.threads.count()))
+        let study = Study::of(self.inputs()?)?.threads(self.threads.count());
+        output::notes(study.stale_checksums().as_slice());
+        Ok(study)
     }
 
     /// The files, opened, and what is asked of them.

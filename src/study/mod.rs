@@ -52,6 +52,7 @@ use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
 use crate::stats::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group};
 use crate::stats::losses::LostCounts;
+use crate::trace::checksums::stale_note;
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceSet;
 use crate::trace::steps::Steps;
@@ -335,6 +336,11 @@ impl Study {
         self.statistics_of(&counted, &cells, options)
     }
 
+    /// A sentence about traces whose checksums are another file's.
+    pub fn stale_checksums(&self) -> Option<String> {
+        self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
+    }
+
     /// The statistics of the episodes that count.
     fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
         let Counted { results, lost, .. } = counted;
@@ -347,6 +353,7 @@ impl Study {
             let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
             statistics.warnings.push(words);
         }
+        statistics.warnings.extend(self.stale_checksums());
         Ok(statistics)
     }
 

@@ -22,6 +22,7 @@ use crate::score::format::Format;
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
 use crate::stats::losses::LostCounts;
+use crate::trace::checksums::missing_note;
 use crate::trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.
@@ -148,6 +149,7 @@ impl Study {
             notes.push(undeclared);
         }
         notes.extend(registered(&results.episodes));
+        notes.extend(self.source.traces().ok().and_then(|traces| missing_note(traces.files())));
         let total = lost.total();
         if total > 0 {
             let (noun, verb) = if total == 1 { ("episode", "was") } else { ("episodes", "were") };

@@ -160,7 +160,7 @@ codes! {
         "nothing to do where the agent said so: the claim counts as a wrong one";
     /// The checksums in the footer are those of the file that this one was made from.
     StaleChecksums, Note, "stale-checksums":
-        "checksums are those of the program that wrote the file",
+        "checksums are those of the file",
         "nothing to do where another program wrote the file again: its bytes are not checked";
     /// A title, an order or a level of an experiment is another in the definitions than in the footer.
     ExperimentOverridden, Note, "experiment-overridden":

@@ -34,6 +34,14 @@ pub fn duckdb() -> PathBuf {
     packages
 }
 
+/// Where `scripts/get-writers.sh` has put programs that write Parquet, beside what cargo builds.
+pub fn writers() -> PathBuf {
+    let packages = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).with_file_name("python-writers");
+    let is_there = packages.join("fastparquet").is_dir();
+    assert!(is_there, "no Parquet writers in {}: scripts/get-writers.sh fetches them", packages.display());
+    packages
+}
+
 /// An interpreter of Python.
 pub fn python() -> &'static str {
     let found = Command::new("python3").arg("--version").stdout(Stdio::null()).status();

@@ -10,3 +10,4 @@ mod trace_commands;
 mod trace_scan;
 mod trace_validate;
 mod trace_write;
+mod writers;

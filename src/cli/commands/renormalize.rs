@@ -99,6 +99,7 @@ impl RenormalizeArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let inputs = self.input.inputs()?;
         let places = self.places(&inputs)?;
+        output::note_stale_checksums(&inputs);
         let old = inputs.iter().map(Old::open).collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
         self.check(&inputs)?;
         let mut answer = RenormalizeAnswer {

@@ -67,6 +67,7 @@ impl ReplayArgs {
     /// When a trace cannot be read or does not say how its world was made, and whatever writing gives.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let files = inputs::resolve(&self.traces, io::stdin()).map_err(Failure::input)?;
+        output::note_stale_checksums(&files);
         let traces = Recorded::open(&files, self.episode.as_deref())?;
         if traces.len() > 1 && (self.mcap.is_some() || self.recompute_visibility) {
             return Err(Failure::input("--mcap and --recompute-visibility take a single trace"));

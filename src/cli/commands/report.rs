@@ -52,6 +52,8 @@ pub struct ReportAnswer {
     pub files: Vec<String>,
     /// How many episodes were counted.
     pub episodes: usize,
+    /// What a reader of the tables must know of the data.
+    pub warnings: Vec<String>,
     /// Where everything comes from; the same as `manifest.json`.
     pub manifest: Manifest,
 }
@@ -67,10 +69,11 @@ impl ReportArgs {
         study.check_folder(&self.out, &options)?;
         let report = study.report(&options)?;
         output::notes(&report.notes);
+        let warnings = study.stale_checksums().into_iter().chain(report.notes.iter().cloned()).collect();
         let WrittenReport { files, manifest } = report.write(&self.out)?;
         if self.json {
             let (out, episodes) = (self.out.display().to_string(), report.results.episodes.len());
-            return output::print_json(&ReportAnswer { out, files, episodes, manifest });
+            return output::print_json(&ReportAnswer { out, files, episodes, warnings, manifest });
         }
         self.print(&report)
     }

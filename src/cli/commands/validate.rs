@@ -8,6 +8,7 @@ use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::text_table::counted;
 use crate::study::{experiment_findings, known_experiments};
+use crate::trace::checksums::Checksums;
 use crate::trace::diagnostic::Severity;
 use crate::trace::inputs;
 use crate::trace::validate::{Validation, validate};
@@ -76,6 +77,11 @@ pub fn print(out: &mut impl Write, report: &Validation) -> io::Result<()> {
         writeln!(out, "`--json` prints all findings\n")?;
     }
     let incomplete = report.files.iter().filter(|file| !file.complete).count();
+    let unchecked = report.files.iter().filter(|file| file.complete && file.checksums == Checksums::None);
+    match unchecked.count() as u64 {
+        0 => {}
+        count => writeln!(out, "no checksums in {}: damage to their data may not be found", counted(count, "file"))?,
+    }
     let (episodes, steps) = report
         .files
         .iter()

@@ -3,9 +3,9 @@
 //! The footer's own covers the bytes from the end of the last chunk to the end of the footer, page indexes included, with
 //! its own eight digits taken as zeros: schema, offsets, statistics and every key.
 //!
-//! Rule: checksums hold for the file of the program that wrote them. Other programs carry the key along when they write a
-//! file again, so they count only where the footer's `created_by` is the one that they name; damage to either of the two
-//! names leaves the data as it is.
+//! Rule: where the key is, the checksums hold, or the file is refused. But other programs carry the key along when they write
+//! a file again. Such a file is read without checksums, and every verb says so. It differs from the one that was summed as a
+//! whole: another program is named in `created_by`, and most chunks are others. Damage leaves most of either as it was.
 
 mod read;
 mod write;
@@ -18,6 +18,7 @@ pub(crate) use read::verify_file;
 pub(in crate::trace) use read::{ChunkChecksums, Fault, of_file, sum};
 pub(crate) use write::{Held, finish, pass_on};
 
+use crate::trace::open::TraceFile;
 use crate::trace::schema::CHECKSUMS_KEY as KEY;
 
 /// What footers name as the program that wrote the file.
@@ -59,6 +60,32 @@ impl<'de> Deserialize<'de> for Checksum {
         let number = is_hexadecimal.then(|| u32::from_str_radix(&text, 16).ok()).flatten();
         number.map(Self).ok_or_else(|| de::Error::custom("a checksum is eight lower-case hexadecimal digits"))
     }
+}
+
+/// A sentence about the files whose checksums are another file's; `None` if there are none.
+pub fn stale_note(files: &[TraceFile]) -> Option<String> {
+    let stale = named(files, Checksums::Stale)?;
+    Some(format!(
+        "{stale}: another program wrote the rows again and copied the checksums of the file that it read; they are not \
+         checked, and damage is not found; use that file where you have it"
+    ))
+}
+
+/// A sentence about the files without checksums; `None` if there are none.
+pub fn missing_note(files: &[TraceFile]) -> Option<String> {
+    let missing = named(files, Checksums::None)?;
+    Some(format!("{missing}: no checksums; damage to the data may not be found"))
+}
+
+/// The first of the files in this state, without its folder, and how many others there are.
+fn named(files: &[TraceFile], state: Checksums) -> Option<String> {
+    let mut of_state = files.iter().filter(|file| file.checksums() == state);
+    let first = of_state.next()?.path().file_name()?.to_string_lossy();
+    Some(match of_state.count() {
+        0 => first.into_owned(),
+        1 => format!("{first} and one other file"),
+        more => format!("{first} and {more} other files"),
+    })
 }
 
 impl Stated {

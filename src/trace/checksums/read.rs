@@ -5,12 +5,12 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use memchr::memmem;
-use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
 use parquet::file::reader::ChunkReader;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{ALGORITHM, FIRST, KEY, Stated, digits, range};
+use super::{ALGORITHM, CREATED_BY, FIRST, KEY, Stated, digits, range};
 use crate::trace::read::footer::shape;
 
 /// How much is read at a time to be summed.
@@ -23,7 +23,7 @@ pub enum Checksums {
     /// It has none.
     #[default]
     None,
-    /// It carries those of the file that another program made it from, which do not apply to it.
+    /// It carries those of the file that another program made it from.
     Stale,
     /// One per column chunk and one of the footer.
     Present,
@@ -65,17 +65,30 @@ pub(in crate::trace) fn of_file(
 ) -> Result<(Checksums, ChunkChecksums), Fault> {
     let about = metadata.file_metadata();
     let Some(pair) = about.key_value_metadata().into_iter().flatten().find(|pair| pair.key == KEY) else {
-        return if is_hidden(footer) {
-            Err(Fault::Malformed("the key where no reader finds it".to_owned()))
+        return if is_hidden(footer) || is_nearly(about.created_by(), CREATED_BY) {
+            Err(Fault::Malformed("a footer of mirrorstats without a readable key of that name".to_owned()))
         } else {
             Ok(<_>::default())
         };
     };
     let text = pair.value.as_deref().ok_or_else(|| Fault::Malformed("no value".to_owned()))?;
     let stated = parsed(text)?;
-    if about.created_by() != Some(&stated.created_by) {
-        return Ok((Checksums::Stale, ChunkChecksums::default()));
+    match of_chunks(file, (start, footer), metadata, &stated, text) {
+        Err(Fault::Malformed(_) | Fault::Footer(..)) if is_another_file(file, metadata, &stated) => {
+            Ok((Checksums::Stale, ChunkChecksums::default()))
+        }
+        found => found.map(|chunks| (Checksums::Present, chunks)),
     }
+}
+
+/// The checksums of the chunks, if the footer keeps its own.
+fn of_chunks(
+    file: &impl ChunkReader,
+    (start, footer): (u64, &[u8]),
+    metadata: &ParquetMetaData,
+    stated: &Stated,
+    text: &str,
+) -> Result<ChunkChecksums, Fault> {
     let groups = metadata.row_groups();
     let counts = stated.chunks.iter().map(Vec::len);
     if !groups.iter().map(|group| group.columns().len()).eq(counts) {
@@ -87,9 +100,28 @@ pub(in crate::trace) fn of_file(
     if found != stated.footer.0 {
         return Err(Fault::Footer(stated.footer.0, found));
     }
-    let columns = about.schema_descr().num_columns();
-    let all = stated.chunks.into_iter().flatten().map(|sum| sum.0).collect();
-    Ok((Checksums::Present, ChunkChecksums { all: Some(all), columns }))
+    let columns = metadata.file_metadata().schema_descr().num_columns();
+    let all = stated.chunks.iter().flatten().map(|sum| sum.0).collect();
+    Ok(ChunkChecksums { all: Some(all), columns })
+}
+
+/// Whether a file that contradicts its checksums is another one than they were made of: another program wrote it, and at
+/// most half the chunks of its first row group are among those that were summed.
+fn is_another_file(file: &impl ChunkReader, metadata: &ParquetMetaData, stated: &Stated) -> bool {
+    let stated_sums = |sum: u32| stated.chunks.iter().flatten().any(|stated| stated.0 == sum);
+    let chunks = metadata.row_groups().first().map_or(&[][..], RowGroupMetaData::columns);
+    let is_kept = |chunk: &&ColumnChunkMetaData| {
+        let bytes = range(chunk).map(|(start, end)| sum(file, start, end - start));
+        bytes.is_some_and(|sum| sum.is_ok_and(stated_sums))
+    };
+    !is_nearly(metadata.file_metadata().created_by(), &stated.created_by)
+        && chunks.iter().filter(is_kept).count() <= chunks.len() / 2
+}
+
+/// Whether a name is this one but for some bytes of damage.
+fn is_nearly(found: Option<&str>, name: &str) -> bool {
+    let equal = found.unwrap_or_default().bytes().zip(name.bytes()).filter(|(found, byte)| found == byte);
+    equal.count() * 2 >= name.len()
 }
 
 /// What stands under the key. There is one way to write it, so that its own digits lie at one place.
@@ -147,12 +179,14 @@ pub(in crate::trace) fn sum(file: &impl ChunkReader, start: u64, length: u64) ->
     Ok(hasher.finalize())
 }
 
-/// Whether a footer holds the key though it has no such pair: damage to a number of a field hides it, and all keys with it.
+/// Whether a footer holds the key or its value though it has no such pair: damage to the name, or to a number of a field,
+/// hides it.
 fn is_hidden(footer: &[u8]) -> bool {
     // As its own format writes a text and the field behind it; no text of another key or column has these bytes.
     let length = u8::try_from(KEY.len()).expect("the key is short");
     let pair = [&[length][..], KEY.as_bytes(), &[0x18]].concat();
-    memmem::find(footer, &pair).is_some()
+    let value = format!(r#"{{"algorithm":"{ALGORITHM}","created_by":""#);
+    [&pair, value.as_bytes()].iter().any(|bytes| memmem::find(footer, bytes).is_some())
 }
 
 /// Verifies all checksums of a file that another room reads; whether it has any is for the file to say.

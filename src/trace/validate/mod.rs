@@ -48,6 +48,8 @@ pub struct CheckedFile {
     pub episodes: u64,
     /// Their rows.
     pub steps: u64,
+    /// Whether it has checksums; without them damage may not be found.
+    pub checksums: Checksums,
 }
 
 /// Findings that an abridged report leaves out.
@@ -101,7 +103,9 @@ pub fn validate(
     let (mut opened, mut places) = (Vec::new(), Vec::new());
     for (place, input) in inputs.iter().enumerate() {
         let file = TraceFile::open(input);
-        report.files.push(CheckedFile { name: input.name.clone(), complete: file.is_ok(), episodes: 0, steps: 0 });
+        let checksums = file.as_ref().map(TraceFile::checksums).unwrap_or_default();
+        let (name, complete) = (input.name.clone(), file.is_ok());
+        report.files.push(CheckedFile { name, complete, episodes: 0, steps: 0, checksums });
         match file {
             Ok(file) => {
                 opened.push(file);
@@ -148,8 +152,8 @@ pub fn validate(
 
 /// A note for a file whose checksums are another file's.
 fn stale(file: &TraceFile) -> Option<Finding> {
-    let expected = format!("a footer whose `created_by` is that of its `{}`", schema::CHECKSUMS_KEY);
-    let found = "another program's: the checksums are not looked at";
+    let expected = format!("a file of which `{}` has the checksums", schema::CHECKSUMS_KEY);
+    let found = "one that another program wrote again: they are not checked";
     (file.checksums() == Checksums::Stale).then(|| Finding::new(Code::StaleChecksums, file.name(), expected, found))
 }
 

@@ -103,7 +103,8 @@ fn verified(
             Fault::Malformed(found) => {
                 let expected = format!("`{CHECKSUMS_KEY}` to hold a CRC-32 of each column chunk and of the footer");
                 let help =
-                    "the file is damaged: restore it from its source; where a program changed that key, remove it";
+                    "the file is damaged: restore it from its source; where a program changed that key, write the rows \
+                     again with another one, such as pyarrow";
                 Box::new(finding(Code::InvalidMetadata, expected, found).with_help(help))
             }
             Fault::Footer(expected, found) => {

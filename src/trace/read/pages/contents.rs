@@ -1,8 +1,9 @@
 //! What the decompressed pages of a column hold, checked before the Parquet library decodes them.
 //!
-//! The library takes any level that is not 0 for 1, and ignores what stands behind the last value. Rule: a page that is
-//! let through has a sound level for each row, as many values as its levels say, and keys within its dictionary.
-//! Delta encodings are checked for their number of values only; their blocks are the library's.
+//! The library takes any level that is not 0 for 1, and ignores what stands behind the last level. Rule: a page that is
+//! let through has a sound level for each row, as many values as its levels say, and keys within its dictionary. Bytes behind
+//! the values are ignored: fastparquet writes eight. Delta encodings are checked for their number of values only; their
+//! blocks are the library's.
 
 use bytes::Bytes;
 use parquet::basic::{Encoding, Type as Physical};
@@ -168,12 +169,21 @@ impl Contents {
             (Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY, _) => self.dictionary(values, count),
             (Encoding::PLAIN, _) => self.plain(values, count),
             (Encoding::RLE, Physical::BOOLEAN) => {
-                let sound = prefixed(values).and_then(|(truths, _)| ones(truths, count));
-                sound.map(drop).map_err(|Unsupported| ("a truth value for each row", "runs of another length".into()))
+                let truths = prefixed(values).and_then(|(truths, _)| Hybrid::new(truths, 1, count));
+                let sound = truths.and_then(|mut truths| {
+                    each_span(&mut truths, count, |_| ())?;
+                    truths.finish_values()
+                });
+                sound.map_err(|Unsupported| ("a truth value for each row", "runs of another length".into()))
             }
-            (Encoding::BYTE_STREAM_SPLIT, _) => fixed(values, count, self.width),
+            // Where a byte of a value lies depends on how many there are.
+            (Encoding::BYTE_STREAM_SPLIT, _) if count.checked_mul(self.width) == Some(values.len()) => Ok(()),
+            (Encoding::BYTE_STREAM_SPLIT, _) => Err(other_bytes(values, count, self.width)),
             (Encoding::DELTA_BYTE_ARRAY, _) => {
                 delta(values, count)?;
+                if count == 0 {
+                    return Ok(());
+                }
                 let shared = delta::sum(values).map_err(|Unsupported| ("lengths from 0", "others".to_owned()))?;
                 self.texts.added = self.texts.added.saturating_add(shared);
                 Ok(())
@@ -204,6 +214,7 @@ impl Contents {
                 texts.key(key, 1);
             }),
         })
+        .and_then(|()| hybrid.finish_values())
         .map_err(|Unsupported| fault("runs of another length"))?;
         if within { Ok(()) } else { Err(fault("a key beyond it")) }
     }
@@ -211,12 +222,13 @@ impl Contents {
     /// Values as they are.
     fn plain(&self, values: &[u8], count: usize) -> Result<(), Fault> {
         match self.physical {
-            Physical::BOOLEAN if values.len() == count.div_ceil(8) => Ok(()),
+            Physical::BOOLEAN if values.len() >= count.div_ceil(8) => Ok(()),
             Physical::BOOLEAN => Err(("a bit for each value", format!("{} bytes for {count}", values.len()))),
             Physical::BYTE_ARRAY => texts(values, count).map_err(|Unsupported| {
-                ("texts as long as their lengths say", "texts that end before or beyond it".into())
+                ("texts as long as their lengths say", "texts that end beyond the page".into())
             }),
-            _ => fixed(values, count, self.width),
+            _ if count.checked_mul(self.width).is_some_and(|bytes| bytes <= values.len()) => Ok(()),
+            _ => Err(other_bytes(values, count, self.width)),
         }
     }
 }
@@ -228,33 +240,33 @@ fn no_levels(stored: Bytes, rows: usize) -> Result<(), Fault> {
     }
     let mut hybrid =
         Hybrid::new(stored, 0, rows).map_err(|Unsupported| levels("runs of another length, or levels above 1"))?;
-    each_span(&mut hybrid, rows, |_| ()).map_err(|Unsupported| levels("some above 0"))
+    let over = each_span(&mut hybrid, rows, |_| ()).and_then(|()| hybrid.finish());
+    over.map_err(|Unsupported| levels("some above 0"))
 }
 
 /// How many numbers of one bit are 1; there are `count`.
 fn ones(stored: Bytes, count: usize) -> Result<usize, Unsupported> {
     let mut ones = 0;
-    each_span(&mut Hybrid::new(stored, 1, count)?, count, |span| match span {
+    let mut hybrid = Hybrid::new(stored, 1, count)?;
+    each_span(&mut hybrid, count, |span| match span {
         Span::Same { value, count } => ones += value as usize * count,
         Span::Packed(packed) => packed.each(|bit| ones += bit as usize),
     })?;
-    Ok(ones)
+    hybrid.finish().map(|()| ones)
 }
 
-/// Goes through all of `count` numbers, behind which there is nothing.
+/// Goes through all of `count` numbers.
 fn each_span(hybrid: &mut Hybrid, mut count: usize, mut take: impl FnMut(Span<'_>)) -> Result<(), Unsupported> {
     while count > 0 {
         let span = hybrid.span(count)?;
         count -= span.count();
         take(span);
     }
-    hybrid.finish()
+    Ok(())
 }
 
-fn fixed(values: &[u8], count: usize, width: usize) -> Result<(), Fault> {
-    let sound = count.checked_mul(width) == Some(values.len());
-    let fault = || ("as many bytes as its values take", format!("{} for {count} of {width}", values.len()));
-    if sound { Ok(()) } else { Err(fault()) }
+fn other_bytes(values: &[u8], count: usize, width: usize) -> Fault {
+    ("as many bytes as its values take", format!("{} for {count} of {width}", values.len()))
 }
 
 fn texts(mut values: &[u8], count: usize) -> Result<(), Unsupported> {
@@ -262,11 +274,14 @@ fn texts(mut values: &[u8], count: usize) -> Result<(), Unsupported> {
         let (length, rest) = values.split_first_chunk().ok_or(Unsupported)?;
         values = rest.get(u32::from_le_bytes(*length) as usize..).ok_or(Unsupported)?;
     }
-    if values.is_empty() { Ok(()) } else { Err(Unsupported) }
+    Ok(())
 }
 
 /// The number of values that a delta encoding declares: the third number, behind the sizes of its blocks.
 fn delta(values: &[u8], count: usize) -> Result<(), Fault> {
+    if values.is_empty() && count == 0 {
+        return Ok(());
+    }
     let opening = delta::Opening::read(values).map_err(|Unsupported| {
         ("the number of its values", "the end of the page, or blocks that are none".to_owned())
     })?;

@@ -285,9 +285,8 @@ impl DataPage {
         }
         self.levels.as_ref().map_or(Ok(()), Hybrid::finish)?;
         match &self.values {
-            Stored::Hybrid(values) => values.finish(),
-            Stored::Bits(values, at) if at.div_ceil(8) == values.len() => Ok(()),
-            Stored::Bits(..) => Err(Unsupported),
+            Stored::Hybrid(values) => values.finish_values(),
+            Stored::Bits(..) => Ok(()),
         }
     }
 }

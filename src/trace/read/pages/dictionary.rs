@@ -28,9 +28,6 @@ impl Dictionary {
             texts.append_value(std::str::from_utf8(text).map_err(|_| Unsupported)?);
             data = rest;
         }
-        if !data.is_empty() {
-            return Err(Unsupported);
-        }
         Ok(Self::Texts(Arc::new(texts.finish())))
     }
 

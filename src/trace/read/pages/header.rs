@@ -150,7 +150,7 @@ impl Header {
             Physical::BYTE_ARRAY => self.values.saturating_mul(4),
             physical => self.values.saturating_mul(width(physical, about.width)),
         };
-        let fits = if about.physical == Physical::BYTE_ARRAY { least <= self.whole } else { least == self.whole };
+        let fits = least <= self.whole;
         let found = || (format!("keys for {} bytes of values", self.whole), self.values.to_string());
         (!fits).then(found)
     }

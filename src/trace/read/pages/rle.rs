@@ -111,9 +111,10 @@ impl Hybrid {
         // Groups of eight. A writer may cut the last one short where the data end.
         let stored = count.checked_mul(self.width).ok_or(Unsupported)?;
         let there = data.len() - from;
+        let groups = count;
         let (bytes, count) =
             if stored <= there { (stored, count.saturating_mul(8)) } else { (there, there * 8 / self.width) };
-        if count == 0 || count >= self.left + GROUP {
+        if count == 0 || groups > MOST_GROUPS {
             return Err(Unsupported);
         }
         self.run = Run::Packed(from * 8);
@@ -121,13 +122,20 @@ impl Hybrid {
         Ok(())
     }
 
-    /// When all numbers are taken: whether that was all. A group may be filled up, and zeros may follow it.
+    /// When all levels are taken: whether that was all. The last packed run may be filled up, and zeros may follow it.
     pub(super) fn finish(&self) -> Result<(), Unsupported> {
-        let filled = match self.run {
+        let is_over = matches!(self.run, Run::Packed(_)) || self.count == 0;
+        if is_over && self.data[self.at..].iter().all(|byte| *byte == 0) { Ok(()) } else { Err(Unsupported) }
+    }
+
+    /// When all values are taken: whether that was all. Any bytes may follow the last group. DuckDB fills its last run up to
+    /// 256 values: behind such a run, which damage to its length may have made, there is nothing.
+    pub(super) fn finish_values(&self) -> Result<(), Unsupported> {
+        let is_last_group = match self.run {
             Run::Same(_) => self.count == 0,
             Run::Packed(_) => self.count < GROUP,
         };
-        if filled && self.data[self.at..].iter().all(|byte| *byte == 0) { Ok(()) } else { Err(Unsupported) }
+        if is_last_group { Ok(()) } else { self.finish() }
     }
 }
 
@@ -167,6 +175,8 @@ impl Span<'_> {
 
 /// Numbers of which a byte boundary follows.
 const GROUP: usize = 8;
+/// The Parquet library takes no longer run.
+const MOST_GROUPS: usize = i32::MAX as usize / GROUP;
 
 /// What stored numbers are made into.
 pub(super) trait Number: Copy + Default + From<u8> {

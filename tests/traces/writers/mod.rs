@@ -1,0 +1,150 @@
+//! Traces as seven other programs write them, in their codecs, versions of pages, dictionaries and sizes around those of
+//! groups: none is refused, every score is that of our own file, and every verb says the same of both.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use mirrorstats::score::format::Format;
+use mirrorstats::study::write_scores;
+use mirrorstats::trace::diagnostic::Severity;
+use mirrorstats::trace::inputs::Input;
+use mirrorstats::trace::validate::validate;
+use mirrorstats::{Study, StudyError};
+
+use crate::harness::files::repository;
+use crate::harness::need;
+use crate::harness::program::{clean, program, run, succeeds};
+
+/// The files of each writer, at least.
+const WRITERS: [(&str, usize); 7] = [
+    ("pyarrow", 80),
+    ("duckdb", 70),
+    ("polars", 40),
+    ("datafusion", 48),
+    ("fastparquet", 40),
+    ("spark", 40),
+    ("java", 80),
+];
+
+/// What traces are asked, with the same answer of all files that have the same rows.
+const SAME: [&[&str]; 13] = [
+    &["score", "trace.parquet"],
+    &["score", "trace.parquet", "--engine", "polars"],
+    &["stats", "trace.parquet"],
+    &["query", "SELECT * FROM steps ORDER BY episode_id, t", "trace.parquet"],
+    &["query", "SELECT * FROM cells ORDER BY experiment, model, metric", "trace.parquet"],
+    &["diff", "paper", "extended", "trace.parquet"],
+    &["check", "trace.parquet", "--max-unreadable", "0.05"],
+    &["sensitivity", "trace.parquet"],
+    &["sensitivity", "trace.parquet", "--metrics", "MCR", "--json"],
+    &["renormalize", "trace.parquet", "-o", "new"],
+    &["score", "new/trace.parquet"],
+    &["figure", "intervals", "trace.parquet", "-o", "figure.svg"],
+    &["report", "trace.parquet", "--no-figures", "--out", "report"],
+];
+
+/// What says something of the file itself.
+const OF_THE_FILE: [&[&str]; 4] = [
+    &["info", "trace.parquet"],
+    &["validate", "trace.parquet"],
+    &["rescore", "report", "--definitions", "battery", "--out", "again"],
+    &["view", "trace.parquet", "--export", "page"],
+];
+
+/// The matrix: each file with the trace of our own that has its rows.
+fn written(folder: &Path) -> BTreeMap<PathBuf, PathBuf> {
+    let packages = std::env::join_paths([need::writers(), need::spark()]).unwrap();
+    let mut command = clean(std::process::Command::new(need::python()), folder);
+    succeeds(command.env("PYTHONPATH", packages).arg(repository().join("tests/traces/writers/write.py")).arg(folder));
+    let mut files = BTreeMap::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let content = entry.unwrap().path();
+        if content.is_dir() {
+            let own = content.with_extension("parquet");
+            let name = |path: &Path| path.file_name().unwrap().to_str().unwrap().to_owned();
+            let lines = content.with_extension("jsonl");
+            run(folder, &["import", &name(&lines), "-o", &name(&own)]).done();
+            let others = fs::read_dir(&content).unwrap().map(|entry| entry.unwrap().path());
+            files.extend(others.filter(|path| path.extension().is_some()).map(|path| (path, own.clone())));
+        }
+    }
+    files
+}
+
+fn scores(path: &Path) -> Result<String, StudyError> {
+    let definitions = repository().join("tests/traces/writers/definitions.toml");
+    let table = Study::open([path])?.definitions(definitions.to_str().unwrap())?.score()?.episodes;
+    let mut bytes = Vec::new();
+    write_scores(&table, Format::Csv, &mut bytes, NonZeroUsize::MIN).unwrap();
+    Ok(String::from_utf8(bytes).unwrap())
+}
+
+/// What a file is refused for, or how its scores differ.
+fn fault(path: &Path, own: &str) -> Option<String> {
+    match scores(path) {
+        Err(error) => return Some(error.to_string()),
+        Ok(scores) if scores != own => return Some("other scores".to_owned()),
+        Ok(_) => {}
+    }
+    let found = validate(&[Input::new(path)], None, NonZeroUsize::MIN).unwrap().findings;
+    found.iter().find(|finding| finding.severity == Severity::Error).map(ToString::to_string)
+}
+
+fn of_writer<'a>(files: &'a BTreeMap<PathBuf, PathBuf>, writer: &str) -> Vec<(&'a Path, &'a Path)> {
+    let is_of = |path: &&PathBuf| path.file_name().unwrap().to_str().unwrap().split('-').next() == Some(writer);
+    files.keys().filter(is_of).map(|path| (path.as_path(), files[path].as_path())).collect()
+}
+
+#[test]
+fn files_of_other_writers_score_as_our_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = written(folder.path());
+    let mut own: BTreeMap<&Path, String> = BTreeMap::new();
+    let mut faults = Vec::new();
+    for (path, trace) in &files {
+        let expected = own.entry(trace).or_insert_with(|| scores(trace).unwrap());
+        let name = path.strip_prefix(folder.path()).unwrap().display();
+        faults.extend(fault(path, expected).map(|fault| format!("{name}: {fault}")));
+    }
+    assert_eq!(faults, Vec::<String>::new(), "of {} files", files.len());
+    for (writer, least) in WRITERS {
+        let count = of_writer(&files, writer).len();
+        assert!(count >= least, "{writer}: {count} files");
+    }
+    assert!(files.len() >= 400 && own.len() >= 100, "{} files of {} contents", files.len(), own.len());
+    for (writer, _) in WRITERS {
+        verbs_say_the_same(folder.path(), writer, &of_writer(&files, writer));
+    }
+}
+
+/// Runs every verb on a file of this writer, and on our own.
+fn verbs_say_the_same(folder: &Path, writer: &str, files: &[(&Path, &Path)]) {
+    let is_sample = |name: &str| ["503", "504", "505", "1023", "1025"].iter().any(|size| name.starts_with(size));
+    let sample = files.iter().find(|(_, own)| is_sample(own.file_name().unwrap().to_str().unwrap()));
+    let (theirs, own) = sample.unwrap_or_else(|| panic!("{writer}: no file of some 500 rows"));
+    let folders = [folder.join(writer), folder.join(format!("own-{writer}"))];
+    for (folder, trace) in folders.iter().zip([theirs, own]) {
+        fs::create_dir(folder).unwrap();
+        fs::copy(trace, folder.join("trace.parquet")).unwrap();
+    }
+    let answer = |folder: &Path, words: &[&str]| {
+        let output = program(folder).args(words).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    for words in SAME {
+        let [theirs, own] = folders.each_ref().map(|folder| answer(folder, words));
+        assert!(matches!(own.0, Some(0 | 1)), "{words:?}: {own:?}");
+        assert_eq!((&theirs.0, &theirs.1), (&own.0, &own.1), "{writer}: {words:?}: {}", theirs.2);
+    }
+    for words in OF_THE_FILE {
+        let (code, _, told) = answer(&folders[0], words);
+        assert_eq!(code, Some(0), "{writer}: {words:?}: {told}");
+    }
+    for file in ["figure.svg", "report/cells.csv", "report/tables/main.md", "again/cells.csv"] {
+        let [theirs, own] = folders.each_ref().map(|folder| fs::read(folder.join(file)));
+        // Only the other file's report is made again.
+        assert!(theirs.is_ok() && (theirs.ok() == own.ok() || file.starts_with("again")), "{writer}: {file}");
+    }
+}

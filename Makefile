@@ -26,6 +26,7 @@ needed:
 	scripts/get-egl.sh
 	scripts/get-mujoco.sh
 	scripts/get-spark.sh
+	scripts/get-writers.sh
 
 # The member `fuzz` replays its corpora; chosen together, both use one build of the program.
 unit: needed

@@ -58,7 +58,8 @@ impl RescoreRequest {
         study.source.traces()?;
         study.check_folder(&self.out, &options)?;
         let before = self.scores_before(&manifest);
-        let report = study.report(&options)?;
+        let mut report = study.report(&options)?;
+        report.notes.extend(study.stale_checksums());
         let changes = match before {
             Ok(before) => Ok(changes(&study, before, &report)?),
             Err(reason) => Err(reason),

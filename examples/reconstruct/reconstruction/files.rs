@@ -69,14 +69,14 @@ pub fn write(folder: &Path, traces: &[Trace]) -> Result<(), TraceError> {
     Ok(())
 }
 
-/// The bytes that [`write`] gives a file: without checksums, as the fixture was made before there were any.
+/// The bytes that [`write`] gives a file.
 ///
 /// # Errors
 /// When the trace schema forbids an episode.
 pub fn bytes(trace: &Trace) -> Result<Vec<u8>, TraceError> {
     let columns = OptionalColumns::used_by(&trace.episodes);
     let metadata = TraceMetadata { recording: Some(trace.recording.clone()), columns };
-    let mut encoder = TraceEncoder::without_checksums(Vec::new(), &metadata)?;
+    let mut encoder = TraceEncoder::new(Vec::new(), &metadata)?;
     for episode in &trace.episodes {
         encoder.write(episode)?;
     }

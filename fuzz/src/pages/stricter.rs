@@ -22,16 +22,17 @@ pub enum Reason {
     LengthOfLevels,
     /// A dictionary behind a page of values. The library takes the last one.
     DictionaryFirst,
-    /// A dictionary that has other bytes than its number of values takes. The library reads as many as it is asked for.
+    /// A dictionary that has fewer bytes than its number of values takes. The library reads as many as it is asked for.
     DictionarySize,
     /// A page that goes on behind the end of its column. The library reads the next column's bytes.
     EndOfColumn,
     /// Definition levels other than 0 and 1, runs of them that end before or behind the rows, levels in a column without
     /// nulls that are not 0. The library takes whatever is not the highest level for null and does not look behind the rows.
     Levels,
-    /// Keys behind the last row, or of a run that goes on behind it. The library does not look there.
+    /// A run of one key that goes on behind the last row, or a packed one that does so by a group and is not the last. The
+    /// library does not look there.
     Keys,
-    /// Bytes behind the last value of a page, or runs of truth values behind it. The library does not look there.
+    /// Truth values as [`Keys`](Self::Keys); more or fewer bytes than split values take.
     ValuesOfPage,
     /// A page of no values in a delta encoding has the encoding's own header, which says that there are none. The library does
     /// not look for it where it needs no value.

@@ -58,6 +58,7 @@ impl DiffArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
         let traces = resolve(&self.traces, io::stdin().lock())?;
+        output::note_stale_checksums(&traces);
         let found = diff(&old, &new, &traces, &self.request())?;
         output::notes(&found.notes);
         self.print(&found.changes)

@@ -61,6 +61,7 @@ impl FilmstripArgs {
         output::check_target(&self.out, &logs)?;
         let files = if traces.is_empty() { Ok(Vec::new()) } else { inputs::resolve(&traces, io::stdin()) };
         let files = files.map_err(Failure::input)?;
+        output::note_stale_checksums(&files);
         output::check_target(&self.out, files.iter().map(|file| &file.path))?;
         if let Some(figure) = strip.from_logs(&logs, &files)? {
             return Ok(figure);

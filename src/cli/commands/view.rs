@@ -11,6 +11,7 @@ use crate::base::web::{Guard, check_token};
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
+use crate::trace::inputs;
 use crate::view::{Options, View, ViewError, export, routes};
 
 /// Look at recordings in the browser: the report, every episode step by step, two beside each other
@@ -75,6 +76,9 @@ impl ViewArgs {
                 "--episode: expected the id of an episode in these recordings, found `{}`\n  help: `mirrorstats info --episodes` lists them",
                 visible(id)
             )));
+        }
+        if let Ok(inputs) = inputs::resolve(&self.runs, io::empty()) {
+            output::note_stale_checksums(&inputs);
         }
         if let Some(folder) = &self.export {
             let written = export::write(&view, folder)?;

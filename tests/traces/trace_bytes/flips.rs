@@ -51,8 +51,16 @@ impl Victim {
     }
 
     fn flip(&self, bits: impl IntoIterator<Item = usize>) -> Counts {
+        self.flip_beside(None, bits)
+    }
+
+    /// The same, with one bit flipped all the time.
+    fn flip_beside(&self, first: Option<usize>, bits: impl IntoIterator<Item = usize>) -> Counts {
         let mut counts = Counts::default();
         let mut bytes = self.whole.clone();
+        if let Some(bit) = first {
+            bytes[bit / 8] ^= 1 << (bit % 8);
+        }
         for bit in bits {
             bytes[bit / 8] ^= 1 << (bit % 8);
             fs::write(&self.path, &bytes).unwrap();
@@ -98,6 +106,37 @@ fn a_flipped_bit_is_refused_or_changes_nothing() {
         let counts = victim.flip(draws(600, victim.bits()));
         assert_eq!((counts.scores_changed, counts.values_changed), (0, 0), "{counts:?}");
         assert!(counts.refused > counts.flips / 2, "{counts:?}");
+    }
+}
+
+/// Where some bytes lie in a footer.
+fn place(whole: &[u8], bytes: &[u8]) -> usize {
+    whole.windows(bytes.len()).rposition(|window| window == bytes).unwrap()
+}
+
+#[test]
+fn a_flipped_bit_of_each_byte_of_the_footer_is_refused_or_changes_nothing() {
+    let victim = Victim::new(trace());
+    let footer = u32::from_le_bytes(*victim.whole[victim.whole.len() - 8..].first_chunk().unwrap()) as usize;
+    let first = victim.whole.len() - 8 - footer;
+    let counts = victim.flip((first..victim.whole.len()).map(|byte| byte * 8 + byte % 8));
+    assert_eq!((counts.scores_changed, counts.values_changed), (0, 0), "{counts:?}");
+    assert_eq!(counts.refused, counts.flips, "{counts:?}");
+}
+
+/// The name of the program decides nothing alone: with damage to it a file is refused, whatever else is damaged.
+#[test]
+fn a_flipped_bit_of_the_name_of_the_program_switches_no_checksum_off() {
+    let victim = Victim::new(trace());
+    let by = place(&victim.whole, b"mirrorstats version ");
+    let key = place(&victim.whole, b"mirrorstats.checksums");
+    // A letter of either, the type and the length of the field before it.
+    for byte in [by - 2, by - 1, by, by + 7, by + 19, key, key + 15] {
+        let first = byte * 8 + byte % 8;
+        let others = draws(60, victim.bits()).filter(|bit| *bit != first).chain([by * 8 + 70, key * 8 + 90]);
+        let counts = victim.flip_beside(Some(first), others);
+        assert_eq!((counts.scores_changed, counts.values_changed), (0, 0), "byte {byte}: {counts:?}");
+        assert_eq!(counts.refused, counts.flips, "byte {byte}: {counts:?}");
     }
 }
 

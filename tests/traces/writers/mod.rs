@@ -6,16 +6,20 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use arrow::util::display::array_value_to_string;
 use mirrorstats::score::format::Format;
 use mirrorstats::study::write_scores;
+use mirrorstats::trace::checksums::Checksums;
 use mirrorstats::trace::diagnostic::Severity;
 use mirrorstats::trace::inputs::Input;
+use mirrorstats::trace::open::TraceFile;
 use mirrorstats::trace::validate::validate;
 use mirrorstats::{Study, StudyError};
 
-use crate::harness::files::repository;
+use crate::harness::files::{fixture, repository};
 use crate::harness::need;
 use crate::harness::program::{clean, program, run, succeeds};
+use crate::harness::traces::{rows, write_rows};
 
 /// The files of each writer, at least.
 const WRITERS: [(&str, usize); 7] = [
@@ -74,8 +78,11 @@ fn written(folder: &Path) -> BTreeMap<PathBuf, PathBuf> {
 }
 
 fn scores(path: &Path) -> Result<String, StudyError> {
-    let definitions = repository().join("tests/traces/writers/definitions.toml");
-    let table = Study::open([path])?.definitions(definitions.to_str().unwrap())?.score()?.episodes;
+    scores_by(path, repository().join("tests/traces/writers/definitions.toml").to_str().unwrap())
+}
+
+fn scores_by(path: &Path, definitions: &str) -> Result<String, StudyError> {
+    let table = Study::open([path])?.definitions(definitions)?.score()?.episodes;
     let mut bytes = Vec::new();
     write_scores(&table, Format::Csv, &mut bytes, NonZeroUsize::MIN).unwrap();
     Ok(String::from_utf8(bytes).unwrap())
@@ -95,6 +102,68 @@ fn fault(path: &Path, own: &str) -> Option<String> {
 fn of_writer<'a>(files: &'a BTreeMap<PathBuf, PathBuf>, writer: &str) -> Vec<(&'a Path, &'a Path)> {
     let is_of = |path: &&PathBuf| path.file_name().unwrap().to_str().unwrap().split('-').next() == Some(writer);
     files.keys().filter(is_of).map(|path| (path.as_path(), files[path].as_path())).collect()
+}
+
+/// pyarrow copies the footer's keys when it writes a trace again, our checksums among them.
+#[test]
+fn a_trace_that_another_program_wrote_again_is_read_and_every_verb_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let own = fixture("recorded/E1-guesser.parquet");
+    fs::create_dir(at.join("again")).unwrap();
+    let mut command = clean(std::process::Command::new(need::python()), at);
+    let script = repository().join("tests/traces/writers/write.py");
+    command.env("PYTHONPATH", need::writers()).arg(script).arg(&own).arg("again");
+    succeeds(&mut command);
+    let expected = scores_by(&own, "paper").unwrap();
+    let files: Vec<PathBuf> = fs::read_dir(at.join("again")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert_eq!(files.len(), 12);
+    for path in &files {
+        let file = TraceFile::open(&Input::new(path)).unwrap();
+        assert_eq!(file.checksums(), Checksums::Stale, "{}", path.display());
+        assert_eq!(scores_by(path, "paper").unwrap(), expected, "{}", path.display());
+    }
+    fs::copy(&files[0], at.join("trace.parquet")).unwrap();
+    for words in SAME.iter().chain(&OF_THE_FILE) {
+        let reads = words.contains(&"trace.parquet") || words.contains(&"rescore");
+        let answer = program(at).args(*words).output().unwrap();
+        let told = String::from_utf8(if words[0] == "validate" { answer.stdout } else { answer.stderr }).unwrap();
+        let says_so = told.contains("trace.parquet: another program wrote the rows again") || told.contains("stale-checksums");
+        // What cannot be done with this trace is refused before.
+        assert_eq!(says_so, reads, "{words:?}: {told}");
+    }
+    let answer = run(at, &["stats", "trace.parquet", "--json"]).json();
+    let warnings = answer["warnings"].as_array().unwrap();
+    assert!(warnings.iter().any(|words| words.as_str().unwrap().contains("another program wrote")), "{warnings:?}");
+    assert!(run(at, &["info", "trace.parquet"]).done().contains("stale"));
+}
+
+#[test]
+fn traces_without_checksums_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let rows = rows(&fixture("recorded/E1-guesser.parquet"));
+    for (name, from) in [("one.parquet", 0), ("two.parquet", rows.num_rows() / 2)] {
+        let ids = rows.column_by_name("episode_id").unwrap();
+        let text = |row: usize| array_value_to_string(ids, row).unwrap();
+        // Whole episodes, from the first on, or from the last.
+        let wanted = text(if from == 0 { 0 } else { rows.num_rows() - 1 });
+        let first = (0..rows.num_rows()).find(|row| text(*row) == wanted).unwrap();
+        let count = (first..rows.num_rows()).take_while(|row| text(*row) == wanted).count();
+        write_rows(&at.join(name), &[rows.slice(first, count)], None);
+    }
+    let both = ["one.parquet", "two.parquet"];
+    let told = run(at, &["validate", both[0], both[1]]).stdout;
+    assert!(told.contains("no checksums in 2 files"), "{told}");
+    let checked = run(at, &["validate", both[0], "--json"]).stdout;
+    assert!(checked.contains(r#""checksums": "none""#), "{checked}");
+    let answer = run(at, &["report", both[0], both[1], "--no-figures", "--json", "--out", "report"]);
+    let words = "one.parquet and one other file: no checksums";
+    assert!(answer.stderr.contains(words), "{}", answer.stderr);
+    assert!(answer.json()["warnings"].to_string().contains(words));
+    // Our own have them.
+    let own = fixture("paper").display().to_string();
+    assert!(!run(at, &["validate", &own]).stdout.contains("no checksums"));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-"""Writes traces with the Parquet writers that people use: write.py FOLDER.
+"""Writes traces with the Parquet writers that people use: write.py FOLDER; or a trace again: write.py TRACE FOLDER.
 
 Each content is FOLDER/CONTENT.jsonl, one step per line, and each file FOLDER/CONTENT/WRITER-OPTIONS.parquet with the
 same rows. Contents differ in how many rows they have, around the sizes of groups, pages and row groups, and in nulls.
@@ -315,7 +315,18 @@ def with_java(matrix):
     spark.stop()
 
 
+def again(trace, folder):
+    """The rows of a trace and its footer's keys once more, as near to the first writer as pyarrow comes."""
+    table = pq.read_table(trace)
+    for codec, version, pages in itertools.product(["snappy", "zstd", "none"], ["1.0", "2.6"], ["1.0", "2.0"]):
+        path = folder / f"again-{codec}-{version}-{pages}.parquet"
+        pq.write_table(table, path, compression=codec, version=version, data_page_version=pages)
+
+
 def main():
+    if len(sys.argv) > 2:
+        again(Path(sys.argv[1]), Path(sys.argv[2]))
+        return
     matrix = Matrix(Path(sys.argv[1]).absolute())
     for write in (with_pyarrow, with_duckdb, with_polars, with_datafusion, with_fastparquet, with_java):
         write(matrix)

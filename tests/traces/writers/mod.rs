@@ -128,7 +128,8 @@ fn a_trace_that_another_program_wrote_again_is_read_and_every_verb_says_so() {
         let reads = words.contains(&"trace.parquet") || words.contains(&"rescore");
         let answer = program(at).args(*words).output().unwrap();
         let told = String::from_utf8(if words[0] == "validate" { answer.stdout } else { answer.stderr }).unwrap();
-        let says_so = told.contains("trace.parquet: another program wrote the rows again") || told.contains("stale-checksums");
+        let says_so =
+            told.contains("trace.parquet: another program wrote the rows again") || told.contains("stale-checksums");
         // What cannot be done with this trace is refused before.
         assert_eq!(says_so, reads, "{words:?}: {told}");
     }

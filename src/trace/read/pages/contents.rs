@@ -221,12 +221,14 @@ impl Contents {
 
     /// Values as they are.
     fn plain(&self, values: &[u8], count: usize) -> Result<(), Fault> {
+        if count == 0 && values.iter().any(|byte| *byte != 0) {
+            return Err(("as many values as its levels say", "some, not 0".to_owned()));
+        }
         match self.physical {
             Physical::BOOLEAN if values.len() >= count.div_ceil(8) => Ok(()),
             Physical::BOOLEAN => Err(("a bit for each value", format!("{} bytes for {count}", values.len()))),
-            Physical::BYTE_ARRAY => texts(values, count).map_err(|Unsupported| {
-                ("texts as long as their lengths say", "texts that end beyond the page".into())
-            }),
+            Physical::BYTE_ARRAY => texts(values, count)
+                .map_err(|Unsupported| ("texts as long as their lengths say", "texts that end beyond the page".into())),
             _ if count.checked_mul(self.width).is_some_and(|bytes| bytes <= values.len()) => Ok(()),
             _ => Err(other_bytes(values, count, self.width)),
         }

@@ -286,6 +286,7 @@ impl DataPage {
         self.levels.as_ref().map_or(Ok(()), Hybrid::finish)?;
         match &self.values {
             Stored::Hybrid(values) => values.finish_values(),
+            Stored::Bits(values, 0) if values.iter().any(|byte| *byte != 0) => Err(Unsupported),
             Stored::Bits(..) => Ok(()),
         }
     }

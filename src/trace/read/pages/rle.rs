@@ -129,10 +129,11 @@ impl Hybrid {
     }
 
     /// When all values are taken: whether that was all. Any bytes may follow the last group. DuckDB fills its last run up to
-    /// 256 values: behind such a run, which damage to its length may have made, there is nothing.
+    /// 256 values: behind such a run, which damage to its length may have made, there is nothing. Nor is there where there
+    /// are no values.
     pub(super) fn finish_values(&self) -> Result<(), Unsupported> {
         let is_last_group = match self.run {
-            Run::Same(_) => self.count == 0,
+            Run::Same(_) => self.count == 0 && self.at > 0,
             Run::Packed(_) => self.count < GROUP,
         };
         if is_last_group { Ok(()) } else { self.finish() }

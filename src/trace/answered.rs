@@ -25,7 +25,10 @@ fn others(recording: &Value) -> Vec<&str> {
     let agent = &recording["agent"];
     let patterns = agent["answers_as"].as_array().into_iter().flatten().filter_map(Value::as_str).map(str::to_owned);
     let patterns: Vec<String> = patterns.collect();
-    let (Some(asked), false) = (agent["id"].as_str(), agent["backend"] == OWN_SERVER && patterns.is_empty()) else {
+    let (Some(asked), false) = (
+        agent["id"].as_str(),
+        agent["backend"] == OWN_SERVER && patterns.is_empty() && agent["accepted_models"].is_null(),
+    ) else {
         return Vec::new();
     };
     let parts = recording["fingerprints"].as_object().into_iter().flat_map(serde_json::Map::values);

@@ -43,7 +43,10 @@ fn look_of(c: char) -> String {
 
 /// The first character of a name that only looks like one of ASCII, for a message.
 fn disguise(name: &str) -> Option<String> {
-    let (c, look) = name.chars().map(|c| (c, look_of(c))).find(|(c, look)| !c.is_ascii() && look.is_ascii())?;
+    let (c, look) = name
+        .chars()
+        .map(|c| (c, look_of(c)))
+        .find(|(c, look)| c.is_alphanumeric() && !c.is_ascii() && look.is_ascii())?;
     Some(format!(" its `{c}` is U+{:04X}, which only looks like `{look}`", u32::from(c)))
 }
 

@@ -9,6 +9,7 @@ pub mod format;
 pub mod frame;
 pub mod hash;
 pub mod input;
+pub mod model_id;
 pub(crate) mod names;
 pub mod number;
 pub mod palette;

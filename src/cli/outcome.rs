@@ -18,6 +18,7 @@ use serde::Serialize;
 
 use crate::base::escape::visible_lines;
 use crate::metric::fault::{FaultRecord, Faults};
+use crate::trace::diagnostic::{MORE_FILES, is_short_of_files};
 
 /// Which form errors have, where no option says it: decided before anything is parsed.
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
@@ -148,6 +149,9 @@ fn words(failure: &Failure, colored: bool) -> String {
             let _ = write!(text, "\n  caused by: {words}");
         }
         cause = error.source();
+    }
+    if is_short_of_files(&text) && !text.contains(MORE_FILES) {
+        let _ = write!(text, "\n  help: {MORE_FILES}");
     }
     text
 }

@@ -11,10 +11,10 @@ use serde::Serialize;
 
 use super::outcome::{Failure, Outcome};
 use crate::base::escape::visible_lines;
-use crate::base::replace::{self, NewFile};
 use crate::trace::checksums::stale_note;
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceFile;
+use crate::base::replace::{self, Content, FolderFiles, NewFile, TemporaryFolder};
 
 /// Prints an answer, as text for people or as JSON for programs.
 ///
@@ -82,6 +82,26 @@ pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T
     })?;
     commit(file, path)?;
     Ok(written)
+}
+
+/// Replaces files of a folder together, by their paths inside it; everything else in it stays.
+///
+/// # Errors
+/// When the folder or a file cannot be written; the error names it, and all files are the old ones.
+pub fn write_folder(folder: &Path, files: &[(&Path, Content<'_>)]) -> Result<(), Failure> {
+    let files = FolderFiles { new: files, index: None, old: &|_| Vec::new() };
+    replace::replace_folder(folder, &files).map_err(|error| unwritable(&error.path, error.source))
+}
+
+/// A temporary folder for what [`write_folder`] puts into `folder`, beside it.
+///
+/// # Errors
+/// When the folder above is not writable; the error names `folder`.
+pub fn stage_beside(folder: &Path) -> Result<TemporaryFolder, Failure> {
+    let parent = replace::folder_of(folder);
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let made = replace::make_folder(parent).and_then(|()| TemporaryFolder::create(parent, &name));
+    made.map_err(|error| unwritable(folder, error))
 }
 
 /// Begins the new content of a file.

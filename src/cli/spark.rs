@@ -4,6 +4,7 @@ use std::path::Path;
 
 use super::args::{Engine, EngineArgs, SparkArgs};
 use super::outcome::Failure;
+use crate::base::replace::is_stream;
 use crate::engine::spark::Cluster;
 use crate::engine::spark::source::is_uri;
 use crate::score::format::Format;
@@ -44,5 +45,5 @@ impl EngineArgs {
 /// Whether an output is a folder that Spark writes, rather than a file that is written here.
 pub fn is_folder(output: &Path) -> bool {
     let name = output.to_string_lossy();
-    is_uri(&name) || Format::of_name(&name).is_err()
+    is_uri(&name) || Format::of_name(&name).is_err() && !is_stream(output)
 }

@@ -15,6 +15,7 @@ use crate::agent::vlm::secrets::Secret;
 use crate::agent::vlm::wire_format::{Dialect, Effort};
 use crate::agent::vlm::{OnOutage, Vlm, spent};
 use crate::agent::{Agent, Lost, Player, Task};
+use crate::base::model_id::OWN_SERVER;
 use crate::record::plan::slug;
 
 /// A model, who serves it, and what a recording with it may spend.
@@ -33,6 +34,10 @@ pub struct VlmArgs {
     /// The address of a server that takes OpenAI's chat completions, such as `http://localhost:8000/v1`
     #[arg(long, value_name = "URL")]
     base_url: Option<String>,
+    /// Record the answers of this model too, by its id as the provider returns it: else an answer by another model than the one
+    /// asked for stops the recording
+    #[arg(long, value_name = "ID")]
+    accept_model: Vec<String>,
     /// Let the prompt alone ask for the reply's shape, and not the provider enforce it
     #[arg(long)]
     prompt_only: bool,
@@ -134,7 +139,7 @@ impl VlmArgs {
             return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
         };
         let models = Models::load(self.models.as_deref()).map_err(Failure::input)?;
-        let backend = self.backend.as_deref().or(self.base_url.is_some().then_some("compatible"));
+        let backend = self.backend.as_deref().or(self.base_url.is_some().then_some(OWN_SERVER));
         let mut choice = models.choose(name, backend).map_err(Failure::input)?;
         if let Some(url) = &self.base_url {
             choice.backend.base_url = Some(url.clone());
@@ -142,6 +147,7 @@ impl VlmArgs {
         if self.prompt_only {
             choice.model.contract = Contract::Prompt;
         }
+        choice.model.accepted.clone_from(&self.accept_model);
         choice.model.max_output_tokens = self.max_output_tokens.or(choice.model.max_output_tokens);
         choice.model.reasoning_effort = self.reasoning_effort.or(choice.model.reasoning_effort);
         Ok(choice)

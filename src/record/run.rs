@@ -5,6 +5,8 @@
 //! end in one go. An agent that cannot answer stops the recording, as Ctrl-C does.
 
 use std::cell::RefCell;
+use std::fs::File;
+use std::io;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -106,6 +108,15 @@ pub struct Recording<'a> {
     pub settings: Settings,
 }
 
+/// Makes sure that the process may open the files which a recording needs: where it may not, libraries panic.
+fn check_descriptors(threads: usize, in_flight: usize) -> io::Result<()> {
+    /// Of libraries, and of each thread and episode under way, at least.
+    const LIBRARIES: usize = 16;
+    let needed = if cfg!(unix) { LIBRARIES + 8 * threads + 2 * in_flight } else { 0 };
+    let opened = (0..needed).map(|_| File::open(".")).collect::<io::Result<Vec<_>>>();
+    opened.map(drop).map_err(|error| io::Error::other(format!("a recording needs {needed} files at once: {error}")))
+}
+
 impl Recording<'_> {
     /// Plays these episodes.
     ///
@@ -116,6 +127,7 @@ impl Recording<'_> {
         let unusable = Unusable::new(self.settings.max_unusable);
         let in_flight = self.settings.in_flight.get();
         let threads = self.settings.threads.get().min(in_flight).min(keys.len().max(1));
+        check_descriptors(threads, in_flight.min(keys.len())).map_err(RecordError::fatal)?;
         let results = std::thread::scope(|scope| {
             let (queue, unusable) = (&queue, &unusable);
             let share = |at| in_flight / threads + usize::from(at < in_flight % threads);

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::base::hash;
 use crate::base::number::full_precision;
-use crate::base::replace::{self, FolderFiles, TargetIsInput};
+use crate::base::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput};
 use crate::metric::catalog::{Catalog, Metric};
 use crate::report::style::Style;
 use crate::report::table::Table;
@@ -116,6 +116,8 @@ pub enum BundleError {
     BadPath { path: PathBuf },
     #[error("cannot write the report: {0}, or the report another --out")]
     Input(#[from] TargetIsInput),
+    #[error(transparent)]
+    Folder(#[from] FolderHoldsInput),
     #[error("cannot write the report to {}; is the folder writable?", path.display())]
     Unwritable { path: PathBuf, source: io::Error },
 }
@@ -198,9 +200,9 @@ pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
         return Err(BundleError::NotAFolder { path: out.to_owned() });
     }
     check_old(out, bundle.read)?;
-    let new: Vec<_> = files.iter().map(|file| (file.path.as_path(), file.bytes.as_slice())).collect();
+    let new: Vec<_> = files.iter().map(|file| (file.path.as_path(), Content::Bytes(&file.bytes))).collect();
     check_inputs(out, &new.iter().map(|(path, _)| path).collect::<Vec<_>>(), bundle.read)?;
-    replace::replace_folder(out, &FolderFiles { new: &new, index: Path::new(MANIFEST), old: &old::files })
+    replace::replace_folder(out, &FolderFiles { new: &new, index: Some(Path::new(MANIFEST)), old: &old::files })
         .map_err(|error| BundleError::Unwritable { path: error.path, source: error.source })?;
     Ok(Written { files: files.into_iter().map(|file| out.join(file.path)).collect(), manifest })
 }

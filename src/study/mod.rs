@@ -36,9 +36,11 @@ use std::ffi::OsString;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
+use crate::base::replace;
 use crate::figures::{Figure, FigureName};
 use crate::metric::columns::Columns;
 use crate::metric::definitions::Definitions;
+use crate::report::bundle::BundleError;
 use crate::report::comparison::{Comparison, choose, compare};
 use crate::report::errata::Errata;
 use crate::report::layout;
@@ -429,6 +431,15 @@ impl Study {
     pub fn files_read(&self, style: Option<&Path>) -> Vec<PathBuf> {
         let named = self.question.definitions.as_deref().into_iter().chain(style).map(PathBuf::from);
         self.inputs.iter().map(|input| input.path.clone()).chain(named).collect()
+    }
+
+    /// Refuses a folder for outputs that holds an input: both would be read together from then on.
+    ///
+    /// # Errors
+    /// When it holds one.
+    pub fn check_out(&self, out: &Path) -> Result<(), StudyError> {
+        let inputs = self.inputs.iter().map(|input| &input.path);
+        Ok(replace::check_folder(out, inputs).map_err(BundleError::from)?)
     }
 
     /// Refuses inputs that are not what they were when they were opened.

@@ -8,9 +8,10 @@ use super::figure_inputs::{Drawings, FigureInputs};
 use super::losses::Counted;
 use super::results::{Outputs, Results};
 use super::{DEFAULT_DEFINITIONS, LostAs, Source, Study, scores};
+use crate::base::replace;
 use crate::base::suggest::hint;
 use crate::figures::{Figure as Drawn, FigureName};
-use crate::report::bundle::{self, Bundle, Manifest, OutputFile};
+use crate::report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
 use crate::report::html::{self, Figure, Page, Recordings};
 use crate::report::layout;
 use crate::report::quality::{self, QualityTable};
@@ -23,6 +24,7 @@ use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
 use crate::stats::losses::LostCounts;
 use crate::trace::checksums::missing_note;
+use crate::trace::answered;
 use crate::trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.
@@ -68,6 +70,8 @@ pub struct Report {
     illustrations: Vec<OutputFile>,
     /// The files that it is made from, none of which it may replace.
     read: Vec<PathBuf>,
+    /// How many of these, the first ones, are traces or scores.
+    inputs: usize,
 }
 
 /// A report that was written.
@@ -85,7 +89,8 @@ impl Study {
     /// # Errors
     /// When it has one.
     pub fn check_folder(&self, out: &Path, options: &ReportOptions) -> Result<(), StudyError> {
-        Ok(bundle::check_old(out, &self.files_read(Some(&options.style)))?)
+        bundle::check_old(out, &self.files_read(Some(&options.style)))?;
+        self.check_out(out)
     }
 
     /// Makes the report of the study.
@@ -124,6 +129,7 @@ impl Study {
             recordings,
             illustrations,
             read,
+            inputs: self.inputs.len(),
         };
         if let Some(statistics) = &statistics {
             report.illustrate(statistics)?;
@@ -150,6 +156,9 @@ impl Study {
         }
         notes.extend(registered(&results.episodes));
         notes.extend(self.source.traces().ok().and_then(|traces| missing_note(traces.files())));
+        if let Source::Traces(set) = &self.source {
+            notes.extend(answered::by_others(set.files()));
+        }
         let total = lost.total();
         if total > 0 {
             let (noun, verb) = if total == 1 { ("episode", "was") } else { ("episodes", "were") };
@@ -223,6 +232,8 @@ impl Report {
     /// Where `out` is no folder or cannot be written; the folder is then as it was, or has no manifest. A file of the old
     /// report that this one is made from.
     pub fn write(&self, out: &Path) -> Result<WrittenReport, StudyError> {
+        bundle::check_old(out, &self.read)?;
+        replace::check_folder(out, &self.read[..self.inputs]).map_err(BundleError::from)?;
         let mut episodes = Vec::new();
         let all = self.all.as_ref().unwrap_or(&self.results.episodes);
         scores::write(all, Format::Parquet, &mut episodes, self.threads)?;

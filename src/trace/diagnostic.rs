@@ -10,6 +10,15 @@ use serde::Serialize;
 use crate::base::budget::Exceeded;
 use crate::base::escape::visible;
 
+/// What helps where the system lets the process open no more files.
+pub const MORE_FILES: &str = "raise the limit of open files, as in `ulimit -n 1024`, and run the command again";
+
+/// Whether words of the system say that too many files are open.
+pub fn is_short_of_files(words: &str) -> bool {
+    // EMFILE and ENFILE.
+    words.contains("(os error 24)") || words.contains("(os error 23)")
+}
+
 /// One thing that is wrong with a trace.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Finding {
@@ -211,6 +220,13 @@ impl fmt::Display for Code {
 impl Finding {
     /// A finding about a whole file; the place is narrowed by the methods that follow.
     pub fn new(code: Code, file: impl Into<String>, expected: impl Into<String>, found: impl Into<String>) -> Self {
+        let mut found = found.into();
+        // Decoders pass on as text what the system says, which is no damage of the file.
+        let decoded = matches!(code, Code::CorruptFooter | Code::CorruptData | Code::NotParquet | Code::Truncated);
+        let code = if decoded && found.contains(" (os error ") { Code::Unreadable } else { code };
+        if let Some(said) = found.strip_prefix("External: ").filter(|_| code == Code::Unreadable) {
+            found = said.to_owned();
+        }
         Self {
             code,
             severity: code.severity(),
@@ -220,8 +236,8 @@ impl Finding {
             t: None,
             column: None,
             expected: expected.into(),
-            found: found.into(),
-            help: code.help().into(),
+            help: if is_short_of_files(&found) { MORE_FILES } else { code.help() }.into(),
+            found,
         }
     }
 

@@ -5,7 +5,7 @@
 //! it has. Inside a folder, links to folders are not followed, and reports and names that begin with `_` or `.` are
 //! passed over: what other programs leave beside their Parquet.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::{OsStr, OsString};
 use std::fs;
 use std::io::Read;
@@ -16,6 +16,7 @@ use super::glob_paths::{GlobError, is_glob, matches};
 
 use crate::base::budget::Limit;
 use crate::base::input;
+use crate::base::replace::{folder_of, is_unfinished};
 
 /// A file to read, and what it is called in messages and outputs.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,6 +52,15 @@ pub fn resolve(arguments: &[OsString], list: impl Read) -> Result<Vec<Input>, Tr
         } else if let Some(list) = list.take() {
             paths.extend(listed(list)?);
         }
+    }
+    let folders: BTreeSet<&Path> = paths.iter().map(|path| folder_of(path)).collect();
+    if let Some(folder) = folders.into_iter().find(|folder| is_unfinished(folder)) {
+        return Err(TraceError::NoInput {
+            argument: folder.display().to_string(),
+            expected: "the files of one command",
+            found: "old and new ones, since their replacement was broken off".into(),
+            help: "run the command again that writes there: it puts them in order",
+        });
     }
     let mut files = BTreeMap::new();
     for path in paths {

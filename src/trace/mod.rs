@@ -10,6 +10,7 @@
 //!
 //! `scan` reads for scoring: `read` and `validate` in one pass. Rule: only this room opens traces. It knows no metric.
 
+pub mod answered;
 pub mod bits;
 pub(crate) mod catch_panic;
 pub mod checksums;

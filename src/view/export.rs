@@ -13,7 +13,7 @@ use super::error::ViewError;
 use super::snapshot::Snapshot;
 use super::{View, changes, episode, list, map, overview, page};
 use crate::base::budget::Limit;
-use crate::base::replace::{FolderFiles, replace_folder};
+use crate::base::replace::{Content, FolderFiles, replace_folder};
 use crate::study::Part;
 
 /// What is asked of programs that collect pages.
@@ -85,8 +85,8 @@ pub fn write(view: &View, folder: &Path) -> Result<usize, ViewError> {
     for (at, id) in ids.iter().enumerate() {
         add_episode(&mut files, &snapshot, at, id)?;
     }
-    let new: Vec<(&Path, &[u8])> = files.all.iter().map(|(path, bytes)| (path.as_path(), bytes.as_slice())).collect();
-    replace_folder(folder, &FolderFiles { new: &new, index: Path::new("index.html"), old: &old_files })?;
+    let new: Vec<_> = files.all.iter().map(|(path, bytes)| (path.as_path(), Content::Bytes(bytes))).collect();
+    replace_folder(folder, &FolderFiles { new: &new, index: Some(Path::new("index.html")), old: &old_files })?;
     Ok(new.len())
 }
 

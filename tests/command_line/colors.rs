@@ -95,7 +95,14 @@ fn refused(folder: &Path, traces: &[&str]) -> String {
 }
 
 /// Texts that no column may hold, as a message shows them, and what it says instead.
-const MISSPELLED: [(&str, &str, &str); 9] = [
+const MISSPELLED: [(&str, &str, &str); 12] = [
+    ("r\u{435}d", "`r\u{435}d`", "did you mean `red`? its `\u{435}` is U+0435, which only looks like `e`"),
+    ("t\u{435}al", "`t\u{435}al`", "did you mean `teal`? its `\u{435}` is U+0435, which only looks like `e`"),
+    (
+        "\u{433}\u{435}\u{501}",
+        "`\u{433}\u{435}\u{501}`",
+        "did you mean `red`? its `\u{433}` is U+0433, which only looks like `r`",
+    ),
     ("Red", "`Red`", "did you mean `red`?"),
     ("BLUE", "`BLUE`", "did you mean `blue`?"),
     (" red", "` red`", "did you mean `red`?"),

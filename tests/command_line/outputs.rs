@@ -71,13 +71,13 @@ fn a_report_does_not_replace_what_it_is_made_of() {
         assert!(error.contains("expected another file to write, found one that is read"), "{error}");
         assert!(contents(folder.path()) == before, "{input}");
     }
-    // A trace where the report has a file of its own, and one that is nobody's.
+    // A trace where the report has a file of its own, and one that it would be read together with from then on.
     fs::create_dir(folder.path().join("new")).unwrap();
-    for (name, is_refused) in [("episodes.parquet", true), ("mine.parquet", false)] {
+    for name in ["episodes.parquet", "mine.parquet"] {
         let path = format!("new/{name}");
         fs::copy(folder.path().join("a.parquet"), folder.path().join(&path)).unwrap();
         let answer = run(folder.path(), &["report", &path, "--no-figures", "--out", "new"]);
-        assert_eq!(answer.code == 2, is_refused, "{}", answer.stderr);
+        assert_eq!(answer.code, 2, "{}", answer.stderr);
         let (trace, now) = (fs::read(folder.path().join("a.parquet")).unwrap(), fs::read(folder.path().join(&path)));
         assert!(now.unwrap() == trace, "{path}");
         fs::remove_file(folder.path().join(&path)).unwrap();
@@ -125,5 +125,110 @@ fn standard_output_by_its_name_may_be_a_file() {
         let answer = figure(folder.path(), name, file.into());
         assert!(answer.status.success(), "{name}: {}", String::from_utf8_lossy(&answer.stderr));
         assert!(fs::read_to_string(&path).unwrap() == format!("{before}{expected}"), "{name}");
+    }
+}
+
+#[test]
+fn a_folder_with_inputs_is_no_folder_for_outputs() {
+    let folder = two_files();
+    let runs = folder.path().join("runs");
+    fs::create_dir_all(runs.join("deep")).unwrap();
+    fs::copy(folder.path().join("a.parquet"), runs.join("deep/a.parquet")).unwrap();
+    let before = contents(folder.path());
+    for (input, out) in [("runs", "runs"), ("runs/deep/a.parquet", "runs"), ("runs/deep", "runs/../runs/deep/.")] {
+        for command in [&["report", "--no-figures"][..], &["sensitivity"]] {
+            let message = run(folder.path(), &[command, &[input, "--out", out]].concat()).refused();
+            assert!(message.contains(&format!("`{out}`: expected a folder for outputs, found an input")), "{message}");
+            assert!(message.contains("\n  help: name another folder"), "{message}");
+        }
+        assert!(contents(folder.path()) == before, "{input}");
+    }
+    #[cfg(feature = "view")]
+    assert!(run(folder.path(), &["view", "runs", "--export", "runs"]).refused().contains("name another one"));
+    // The library refuses it too, for Python.
+    let study = mirrorstats::Study::open([&runs]).unwrap();
+    let report = study.report(&mirrorstats::ReportOptions { figures: false, ..Default::default() }).unwrap();
+    assert!(report.write(&runs).unwrap_err().to_string().contains("expected a folder for outputs"));
+    // A new folder inside is no trouble: what reads the traces passes over reports.
+    run(folder.path(), &["report", "runs", "--no-figures", "--out", "runs/report"]).done();
+    run(folder.path(), &["score", "runs"]).done();
+}
+
+#[test]
+fn scores_go_to_standard_output_and_into_pipes_by_name() {
+    let folder = two_files();
+    let expected = run(folder.path(), &["score", "a.parquet"]).done();
+    for name in ["/dev/stdout", "/dev/fd/1"] {
+        assert_eq!(run(folder.path(), &["score", "a.parquet", "-o", name]).done(), expected, "{name}");
+    }
+    assert_eq!(run(folder.path(), &["score", "a.parquet", "-o", "/dev/null"]).done(), "");
+    for pipe in ["pipe", "pipe.jsonl"] {
+        let path = folder.path().join(pipe);
+        assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let path = path.clone();
+            move || fs::read_to_string(path).unwrap()
+        });
+        run(folder.path(), &["score", "a.parquet", "-o", pipe]).done();
+        let (read, is_csv) = (reader.join().unwrap(), pipe == "pipe");
+        assert!(if is_csv { read == expected } else { read.starts_with("{\"episode_id\"") }, "{pipe}: {read}");
+        assert!(!fs::metadata(&path).unwrap().is_file(), "{pipe}");
+    }
+}
+
+#[test]
+fn a_folder_of_a_user_is_no_leftover_whatever_its_name() {
+    let folder = two_files();
+    let notes = folder.path().join(".mirrorstats-notes.backup");
+    fs::create_dir(&notes).unwrap();
+    fs::write(notes.join("thesis.txt"), "mine").unwrap();
+    run(folder.path(), &["score", "a.parquet", "-o", "s.csv"]).done();
+    run(folder.path(), &["report", "a.parquet", "--no-figures", "--out", "r"]).done();
+    assert_eq!(fs::read(notes.join("thesis.txt")).unwrap(), b"mine");
+}
+
+#[test]
+fn a_folder_whose_replacement_was_broken_off_is_not_read() {
+    let folder = two_files();
+    let runs = folder.path().join("runs");
+    fs::create_dir(&runs).unwrap();
+    fs::copy(folder.path().join("a.parquet"), runs.join("a.parquet")).unwrap();
+    fs::write(runs.join(".mirrorstats-unfinished"), "a.parquet").unwrap();
+    for input in ["runs", "runs/a.parquet"] {
+        let message = run(folder.path(), &["score", input]).refused();
+        assert!(message.contains("broken off; run the command again"), "{message}");
+    }
+}
+
+#[test]
+fn running_out_of_open_files_is_no_damage() {
+    let folder = two_files();
+    for at in 0..20 {
+        fs::copy(folder.path().join("a.parquet"), folder.path().join(format!("{at}.parquet"))).unwrap();
+    }
+    let refused = |limit: usize, words: &str| {
+        let script = format!("ulimit -n {limit}; exec {} {words}", crate::harness::program::PROGRAM);
+        let output = std::process::Command::new("sh").args(["-c", &script]).current_dir(&folder).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    let mut seen = 0;
+    for limit in 4..14 {
+        for words in ["score a.parquet", "stats a.parquet", "report a.parquet --no-figures --out r"] {
+            let (code, said) = refused(limit, words);
+            assert!(!said.contains("damaged") && !said.contains("panicked"), "{limit} {words}: {said}");
+            // With fewer, not even the linker starts the program.
+            if code == Some(2) {
+                assert!(said.contains("Too many open files") && said.contains("ulimit -n"), "{limit} {words}: {said}");
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen > 0, "no limit was too small");
+    #[cfg(feature = "sim")]
+    for limit in [8, 12, 16] {
+        let (code, said) = refused(limit, "record --agent random --experiment E1 --seeds 1 --runs 1 --no-frames");
+        assert_eq!(code, Some(2), "{limit}: {said}");
+        assert!(said.contains("Too many open files") && said.contains("ulimit -n"), "{limit}: {said}");
+        assert!(!said.contains("damaged") && !said.contains("panicked"), "{limit}: {said}");
     }
 }

@@ -92,6 +92,7 @@ impl VlmAgent {
                     .vlm
                     .read(body)
                     .ok_or_else(|| Lost::because(format!("the recorded answer of step {t} cannot be read")))?;
+                self.vlm.check_model(answer.model.as_deref())?;
                 let count = |tokens: Option<u32>| tokens.and_then(|tokens| i32::try_from(tokens).ok());
                 let usage = Usage {
                     latency_ms: Some(*latency_ms),

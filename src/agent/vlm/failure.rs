@@ -24,6 +24,8 @@ pub struct Failure {
 pub enum FailureKind {
     /// Too many requests.
     RateLimited,
+    /// Too many requests for today.
+    DailyQuota,
     /// The provider failed, the connection broke, or what came is no answer.
     Server,
     /// Nothing whole came in time.
@@ -40,7 +42,7 @@ impl FailureKind {
     /// The status of a step that ends in this failure.
     pub const fn status(self) -> Status {
         match self {
-            Self::RateLimited => Status::RateLimited,
+            Self::RateLimited | Self::DailyQuota => Status::RateLimited,
             Self::Server | Self::Rejected | Self::Denied | Self::NoImages => Status::ServerError,
             Self::Timeout => Status::Timeout,
         }
@@ -88,6 +90,7 @@ pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
         // Whatever the status: llama.cpp says it as a failure of the server, others as a bad request.
         _ if takes_no_images(body) => FailureKind::NoImages,
         StatusCode::TOO_MANY_REQUESTS if is_out_of_credit(body) => FailureKind::Denied,
+        StatusCode::TOO_MANY_REQUESTS if is_of_a_day(body) => FailureKind::DailyQuota,
         StatusCode::TOO_MANY_REQUESTS => FailureKind::RateLimited,
         StatusCode::REQUEST_TIMEOUT | StatusCode::GATEWAY_TIMEOUT => FailureKind::Timeout,
         status if status.is_server_error() => FailureKind::Server,
@@ -152,9 +155,32 @@ fn is_out_of_credit(body: &str) -> bool {
     error["code"] == CODE || error["type"] == CODE
 }
 
-/// The wait that a provider asks for: seconds, whole or not, or a date. A date that is over asks for none, what is
+/// Whether too many requests are those of a day. Gemini names the quota (`GenerateRequestsPerDayPerProjectPerModel`), OpenAI
+/// and OpenRouter say it in words ("requests per day (RPD)", "free-models-per-day").
+fn is_of_a_day(body: &str) -> bool {
+    ["PerDay", "per day", "per-day"].iter().any(|words| body.contains(words))
+}
+
+/// The wait that the body of an error asks for: `google.rpc.RetryInfo`, as Gemini sends it, has seconds and an `s`.
+/// Source: <https://github.com/googleapis/googleapis/blob/master/google/rpc/error_details.proto>, duration in JSON.
+pub(super) fn retry_info(body: &str) -> Option<Duration> {
+    let body: Value = serde_json::from_str(body).ok()?;
+    let error = body.get("error").or_else(|| body.get(0)?.get("error"))?;
+    let info = error["details"]
+        .as_array()?
+        .iter()
+        .find(|detail| detail["@type"].as_str().is_some_and(|name| name.ends_with("google.rpc.RetryInfo")))?;
+    let seconds = info["retryDelay"].as_str()?.strip_suffix('s')?.parse().ok()?;
+    Duration::try_from_secs_f64(seconds).ok()
+}
+
+/// The wait that a provider asks for: milliseconds, as OpenAI and its own client have them; seconds, whole or not, or a date. A date that is over asks for none, what is
 /// neither asks for nothing, and what no duration can hold asks for the longest.
 pub(super) fn retry_after(headers: &HeaderMap) -> Option<Duration> {
+    let milliseconds = headers.get("retry-after-ms").and_then(|value| value.to_str().ok()?.trim().parse::<f64>().ok());
+    if let Some(wait) = milliseconds.and_then(|wait| Duration::try_from_secs_f64(wait / 1e3).ok()) {
+        return Some(wait);
+    }
     let value = headers.get(RETRY_AFTER)?.to_str().ok()?.trim();
     if let Ok(seconds) = value.parse::<f64>() {
         let is_wait = seconds >= 0.0;

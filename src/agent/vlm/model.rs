@@ -58,6 +58,10 @@ pub struct Vlm {
     max_output_tokens: u32,
     /// Why no further request makes sense, once there is such a reason.
     stop: OnceLock<Lost>,
+    /// Whether a request of this recording has had its outcome.
+    is_known: AtomicBool,
+    /// Held by the first request: until its outcome no other one goes out.
+    first: tokio::sync::Mutex<()>,
     /// Whether the model has answered a request of this recording, so that one that is rejected is wrong by itself.
     pub(super) has_answered: AtomicBool,
 }
@@ -81,6 +85,8 @@ impl Vlm {
             account,
             on_outage,
             stop: OnceLock::new(),
+            is_known: AtomicBool::new(false),
+            first: tokio::sync::Mutex::default(),
             has_answered: AtomicBool::new(false),
         }
     }
@@ -96,6 +102,8 @@ impl Vlm {
             account: Arc::default(),
             on_outage: OnOutage::default(),
             stop: OnceLock::new(),
+            is_known: AtomicBool::new(false),
+            first: tokio::sync::Mutex::default(),
             has_answered: AtomicBool::new(false),
         }
     }
@@ -118,6 +126,36 @@ impl Vlm {
     /// Notes that the model has answered: a request that is rejected from now on costs its episode, not the recording.
     pub fn note_answered(&self) {
         self.has_answered.store(true, Ordering::Relaxed);
+    }
+
+    /// Waits while the first request is out, which tells which model answers. The first one gets what to hold.
+    pub(super) async fn turn_of_first(&self) -> Option<tokio::sync::MutexGuard<'_, ()>> {
+        let is_over = || self.is_known.load(Ordering::Relaxed) || self.has_answered.load(Ordering::Relaxed);
+        if is_over() {
+            return None;
+        }
+        let turn = self.first.lock().await;
+        (!is_over()).then_some(turn)
+    }
+
+    /// Notes that a request has had its outcome: others need not wait for it.
+    pub(super) fn note_known(&self) {
+        self.is_known.store(true, Ordering::Relaxed);
+    }
+
+    /// Stops the recording if another model answered than the one that was asked for.
+    ///
+    /// # Errors
+    /// The reason.
+    pub(super) fn check_model(&self, returned: Option<&str>) -> Result<(), Lost> {
+        let Some(other) = returned.filter(|returned| !self.choice.model.takes_answer_of(returned)) else {
+            return Ok(());
+        };
+        let (id, name) = (&self.choice.model.id, &self.choice.name);
+        Err(self.halt(Lost::because(format!(
+            "another model answers: asked for `{id}`, found an answer by `{other}`\n  help: `--accept-model {other}` records \
+             it under the name `{name}`; if it is the same model, add its id to `answers_as` of the model in a file for --models"
+        ))))
     }
 
     /// Whether the provider can be reached; a cassette needs none.
@@ -163,6 +201,13 @@ impl Vlm {
         });
         if let Some(effort) = self.choice.model.reasoning_effort {
             description["reasoning_effort"] = effort.name().into();
+        }
+        let (patterns, accepted) = (&self.choice.model.answers_as, &self.choice.model.accepted);
+        if !patterns.is_empty() && patterns != &["*"] {
+            description["answers_as"] = patterns.clone().into();
+        }
+        if !accepted.is_empty() {
+            description["accepted_models"] = accepted.clone().into();
         }
         description
     }

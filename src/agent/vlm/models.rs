@@ -13,6 +13,7 @@ use serde::Deserialize;
 use super::wire_format::{Dialect, Effort};
 use crate::base::budget::Limit;
 use crate::base::input;
+use crate::base::model_id::{OWN_SERVER, answers_for};
 use crate::base::suggest::hint;
 
 const BUILT_IN: &str = include_str!("../../../assets/models.toml");
@@ -62,9 +63,20 @@ pub struct Model {
     pub max_output_tokens: Option<NonZeroU32>,
     /// How much the model is asked to reason before it replies; absent to leave it to the provider.
     pub reasoning_effort: Option<Effort>,
+    /// Ids by which the model answers, besides its own and those of its dated snapshots; `*` is any text.
+    #[serde(default)]
+    pub answers_as: Vec<String>,
+    /// Ids of other models that the user accepts in its place.
+    #[serde(skip)]
+    pub accepted: Vec<String>,
 }
 
 impl Model {
+    /// Whether an answer by the model of this id is one of this model, or accepted as one.
+    pub fn takes_answer_of(&self, returned: &str) -> bool {
+        self.accepted.iter().any(|accepted| accepted == returned) || answers_for(&self.id, returned, &self.answers_as)
+    }
+
     /// The most tokens of a reply where nobody asks for another number. A model that is asked to reason gets more, or it
     /// would be cut off before its reply.
     pub fn max_output_tokens(&self) -> u32 {
@@ -243,6 +255,9 @@ impl Models {
                     contract: Contract::default(),
                     max_output_tokens: None,
                     reasoning_effort: None,
+                    // A server of one's own may call the only model that it has by any name.
+                    answers_as: if backend == OWN_SERVER { vec!["*".to_owned()] } else { Vec::new() },
+                    accepted: Vec::new(),
                 },
             ),
             (None, None) => return Err(self.unknown(name)),

@@ -2,6 +2,7 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use backon::{ExponentialBuilder, Retryable as _};
 use serde_json::Value;
@@ -16,6 +17,10 @@ use crate::agent::Lost;
 /// What helps where a model takes no images.
 const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
                     for images (llama.cpp: --mmproj FILE)";
+
+/// What helps where a day's quota is used up.
+const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
+                        answered is not asked again";
 
 /// Journals stay usable when a thread that held one ended badly: every line in them is whole.
 pub(super) fn locked(journal: &Mutex<Journal>) -> MutexGuard<'_, Journal> {
@@ -56,7 +61,7 @@ impl Step {
         let mut attempt = 0;
         let asked = (|| {
             attempt += 1;
-            self.attempt(provider, attempt)
+            self.attempt_in_turn(provider, attempt)
         })
         .retry(backoff)
         .when(|ended| matches!(ended, Ended::Failed(failure) if failure.kind.may_pass()))
@@ -85,12 +90,41 @@ impl Step {
             FailureKind::NoImages => {
                 format!("the model, or the server that runs it, takes no images: {}{SEES}", failure.detail)
             }
+            FailureKind::DailyQuota => {
+                format!("the provider's quota of the day is used up: {}{TOMORROW}", failure.detail)
+            }
             _ => format!("the provider refuses the request: {}", failure.detail),
         };
         self.vlm.halt(Lost::because(reason))
     }
 
+    /// An attempt, made again when the provider says when: a rate limit is no fault, and uses up no attempts.
+    async fn attempt_in_turn(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
+        let patience = provider.patience();
+        let mut waited = Duration::ZERO;
+        loop {
+            let ended = self.attempt(provider, attempt).await;
+            let Err(Ended::Failed(Failure { kind: FailureKind::RateLimited, after: Some(after), .. })) = &ended else {
+                return ended;
+            };
+            let is_over = waited + *after > patience.longest_wait || *after > patience.longest_asked_delay;
+            if after.is_zero() || is_over {
+                return ended;
+            }
+            tokio::time::sleep(*after).await;
+            waited += *after;
+        }
+    }
+
     async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
+        let first = self.vlm.turn_of_first().await;
+        let ended = self.exchange(provider, attempt).await;
+        self.vlm.note_known();
+        drop(first);
+        ended
+    }
+
+    async fn exchange(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
         if let Some(lost) = self.vlm.end() {
             return Err(Ended::Stopped(lost));
         }
@@ -104,8 +138,10 @@ impl Step {
                 self.vlm.account.answer(tokens(&received.answer), cost);
                 let latency_ms = i32::try_from(received.latency.as_millis()).unwrap_or(i32::MAX);
                 let (body, model, answered) = (received.body, received.answer.model, question.clone());
+                let other = model.clone();
                 self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body: body.clone() })?;
                 self.vlm.note_answered();
+                self.vlm.check_model(other.as_deref()).map_err(Ended::Stopped)?;
                 Ok(Recorded::Answer { question: answered, latency_ms, body })
             }
             Err(failure) => {

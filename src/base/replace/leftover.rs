@@ -1,15 +1,15 @@
 //! Temporary files that killed processes have left behind.
 //!
-//! Rule: a temporary file or folder is locked for as long as its process lives, however that ends. Whoever gets the
-//! lock may remove it. Where the file system has no locks, nothing is removed.
+//! Rule: a temporary name proves by its checksum that this program gave it, and its file or folder is locked for as long
+//! as its process lives, however that ends. Whoever gets the lock may remove it. Where the file system has no locks, nothing
+//! is removed.
 
 use std::collections::BTreeSet;
-use std::ffi::OsStr;
 use std::fs::{self, DirEntry, File};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use super::place::{PREFIX, RANDOM};
+use super::place::is_temporary;
 
 /// The folders that this process has swept. Once is enough, and a folder of a hundred thousand files takes its time.
 static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -40,14 +40,6 @@ fn remove(folder: &Path) {
     }
 }
 
-/// Whether a name is one that [`temporary`](super::temporary) gives.
-fn is_temporary(name: &OsStr) -> bool {
-    let Some(rest) = name.as_encoded_bytes().strip_prefix(PREFIX.as_bytes()) else { return false };
-    rest.split_at_checked(rest.len().saturating_sub(RANDOM)).is_some_and(|(before, random)| {
-        before.ends_with(b".") && random.len() == RANDOM && random.iter().all(u8::is_ascii_alphanumeric)
-    })
-}
-
 fn remove_unowned(entry: &DirEntry) {
     let path = entry.path();
     // A pipe would block when opened, and a link leads elsewhere: neither is ours.
@@ -65,7 +57,7 @@ fn remove_unowned(entry: &DirEntry) {
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt as _;
     let place = |metadata: &fs::Metadata| (metadata.dev(), metadata.ino());
-    matches!((file.metadata(), fs::metadata(path)), (Ok(ours), Ok(there)) if place(&ours) == place(&there))
+    matches!((file.metadata(), fs::symlink_metadata(path)), (Ok(ours), Ok(there)) if place(&ours) == place(&there))
 }
 
 #[cfg(not(unix))]

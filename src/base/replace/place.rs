@@ -1,14 +1,18 @@
 //! Where files go, what they are called until they are complete, and whether they can be replaced at all.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 use std::fs::{self, File};
 use std::io;
 use std::path::Path;
 
+use crate::base::hash;
+
 /// Every temporary name begins with this; those who look for data pass over names that begin with a dot.
 pub(super) const PREFIX: &str = ".mirrorstats-";
-/// How many random characters end a temporary name.
+/// How many random characters a temporary name has.
 pub(super) const RANDOM: usize = 6;
+/// How many characters of a checksum end a temporary name.
+const CHECK: usize = 10;
 /// The longest part of the target's name in a temporary name, bytes: file systems allow 255 in all.
 const LONGEST_NAME: usize = 200;
 
@@ -56,7 +60,7 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
 
 /// Whether bytes can only be written into `target`: it exists and is no regular file, or names an open file of the
 /// process, which may be any.
-pub(super) fn is_stream(target: &Path) -> bool {
+pub fn is_stream(target: &Path) -> bool {
     let names_open_file = cfg!(unix)
         && (["/dev/stdout", "/dev/stderr"].iter().any(|name| target == Path::new(name))
             || folder_of(target) == Path::new("/dev/fd")
@@ -64,7 +68,7 @@ pub(super) fn is_stream(target: &Path) -> bool {
     fs::metadata(target).is_ok_and(|metadata| names_open_file || !metadata.is_file())
 }
 
-/// What the temporary names for a target begin with; six random characters follow.
+/// What the temporary names for a target begin with; random characters and the checksum follow.
 pub(super) fn prefix_for(target: &Path) -> OsString {
     let name = target.file_name().unwrap_or_default();
     let mut prefix = OsString::from(PREFIX);
@@ -75,4 +79,18 @@ pub(super) fn prefix_for(target: &Path) -> OsString {
     }
     prefix.push(".");
     prefix
+}
+
+/// The checksum that ends a temporary name, by which it is known to be ours.
+pub(super) fn checksum(before: &[u8]) -> String {
+    hash::of_bytes(before)[..CHECK].to_owned()
+}
+
+/// Whether a name is one that [`temporary`](super::temporary) gives.
+pub(super) fn is_temporary(name: &OsStr) -> bool {
+    let name = name.as_encoded_bytes();
+    name.starts_with(PREFIX.as_bytes())
+        && name
+            .split_at_checked(name.len().saturating_sub(CHECK))
+            .is_some_and(|(before, end)| checksum(before).as_bytes() == end)
 }

@@ -36,6 +36,34 @@ pub fn check_target<P: AsRef<Path>>(
     }
 }
 
+/// A folder for outputs that holds one of the inputs.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "`{folder}`: expected a folder for outputs, found an input in it (`{input}`): both would be read together from then \
+     on\n  help: name another folder; it may be a new one inside this one"
+)]
+pub struct FolderHoldsInput {
+    /// The folder, as typed.
+    folder: String,
+    /// The first input in it.
+    input: String,
+}
+
+/// Refuses a folder for outputs that one of `inputs` is in, or below, under whatever name.
+///
+/// # Errors
+/// [`FolderHoldsInput`].
+pub fn check_folder<P: AsRef<Path>>(
+    folder: &Path,
+    inputs: impl IntoIterator<Item = P>,
+) -> Result<(), FolderHoldsInput> {
+    let Ok(place) = fs::canonicalize(folder) else { return Ok(()) };
+    let is_inside = |input: &P| fs::canonicalize(input).is_ok_and(|input| input.starts_with(&place));
+    let Some(input) = inputs.into_iter().find(is_inside) else { return Ok(()) };
+    let name = input.as_ref().file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Err(FolderHoldsInput { folder: folder.display().to_string(), input: name })
+}
+
 /// Whether two paths lead to one existing file: links are followed, and hard links are one file.
 #[cfg(unix)]
 pub fn is_same_file(a: &Path, b: &Path) -> bool {

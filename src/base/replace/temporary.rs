@@ -12,7 +12,7 @@ use std::mem;
 use std::path::{Path, PathBuf};
 
 use super::leftover;
-use super::place::RANDOM;
+use super::place::{RANDOM, checksum};
 
 /// The characters, which are no others where a file system does not tell capitals apart.
 const CHARACTERS: &[u8; 36] = b"abcdefghijklmnopqrstuvwxyz0123456789";
@@ -152,7 +152,7 @@ fn make(
 }
 
 /// A name that no other process will think of: what is random is drawn by the system.
-fn name(prefix: &OsStr) -> OsString {
+pub(super) fn name(prefix: &OsStr) -> OsString {
     let mut drawn = RandomState::new().hash_one(std::process::id());
     let mut name = prefix.to_owned();
     for _ in 0..RANDOM {
@@ -160,6 +160,8 @@ fn name(prefix: &OsStr) -> OsString {
         name.push(char::from(CHARACTERS[at]).encode_utf8(&mut [0; 4]));
         drawn /= CHARACTERS.len() as u64;
     }
+    let end = checksum(name.as_encoded_bytes());
+    name.push(end);
     name
 }
 

@@ -12,6 +12,11 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
+/// A name as a process gives it that is killed before it is done.
+fn temporary_name(target: &str) -> String {
+    super::temporary::name(&prefix_for(Path::new(target))).into_string().unwrap()
+}
+
 #[test]
 fn a_target_is_replaced_by_a_commit_alone() {
     let folder = tempfile::tempdir().unwrap();
@@ -70,23 +75,28 @@ fn leftovers_of_dead_processes_go_and_all_else_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = |name: &str| folder.path().join(name);
     // Whatever they were to become.
-    let dead = [".mirrorstats-a.txt.abc123", ".mirrorstats-b.txt.Xyz789", ".mirrorstats-frames.000000"];
-    fs::create_dir(path(dead[2])).unwrap();
+    let dead = ["a.txt", "b.txt", "frames"].map(temporary_name);
+    fs::create_dir(path(&dead[2])).unwrap();
     for name in ["001.png", "002.png"] {
-        fs::write(path(dead[2]).join(name), "").unwrap();
+        fs::write(path(&dead[2]).join(name), "").unwrap();
     }
-    let stay =
-        [".mirrorstats-a.txt.abc12", ".mirrorstats-abc123", ".mirrorstats-unfinished", "mine.abc123", "a.abc123"];
-    for name in dead[..2].iter().chain(&stay) {
+    // A user's own, however much like ours.
+    let mine = path(".mirrorstats-notes.backup");
+    fs::create_dir(&mine).unwrap();
+    fs::write(mine.join("thesis.txt"), "mine").unwrap();
+    let nearly = dead[0].replacen("a.txt", "b.txt", 1);
+    let stay = [".mirrorstats-a.txt.abc123", ".mirrorstats-unfinished", "mine.abc123", nearly.as_str()];
+    for name in dead[..2].iter().map(String::as_str).chain(stay) {
         fs::write(path(name), "half").unwrap();
     }
-    let (alive, link) = (path(".mirrorstats-a.txt.abc124"), path(".mirrorstats-a.txt.abc125"));
+    let (alive, link) = (path(&temporary_name("a.txt")), path(&temporary_name("a.txt")));
     let owner = File::create(&alive).unwrap();
     owner.lock().unwrap();
     std::os::unix::fs::symlink("mine.abc123", &link).unwrap();
     replace(&path("a.txt"), b"new").unwrap();
     assert!(dead.iter().all(|name| !path(name).exists()));
     assert!(alive.exists() && link.exists() && stay.iter().all(|name| path(name).exists()));
+    assert_eq!(fs::read(mine.join("thesis.txt")).unwrap(), b"mine");
 }
 
 #[cfg(unix)]
@@ -94,7 +104,7 @@ fn leftovers_of_dead_processes_go_and_all_else_stays() {
 fn a_folder_is_swept_once_however_many_files_are_written() {
     let folder = tempfile::tempdir().unwrap();
     replace(&folder.path().join("a.txt"), b"new").unwrap();
-    let later = folder.path().join(".mirrorstats-a.txt.abc123");
+    let later = folder.path().join(temporary_name("a.txt"));
     fs::write(&later, "half").unwrap();
     replace(&folder.path().join("b.txt"), b"new").unwrap();
     assert!(later.exists(), "the next process sweeps it");

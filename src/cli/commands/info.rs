@@ -10,11 +10,13 @@ use serde::Serialize;
 use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
 use crate::cli::quality::{self, CellAnswer};
 use crate::cli::terminal;
 use crate::cli::text_table::{aligned_right, counted, listing};
 use crate::report::tables::fit::{fitted, wrapped};
 use crate::score::quality::QualityByCell;
+use crate::trace::answered::by_others;
 use crate::trace::checksums::Checksums;
 use crate::trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
 
@@ -49,6 +51,7 @@ impl InfoCommand {
     pub fn run(&self) -> Result<Outcome, Failure> {
         let study = self.input.open()?;
         let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };
+        output::notes(&by_others(study.traces()?.files()));
         let info = info(study.traces()?, listing, self.input.threads.count()).map_err(Failure::input)?;
         if let Some(episodes) = info.episode_list.as_ref().filter(|_| !self.json) {
             writeln!(io::stdout().lock(), "{}", fitted(&list_of(episodes), 1, terminal::width()))?;

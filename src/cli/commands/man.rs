@@ -1,9 +1,10 @@
 //! `mirrorstats man`: manual pages, one per command.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::CommandFactory as _;
 
+use crate::base::replace::Content;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{Cli, help, output};
 
@@ -22,18 +23,20 @@ impl ManArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let mut command = help::with_examples_alone(Cli::command());
         command.build();
-        std::fs::create_dir_all(&self.folder)
-            .map_err(|error| Failure::input(format!("cannot make the folder `{}`: {error}", self.folder.display())))?;
-        pages(&command, &self.folder)?;
+        let mut made = Vec::new();
+        pages(&command, &mut made)?;
+        let files: Vec<_> = made.iter().map(|(name, page)| (Path::new(name), Content::Bytes(page))).collect();
+        output::write_folder(&self.folder, &files)?;
         output::say(&format!("the pages are in {}", self.folder.display()));
         Ok(Outcome::Done)
     }
 }
 
-fn pages(command: &clap::Command, folder: &std::path::Path) -> Result<(), Failure> {
+/// Adds the pages of a command and of those below it, each with the name of its file.
+fn pages(command: &clap::Command, made: &mut Vec<(String, Vec<u8>)>) -> Result<(), Failure> {
     let name = command.get_display_name().unwrap_or_else(|| command.get_name()).to_owned();
     let mut page = Vec::new();
     clap_mangen::Man::new(command.clone()).date("").render(&mut page)?;
-    output::write_file(&folder.join(format!("{name}.1")), &page)?;
-    command.get_subcommands().filter(|inner| inner.get_name() != "help").try_for_each(|inner| pages(inner, folder))
+    made.push((format!("{name}.1"), page));
+    command.get_subcommands().filter(|inner| inner.get_name() != "help").try_for_each(|inner| pages(inner, made))
 }

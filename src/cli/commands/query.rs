@@ -77,6 +77,7 @@ mod rows {
 
     use super::{AnswerFormat, Failure, Outcome, QueryArgs};
     use crate::base::escape::visible;
+    use crate::base::replace::is_stream;
     use crate::cli::args::GroupingArgs;
     use crate::cli::text_table::listing;
     use crate::cli::{output, terminal};
@@ -133,7 +134,7 @@ mod rows {
             (Some("csv"), _) => AnswerFormat::Csv,
             (Some("jsonl" | "ndjson"), _) => AnswerFormat::Jsonl,
             (Some("parquet"), _) => AnswerFormat::Parquet,
-            (_, Some(path)) if args.format.is_none() => {
+            (_, Some(path)) if args.format.is_none() && !is_stream(path) => {
                 return Err(Failure::Rendered(format!(
                     "error: `{}`: expected a name that ends in .csv, .jsonl, .parquet or .txt\n  help: or say which format with --format",
                     path.display()

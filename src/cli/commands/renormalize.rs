@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::fs::File;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::base::escape::visible;
-use crate::base::replace::{NewFile, is_same_file};
+use crate::base::replace::{Content, is_same_file};
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::text_table::{aligned_right, counted, listing};
@@ -108,24 +110,32 @@ impl RenormalizeArgs {
             files: Vec::new(),
             flips: Vec::new(),
         };
+        let stage = self.written_to().map(output::stage_beside).transpose()?;
         let mut new = Vec::new();
         for (at, (input, old)) in inputs.iter().zip(&old).enumerate() {
             let place = places.as_ref().map(|places| places[at].as_path());
-            let (file, result) = renormalized(old, place)?;
-            new.extend(file.zip(place));
+            let staged = stage.as_ref().map(|stage| stage.path().join(at.to_string()));
+            let result = renormalized(old, place.zip(staged.as_deref()))?;
+            new.extend(input.path.file_name().map(Path::new).zip(staged));
             answer.add(input, place, result);
         }
-        for (file, place) in new {
-            output::commit(file, place)?;
+        if let Some(folder) = self.written_to() {
+            let files: Vec<_> = new.iter().map(|(name, staged)| (*name, Content::File(staged))).collect();
+            output::write_folder(folder, &files)?;
         }
         output::print(&answer, self.json)?;
         let has_failed = self.fail_on_change && !answer.flips.is_empty();
         Ok(if has_failed { Outcome::CheckFailed } else { Outcome::Done })
     }
 
-    /// Where each trace goes; `None` if nothing is written. The folder is made.
+    /// The folder, if anything is written.
+    fn written_to(&self) -> Option<&Path> {
+        self.out.as_deref().filter(|_| !self.dry_run)
+    }
+
+    /// Where each trace goes; `None` if nothing is written.
     fn places(&self, inputs: &[Input]) -> Result<Option<Vec<PathBuf>>, Failure> {
-        let Some(folder) = self.out.as_deref().filter(|_| !self.dry_run) else { return Ok(None) };
+        let Some(folder) = self.written_to() else { return Ok(None) };
         let mut taken: BTreeMap<PathBuf, &Input> = BTreeMap::new();
         let mut places = Vec::new();
         for input in inputs {
@@ -140,7 +150,6 @@ impl RenormalizeArgs {
                 return Err(refused(input, "another folder for the new trace", "the trace itself"));
             }
         }
-        output::make_folder(folder)?;
         Ok(Some(places))
     }
 
@@ -152,14 +161,13 @@ impl RenormalizeArgs {
     }
 }
 
-/// The new trace in a temporary file beside its place, and what changes in it.
-fn renormalized(old: &Old, place: Option<&Path>) -> Result<(Option<NewFile>, Renormalized), Failure> {
-    let Some(place) = place else {
-        let (_, result) = old.renormalize(std::io::sink()).map_err(Failure::input)?;
-        return Ok((None, result));
+/// What changes in a trace; the new one for `place` is written to another path, if anything is written.
+fn renormalized(old: &Old, to: Option<(&Path, &Path)>) -> Result<Renormalized, Failure> {
+    let out: Box<dyn Write + Send> = match to {
+        Some((place, staged)) => Box::new(File::create(staged).map_err(|error| output::unwritable(place, error))?),
+        None => Box::new(io::sink()),
     };
-    let (file, result) = old.renormalize(output::create(place)?).map_err(Failure::input)?;
-    Ok((Some(file), result))
+    Ok(old.renormalize(out).map_err(Failure::input)?.1)
 }
 
 fn refused(input: &Input, expected: &str, found: &str) -> Failure {

@@ -7,6 +7,7 @@ use super::super::args::{Engine, EngineArgs, GroupingArgs, ScoringArgs, TraceArg
 use super::super::outcome::{Failure, Outcome};
 use super::super::text_table::counted;
 use super::super::{output, spark};
+use crate::base::replace::is_stream;
 use crate::score::format::Format;
 use crate::score::table::EpisodeTable;
 use crate::study::{SparkJob, are_uris, write_scores};
@@ -120,6 +121,10 @@ impl ScoreArgs {
     }
 }
 
+/// The format that the name asks for; CSV for a pipe or a device without an ending, as on standard output.
 fn format_of(path: &Path) -> Result<Format, Failure> {
-    Format::of_name(&path.to_string_lossy()).map_err(Failure::input)
+    match Format::of_name(&path.to_string_lossy()) {
+        Err(_) if is_stream(path) => Ok(Format::Csv),
+        format => format.map_err(Failure::input),
+    }
 }

@@ -3,6 +3,7 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
+use crate::base::replace::Content;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
@@ -38,8 +39,8 @@ pub struct SensitivityArgs {
     pub json: bool,
 }
 
-/// The name of the files in the folder.
-const NAME: &str = "sensitivity";
+/// The names of the tables in the folder.
+const TABLES: [&str; 3] = ["sensitivity.csv", "sensitivity.md", "sensitivity.tex"];
 
 impl SensitivityArgs {
     /// Scores under every threshold, prints and writes.
@@ -50,8 +51,11 @@ impl SensitivityArgs {
         // A name of no known format should not cost a pass over the traces.
         let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;
         let study = self.traces.study(&self.scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
-        let mut targets = self.out.iter().flat_map(|out| files(out)).chain(self.figure.clone());
+        let mut targets = self.out.iter().flat_map(|out| names().map(|name| out.join(name))).chain(self.figure.clone());
         targets.try_for_each(|path| output::check_target(&path, study.files_read(None)))?;
+        if let Some(out) = &self.out {
+            study.check_out(out)?;
+        }
         let report = study.sensitivity(&self.thresholds)?;
         output::notes(&report.notes);
         if let (Some(path), Some(format)) = (&self.figure, format) {
@@ -68,27 +72,20 @@ impl SensitivityArgs {
     }
 }
 
-/// The files of the folder: the tables, then the figure.
-fn files(out: &Path) -> Vec<PathBuf> {
-    let tables = ["csv", "md", "tex"].map(|ending| out.join(format!("{NAME}.{ending}")));
-    let figures = FigureFormat::ALL.iter().map(|format| figure(out, *format));
-    tables.into_iter().chain(figures).collect()
-}
-
-fn figure(out: &Path, format: FigureFormat) -> PathBuf {
-    out.join("figures").join(format!("{NAME}.{}", format.ending()))
+/// The files of the folder: the tables, then the figure in every format.
+fn names() -> impl Iterator<Item = PathBuf> {
+    let figures = FigureFormat::ALL.iter().map(|format| format!("figures/sensitivity.{}", format.ending()).into());
+    TABLES.into_iter().map(PathBuf::from).chain(figures)
 }
 
 fn write(out: &Path, report: &SensitivityReport) -> Result<(), Failure> {
-    output::make_folder(&out.join("figures"))?;
     let found = &report.found;
-    let tables = [("csv", found.csv()), ("md", found.markdown()), ("tex", found.latex())];
-    for (ending, text) in tables {
-        output::write_file(&out.join(format!("{NAME}.{ending}")), text.as_bytes())?;
-    }
+    let mut contents = vec![found.csv().into_bytes(), found.markdown().into_bytes(), found.latex().into_bytes()];
     for format in FigureFormat::ALL {
-        let bytes = format.encode(&report.figure).map_err(Failure::input)?;
-        output::write_file(&figure(out, *format), &bytes)?;
+        contents.push(format.encode(&report.figure).map_err(Failure::input)?);
     }
-    Ok(())
+    let names: Vec<PathBuf> = names().collect();
+    let files: Vec<_> =
+        names.iter().map(PathBuf::as_path).zip(contents.iter().map(|bytes| Content::Bytes(bytes))).collect();
+    output::write_folder(out, &files)
 }

@@ -6,11 +6,14 @@ use std::path::PathBuf;
 use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
 use crate::cli::text_table::counted;
 use crate::study::{experiment_findings, known_experiments};
 use crate::trace::checksums::Checksums;
+use crate::trace::answered::by_others;
 use crate::trace::diagnostic::Severity;
 use crate::trace::inputs;
+use crate::trace::open::TraceFile;
 use crate::trace::validate::{Validation, validate};
 
 /// Check traces against every rule of the schema and report all that is wrong
@@ -56,6 +59,8 @@ impl ValidateCommand {
         let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
         let threads = self.input.threads.count();
         let mut report = validate(&inputs, experiments.as_deref(), threads).map_err(Failure::input)?;
+        let files: Vec<_> = inputs.iter().filter_map(|input| TraceFile::open(input).ok()).collect();
+        output::notes(&by_others(&files));
         report.findings.extend(experiment_findings(&self.definitions, &inputs)?);
         Ok(report)
     }

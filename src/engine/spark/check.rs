@@ -11,7 +11,7 @@ use crate::metric::catalog::Catalog;
 use crate::metric::sql::Dialect;
 use crate::trace::colors::ColorColumn;
 use crate::trace::colors::palette::Palette;
-use crate::trace::colors::spelling::{STRAY, WORDS};
+use crate::trace::colors::spelling::{MIXED, STRAY, WORDS};
 use crate::trace::diagnostic::Code;
 use crate::trace::schema::rules::{Known, Requirement, rules_of};
 use crate::trace::schema::{self, Column, Kind};
@@ -84,10 +84,10 @@ fn no_color(x: &str, column: ColorColumn, palette: Option<&Palette>) -> String {
         return format!("{x} NOT IN ({})", texts(names));
     }
     let words = texts(WORDS.into_iter().filter(|word| column.word != Some(*word)));
-    let stray = Dialect::Spark.pattern(STRAY);
+    let [stray, mixed] = [STRAY, MIXED].map(|pattern| Dialect::Spark.pattern(pattern));
     let study = texts(Color::ALL.map(Color::name));
     format!(
-        "{x} IN ({words}) OR {x} <> LOWER({x}) OR regexp_like({x}, {stray}) OR ({x} LIKE '% %' AND REPLACE({x}, ' ', '') IN ({study}))"
+        "{x} IN ({words}) OR {x} <> LOWER({x}) OR regexp_like({x}, {stray}) OR regexp_like({x}, {mixed}) OR ({x} LIKE '% %' AND REPLACE({x}, ' ', '') IN ({study}))"
     )
 }
 
@@ -138,7 +138,9 @@ mod tests {
     use crate::trace::schema::COLUMNS;
     use crate::trace::validate::validate;
 
-    const TEXTS: [&str; 22] = [
+    const TEXTS: [&str; 24] = [
+        "r\u{435}d",
+        "те\u{430}l",
         "red",
         "teal",
         "dark teal",

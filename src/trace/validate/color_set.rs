@@ -18,7 +18,7 @@ use crate::trace::read::open::TraceFile;
 use crate::trace::read::parallel_scan::{Episodes, Event, pass};
 use crate::trace::read::projection::{Layout, T};
 use crate::trace::schema::colors::palette::Palette;
-use crate::trace::schema::colors::spelling::{WORDS, did_you_mean, most_like, spelling_key};
+use crate::trace::schema::colors::spelling::{WORDS, did_you_mean, meant_by, most_like, spelling_key};
 use crate::trace::schema::colors::{ColorColumn, column};
 
 /// A colour in one column of some episodes.
@@ -182,7 +182,7 @@ fn respelled(sighting: &Sighting, file: &TraceFile, right: Option<&str>) -> Opti
     let more = if sighting.rows == 1 { String::new() } else { format!(" (in {} rows)", sighting.rows) };
     let found = format!("`{}`{more}", sighting.name.escape_debug());
     let finding = Finding::new(Code::InvalidColor, file.name(), "one spelling of a colour in all inputs", found);
-    Some(sighting.place(finding).with_help(did_you_mean(right)))
+    Some(sighting.place(finding).with_help(meant_by(&sighting.name, right)))
 }
 
 impl Sighting {

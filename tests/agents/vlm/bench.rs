@@ -46,6 +46,8 @@ pub fn choice(dialect: Dialect) -> Choice {
             contract: Contract::Schema,
             max_output_tokens: NonZeroU32::new(500),
             reasoning_effort: None,
+            answers_as: Vec::new(),
+            accepted: Vec::new(),
         },
         backend: Backend { dialect, base_url: None, key: "UNUSED".to_owned() },
     }

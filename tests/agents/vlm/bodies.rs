@@ -139,6 +139,7 @@ fn most_tokens_and_reasoning_are_asked_for_as_each_provider_has_them() {
         let bench = Bench::new(Limits::default());
         let mut choice = choice(dialect);
         id.clone_into(&mut choice.model.id);
+        choice.model.answers_as = vec!["*".to_owned()];
         (choice.model.max_output_tokens, choice.model.reasoning_effort) = (NonZeroU32::new(9_000), effort);
         let vlm = bench.vlm_of(&server, choice, OnOutage::Lose, patience());
         Bench::play(&vlm, "episode", 1).remove(0).unwrap();

@@ -9,6 +9,7 @@ mod languages;
 mod memory;
 #[cfg(target_os = "linux")]
 mod power;
+mod providers;
 mod reach;
 mod recordings;
 mod refusals;

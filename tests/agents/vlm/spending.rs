@@ -34,7 +34,7 @@ fn started(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, Strin
 
 #[test]
 fn limits_count_what_earlier_starts_spent() {
-    let own = "[model.own]\nbackend = \"compatible\"\nid = \"own-1\"\nprices = { input = 1.0, output = 10.0 }\n";
+    let own = "[model.own]\nbackend = \"compatible\"\nid = \"own-1\"\nanswers_as = [\"model-1-*\"]\nprices = { input = 1.0, output = 10.0 }\n";
     // An answer takes 1100 tokens and 0.002 dollars.
     let cases = [
         ("--max-requests 2", "requests is reached: 2 of 2", 2),
@@ -93,7 +93,7 @@ fn models_that_share_a_folder_have_accounts_of_their_own() {
     let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
     let model = |name: &str, price: f64| {
         format!(
-            "[model.\"{name}\"]\nbackend = \"compatible\"\nid = \"{name}\"\n\
+            "[model.\"{name}\"]\nbackend = \"compatible\"\nid = \"{name}\"\nanswers_as = [\"model-1-*\"]\n\
              prices = {{ input = {price:.1}, output = {price:.1} }}\n"
         )
     };
@@ -121,7 +121,7 @@ fn models_that_share_a_folder_have_accounts_of_their_own() {
 
 #[test]
 fn a_limit_of_cost_without_prices_is_refused_before_anything_is_sent_or_made() {
-    let own = "[model.own]\nbackend = \"compatible\"\nid = \"own-1\"\n";
+    let own = "[model.own]\nbackend = \"compatible\"\nid = \"own-1\"\nanswers_as = [\"model-1-*\"]\n";
     let cases = [
         ("", "`own` has no input and no output price"),
         ("prices = { input = 1.0 }\n", "`own` has no output price"),

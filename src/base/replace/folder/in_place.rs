@@ -1,4 +1,4 @@
-//! The files of a folder replaced one by one, without an index in between.
+//! The files of a folder replaced one by one, with a note and without an index in between.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, TryLockError};
@@ -12,26 +12,27 @@ use super::stage::{FolderError, FolderFiles, NOTE, Stage, old_files, step, sync_
 /// Replaces the files of the existing folder `out`.
 ///
 /// # Errors
-/// Whatever writing gives. Until all new files are written nothing has changed; after that the folder has no index.
+/// Whatever writing gives. Until all new files are written nothing has changed; after that the folder has a note and no
+/// index.
 pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
     let _lock = lock(out).map_err(FolderError::at(out))?;
     // Inside the folder, which may be a volume of its own.
-    let stage = Stage::create(out, files.index).map_err(FolderError::at(out))?;
+    let stage = Stage::create(out, files.index.unwrap_or(out)).map_err(FolderError::at(out))?;
     stage.write(files, out)?;
     let old = old_files(out, files);
     note(out, &old, files).map_err(FolderError::at(out))?;
-    remove(out, files.index)?;
+    files.index.map_or(Ok(()), |index| remove(out, index))?;
     sync_folder(out).map_err(FolderError::at(out))?;
     let is_new = |path: &Path| files.new.iter().any(|(new, _)| *new == path);
     for path in old.iter().filter(|path| !is_new(path) && *path != Path::new(NOTE)) {
         remove(out, path)?;
         remove_empty(out, path);
     }
-    for (path, _) in files.new.iter().filter(|(path, _)| *path != files.index) {
+    for (path, _) in files.new.iter().filter(|(path, _)| Some(*path) != files.index) {
         put(&stage, out, path)?;
     }
     sync_folders(out, files).map_err(FolderError::at(out))?;
-    put(&stage, out, files.index)?;
+    files.index.map_or(Ok(()), |index| put(&stage, out, index))?;
     remove(out, Path::new(NOTE))?;
     step();
     sync_folder(out).map_err(FolderError::at(out))

@@ -2,7 +2,8 @@
 //!
 //! The new folder is completed beside the old one, with hard links to all that does not change, and the two exchange
 //! their names in one step of the file system. Where that is impossible (see [`exchange`]), files are replaced one by
-//! one: the index goes first and comes last, so that a folder which has an index is complete.
+//! one: a note says so until all are replaced, and the index goes first and comes last, so that a folder without a note or
+//! with an index is complete.
 
 mod exchange;
 mod in_place;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 
 use super::leftover;
 use super::place::{folder_of, make_folder, sync_folder};
-pub use stage::{FolderError, FolderFiles};
+pub use stage::{Content, FolderError, FolderFiles, is_unfinished};
 use stage::{Stage, step};
 
 /// Replaces the files of the folder `out`, which is made if need be with the folders above it. What killed processes
@@ -23,7 +24,7 @@ use stage::{Stage, step};
 ///
 /// # Errors
 /// When something else is in the place of a file or folder, and whatever writing gives. The folder has its old files
-/// then; where names cannot be exchanged it may instead have no index.
+/// then; where names cannot be exchanged it may instead be [unfinished](is_unfinished), without an index.
 pub fn replace_folder(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
     // Without the slash at the end of `link/`, which would lead through the link.
     let out: &Path = &out.components().collect::<PathBuf>();

@@ -8,17 +8,31 @@ use std::path::{Component, Path, PathBuf};
 use super::super::place::{folder_of, prefix_for, sync_folder};
 use super::super::temporary::TemporaryFolder;
 
-/// A file in a folder without an index that lists what the next attempt replaces or removes.
+/// A file in a folder with old and new files that lists what the next attempt replaces or removes.
 pub(super) const NOTE: &str = ".mirrorstats-unfinished";
+
+/// The content of a new file.
+#[derive(Clone, Copy, Debug)]
+pub enum Content<'a> {
+    /// These bytes.
+    Bytes(&'a [u8]),
+    /// Those of a file, which stays where it is.
+    File(&'a Path),
+}
 
 /// The files of a folder that are replaced together. All paths are inside the folder.
 pub struct FolderFiles<'a> {
     /// The new files and their content.
-    pub new: &'a [(&'a Path, &'a [u8])],
-    /// One of the new files: who finds it may rely on the others.
-    pub index: &'a Path,
+    pub new: &'a [(&'a Path, Content<'a>)],
+    /// One of the new files, if readers rely on the others where they find it.
+    pub index: Option<&'a Path>,
     /// What of the folder at this path is to be replaced or removed. Everything else in it stays.
     pub old: &'a dyn Fn(&Path) -> Vec<PathBuf>,
+}
+
+/// Whether a folder has files of both sides, because a replacement in place was broken off.
+pub fn is_unfinished(folder: &Path) -> bool {
+    folder.join(NOTE).is_file()
 }
 
 /// Why the files of a folder cannot be replaced.
@@ -64,19 +78,22 @@ impl Stage {
 
     /// Writes the new files, on the disk when this returns; `out` is for errors.
     pub(super) fn write(&self, files: &FolderFiles<'_>, out: &Path) -> Result<(), FolderError> {
-        for (path, bytes) in files.new {
-            write_synced(&self.path().join(path), bytes).map_err(FolderError::at(&out.join(path)))?;
+        for (path, content) in files.new {
+            write_synced(&self.path().join(path), *content).map_err(FolderError::at(&out.join(path)))?;
         }
         sync_folders(self.path(), files).map_err(FolderError::at(out))
     }
 }
 
-fn write_synced(path: &Path, bytes: &[u8]) -> io::Result<()> {
+fn write_synced(path: &Path, content: Content<'_>) -> io::Result<()> {
     step();
     fs::create_dir_all(folder_of(path))?;
     let mut file = File::create(path)?;
     step();
-    file.write_all(bytes)?;
+    match content {
+        Content::Bytes(bytes) => file.write_all(bytes)?,
+        Content::File(source) => io::copy(&mut File::open(source)?, &mut file).map(drop)?,
+    }
     file.sync_all()
 }
 

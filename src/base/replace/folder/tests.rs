@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, exit};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{FolderFiles, replace_folder};
+use super::{Content, FolderFiles, replace_folder};
 
 /// Names the step before which the process ends.
 const LAST_STEP: &str = "MIRRORSTATS_TEST_LAST_STEP";
@@ -44,8 +44,8 @@ fn listed(folder: &Path) -> Vec<PathBuf> {
 }
 
 fn replace(out: &Path, files: &[(&str, &str)]) {
-    let new: Vec<(&Path, &[u8])> = files.iter().map(|(path, text)| (Path::new(path), text.as_bytes())).collect();
-    replace_folder(out, &FolderFiles { new: &new, index: Path::new(INDEX), old: &listed }).unwrap();
+    let new: Vec<_> = files.iter().map(|(path, text)| (Path::new(path), Content::Bytes(text.as_bytes()))).collect();
+    replace_folder(out, &FolderFiles { new: &new, index: Some(Path::new(INDEX)), old: &listed }).unwrap();
 }
 
 fn write(out: &Path, files: &[(&str, &str)]) {
@@ -203,8 +203,8 @@ fn what_has_no_room_changes_nothing() {
     old_folder(&out);
     fs::create_dir(out.join("tables/u.csv")).unwrap();
     let before = contents(home.path());
-    let new: Vec<(&Path, &[u8])> = NEW.iter().map(|(path, text)| (Path::new(path), text.as_bytes())).collect();
-    let files = FolderFiles { new: &new, index: Path::new(INDEX), old: &listed };
+    let new: Vec<_> = NEW.iter().map(|(path, text)| (Path::new(path), Content::Bytes(text.as_bytes()))).collect();
+    let files = FolderFiles { new: &new, index: Some(Path::new(INDEX)), old: &listed };
     let error = replace_folder(&out, &files).unwrap_err();
     assert_eq!(error.path, out.join("tables/u.csv"));
     assert_eq!(contents(home.path()), before);

@@ -15,7 +15,7 @@ pub mod palette;
 pub(crate) mod spelling;
 
 use self::palette::Palette;
-use self::spelling::{WORDS, did_you_mean, is_well_spelled, normal, study_color};
+use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spelling_key, study_color};
 use crate::trace::schema;
 
 /// A column of colours.
@@ -76,9 +76,10 @@ impl ColorColumn {
         if self.word == Some(likely.as_str()) {
             return did_you_mean(&likely);
         }
-        let Some(palette) = palette else { return did_you_mean(study_color(text).unwrap_or(&likely)) };
+        let like = if is_well_spelled(&likely) { likely } else { spelling_key(text) };
+        let Some(palette) = palette else { return meant_by(text, study_color(text).unwrap_or(&like)) };
         match palette.nearest(text) {
-            Some(color) => did_you_mean(color),
+            Some(color) => meant_by(text, color),
             None => "use a name of the palette, or add the colour to the palette".to_owned(),
         }
     }
@@ -121,7 +122,9 @@ mod tests {
                 assert_eq!(column.help(text, None), format!("did you mean `{meant}`?"), "{} {text:?}", column.name);
                 assert_eq!(normal(&normal(text)), normal(text));
             }
-            for text in ["red", "teal", "dark red", "dark-red", "olive2", "grün", ""] {
+            for text in
+                ["red", "teal", "dark red", "dark-red", "olive2", "grün", "gru\u{308}n", "красный", "赤い色", ""]
+            {
                 assert!(column.may_hold(text, None), "{} {text:?}", column.name);
             }
         }

@@ -1,5 +1,10 @@
 //! How a colour is spelled: in lower case, with single spaces between words and no character that does not show.
 
+use std::sync::LazyLock;
+
+use regex::Regex;
+use unicode_security::skeleton;
+
 use crate::base::palette::Color;
 use crate::base::suggest::nearest;
 
@@ -9,11 +14,40 @@ pub(crate) const WORDS: [&str; 2] = ["none", "unknown"];
 /// What a name in normal form has no match of, for engines that match patterns; letters in upper case apart.
 pub(crate) const STRAY: &str = r"^ | $|  |[\s&&[^ ]]|[\p{Cc}\u{ad}\u{61c}\u{200b}-\u{200f}\u{2028}-\u{202e}\u{2060}-\u{206f}\u{feff}\u{e0000}-\u{e007f}]";
 
-/// Whether a name is in normal form and no other spelling of a colour of the study.
+/// What a name has a match of that mixes Latin letters with those of other scripts, many of which look alike.
+pub(crate) const MIXED: &str =
+    r"\p{Latin}.*[\p{L}&&[^\p{Latin}\p{Common}\p{Inherited}]]|[\p{L}&&[^\p{Latin}\p{Common}\p{Inherited}]].*\p{Latin}";
+
+/// Whether a name is in normal form, of one script, and no other spelling of a colour of the study.
 pub(in crate::trace) fn is_well_spelled(name: &str) -> bool {
     // Nearly every name: no need to make its normal form.
     name.bytes().all(|byte| byte.is_ascii_lowercase())
-        || normal(name) == name && study_color(name).is_none_or(|color| color == name)
+        || normal(name) == name && !is_mixed(name) && study_color(name).is_none_or(|color| color == name)
+}
+
+fn is_mixed(name: &str) -> bool {
+    static PATTERN: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new(MIXED).ok());
+    !name.is_ascii() && PATTERN.as_ref().is_some_and(|pattern| pattern.is_match(name))
+}
+
+/// A character as those of ASCII that it looks like, by Unicode's table of confusables; itself where it looks like none.
+fn look_of(c: char) -> String {
+    let look: String = skeleton(c.encode_utf8(&mut [0; 4])).collect();
+    match look.as_str() {
+        _ if c.is_ascii() => c.to_string(),
+        // In that table `m` is the same as `rn`.
+        "rn" => "m".to_owned(),
+        _ => look.to_lowercase(),
+    }
+}
+
+/// The first character of a name that only looks like one of ASCII, for a message.
+fn disguise(name: &str) -> Option<String> {
+    let (c, look) = name
+        .chars()
+        .map(|c| (c, look_of(c)))
+        .find(|(c, look)| c.is_alphanumeric() && !c.is_ascii() && look.is_ascii())?;
+    Some(format!(" its `{c}` is U+{:04X}, which only looks like `{look}`", u32::from(c)))
 }
 
 /// A name in lower case, with single spaces between its words and no character that does not show.
@@ -29,9 +63,10 @@ fn hides(c: char) -> bool {
     c.is_control() || is_mark || matches!(c, '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{e0000}'..='\u{e007f}')
 }
 
-/// The normal form without white space: the same for all spellings of a name.
+/// The normal form without white space, and without letters that look like others: the same for all spellings of a name.
 pub(in crate::trace) fn spelling_key(name: &str) -> String {
-    normal(name).replace(' ', "")
+    let key = normal(name).replace(' ', "");
+    if key.is_ascii() { key } else { key.chars().map(look_of).collect() }
 }
 
 /// The colour of the study that a name is a spelling of.
@@ -48,6 +83,11 @@ pub(in crate::trace) fn most_like<'a>(text: &str, names: impl Iterator<Item = &'
 /// The advice that names a colour.
 pub(in crate::trace) fn did_you_mean(name: &str) -> String {
     format!("did you mean `{}`?", name.escape_debug())
+}
+
+/// The advice that names the colour meant by a text, and the letter by which they differ where nobody sees it.
+pub(in crate::trace) fn meant_by(text: &str, name: &str) -> String {
+    did_you_mean(name) + &disguise(text).unwrap_or_default()
 }
 
 #[cfg(test)]

@@ -1,0 +1,152 @@
+//! Providers as their own documents and clients have them: rate limits in bodies and headers, another model, other types.
+
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use mirrorstats::agent::Status;
+use mirrorstats::agent::vlm::OnOutage;
+use mirrorstats::agent::vlm::limits::Limits;
+use mirrorstats::agent::vlm::wire_format::Dialect;
+use serde_json::{Value, json};
+
+use super::bench::{Bench, KEY};
+use super::recordings::{Folder, counting};
+use super::server::{JSON, Request, Server, decision, endings, http, ok, spoken, whole};
+use crate::harness::program::{run, stderr};
+use crate::harness::traces;
+
+const PROVIDERS: [Dialect; 4] =
+    [Dialect::OpenaiChat, Dialect::OpenaiCompatible, Dialect::Gemini, Dialect::AnthropicMessages];
+
+/// An error of Gemini: <https://ai.google.dev/gemini-api/docs/rate-limits>, details as `google.rpc` has them.
+fn exhausted(quota: &str, delay: &str) -> Vec<u8> {
+    let body = json!({ "error": {
+        "code": 429,
+        "message": "You exceeded your current quota, please check your plan and billing details.",
+        "status": "RESOURCE_EXHAUSTED",
+        "details": [
+            { "@type": "type.googleapis.com/google.rpc.QuotaFailure", "violations": [{ "quotaId": quota }] },
+            { "@type": "type.googleapis.com/google.rpc.RetryInfo", "retryDelay": delay },
+        ],
+    } });
+    http("429 Too Many Requests", JSON, body.to_string().as_bytes())
+}
+
+const A_MINUTE: &str = "GenerateRequestsPerMinutePerProjectPerModel";
+const A_DAY: &str = "GenerateRequestsPerDayPerProjectPerModel";
+
+#[test]
+fn a_whole_answer_counts_whatever_its_content_type_says() {
+    for dialect in PROVIDERS {
+        for headers in ["", "content-type: text/plain\r\n", "content-type: text/html; charset=utf-8\r\n"] {
+            let body = spoken(dialect, &decision("w"), endings(dialect).0).to_string();
+            let server = Server::start(move |_, _| http("200 OK", headers, body.as_bytes()));
+            let bench = Bench::new(Limits::default());
+            let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+            let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
+            assert_eq!((reply.status, server.count()), (Status::Ok, 1), "{dialect:?} {headers:?}");
+            assert!(reply.usage.cost_usd.is_some_and(|cost| cost > 0.0), "{dialect:?} {headers:?}");
+        }
+    }
+}
+
+#[test]
+fn a_rate_limit_with_a_delay_is_waited_for_and_uses_up_no_attempts() {
+    // OpenAI's client reads `retry-after-ms` before `retry-after`: openai-python, `_base_client.py`.
+    let milliseconds = || http("429 Too Many Requests", "retry-after-ms: 20\r\nretry-after: 99\r\n", b"slow down");
+    for (dialect, is_google) in [(Dialect::Gemini, true), (Dialect::OpenaiChat, false)] {
+        let server = Server::start(move |at, _| match at {
+            // More often than there are attempts.
+            0..8 if is_google => exhausted(A_MINUTE, "0.020s"),
+            0..8 => milliseconds(),
+            _ => whole(dialect, &decision("w")),
+        });
+        let bench = Bench::new(Limits::default());
+        let start = Instant::now();
+        let reply = Bench::play(&bench.vlm(&server, dialect, OnOutage::Lose), "episode", 1).remove(0).unwrap();
+        assert_eq!((reply.status, server.count()), (Status::Ok, 9), "{dialect:?}");
+        assert!(start.elapsed() >= Duration::from_millis(160), "{dialect:?}: asked too early");
+    }
+}
+
+#[test]
+fn the_quota_of_a_day_stops_the_recording_with_what_to_do() {
+    let router = br#"{"error": {"code": 429, "message": "Rate limit exceeded: free-models-per-day"}}"#;
+    let answers = [exhausted(A_DAY, "34s"), http("429 Too Many Requests", JSON, router)];
+    for answer in answers {
+        let server = Server::start(move |_, _| answer.clone());
+        let bench = Bench::new(Limits::default());
+        let vlm = bench.vlm(&server, Dialect::Gemini, OnOutage::StandStill);
+        let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err().cause;
+        assert!(lost.contains("quota of the day is used up") && lost.contains("\n  help: "), "{lost}");
+        assert_eq!((vlm.stopped(), server.count()), (Some(lost.as_str()), 1));
+    }
+}
+
+/// `record` of Gemini 2.5 Pro at this server.
+fn record(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String) {
+    let words = format!("--backend google --seeds 1 --max-output-tokens 100 {words}");
+    let output = folder.record(server, "Gemini 2.5 Pro", &words).env("GEMINI_API_KEY", KEY).output().unwrap();
+    (output.status.code(), stderr(&output))
+}
+
+/// An answer of two steps' length by a model of this id.
+fn by(id: &str, request: &Request, at: usize) -> Value {
+    let mut body = spoken(Dialect::Gemini, &counting(request, 2, at), endings(Dialect::Gemini).0);
+    body["modelVersion"] = id.into();
+    body
+}
+
+#[test]
+fn no_episode_is_lost_to_a_provider_that_allows_few_requests() {
+    // Four in a tenth of a second, for twelve episodes of two steps at once.
+    let window = Mutex::new((Instant::now(), 0));
+    let server = Server::start(move |at, request| {
+        let mut window = window.lock().unwrap();
+        if window.0.elapsed() > Duration::from_millis(100) {
+            *window = (Instant::now(), 0);
+        }
+        window.1 += 1;
+        if window.1 > 4 { exhausted(A_MINUTE, "0.1s") } else { ok(&by("gemini-2.5-pro", request, at)) }
+    });
+    let folder = Folder::new();
+    let (code, said) = record(&folder, &server, "--runs 12 --in-flight 12 --attempts 2");
+    assert_eq!(code, Some(0), "{said}");
+    assert!(server.count() > 24 && !folder.path().join("runs/lost.jsonl").exists(), "{said}");
+}
+
+#[test]
+fn an_answer_by_another_model_stops_the_recording_before_the_second_request() {
+    const OTHER: &str = "gemini-3.8-flash";
+    let server = Server::start(|at, request| ok(&by(OTHER, request, at)));
+    let folder = Folder::new();
+    for _ in 0..2 {
+        // The second time the answer is in the journal.
+        let (code, said) = record(&folder, &server, "--runs 4 --in-flight 4");
+        assert_eq!((code, server.count()), (Some(2), 1), "{said}");
+        let words =
+            format!("asked for `gemini-2.5-pro`, found an answer by `{OTHER}`\n  help: `--accept-model {OTHER}`");
+        assert!(said.contains(&words), "{said}");
+    }
+    let (code, said) = record(&folder, &server, &format!("--runs 4 --in-flight 4 --accept-model {OTHER}"));
+    assert_eq!((code, server.count()), (Some(0), 8), "{said}");
+
+    let trace = "runs/E1-gemini-2-5-pro.parquet";
+    let recording = traces::recording(&folder.path().join(trace));
+    assert_eq!(recording["agent"]["accepted_models"], json!([OTHER]));
+    let note = format!("note: another model answered in {trace}: asked for `gemini-2.5-pro`, found `{OTHER}`\n");
+    for words in [&["info", "runs"][..], &["validate", "runs"], &["report", "runs", "--no-figures"]] {
+        let answer = run(folder.path(), words).ends(0);
+        assert_eq!(answer.stderr.matches(&note).count(), 1, "{words:?}: {}", answer.stderr);
+    }
+}
+
+#[test]
+fn a_dated_snapshot_is_the_model_that_was_asked_for() {
+    let server = Server::start(|at, request| ok(&by("models/gemini-2.5-pro-preview-06-05", request, at)));
+    let folder = Folder::new();
+    let (code, said) = record(&folder, &server, "--runs 1");
+    assert_eq!((code, server.count()), (Some(0), 2), "{said}");
+    let answer = run(folder.path(), &["report", "runs", "--no-figures"]).ends(0);
+    assert!(!answer.stderr.contains("another model"), "{}", answer.stderr);
+}

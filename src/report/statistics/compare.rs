@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::durations::{decided, is_duration};
 use super::matching::Matched;
-use super::study::{Block, Study, counts};
+use super::study::{Block, Study};
 use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::MetricColumn;
 use crate::stats::contrast::{newcombe, welch};
@@ -128,7 +128,7 @@ impl Compared<'_, '_> {
     fn independent(&self, column: &MetricColumn, rates: bool) -> Comparison {
         let (a, b) = (self.first.moments(column), self.second.moments(column));
         let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
-        let counted = rates.then(|| counts(&a).zip(counts(&b))).flatten();
+        let counted = rates.then(|| a.counts().zip(b.counts())).flatten();
         if let Some((first, second)) = counted {
             return Comparison {
                 successes: Some([first.0, second.0]),

@@ -39,10 +39,10 @@ pub use models::{Family, Gap, PairTest, Reach};
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
 pub use retest::RetestRow;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
-pub use study::CENSORED;
 
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
+pub use crate::stats::cell_interval::CENSORED;
 use crate::stats::design::Design;
 use crate::stats::losses::LostCounts;
 use crate::stats::moments::MomentOverflow;

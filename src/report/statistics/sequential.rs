@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use super::chance::levels;
 use super::conclusions::headline;
 use super::models::compared;
-use super::study::{Experiment, Study, counts, named};
+use super::study::{Experiment, Study, named};
 use super::{Family, Options, PairTest, Role, Verdict};
 use crate::base::ratio::Ratio;
 use crate::metric::catalog::Kind;
@@ -160,7 +160,7 @@ impl SequentialRate {
 fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec<SequentialRate> {
     let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
     each.filter_map(|(column, block)| {
-        let (successes, n) = counts(&block.moments(column))?;
+        let (successes, n) = block.moments(column).counts()?;
         Some(SequentialRate {
             experiment: experiment.name.to_owned(),
             model: block.model.to_owned(),

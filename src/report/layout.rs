@@ -104,7 +104,9 @@ impl<'a> Layout<'a> {
             notes.push(format!("{DAGGER} defined in fewer than {} episodes.", self.print.mark_n_below));
         }
         if cells().any(|cell| matches!(cell.value, Value::Mean { spread: Spread::Unknown, .. })) {
-            notes.push(format!("A mean of fewer than {STUDENT} episodes has no interval: it would miss the truth too often."));
+            notes.push(format!(
+                "A mean of fewer than {STUDENT} episodes has no interval: it would miss the truth too often."
+            ));
         }
         notes
     }
@@ -165,11 +167,8 @@ impl<'a> Layout<'a> {
         let cell = self.cells.of_metric(group, name)?;
         let (metric, moments) = (cell.metric, cell.moments);
         let is_zero = moments.n == 0 && sheet.undefined_as_zero.iter().any(|zero| zero == name);
-        let value = if is_zero {
-            value::zero(metric, &self.print)
-        } else {
-            value::value(&cell, group.episodes, &self.print)
-        };
+        let value =
+            if is_zero { value::zero(metric, &self.print) } else { value::value(&cell, group.episodes, &self.print) };
         let is_marked = self.is_marked(metric, moments.n, &value);
         Some(Cell { is_marked, ..Cell::plain(value, moments, group.episodes) })
     }

@@ -118,7 +118,8 @@ fn quality_is_in_reports_in_info_and_in_check() {
     assert!(failed.contains("E1, m: --max-unreadable: expected at most 0.05, found 0.0833"), "{failed}");
     assert!(failed.contains("--max-lost: expected at most 0, found 2"), "{failed}");
     let answer: Value =
-        serde_json::from_str(&run(at, &["check", "a.parquet", "--max-unreadable", "0.05", "--json"]).ends(1).stdout).unwrap();
+        serde_json::from_str(&run(at, &["check", "a.parquet", "--max-unreadable", "0.05", "--json"]).ends(1).stdout)
+            .unwrap();
     let violation = json!({
         "cell": { "experiment": "E1", "model": "m", "condition": "default" },
         "limit": "max-unreadable", "expected": 0.05, "found": 2.0 / 24.0,

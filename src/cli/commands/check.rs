@@ -12,6 +12,7 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::quality::{self, CellAnswer};
 use crate::score::quality::{CellKey, Quality, QualityByCell};
+use crate::stats::losses::INFRASTRUCTURE;
 
 /// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
 ///
@@ -120,7 +121,9 @@ impl CheckArgs {
     fn not_recorded(&self, cells: &QualityByCell) -> Vec<NotRecorded> {
         let missing = |quality: &Quality| {
             let replies = quality.steps.saturating_sub(quality.replies());
-            let timed = quality.latencies.values().sum();
+            // What the infrastructure ended came with no reply, which would have taken some time.
+            let ended: u64 = INFRASTRUCTURE.iter().map(|status| quality.of_status(status)).sum();
+            let timed = quality.latencies.values().sum::<u64>() + ended;
             [
                 ("max-unreadable", self.max_unreadable.is_some(), replies),
                 ("max-refused", self.max_refused.is_some(), replies),

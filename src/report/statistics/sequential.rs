@@ -10,7 +10,7 @@ use super::chance::levels;
 use super::conclusions::headline;
 use super::models::compared;
 use super::study::{Experiment, Study, named};
-use super::{Family, Options, PairTest, Role, Verdict};
+use super::{Family, Options, PairTest, Role, Selection, Verdict};
 use crate::base::ratio::Ratio;
 use crate::metric::catalog::Kind;
 use crate::score::table::EpisodeTable;
@@ -31,6 +31,9 @@ pub struct Sequential {
     pub confidence: f64,
     /// The number of episodes so far.
     pub episodes: usize,
+    /// The filter that chose the episodes; null without one.
+    #[serde(default, rename = "where")]
+    pub selection: Option<Selection>,
     /// The rates that have a level to be compared with.
     pub headline: Vec<String>,
     /// Every rate of every model.
@@ -130,6 +133,7 @@ impl Sequential {
             definitions_hash: table.catalog.hash.clone(),
             confidence: options.confidence,
             episodes: table.len(),
+            selection: options.selection.clone(),
             headline: headline_rates(&study),
             rates: SequentialRate::all(&study, options.confidence),
             chance: SequentialChance::all(&study, options.confidence),

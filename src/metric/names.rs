@@ -12,6 +12,19 @@ pub fn mentioned(expression: &str) -> Vec<String> {
     found
 }
 
+/// Whether an expression asks for values of these names alone, and for no aggregate of steps.
+pub fn is_about(expression: &str, is_known: &dyn Fn(&str) -> bool) -> bool {
+    fn holds(expr: &Expr, is_known: &dyn Fn(&str) -> bool) -> bool {
+        let own = match &expr.kind {
+            ExprKind::Name(name) => is_known(name),
+            ExprKind::Call { name, .. } => matches!(name.as_str(), "coalesce" | "nullif" | "div" | "regexp_like"),
+            _ => true,
+        };
+        own && parts(expr).into_iter().all(|part| holds(part, is_known))
+    }
+    parse(expression).is_ok_and(|expr| holds(&expr, is_known))
+}
+
 fn add(expr: &Expr, found: &mut Vec<String>) {
     if let ExprKind::Name(name) = &expr.kind
         && !found.contains(name)
@@ -42,7 +55,18 @@ fn parts(expr: &Expr) -> Vec<&Expr> {
 
 #[cfg(test)]
 mod tests {
-    use super::mentioned;
+    use super::{is_about, mentioned};
+
+    #[test]
+    fn an_aggregate_and_an_unknown_name_are_more_than_keys() {
+        let is_key = |name: &str| ["seed", "model"].contains(&name);
+        for text in ["seed = 1 and model in ('a', 'b')", "regexp_like(model, 'x')"] {
+            assert!(is_about(text, &is_key), "{text}");
+        }
+        for text in ["TSA = 1", "seed = 1 and length() > 5", "any(seed = 1)", "seed ="] {
+            assert!(!is_about(text, &is_key), "{text}");
+        }
+    }
 
     #[test]
     fn names_come_once_and_in_order_from_every_construct() {

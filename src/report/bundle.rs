@@ -15,12 +15,11 @@ use serde::{Deserialize, Serialize};
 use crate::base::hash;
 use crate::base::number::full_precision;
 use crate::base::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput};
-use crate::metric::catalog::{Catalog, Metric};
+use crate::metric::catalog::Catalog;
 use crate::report::style::Style;
 use crate::report::table::Table;
 use crate::report::tables::{csv, latex, markdown};
-use crate::report::value::interval;
-use crate::stats::cell::{Cells, Group};
+use crate::stats::cell::{Cell, Cells};
 pub use old::MANIFEST;
 
 /// What goes into the folder.
@@ -239,26 +238,18 @@ fn files(bundle: &Bundle) -> Vec<OutputFile> {
 /// The text of `cells.csv`: the key columns, then `metric,n,sum,sum_sq,mean,se,ci_low,ci_high` in full precision.
 ///
 /// The standard error is the one that the definition asks for; the interval is Wilson's for a rate, Student's for a
-/// quantity, at 95 %. What is undefined is empty. The header's keys are those that the cells are grouped by.
+/// quantity, at 95 %. What is undefined or withheld is empty. The header's keys are those that the cells are grouped by.
 pub fn cells_csv(cells: &Cells) -> String {
     const TAIL: [&str; 8] = ["metric", "n", "sum", "sum_sq", "mean", "se", "ci_low", "ci_high"];
     let mut writer = ::csv::Writer::from_writer(Vec::new());
     csv::write(&mut writer, cells.by.iter().cloned().chain(TAIL.map(str::to_owned)));
-    for group in &cells.groups {
-        for (at, name) in cells.metrics.iter().enumerate() {
-            if let Some(metric) = cells.catalog.metric.get(name) {
-                csv::write(&mut writer, cell_record(group, at, name, metric));
-            }
-        }
-    }
+    cells.all().for_each(|cell| csv::write(&mut writer, cell_record(cell)));
     csv::finish(writer)
 }
 
-fn cell_record(group: &Group, at: usize, name: &str, metric: &Metric) -> Vec<String> {
-    let moments = &group.moments[at];
-    let interval = interval(moments, metric);
+fn cell_record(Cell { key, name, metric, moments, interval }: Cell) -> Vec<String> {
     let of = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
-    let mut record: Vec<String> = group.key.iter().map(csv::key_field).collect();
+    let mut record: Vec<String> = key.iter().map(csv::key_field).collect();
     record.extend([name.to_owned(), moments.n.to_string(), moments.sum.to_string(), moments.sum_sq.to_string()]);
     record.extend([of(moments.mean()), of(moments.se(metric.se))]);
     record.extend([of(interval.map(|i| i.low)), of(interval.map(|i| i.high))]);

@@ -7,9 +7,10 @@ use crate::metric::catalog::{Catalog, Metric};
 use crate::report::emphasis::emphasise;
 use crate::report::order::{TableOrder, row_key};
 use crate::report::style::{MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
-use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
+use crate::report::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Spread, Table, Value};
 use crate::report::value;
 use crate::stats::cell::{Cells, Group, KeyValue};
+use crate::stats::coverage::STUDENT;
 
 /// The tables of a report, in the order of the style; the first is `main`.
 ///
@@ -102,6 +103,11 @@ impl<'a> Layout<'a> {
         if cells().any(|cell| cell.is_marked) {
             notes.push(format!("{DAGGER} defined in fewer than {} episodes.", self.print.mark_n_below));
         }
+        if cells().any(|cell| matches!(cell.value, Value::Mean { spread: Spread::Unknown, .. })) {
+            notes.push(format!(
+                "A mean of fewer than {STUDENT} episodes has no interval: it would miss the truth too often."
+            ));
+        }
         notes
     }
 
@@ -158,14 +164,11 @@ impl<'a> Layout<'a> {
     }
 
     fn cell(&self, group: &Group, name: &str, sheet: &TableSheet) -> Option<Cell> {
-        let moments = &group.moments[self.cells.metrics.iter().position(|metric| metric == name)?];
-        let metric = self.cells.catalog.metric.get(name)?;
+        let cell = self.cells.of_metric(group, name)?;
+        let (metric, moments) = (cell.metric, cell.moments);
         let is_zero = moments.n == 0 && sheet.undefined_as_zero.iter().any(|zero| zero == name);
-        let value = if is_zero {
-            value::zero(metric, &self.print)
-        } else {
-            value::value(moments, metric, group.episodes, &self.print)
-        };
+        let value =
+            if is_zero { value::zero(metric, &self.print) } else { value::value(&cell, group.episodes, &self.print) };
         let is_marked = self.is_marked(metric, moments.n, &value);
         Some(Cell { is_marked, ..Cell::plain(value, moments, group.episodes) })
     }

@@ -4,33 +4,26 @@ use crate::base::number::Decimal;
 use crate::metric::catalog::{Kind, Metric, PPM, StandardError};
 use crate::report::style::{CellForm, Print, Rounding, SingleSe};
 use crate::report::table::{Spread, Value};
-use crate::stats::interval::{Interval, student_t, wilson};
+use crate::stats::cell::Cell;
+use crate::stats::interval::Interval;
 use crate::stats::moments::Moments;
-
-/// The confidence of every interval that a report shows.
-pub const CONFIDENCE: f64 = 0.95;
 
 const MILLION: i128 = 1_000_000;
 
-/// What the cell of `metric` with these moments shows, in a row of `episodes` episodes.
-pub fn value(moments: &Moments, metric: &Metric, episodes: u64, print: &Print) -> Value {
+/// What a cell shows in a row of `episodes` episodes.
+pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {
+    let Cell { moments, metric, interval, .. } = *cell;
     let (whole, places) = scale(metric, print);
     let Some(mean) = mean(moments, print.rounding, whole, places) else { return Value::Undefined };
+    let spread = || spread(interval, print.rounding, (whole, places));
     match (print.cell, metric.kind) {
         (CellForm::MeanSe, _) => Value::MeanSe { mean, se: standard_error(moments, metric.se, print, (whole, places)) },
-        (CellForm::CountInterval, Kind::Rate) => Value::Count {
-            count: moments.sum,
-            n: moments.n,
-            mean,
-            spread: spread(interval(moments, metric), print.rounding, (whole, places)),
-        },
+        (CellForm::CountInterval, Kind::Rate) => {
+            Value::Count { count: moments.sum, n: moments.n, mean, spread: spread() }
+        }
         (CellForm::CountInterval, Kind::Quantity) => {
-            let spread = if is_constant(moments) {
-                Spread::AllEqual
-            } else {
-                spread(interval(moments, metric), print.rounding, (whole, places))
-            };
-            Value::Mean { mean, spread, n: (moments.n != episodes || moments.n == 1).then_some(moments.n) }
+            let spread = if moments.n > 1 && !moments.has_spread() { Spread::AllEqual } else { spread() };
+            Value::Mean { mean, spread, n: (moments.n != episodes || spread == Spread::Unknown).then_some(moments.n) }
         }
     }
 }
@@ -39,20 +32,6 @@ pub fn value(moments: &Moments, metric: &Metric, episodes: u64, print: &Print) -
 pub fn zero(metric: &Metric, print: &Print) -> Value {
     let zero = Decimal::zero(scale(metric, print).1);
     Value::MeanSe { mean: zero, se: Some(zero) }
-}
-
-/// The 95 % interval of a cell: Wilson's for a rate, Student's for a quantity.
-///
-/// `None` where it is undefined, and for a rate whose values are not 0 and 1.
-pub fn interval(moments: &Moments, metric: &Metric) -> Option<Interval> {
-    match metric.kind {
-        Kind::Rate => wilson(u64::try_from(moments.sum).ok()?, moments.n, CONFIDENCE),
-        // No share is more than all.
-        Kind::Quantity if metric.unit == PPM => {
-            Some(student_t(moments, metric.se, CONFIDENCE)?.within(f64::NEG_INFINITY, float_of(MILLION)))
-        }
-        Kind::Quantity => student_t(moments, metric.se, CONFIDENCE),
-    }
 }
 
 /// What a value of one is, and the decimals: shares in parts per million are shown as rates are.
@@ -101,9 +80,4 @@ fn spread(interval: Option<Interval>, rounding: Rounding, (whole, places): (i128
     let bound = |value: f64| float(value / float_of(whole), rounding, places);
     let bounds = interval.and_then(|interval| Some((bound(interval.low)?, bound(interval.high)?)));
     bounds.map_or(Spread::Unknown, |(low, high)| Spread::Interval { low, high })
-}
-
-/// Whether there are several values and all are the same.
-fn is_constant(moments: &Moments) -> bool {
-    moments.n > 1 && moments.se_squared(StandardError::Population).is_some_and(|(spread, _)| spread == 0)
 }

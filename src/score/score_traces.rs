@@ -437,23 +437,27 @@ fn experiments(definitions: &[&Definitions]) -> Option<Vec<String>> {
     })
 }
 
+/// Whether a column of the schema has one value in all steps of an episode.
+pub fn is_constant(name: &str) -> bool {
+    COLUMNS.iter().any(|column| column.name == name && column.constant)
+}
+
 /// Refuses a column to group by that is not constant in an episode, or not in every trace.
 ///
 /// # Errors
 /// [`ScoreError::Label`].
 pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
-    let constant = |name: &str| COLUMNS.iter().any(|column| column.name == name && column.constant);
     let problem = column_problem(traces, label);
     // What version 2 brought is null in older traces, or has a meaning where there is no value.
     let is_known_anyway = schema::column(label).is_some_and(|known| {
         let found = traces.column(label);
         known.default_text().is_some() || known.since > 1 && found.is_some_and(|found| found.conflict.is_none())
     });
-    if constant(label) && (problem.is_none() || is_known_anyway) {
+    if is_constant(label) && (problem.is_none() || is_known_anyway) {
         return Ok(());
     }
     let known: Vec<String> =
-        traces.column_names().into_iter().filter(|name| constant(name)).map(str::to_owned).collect();
+        traces.column_names().into_iter().filter(|name| is_constant(name)).map(str::to_owned).collect();
     let near = nearest(label, known.iter().map(String::as_str)).filter(|near| *near != label);
     let help = match (near, problem) {
         (Some(near), _) => format!("did you mean `{near}`?"),

@@ -5,8 +5,10 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::cell_interval::{CONFIDENCE, cell_interval};
+use super::interval::Interval;
 use super::moments::Moments;
-use crate::metric::catalog::Catalog;
+use crate::metric::catalog::{Catalog, Metric};
 
 /// All cells of a report.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,8 +19,45 @@ pub struct Cells {
     pub by: Vec<String>,
     /// The metrics, in the order of the episode table.
     pub metrics: Vec<String>,
+    /// The least and the largest mean that each metric can have; without bounds where it is empty.
+    pub ranges: Vec<Interval>,
     /// The groups, ascending by key; each has one cell per metric.
     pub groups: Vec<Group>,
+}
+
+/// One cell of [`Cells`].
+#[derive(Clone, Copy, Debug)]
+pub struct Cell<'c> {
+    /// A value for each column of [`Cells::by`].
+    pub key: &'c [KeyValue],
+    /// The metric's name.
+    pub name: &'c str,
+    /// Its definition.
+    pub metric: &'c Metric,
+    /// The moments of its values.
+    pub moments: &'c Moments,
+    /// The 95 % interval of the mean; `None` where it is withheld.
+    pub interval: Option<Interval>,
+}
+
+impl Cells {
+    /// Every cell, by group and metric.
+    pub fn all(&self) -> impl Iterator<Item = Cell<'_>> {
+        self.groups.iter().flat_map(|group| (0..self.metrics.len()).filter_map(|at| self.at(group, at)))
+    }
+
+    /// The cell of a metric in a group.
+    pub fn of_metric<'c>(&'c self, group: &'c Group, name: &str) -> Option<Cell<'c>> {
+        self.at(group, self.metrics.iter().position(|metric| metric == name)?)
+    }
+
+    fn at<'c>(&'c self, group: &'c Group, at: usize) -> Option<Cell<'c>> {
+        let (name, moments) = (self.metrics[at].as_str(), &group.moments[at]);
+        let metric = self.catalog.metric.get(name)?;
+        let range = self.ranges.get(at).copied().unwrap_or(Interval::UNBOUNDED);
+        let (interval, _) = cell_interval(moments, metric, range, CONFIDENCE);
+        Some(Cell { key: &group.key, name, metric, moments, interval })
+    }
 }
 
 /// The episodes that share a key.

@@ -5,45 +5,22 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Decimal128Array, Float64Array, RecordBatch, StringArray, UInt64Array};
 use arrow::error::ArrowError;
 
-use super::cell::{Cells, Group, KeyValue};
-use super::interval::{Interval, student_t, wilson};
+use super::cell::{Cell, Cells, KeyValue};
 use super::moments::Moments;
-use crate::metric::catalog::{Kind, Metric};
-
-/// The confidence of the intervals.
-const CONFIDENCE: f64 = 0.95;
 
 /// Digits of the sums: 38 is the most that 128 bits hold.
 const DIGITS: u8 = 38;
 
-/// One cell.
-struct Row<'c> {
-    group: &'c Group,
-    name: &'c str,
-    metric: &'c Metric,
-    moments: &'c Moments,
-}
-
-impl Row<'_> {
-    /// Wilson's for a rate, Student's for a quantity.
-    fn interval(&self) -> Option<Interval> {
-        match self.metric.kind {
-            Kind::Rate => wilson(u64::try_from(self.moments.sum).ok()?, self.moments.n, CONFIDENCE),
-            Kind::Quantity => student_t(self.moments, self.metric.se, CONFIDENCE),
-        }
-    }
-}
-
 /// One row per cell: the key columns as text (null where the key is missing), then `metric`, `n` (uint64), `sum` and
-/// `sum_sq` (decimal), `mean`, `se`, `ci_low`, `ci_high` (float64; null where undefined).
+/// `sum_sq` (decimal), `mean`, `se`, `ci_low`, `ci_high` (float64; null where undefined or withheld).
 ///
 /// # Errors
 /// A sum of more than 38 digits.
 pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
-    let rows = rows(cells);
+    let rows: Vec<Cell> = cells.all().collect();
     let mut columns: Vec<(&str, ArrayRef)> = Vec::new();
     for (at, name) in cells.by.iter().enumerate() {
-        columns.push((name, Arc::new(rows.iter().map(|row| text(&row.group.key[at])).collect::<StringArray>())));
+        columns.push((name, Arc::new(rows.iter().map(|row| text(&row.key[at])).collect::<StringArray>())));
     }
     let decimal = |of: fn(&Moments) -> i128| -> Result<ArrayRef, ArrowError> {
         let values = Decimal128Array::from_iter_values(rows.iter().map(|row| of(row.moments)));
@@ -51,31 +28,19 @@ pub fn record_batch(cells: &Cells) -> Result<RecordBatch, ArrowError> {
         values.validate_decimal_precision(DIGITS)?;
         Ok(Arc::new(values))
     };
-    let float = |of: fn(&Row) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
+    let float = |of: fn(&Cell) -> Option<f64>| -> ArrayRef { Arc::new(rows.iter().map(of).collect::<Float64Array>()) };
     columns.push(("metric", Arc::new(StringArray::from_iter_values(rows.iter().map(|row| row.name)))));
     columns.push(("n", Arc::new(UInt64Array::from_iter_values(rows.iter().map(|row| row.moments.n)))));
     columns.push(("sum", decimal(|moments| moments.sum)?));
     columns.push(("sum_sq", decimal(|moments| moments.sum_sq)?));
     columns.push(("mean", float(|row| row.moments.mean())));
     columns.push(("se", float(|row| row.moments.se(row.metric.se))));
-    columns.push(("ci_low", float(|row| row.interval().map(|interval| interval.low))));
-    columns.push(("ci_high", float(|row| row.interval().map(|interval| interval.high))));
+    columns.push(("ci_low", float(|row| row.interval.map(|interval| interval.low))));
+    columns.push(("ci_high", float(|row| row.interval.map(|interval| interval.high))));
     RecordBatch::try_from_iter_with_nullable(columns.into_iter().map(|(name, column)| {
         let nullable = !matches!(name, "metric" | "n" | "sum" | "sum_sq");
         (name, column, nullable)
     }))
-}
-
-fn rows(cells: &Cells) -> Vec<Row<'_>> {
-    let mut rows = Vec::new();
-    for group in &cells.groups {
-        for (name, moments) in cells.metrics.iter().zip(&group.moments) {
-            if let Some(metric) = cells.catalog.metric.get(name) {
-                rows.push(Row { group, name, metric, moments });
-            }
-        }
-    }
-    rows
 }
 
 fn text(key: &KeyValue) -> Option<String> {

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::cell::{Cells, Group, KeyValue};
+use super::cell_interval::ranges;
 use super::moments::{MomentOverflow, Moments};
 use crate::base::suggest::hint;
 pub use crate::score::table::CONDITION;
@@ -58,6 +59,7 @@ pub fn group(table: &EpisodeTable, by: &[String]) -> Result<Cells, GroupError> {
         catalog: table.catalog.clone(),
         by: by.to_vec(),
         metrics: table.metrics.iter().map(|metric| metric.name.clone()).collect(),
+        ranges: ranges(table),
         groups,
     })
 }

@@ -20,6 +20,9 @@ pub struct Interval {
 }
 
 impl Interval {
+    /// No bounds.
+    pub const UNBOUNDED: Self = Self { low: f64::NEG_INFINITY, high: f64::INFINITY };
+
     /// The part between `least` and `most`, where bounds beyond them mean nothing.
     #[must_use]
     pub fn within(self, least: f64, most: f64) -> Self {

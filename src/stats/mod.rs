@@ -4,6 +4,7 @@
 
 pub mod bootstrap;
 pub mod cell;
+pub mod cell_interval;
 pub mod chance;
 pub mod clustered;
 pub mod columns;

@@ -55,6 +55,17 @@ impl Moments {
         })
     }
 
+    /// The successes of a rate and its episodes, where every value is 0 or 1.
+    pub fn counts(self) -> Option<(u64, u64)> {
+        let successes = u64::try_from(self.sum).ok()?;
+        (successes <= self.n && self.sum == self.sum_sq).then_some((successes, self.n))
+    }
+
+    /// Returns true if two values differ.
+    pub fn has_spread(self) -> bool {
+        self.se(StandardError::Population).is_some_and(|se| se > 0.0)
+    }
+
     /// The arithmetic mean; `None` for no value.
     #[expect(clippy::cast_precision_loss, reason = "the one conversion from integers, done once")]
     pub fn mean(self) -> Option<f64> {

@@ -48,6 +48,12 @@ pub fn student(tail: f64, freedom: f64) -> f64 {
     settled(-refined)
 }
 
+/// The share of Student's t distribution beyond a deviate in either direction, for `freedom` > 0 degrees of freedom.
+pub fn student_beyond(deviate: f64, freedom: f64) -> f64 {
+    let t = StudentsT::new(0.0, 1.0, freedom).expect("degrees of freedom are positive");
+    settled(2.0 * t.cdf(-deviate.abs()))
+}
+
 fn student_expansion(z: f64, freedom: f64) -> f64 {
     let s = z * z;
     let terms = [
@@ -81,7 +87,7 @@ pub fn settled(x: f64) -> f64 {
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::{chi_squared_above, normal, student, tail};
+    use super::{chi_squared_above, normal, student, student_beyond, tail};
 
     fn close(found: f64, expected: f64) {
         assert!((found / expected - 1.0).abs() < 2e-11, "found {found}, expected {expected}");
@@ -97,6 +103,21 @@ mod tests {
     }
 
     // scipy 1.17.1 stats.t.isf, refined with mpmath: findroot of betainc(d/2, 1/2, 0, d/(d+t*t))/2 - tail
+    // scipy 1.17.1: 2 * t.sf(x, freedom)
+    #[test]
+    fn shares_beyond_a_deviate_of_student_are_the_known_ones() {
+        for (freedom, beyond) in [
+            (1.0, [0.936548965138893, 0.2951672353008665, 0.1256659163780024]),
+            (2.5, [0.9278065440624897, 0.1573914957579659, 0.02345118997086185]),
+            (11.0, [0.9221435927771462, 0.07080395506803458, 0.0004025298181245196]),
+            (40.3, [0.9208401468347593, 0.052271066125965986, 1.1646902904070114e-05]),
+        ] {
+            for (deviate, beyond) in [0.1, -2.0, 5.0].into_iter().zip(beyond) {
+                close(student_beyond(deviate, freedom), beyond);
+            }
+        }
+    }
+
     #[test]
     fn student_deviates_are_the_known_ones() {
         for (freedom, at_025, at_005) in [

@@ -41,12 +41,14 @@ use crate::figures::{Figure, FigureName};
 use crate::metric::columns::Columns;
 use crate::metric::definitions::Definitions;
 use crate::report::bundle::BundleError;
+use crate::metric::names::is_about;
 use crate::report::comparison::{Comparison, choose, compare};
 use crate::report::errata::Errata;
 use crate::report::layout;
 use crate::report::published;
-use crate::report::statistics::{Options, Sequential, Statistics};
+use crate::report::statistics::{Options, Replies, Selection, Sequential, Statistics};
 use crate::report::style::Style;
+use crate::report::table::Table;
 use crate::score::declared_experiments::declare;
 use crate::score::evidence::{self, Evidence};
 use crate::score::score_traces;
@@ -326,12 +328,29 @@ impl Study {
         Ok(cells)
     }
 
+    /// The tables of these episodes, each with the filter that chose them.
+    fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<Table>, StudyError> {
+        let mut tables = layout::tables(cells, style)?;
+        if let Some(selection) = self.selection(episodes) {
+            tables.iter_mut().for_each(|table| table.footnotes.push(selection.sentence()));
+        }
+        Ok(tables)
+    }
+
+    /// The filter; it is by results where it asks for more than what is recorded of an episode before it begins.
+    fn selection(&self, episodes: &EpisodeTable) -> Option<Selection> {
+        let condition = self.question.filter.clone()?;
+        let is_key = |name: &str| episodes.label(name).is_some() || score_traces::is_constant(name);
+        let by_results = !is_about(&condition, &is_key);
+        Some(Selection { condition, by_results })
+    }
+
     /// The statistics of the cells: intervals, tests, comparisons.
     ///
     /// # Errors
     /// As [`Study::score`]; sums of squares beyond 128 bits.
     pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
-        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
+        let results = self.scan(Outputs { losses: true, quality: true, ..Outputs::default() })?;
         self.check_filter(results.episodes.len())?;
         let counted = self.counted(results);
         let cells = self.cells_of(&counted.results.episodes)?;
@@ -346,10 +365,13 @@ impl Study {
     /// The statistics of the episodes that count.
     fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
         let Counted { results, lost, .. } = counted;
-        let (is_known, total) = (results.lost.is_some() || !lost.is_empty(), lost.total());
+        let declared = &results.episodes.declared;
+        let (is_known, total) = (results.lost.is_some() || declared.losses_recorded || !lost.is_empty(), lost.total());
         let beside = if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() };
-        let design = design_of(&results.episodes.declared);
-        let options = Options { lost: is_known.then_some(beside), design, ..options.clone() };
+        let (design, selection) = (design_of(declared), self.selection(&results.episodes));
+        let replies = results.quality.as_ref().and_then(Replies::of);
+        let lost = is_known.then_some(beside);
+        let options = Options { lost, design, selection, replies, ..options.clone() };
         let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
         if self.question.lost == LostAs::Failure && total > 0 {
             let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
@@ -368,7 +390,8 @@ impl Study {
         self.check_filter(results.episodes.len())?;
         let episodes = self.counted(results).results.episodes;
         size::check_comparisons(&episodes)?;
-        let options = Options { design: design_of(&episodes.declared), ..options.clone() };
+        let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
+        let options = Options { design, selection, ..options.clone() };
         Ok(Sequential::of(&episodes, &options)?)
     }
 
@@ -422,7 +445,8 @@ impl Study {
         // Small files first: a slip in them should not cost a pass over the traces.
         let published = published::read(published)?;
         let style = Style::load(style)?;
-        let tables = layout::tables(&self.cells()?, &style)?;
+        let counted = self.counted(self.score()?);
+        let tables = self.tables(&counted.results.episodes, &self.cells_of(&counted.results.episodes)?, &style)?;
         Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
     }
 

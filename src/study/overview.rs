@@ -9,7 +9,6 @@ use super::report::figure_of;
 use super::results::Results;
 use crate::report::bundle::Manifest;
 use crate::report::html::{self, Figure, Page};
-use crate::report::layout;
 use crate::report::quality::QualityTable;
 use crate::report::statistics::Options;
 use crate::report::style::Style;
@@ -62,7 +61,7 @@ impl Study {
         let figures: Vec<Figure> =
             drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
         let quality = results.quality.as_ref().and_then(QualityTable::of);
-        let tables = layout::tables(&cells, &style)?;
+        let tables = self.tables(&results.episodes, &cells, &style)?;
         let manifest =
             Manifest::new(&cells, &style, SCHEMA_VERSION, self.question.filter.clone(), results.inputs.clone());
         let names: &[&str] = match part {

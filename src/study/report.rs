@@ -13,9 +13,8 @@ use crate::base::suggest::hint;
 use crate::figures::{Figure as Drawn, FigureName};
 use crate::report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
 use crate::report::html::{self, Figure, Page, Recordings};
-use crate::report::layout;
 use crate::report::quality::{self, QualityTable};
-use crate::report::statistics::{Options, Statistics};
+use crate::report::statistics::{Options, Replies, Statistics, TEXT_SCORES};
 use crate::report::style::{MAIN_TABLE, OTHER_TABLE, Style};
 use crate::report::table::Table;
 use crate::report::tables::markdown;
@@ -60,6 +59,8 @@ pub struct Report {
     pub quality: Option<QualityTable>,
     /// Where everything comes from.
     pub manifest: Manifest,
+    /// How many replies gave no decision; `None` where each gave one, and where that is not recorded.
+    pub replies: Option<String>,
     /// What the folder lacks and why, one sentence each.
     pub notes: Vec<String>,
     pub(super) style: Style,
@@ -110,7 +111,8 @@ impl Study {
             options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
         let Counted { results, all, lost } = counted;
         let quality = results.quality.as_ref().and_then(QualityTable::of);
-        let tables = layout::tables(&cells, &style)?;
+        let replies = results.quality.as_ref().and_then(Replies::of).and_then(|replies| replies.sentence());
+        let tables = self.tables(&results.episodes, &cells, &style)?;
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
         let notes = self.notes(&results, &lost);
@@ -123,6 +125,7 @@ impl Study {
             tables,
             quality,
             manifest,
+            replies,
             notes,
             style,
             threads,
@@ -187,6 +190,9 @@ fn registered(episodes: &EpisodeTable) -> Option<String> {
 
 /// What the traces do not declare, in one line; `None` where they declare it.
 fn undeclared(episodes: &EpisodeTable) -> Option<String> {
+    if episodes.declared.from_text {
+        return Some(format!("{TEXT_SCORES}; give the traces, or score them into Parquet"));
+    }
     let lacks = |label: &str| episodes.label(label).is_none();
     let what = match (lacks("fingerprint"), lacks("scene")) {
         (true, true) => "what they were recorded with, nor which episodes share a scene",

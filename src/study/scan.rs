@@ -75,7 +75,8 @@ impl Study {
     pub(super) fn declare(&self, results: &mut Results) -> Result<(), StudyError> {
         if let Source::Traces(traces) = &self.source {
             let unrecorded = losses::unrecorded(&self.inputs, &results.episodes)?;
-            results.episodes.declared = Declared { unrecorded, ..Declared::of(traces) };
+            let losses_recorded = results.lost.is_some();
+            results.episodes.declared = Declared { unrecorded, losses_recorded, ..Declared::of(traces) };
         }
         let asked = self.question.labels();
         results.episodes.labels.retain(|label| asked.contains(&label.name) || says_something(label));

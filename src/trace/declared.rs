@@ -62,6 +62,17 @@ pub struct Declared {
     /// Episodes that failures kept from being recorded: in no trace.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unrecorded: Vec<LostEpisode>,
+    /// Whether every file says which episodes were lost.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub losses_recorded: bool,
+    /// Whether some rows are of scores in CSV or JSON Lines, which carry nothing of this.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub from_text: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde gives a reference")]
+const fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 impl Declared {
@@ -83,7 +94,7 @@ impl Declared {
                 .map(|_| Cluster::Seed),
             fingerprints: fingerprints.into_iter().collect(),
             registration: serde_json::from_value(recording["registration"].clone()).unwrap_or_default(),
-            unrecorded: Vec::new(),
+            ..Self::default()
         }
     }
 
@@ -100,6 +111,8 @@ impl Declared {
             registration: self.registration.filter(|hash| other.registration.as_ref() == Some(hash)),
             fingerprints: self.fingerprints,
             unrecorded: self.unrecorded,
+            losses_recorded: self.losses_recorded && other.losses_recorded,
+            from_text: self.from_text || other.from_text,
         }
     }
 }

@@ -117,6 +117,16 @@ fn quality_is_in_reports_in_info_and_in_check() {
     let failed = run(at, &["check", "a.parquet", "--max-unreadable", "0.05", "--max-lost", "0"]).ends(1).stdout;
     assert!(failed.contains("E1, m: --max-unreadable: expected at most 0.05, found 0.0833"), "{failed}");
     assert!(failed.contains("--max-lost: expected at most 0, found 2"), "{failed}");
+    let answer: Value =
+        serde_json::from_str(&run(at, &["check", "a.parquet", "--max-unreadable", "0.05", "--json"]).ends(1).stdout)
+            .unwrap();
+    let violation = json!({
+        "cell": { "experiment": "E1", "model": "m", "condition": "default" },
+        "limit": "max-unreadable", "expected": 0.05, "found": 2.0 / 24.0,
+    });
+    assert_eq!(answer["violations"], json!([violation]));
+    assert_eq!([&answer["holds"], &answer["not_recorded"]], [&json!(false), &json!([])]);
+    assert!(answer.get("passed").is_none());
     assert!(run(at, &["check", "a.parquet"]).refused().contains("expected a limit to check"));
     assert_eq!(run(at, &["check", "a.parquet", "--max-unreadable", "5"]).code, 2);
 }
@@ -127,10 +137,34 @@ fn what_is_not_recorded_passes_no_check_and_is_not_zero() {
     let episodes = [episode("e1", vec![Step { action: Some(Action::Done), ..Step::default() }])];
     write_trace(&folder.path().join("a.parquet"), &episodes, OptionalColumns::NONE);
     let failed = run(folder.path(), &["check", "a.parquet", "--max-unreadable", "1"]).ends(1).stdout;
-    assert!(failed.contains("nothing recorded"), "{failed}");
+    let told = "E1, m: --max-unreadable: not recorded for 1 of 1 steps, so the limit cannot be checked";
+    assert!(failed.contains(told), "{failed}");
+    let failed = run(folder.path(), &["check", "a.parquet", "--max-lost", "9", "--max-latency", "9"]).ends(1).stdout;
+    assert!(failed.contains("--max-lost: not recorded") && failed.contains("--max-latency: not recorded"), "{failed}");
     run(folder.path(), &["report", "a.parquet", "--out", "out"]).done();
     let quality = fs::read_to_string(folder.path().join("out/tables/quality.md")).unwrap();
     assert!(quality.contains("| E1 | m | 1 | -- | 1 | -- | -- | -- | -- | -- | -- |"), "{quality}");
+}
+
+#[test]
+fn a_limit_on_replies_that_are_recorded_in_part_is_not_satisfied() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let known = [episode("e1", vec![step(Some(Action::Done), "ok", "red")])];
+    write_trace(&at.join("a.parquet"), &known, OptionalColumns::used_by(&known));
+    let unknown = [episode("e2", vec![Step { action: Some(Action::Done), ..Step::default() }])];
+    write_trace(&at.join("b.parquet"), &unknown, OptionalColumns::NONE);
+    let limits = ["--max-unreadable", "1", "--max-lost", "0", "--max-latency", "1000"];
+    let answer = |files: &[&str]| run(at, &[&["check"], files, &limits].concat());
+    answer(&["a.parquet"]).done();
+    let failed = answer(&["a.parquet", "b.parquet"]).ends(1).stdout;
+    for (limit, missing) in [("max-unreadable", 1), ("max-latency", 1), ("max-lost", 2)] {
+        assert!(failed.contains(&format!("--{limit}: not recorded for {missing} of 2 steps")), "{failed}");
+    }
+    let json: Value = serde_json::from_str(&answer(&["a.parquet", "b.parquet", "--json"]).ends(1).stdout).unwrap();
+    assert_eq!([&json["holds"], &json["violations"]], [&json!(false), &json!([])]);
+    let cell = json!({ "experiment": "E1", "model": "m", "condition": "default" });
+    assert_eq!(json["not_recorded"][0], json!({ "cell": cell, "limit": "max-unreadable", "missing": 1, "steps": 2 }));
 }
 
 #[test]

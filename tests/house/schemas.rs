@@ -4,6 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use mirrorstats::agent::reply;
+use mirrorstats::cli::commands::check::QualityCheckAnswer;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
 use mirrorstats::cli::commands::experiments::ExperimentsAnswer;
 use mirrorstats::cli::commands::import::ImportAnswer;
@@ -43,6 +44,7 @@ fn current() -> Vec<(&'static str, Value)> {
     #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
     let mut schemas = vec![
         ("audit", json!(schema_for!(Audit))),
+        ("check", json!(schema_for!(QualityCheckAnswer))),
         ("comparison", json!(schema_for!(Comparison))),
         ("decision", json!(schema_for!(Decision))),
         ("definitions-check", json!(schema_for!(CheckAnswer))),

@@ -5,6 +5,7 @@ mod figures;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod html;
+mod one_interval;
 mod reconstruction;
 mod report;
 mod sequential;

@@ -10,6 +10,7 @@ use mirrorstats::report::statistics::{Contrast, Intervals, Options, Statistics, 
 use mirrorstats::score::quality::CellKey;
 use mirrorstats::score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 use mirrorstats::stats::cell::{Cells, Group, KeyValue};
+use mirrorstats::stats::cell_interval::ranges;
 use mirrorstats::stats::design::{Cluster, Design, DesignKind};
 use mirrorstats::stats::interval::Interval;
 use mirrorstats::stats::losses::LostCounts;
@@ -105,6 +106,7 @@ fn cells(table: &EpisodeTable) -> Cells {
         catalog: table.catalog.clone(),
         by: vec!["experiment".into(), "model".into()],
         metrics: table.metrics.iter().map(|column| column.name.clone()).collect(),
+        ranges: ranges(table),
         groups: groups.into_values().collect(),
     }
 }
@@ -276,7 +278,13 @@ fn values_too_large_to_square_are_refused() {
         ("E1", "a", 0, 1, true, i64::MAX),
         ("E1", "a", 0, 2, true, i64::MAX),
     ]);
-    let none = Cells { groups: Vec::new(), catalog: table.catalog.clone(), by: Vec::new(), metrics: Vec::new() };
+    let none = Cells {
+        groups: Vec::new(),
+        catalog: table.catalog.clone(),
+        by: Vec::new(),
+        metrics: Vec::new(),
+        ranges: Vec::new(),
+    };
     let refused = Statistics::of(&table, &none, &Options::default()).unwrap_err();
     assert!(refused.to_string().contains("smaller unit"));
 }

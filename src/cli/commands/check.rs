@@ -12,12 +12,13 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::quality::{self, CellAnswer};
 use crate::score::quality::{CellKey, Quality, QualityByCell};
+use crate::stats::losses::INFRASTRUCTURE;
 
-/// Check what became of the replies in traces: exits with 1 where a limit is passed
+/// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
 ///
-/// Shares are of the replies of one cell: an experiment, a model and a condition. A limit on something that the traces do
-/// not record counts as passed. Lost episodes are those that the infrastructure ended, and those in `lost.jsonl` beside the
-/// traces.
+/// Shares are of the replies of one cell: an experiment, a model and a condition. A limit cannot be checked where traces do
+/// not record its quantity for every step. Lost episodes are those that the infrastructure ended, and those in `lost.jsonl`
+/// beside the traces.
 #[derive(Clone, Debug, clap::Args)]
 pub struct CheckArgs {
     /// The traces to read.
@@ -46,28 +47,46 @@ pub struct CheckArgs {
     pub json: bool,
 }
 
-/// What was checked.
+/// The result of the check.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct CheckAnswer {
-    /// Whether no limit is passed.
+#[serde(deny_unknown_fields)]
+pub struct QualityCheckAnswer {
+    /// Whether every limit could be checked and none is exceeded.
     pub holds: bool,
-    /// The limits that are passed.
-    pub passed: Vec<PassedLimit>,
+    /// The limits that are exceeded.
+    pub violations: Vec<Violation>,
+    /// The limits that could not be checked.
+    pub not_recorded: Vec<NotRecorded>,
     /// Every cell.
     pub cells: Vec<CellAnswer>,
 }
 
-/// A limit that is passed.
+/// A limit that is exceeded.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct PassedLimit {
+#[serde(deny_unknown_fields)]
+pub struct Violation {
     /// The cell; null for a limit over all cells.
     pub cell: Option<CellKey>,
     /// The option, without its dashes.
     pub limit: &'static str,
     /// The largest that was allowed.
     pub expected: f64,
-    /// What was found; null where the traces do not record it.
-    pub found: Option<f64>,
+    /// The value in the traces.
+    pub found: f64,
+}
+
+/// A limit on a quantity that the traces do not record for every step of a cell.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NotRecorded {
+    /// The cell.
+    pub cell: CellKey,
+    /// The option, without its dashes.
+    pub limit: &'static str,
+    /// The steps of the cell without it.
+    pub missing: u64,
+    /// All steps of the cell.
+    pub steps: u64,
 }
 
 impl CheckArgs {
@@ -82,8 +101,9 @@ impl CheckArgs {
             return Err(Failure::input(words));
         }
         let cells = self.traces.open()?.quality()?;
-        let answer = CheckAnswer { passed: self.passed(&cells), holds: true, cells: quality::answers(&cells) };
-        let answer = CheckAnswer { holds: answer.passed.is_empty(), ..answer };
+        let (violations, not_recorded) = (self.violations(&cells), self.not_recorded(&cells));
+        let holds = violations.is_empty() && not_recorded.is_empty();
+        let answer = QualityCheckAnswer { holds, violations, not_recorded, cells: quality::answers(&cells) };
         if self.json {
             output::print_json(&answer)?;
         } else {
@@ -92,20 +112,38 @@ impl CheckArgs {
         Ok(if answer.holds { Outcome::Done } else { Outcome::CheckFailed })
     }
 
-    fn passed(&self, cells: &QualityByCell) -> Vec<PassedLimit> {
-        let mut passed = Vec::new();
-        for (key, quality) in &cells.0 {
-            for (limit, expected, found) in self.found(quality) {
-                passed.extend(exceeded(Some(key), limit, expected, found));
-            }
+    fn violations(&self, cells: &QualityByCell) -> Vec<Violation> {
+        let of_cell = |(key, quality)| self.found(quality).map(|found| exceeded(Some(key), found));
+        let lost = ("max-lost", self.max_lost.map(real), cells.whole().lost.map(real));
+        cells.0.iter().flat_map(of_cell).chain([exceeded(None, lost)]).flatten().collect()
+    }
+
+    fn not_recorded(&self, cells: &QualityByCell) -> Vec<NotRecorded> {
+        let missing = |quality: &Quality| {
+            let replies = quality.steps.saturating_sub(quality.replies());
+            // What the infrastructure ended came with no reply, which would have taken some time.
+            let ended: u64 = INFRASTRUCTURE.iter().map(|status| quality.of_status(status)).sum();
+            let timed = quality.latencies.values().sum::<u64>() + ended;
+            [
+                ("max-unreadable", self.max_unreadable.is_some(), replies),
+                ("max-refused", self.max_refused.is_some(), replies),
+                ("max-truncated", self.max_truncated.is_some(), replies),
+                ("max-repaired", self.max_repaired.is_some(), replies),
+                ("max-latency", self.max_latency.is_some(), quality.steps.saturating_sub(timed)),
+                ("max-lost", self.max_lost.is_some(), if quality.lost.is_none() { quality.steps } else { replies }),
+            ]
+        };
+        let mut found = Vec::new();
+        for (cell, quality) in &cells.0 {
+            let asked = missing(quality).into_iter().filter(|(_, is_asked, missing)| *is_asked && *missing > 0);
+            let of = |(limit, _, missing)| NotRecorded { cell: cell.clone(), limit, missing, steps: quality.steps };
+            found.extend(asked.map(of));
         }
-        let lost = cells.whole().lost.map(real);
-        passed.extend(exceeded(None, "max-lost", self.max_lost.map(real), lost));
-        passed
+        found
     }
 
     /// Each limit of a cell, what it allows, and what was found.
-    fn found(&self, quality: &Quality) -> [(&'static str, Option<f64>, Option<f64>); 5] {
+    fn found(&self, quality: &Quality) -> [Limit; 5] {
         let of = |count: u64| (quality.replies() > 0).then(|| real(count) / real(quality.replies()));
         #[expect(clippy::cast_precision_loss, reason = "milliseconds are far below 2^53")]
         let ms = |ms: i64| ms as f64;
@@ -119,37 +157,37 @@ impl CheckArgs {
     }
 }
 
+/// An option, the largest value that it allows, and the value in the traces.
+type Limit = (&'static str, Option<f64>, Option<f64>);
+
 #[expect(clippy::cast_precision_loss, reason = "counts of replies are far below 2^53")]
 fn real(count: u64) -> f64 {
     count as f64
 }
 
-/// The limit, if it is passed or cannot be told.
-fn exceeded(
-    cell: Option<&CellKey>,
-    limit: &'static str,
-    expected: Option<f64>,
-    found: Option<f64>,
-) -> Option<PassedLimit> {
-    let expected = expected?;
-    let holds = found.is_some_and(|found| found <= expected);
-    (!holds).then(|| PassedLimit { cell: cell.cloned(), limit, expected, found })
+fn exceeded(cell: Option<&CellKey>, (limit, expected, found): Limit) -> Option<Violation> {
+    let (expected, found) = expected.zip(found)?;
+    (found > expected).then(|| Violation { cell: cell.cloned(), limit, expected, found })
 }
 
-fn print(answer: &CheckAnswer, cells: &QualityByCell) -> io::Result<()> {
+fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {
     let mut out = io::stdout().lock();
     out.write_all(quality::text(cells, crate::cli::terminal::width()).as_bytes())?;
     writeln!(out)?;
-    for passed in &answer.passed {
-        let place = match &passed.cell {
-            Some(CellKey { experiment, model, .. }) => format!("{}, {}: ", visible(experiment), visible(model)),
-            None => String::new(),
-        };
-        let found = passed.found.map_or_else(|| "nothing recorded".to_owned(), number);
-        writeln!(out, "{place}--{}: expected at most {}, found {found}", passed.limit, number(passed.expected))?;
+    let named = |cell: &CellKey| match cell.condition.as_str() {
+        _ if !cells.has_conditions() => format!("{}, {}: ", visible(&cell.experiment), visible(&cell.model)),
+        condition => format!("{}, {} [{}]: ", visible(&cell.experiment), visible(&cell.model), visible(condition)),
+    };
+    for Violation { cell, limit, expected, found } in &answer.violations {
+        let place = cell.as_ref().map_or_else(String::new, named);
+        writeln!(out, "{place}--{limit}: expected at most {}, found {}", number(*expected), number(*found))?;
+    }
+    for NotRecorded { cell, limit, missing, steps } in &answer.not_recorded {
+        let what = format!("not recorded for {missing} of {steps} steps, so the limit cannot be checked");
+        writeln!(out, "{}--{limit}: {what}", named(cell))?;
     }
     if answer.holds {
-        writeln!(out, "no limit is passed")?;
+        writeln!(out, "no limit is exceeded")?;
     }
     Ok(())
 }

@@ -87,6 +87,9 @@ impl ReportArgs {
             writeln!(out, "\n{}: what the style names nowhere", table.title)?;
             out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
         }
+        if let Some(replies) = &report.replies {
+            writeln!(out, "\n{replies}")?;
+        }
         let episodes = counted(report.results.episodes.len() as u64, "episode");
         output::say(&format!("{episodes}; the report is in {}", self.out.display()));
         if !self.no_figures {

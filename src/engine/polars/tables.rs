@@ -4,15 +4,10 @@ use polars::prelude::{Column, DataFrame, IntoLazy as _, LazyFrame};
 
 use super::frame::{self, FrameColumn};
 use super::run::PolarsError;
-use crate::metric::catalog::{Kind, Metric};
 use crate::score::table::{EpisodeTable, KeyRef, MetricColumn};
-use crate::stats::cell::{Cells, KeyValue};
-use crate::stats::interval::{Interval, student_t, wilson};
+use crate::stats::cell::{Cell, Cells, KeyValue};
 use crate::stats::moments::Moments;
 use crate::trace::open::TraceSet;
-
-/// The confidence of the intervals of `cells`.
-const CONFIDENCE: f64 = 0.95;
 
 /// The steps of all files with all their columns; a file without a column has nulls there.
 ///
@@ -58,7 +53,7 @@ pub fn episodes(table: &EpisodeTable) -> Result<LazyFrame, PolarsError> {
 /// # Errors
 /// A sum beyond 64 bits; what Polars says of the columns.
 pub fn cells(cells: &Cells) -> Result<LazyFrame, PolarsError> {
-    let rows: Vec<Row> = rows(cells);
+    let rows: Vec<Cell> = cells.all().collect();
     let mut columns = Vec::new();
     for (at, name) in cells.by.iter().enumerate() {
         let texts: Vec<Option<String>> = rows.iter().map(|row| text_of(&row.key[at])).collect();
@@ -70,46 +65,16 @@ pub fn cells(cells: &Cells) -> Result<LazyFrame, PolarsError> {
         Ok::<_, PolarsError>(Column::new(name.into(), values))
     };
     let float =
-        |name: &str, of: fn(&Row) -> Option<f64>| Column::new(name.into(), rows.iter().map(of).collect::<Vec<_>>());
-    columns.push(Column::new("metric".into(), rows.iter().map(|row| row.metric).collect::<Vec<_>>()));
+        |name: &str, of: fn(&Cell) -> Option<f64>| Column::new(name.into(), rows.iter().map(of).collect::<Vec<_>>());
+    columns.push(Column::new("metric".into(), rows.iter().map(|row| row.name).collect::<Vec<_>>()));
     columns.push(int("n", |moments| moments.n.into())?);
     columns.push(int("sum", |moments| moments.sum)?);
     columns.push(int("sum_sq", |moments| moments.sum_sq)?);
     columns.push(float("mean", |row| row.moments.mean()));
-    columns.push(float("se", |row| row.moments.se(row.definition.se)));
-    columns.push(float("ci_low", |row| row.interval().map(|interval| interval.low)));
-    columns.push(float("ci_high", |row| row.interval().map(|interval| interval.high)));
+    columns.push(float("se", |row| row.moments.se(row.metric.se)));
+    columns.push(float("ci_low", |row| row.interval.map(|interval| interval.low)));
+    columns.push(float("ci_high", |row| row.interval.map(|interval| interval.high)));
     Ok(DataFrame::new(rows.len(), columns)?.lazy())
-}
-
-/// One cell.
-struct Row<'c> {
-    key: &'c [KeyValue],
-    metric: &'c str,
-    definition: &'c Metric,
-    moments: &'c Moments,
-}
-
-impl Row<'_> {
-    /// Wilson's for a rate, Student's for a quantity.
-    fn interval(&self) -> Option<Interval> {
-        match self.definition.kind {
-            Kind::Rate => wilson(u64::try_from(self.moments.sum).ok()?, self.moments.n, CONFIDENCE),
-            Kind::Quantity => student_t(self.moments, self.definition.se, CONFIDENCE),
-        }
-    }
-}
-
-fn rows(cells: &Cells) -> Vec<Row<'_>> {
-    let mut rows = Vec::new();
-    for group in &cells.groups {
-        for (metric, moments) in cells.metrics.iter().zip(&group.moments) {
-            if let Some(definition) = cells.catalog.metric.get(metric) {
-                rows.push(Row { key: &group.key, metric, definition, moments });
-            }
-        }
-    }
-    rows
 }
 
 fn text_of(key: &KeyValue) -> Option<String> {

@@ -10,20 +10,14 @@ use crate::base::number::{Decimal, full_precision};
 use crate::base::ratio::Ratio;
 use crate::metric::catalog::{Kind, Metric};
 use crate::report::table::{Cell, DAGGER, Emphasis, Value};
-use crate::report::value::interval;
+use crate::stats::cell;
 use crate::stats::interval::Interval;
 use crate::stats::moments::Moments;
 
 /// A cell of a metric, with the level of blind guessing where there is one.
-pub(super) fn cell(
-    cell: &Cell,
-    (name, metric): (&str, &Metric),
-    moments: &Moments,
-    undefined: &str,
-    chance: Option<Ratio>,
-) -> Json {
+pub(super) fn cell(cell: &Cell, of: cell::Cell, undefined: &str, chance: Option<Ratio>) -> Json {
+    let cell::Cell { name, metric, moments, interval, .. } = of;
     let (estimate, detail) = cell.value.parts(&visible(undefined));
-    let interval = interval(moments, metric);
     let of = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
     json!({
         "metric": visible(name),

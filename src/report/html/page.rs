@@ -12,7 +12,7 @@ use super::template::markup;
 use super::{Figure, HtmlError, Page, definitions, embedded, pair};
 use crate::base::escape::visible;
 use crate::figures;
-use crate::metric::catalog::{Better, Metric};
+use crate::metric::catalog::Better;
 use crate::report::bundle::Manifest;
 use crate::report::layout::heading;
 use crate::report::order::row_key;
@@ -21,9 +21,8 @@ use crate::report::statistics::Statistics;
 use crate::report::statistics::text::{self, Length};
 use crate::report::table::{Column, Row, RowGroup, Table};
 use crate::score::table::{EpisodeTable, KeyRef};
-use crate::stats::cell::{Cells, Group};
+use crate::stats::cell::Cells;
 use crate::stats::group::group;
-use crate::stats::moments::Moments;
 
 /// Everything that a report puts into its page.
 ///
@@ -102,9 +101,9 @@ fn row(row: &Row, table: &Table, cells: &Cells, filters: &Filters) -> Result<Jso
     let key = |name: &str| cells.by.iter().position(|key| key == name).map(|at| row.key[at].to_string());
     let experiment = key("experiment");
     let views = row.cells.iter().zip(&table.columns).map(|(own, column)| {
-        let (metric, moments) = found(cells, group, &column.metric)?;
+        let of = cells.of_metric(group, &column.metric)?;
         let level = experiment.as_deref().and_then(|experiment| cells.catalog.chance(experiment, &column.metric));
-        Some(cell(own, (&column.metric, metric), moments, &table.undefined, level))
+        Some(cell(own, of, &table.undefined, level))
     });
     Ok(json!({
         "name": visible(&row.name),
@@ -116,12 +115,6 @@ fn row(row: &Row, table: &Table, cells: &Cells, filters: &Filters) -> Result<Jso
         "experiment": experiment.as_deref().map(visible),
         "cells": views.collect::<Option<Vec<_>>>().ok_or_else(stray)?,
     }))
-}
-
-/// The definition and the moments of a metric in a group.
-fn found<'a>(cells: &'a Cells, group: &'a Group, name: &str) -> Option<(&'a Metric, &'a Moments)> {
-    let at = cells.metrics.iter().position(|metric| metric == name)?;
-    Some((cells.catalog.metric.get(name)?, group.moments.get(at)?))
 }
 
 fn figure(figure: &Figure<'_>) -> Value {

@@ -4,14 +4,15 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::{Study, counts};
-use crate::metric::catalog::{Kind, StandardError};
+use super::study::Study;
+use crate::metric::catalog::{Kind, Metric, StandardError};
 use crate::score::table::EpisodeTable;
 use crate::stats::bootstrap;
 use crate::stats::cell::{Cells, Group, KeyValue};
+use crate::stats::cell_interval::{bounded, cell_interval};
 use crate::stats::coverage::{self, Withheld};
 use crate::stats::group::membership;
-use crate::stats::interval::{Interval, clopper_pearson, jeffreys, student_t, wilson};
+use crate::stats::interval::{Interval, clopper_pearson, jeffreys, wilson};
 use crate::stats::moments::Moments;
 
 /// Conditional metrics with fewer defined episodes than this are marked.
@@ -84,9 +85,10 @@ impl CellRow {
             let kind = study.kind(metric);
             let definition = study.metric(metric);
             let se = definition.map_or(StandardError::Sample, |definition| definition.se);
-            let intervals = match (kind, counts(moments)) {
-                (Kind::Rate, Some((k, n))) => Intervals::rate(k, n, confidence),
-                _ => Intervals::quantity(study, metric, moments, rows, confidence),
+            let intervals = match (definition, kind, moments.counts()) {
+                (_, Kind::Rate, Some((k, n))) => Intervals::rate(k, n, confidence),
+                (None, ..) => Intervals::NONE,
+                (Some(definition), ..) => Intervals::quantity(study, (metric, definition), moments, rows, confidence),
             };
             Self {
                 key: key.clone(),
@@ -106,6 +108,14 @@ impl CellRow {
 }
 
 impl Intervals {
+    /// Of a metric that the catalog does not describe.
+    const NONE: Self = Self::Quantity {
+        student_t: None,
+        student_t_withheld: Some(Withheld::Undefined),
+        bootstrap: None,
+        bootstrap_withheld: Some(Withheld::Undefined),
+    };
+
     fn rate(successes: u64, n: u64, confidence: f64) -> Self {
         Self::Rate {
             wilson: wilson(successes, n, confidence),
@@ -113,23 +123,21 @@ impl Intervals {
             jeffreys: jeffreys(successes, n, confidence),
         }
     }
-}
 
-impl Intervals {
-    fn quantity(study: &Study, metric: &str, moments: &Moments, rows: &[usize], confidence: f64) -> Self {
-        let form = study.metric(metric).map_or(StandardError::Sample, |definition| definition.se);
-        let (low, high) = study.range(metric);
-        let is_spread = moments.se(StandardError::Sample).is_some_and(|se| se > 0.0);
-        let given = |found: Option<Interval>, fewest| {
-            let found = found.filter(|found| found.low < found.high).map(|found| found.within(low, high));
-            coverage::given(found, moments.n, fewest, is_spread)
-        };
+    fn quantity(
+        study: &Study,
+        (name, metric): (&str, &Metric),
+        moments: &Moments,
+        rows: &[usize],
+        confidence: f64,
+    ) -> Self {
+        let range = study.range(name);
         // 10,000 resamples are drawn only where their interval may be given.
-        let resampled = (moments.n >= coverage::BOOTSTRAP && is_spread)
-            .then(|| bootstrap::mean(&values(study, metric, rows), confidence))
+        let resampled = (moments.n >= coverage::BOOTSTRAP && moments.has_spread())
+            .then(|| bootstrap::mean(&values(study, name, rows), confidence))
             .flatten();
-        let (student_t, student_t_withheld) = given(student_t(moments, form, confidence), coverage::STUDENT);
-        let (bootstrap, bootstrap_withheld) = given(resampled, coverage::BOOTSTRAP);
+        let (student_t, student_t_withheld) = cell_interval(moments, metric, range, confidence);
+        let (bootstrap, bootstrap_withheld) = bounded(resampled, moments, range, coverage::BOOTSTRAP);
         Self::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld }
     }
 }

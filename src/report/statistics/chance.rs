@@ -6,7 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::{Block, Experiment, Study, counts, named};
+use super::study::{Block, Experiment, Study, named};
 use crate::base::ratio::Ratio;
 use crate::score::table::MetricColumn;
 use crate::stats::chance::{exact_test, least_p};
@@ -133,7 +133,7 @@ struct Tested<'s, 'a> {
 
 impl<'s, 'a> Tested<'s, 'a> {
     fn of(block: &'s Block<'a>, column: &MetricColumn, chance: Ratio) -> Option<Self> {
-        let (successes, n) = counts(&block.moments(column))?;
+        let (successes, n) = block.moments(column).counts()?;
         Some(Self { block, successes, n, test: exact_test(successes, n, chance)?, least: least_p(n, chance)? })
     }
 }

@@ -54,8 +54,8 @@ impl ClusterRow {
             Kind::Rate => clustered_rate(&seeds, confidence),
             Kind::Quantity => clustered(&seeds, confidence),
         };
-        let (low, high) = study.range(&column.name);
-        let interval = found.and_then(|found| found.interval).map(|interval| interval.within(low, high));
+        let range = study.range(&column.name);
+        let interval = found.and_then(|found| found.interval).map(|interval| interval.within(range.low, range.high));
         let (interval, withheld) =
             coverage::given(interval, seeds.len() as u64, coverage::CLUSTERS, found.is_some_and(|it| it.se > 0.0));
         Self {

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::durations::{decided, is_duration};
 use super::matching::Matched;
-use super::study::{Block, Study, counts};
+use super::study::{Block, Study};
 use crate::metric::catalog::{Kind, StandardError};
 use crate::score::table::MetricColumn;
 use crate::stats::contrast::{newcombe, welch};
@@ -27,9 +27,9 @@ pub enum Method {
     Mcnemar,
     /// Independent rates: Fisher's exact test, Newcombe's hybrid score interval.
     Fisher,
-    /// Pairs of a duration: restricted means, a normal interval and test of their difference.
+    /// Pairs of a duration: restricted means, Student's t interval and test of their difference.
     RestrictedMeanPaired,
-    /// Independent durations: the same.
+    /// Independent durations: the same with Satterthwaite's degrees of freedom.
     RestrictedMean,
     /// Pairs of another quantity: Student's t interval of the differences; no test.
     StudentPaired,
@@ -58,7 +58,7 @@ pub struct Comparison {
     pub interval: Option<Interval>,
     /// Why there is no interval.
     pub withheld: Option<Withheld>,
-    /// The p value, two-sided: exact and by minimum likelihood for rates, by the normal distribution for durations.
+    /// The p value, two-sided: exact and by minimum likelihood for rates, by Student's t for durations.
     pub p: Option<f64>,
     /// The mid-p value of a rate, which is not guaranteed to keep the level.
     pub mid_p: Option<f64>,
@@ -128,7 +128,7 @@ impl Compared<'_, '_> {
     fn independent(&self, column: &MetricColumn, rates: bool) -> Comparison {
         let (a, b) = (self.first.moments(column), self.second.moments(column));
         let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
-        let counted = rates.then(|| counts(&a).zip(counts(&b))).flatten();
+        let counted = rates.then(|| a.counts().zip(b.counts())).flatten();
         if let Some((first, second)) = counted {
             return Comparison {
                 successes: Some([first.0, second.0]),

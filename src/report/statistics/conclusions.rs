@@ -4,7 +4,7 @@ use indexmap::IndexMap;
 
 use super::chance::own_levels;
 use super::study::Study;
-use super::{CENSORED, ChanceRow, DurationRow, Family, Method, Reach, Role, Statistics, Verdict};
+use super::{CENSORED, ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Statistics, Verdict};
 use crate::base::format::fixed;
 use crate::stats::power::Detectable;
 
@@ -26,7 +26,8 @@ pub(super) fn headline(study: &Study) -> Vec<String> {
 pub(super) fn conclusions(statistics: &Statistics) -> Vec<String> {
     let is_headline = |metric: &String| statistics.headline.contains(metric);
     let families: Vec<&Family> = statistics.models.iter().filter(|family| is_headline(&family.metric)).collect();
-    let mut sentences = reaches(&families);
+    let mut sentences: Vec<String> = statistics.selection.iter().map(Selection::sentence).collect();
+    sentences.extend(reaches(&families));
     sentences.extend(against_levels(&statistics.chance));
     sentences.extend(families.iter().map(|family| ties(family)));
     sentences.extend(unfinished(&statistics.durations));

@@ -3,8 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::study::{Block, CENSORED, Experiment, Study};
+use super::study::{Block, Experiment, Study};
 use crate::score::table::MetricColumn;
+use crate::stats::cell_interval::CENSORED;
 use crate::stats::competing::{Ending, Incidence, Outcome};
 use crate::stats::coverage::{self, Withheld};
 use crate::stats::interval::Interval;

@@ -17,7 +17,9 @@ mod losses;
 mod matching;
 mod models;
 mod overall;
+mod replies;
 mod retest;
+mod selection;
 mod sequential;
 mod study;
 pub mod text;
@@ -37,12 +39,17 @@ pub use losses::{LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
+pub use replies::{Replies, UnusableReplies};
 pub use retest::RetestRow;
+pub use selection::Selection;
 pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
-pub use study::CENSORED;
+
+pub use warnings::TEXT_SCORES;
 
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
+pub use crate::stats::cell_interval::CENSORED;
+use crate::stats::cell_interval::CONFIDENCE;
 use crate::stats::design::Design;
 use crate::stats::losses::LostCounts;
 use crate::stats::moments::MomentOverflow;
@@ -59,13 +66,25 @@ pub struct Options {
     pub lost: Option<LostCounts>,
     /// What the traces declare about their design; nothing by default.
     pub design: Design,
+    /// Which episodes were chosen; all by default.
+    pub selection: Option<Selection>,
+    /// How many replies gave no decision; `None` where that is not recorded.
+    pub replies: Option<Replies>,
     /// Whether probabilities of improvement are computed, each of which resamples all episodes of two models.
     pub improvements: bool,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { confidence: 0.95, horizon: None, lost: None, design: Design::default(), improvements: false }
+        Self {
+            confidence: CONFIDENCE,
+            horizon: None,
+            lost: None,
+            design: Design::default(),
+            selection: None,
+            replies: None,
+            improvements: false,
+        }
     }
 }
 
@@ -82,6 +101,9 @@ pub struct Statistics {
     pub by: Vec<String>,
     /// The number of episodes.
     pub episodes: usize,
+    /// The filter that chose the episodes; null without one.
+    #[serde(default, rename = "where")]
+    pub selection: Option<Selection>,
     /// What the traces declare about their design.
     pub design: Design,
     /// What follows from the design, in a sentence.
@@ -117,6 +139,9 @@ pub struct Statistics {
     pub retests: Vec<RetestRow>,
     /// Episodes lost to infrastructure.
     pub losses: Losses,
+    /// Replies that gave no decision; null where no status of a reply is recorded.
+    #[serde(default)]
+    pub replies: Option<Replies>,
 }
 
 impl Statistics {
@@ -138,6 +163,7 @@ impl Statistics {
             confidence,
             by: cells.by.clone(),
             episodes: table.len(),
+            selection: options.selection.clone(),
             design: options.design,
             design_note: String::new(),
             answers: Vec::new(),
@@ -154,12 +180,14 @@ impl Statistics {
             durations: DurationRow::all(&study, horizon, confidence),
             retests: RetestRow::all(&study),
             losses: Losses::of(&study, options.lost.as_ref(), confidence),
+            replies: options.replies.clone(),
             headline,
         };
-        statistics.design_note = warnings::design_note(&statistics);
+        let from_text = table.declared.from_text;
+        statistics.design_note = warnings::design_note(&statistics, from_text);
         statistics.answers = answers::answers(&statistics);
         statistics.conclusions = conclusions::conclusions(&statistics);
-        statistics.warnings = warnings::warnings(&statistics);
+        statistics.warnings = warnings::warnings(&statistics, from_text);
         Ok(statistics)
     }
 }

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::durations::{decided, is_duration};
 use super::matching::{Matched, Scenes};
-use super::study::{Block, Study, counts};
+use super::study::{Block, Study};
 use crate::metric::catalog::Kind;
 use crate::score::table::MetricColumn;
 use crate::stats::competing::Outcome;
@@ -142,7 +142,7 @@ impl<'s, 'a> Couple<'s, 'a> {
             .strata
             .iter()
             .filter_map(|(a, b)| {
-                Some(Stratum { first: counts(&a.moments(column))?, second: counts(&b.moments(column))? })
+                Some(Stratum { first: a.moments(column).counts()?, second: b.moments(column).counts()? })
             })
             .filter(|stratum| stratum.first.1 > 0 && stratum.second.1 > 0)
             .collect();

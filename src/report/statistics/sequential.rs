@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use super::chance::levels;
 use super::conclusions::headline;
 use super::models::compared;
-use super::study::{Experiment, Study, counts, named};
-use super::{Family, Options, PairTest, Role, Verdict};
+use super::study::{Experiment, Study, named};
+use super::{Family, Options, PairTest, Role, Selection, Verdict};
 use crate::base::ratio::Ratio;
 use crate::metric::catalog::Kind;
 use crate::score::table::EpisodeTable;
@@ -31,6 +31,9 @@ pub struct Sequential {
     pub confidence: f64,
     /// The number of episodes so far.
     pub episodes: usize,
+    /// The filter that chose the episodes; null without one.
+    #[serde(default, rename = "where")]
+    pub selection: Option<Selection>,
     /// The rates that have a level to be compared with.
     pub headline: Vec<String>,
     /// Every rate of every model.
@@ -130,6 +133,7 @@ impl Sequential {
             definitions_hash: table.catalog.hash.clone(),
             confidence: options.confidence,
             episodes: table.len(),
+            selection: options.selection.clone(),
             headline: headline_rates(&study),
             rates: SequentialRate::all(&study, options.confidence),
             chance: SequentialChance::all(&study, options.confidence),
@@ -160,7 +164,7 @@ impl SequentialRate {
 fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec<SequentialRate> {
     let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
     each.filter_map(|(column, block)| {
-        let (successes, n) = counts(&block.moments(column))?;
+        let (successes, n) = block.moments(column).counts()?;
         Some(SequentialRate {
             experiment: experiment.name.to_owned(),
             model: block.model.to_owned(),

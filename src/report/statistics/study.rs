@@ -3,16 +3,12 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crate::metric::catalog::{Better, Kind, Metric, PPM};
+use crate::metric::catalog::{Better, Kind, Metric};
 use crate::score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
+use crate::stats::cell_interval;
 use crate::stats::design::Design;
+use crate::stats::interval::Interval;
 use crate::stats::moments::{MomentOverflow, Moments};
-
-/// Which metrics are durations that end with a decision, and which metric is defined where there was one, 1 where that
-/// was correct.
-///
-/// The one place where statistics know a metric by name: a definition file does not say that a quantity is censored.
-pub const CENSORED: [(&str, &str); 1] = [("TTD", "TSA-C")];
 
 /// What stands for no condition.
 const DEFAULT_CONDITION: &str = "default";
@@ -20,15 +16,12 @@ const DEFAULT_CONDITION: &str = "default";
 /// The label of the scene: room, body, cubes, start.
 const SCENE: &str = "scene";
 
-/// The unit of metrics that count steps.
-const STEPS: &str = "steps";
-
 /// An episode table and its blocks, ordered by the catalog's experiments, then by model and condition.
 pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
-    ranges: BTreeMap<&'a str, (f64, f64)>,
+    ranges: BTreeMap<&'a str, Interval>,
 }
 
 /// The blocks of one experiment.
@@ -62,7 +55,9 @@ impl<'a> Study<'a> {
             }
         }
         let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
-        Ok(Self { table, design, experiments, ranges: ranges(table) })
+        let names = table.metrics.iter().map(|column| column.name.as_str());
+        let ranges = names.zip(cell_interval::ranges(table)).collect();
+        Ok(Self { table, design, experiments, ranges })
     }
 
     pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {
@@ -97,33 +92,10 @@ impl<'a> Study<'a> {
         self.metric(metric).map_or(Better::Neither, |metric| metric.better)
     }
 
-    /// The least and the largest mean that a metric can have, as far as that is known: steps are never negative, and
-    /// no more than the longest episode that ended without a decision had, which is the budget.
-    pub fn range(&self, metric: &str) -> (f64, f64) {
-        self.ranges.get(metric).copied().unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
+    /// The least and the largest mean that a metric can have.
+    pub fn range(&self, metric: &str) -> Interval {
+        self.ranges.get(metric).copied().unwrap_or(Interval::UNBOUNDED)
     }
-}
-
-/// The [`Study::range`] of each metric of a table; each takes a pass over all episodes.
-#[expect(clippy::cast_precision_loss, reason = "steps are far below 2^53")]
-fn ranges(table: &EpisodeTable) -> BTreeMap<&str, (f64, f64)> {
-    let longest = CENSORED.iter().filter_map(|(duration, finished)| {
-        let (duration, finished) = (table.metric(duration)?, table.metric(finished)?);
-        let unfinished = duration.iter().zip(finished.iter()).filter(|(_, finished)| finished.is_none());
-        unfinished.filter_map(|(steps, _)| steps).max()
-    });
-    let longest = longest.max();
-    let range = |column: &MetricColumn| match table.catalog.metric.get(&column.name) {
-        Some(metric) if metric.unit == PPM => (f64::NEG_INFINITY, 1e6),
-        Some(metric) if metric.kind != Kind::Rate && metric.unit == STEPS => {
-            let most = column.iter().flatten().max();
-            // A metric that exceeds it counts something else than the steps of one episode.
-            let budget = longest.filter(|&budget| most.is_none_or(|most| most <= budget));
-            (0.0, budget.map_or(f64::INFINITY, |budget| budget as f64))
-        }
-        _ => (f64::NEG_INFINITY, f64::INFINITY),
-    };
-    table.metrics.iter().map(|column| (column.name.as_str(), range(column))).collect()
 }
 
 impl<'a> Block<'a> {
@@ -200,10 +172,4 @@ fn runs<K: PartialEq>(rows: Range<usize>, key: impl Fn(usize) -> K) -> Vec<Range
         }
     }
     runs
-}
-
-/// The successes of a rate and its episodes, where every value is 0 or 1.
-pub(super) fn counts(moments: &Moments) -> Option<(u64, u64)> {
-    let successes = u64::try_from(moments.sum).ok()?;
-    (successes <= moments.n && moments.sum == moments.sum_sq).then_some((successes, moments.n))
 }

@@ -3,11 +3,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::matching::Matching;
-use super::{CellRow, FEW, Statistics};
+use super::{CellRow, FEW, Replies, Selection, Statistics};
 use crate::base::format::p_value;
 use crate::stats::clustered::fewest_clusters;
 use crate::stats::design::{Cluster, DesignKind};
 use crate::stats::holm::level;
+
+/// What a file of scores in text leaves unknown.
+pub const TEXT_SCORES: &str = "scores in CSV and JSON Lines do not carry the kind of episodes, their clusters, losses and reply \
+                           quality, which are unknown here";
 
 /// How many gaps a warning names before it counts the rest.
 const NAMED_GAPS: usize = 5;
@@ -16,7 +20,7 @@ const NAMED_GAPS: usize = 5;
 const SCENE_SHOWN: usize = 16;
 
 /// What the design declares, what follows from it, and what to do where it declares nothing.
-pub(super) fn design_note(statistics: &Statistics) -> String {
+pub(super) fn design_note(statistics: &Statistics, from_text: bool) -> String {
     let (paired, all) = pairings(statistics);
     if statistics.design.kind == Some(DesignKind::Reconstruction) {
         return "reconstructed episodes: their seeds, runs and scenes are made up, so nothing is paired or clustered and every \
@@ -25,6 +29,12 @@ pub(super) fn design_note(statistics: &Statistics) -> String {
             .to_owned();
     }
     let has_scenes = matchings(statistics).any(|matching| matching.pairs + matching.alone + matching.repeated > 0);
+    if from_text {
+        return format!(
+            "{TEXT_SCORES}: no test knows clusters, and {}; give the traces, or score them into Parquet",
+            if paired == 0 { "nothing is paired" } else { "pairs are by the column `scene` alone" }
+        );
+    }
     if statistics.design.kind.is_none() && statistics.design.cluster.is_none() && !has_scenes {
         return "the traces declare no design: episodes are taken as independent, nothing is paired or clustered; record or import \
                 them with a column `scene` and the design in the footer to have pairs"
@@ -65,14 +75,17 @@ fn pairings(statistics: &Statistics) -> (usize, usize) {
 }
 
 /// What the numbers do not allow to say.
-pub(super) fn warnings(statistics: &Statistics) -> Vec<String> {
+pub(super) fn warnings(statistics: &Statistics, from_text: bool) -> Vec<String> {
+    let chosen = statistics.selection.as_ref().filter(|selection| selection.by_results);
     let found = [
+        chosen.map(Selection::sentence),
         is_undeclared(statistics).then(|| format!("{}.", statistics.design_note)),
         repeated(statistics),
         few_seeds(statistics),
         few_episodes(statistics),
         gaps(statistics),
-        losses(statistics),
+        losses(statistics, from_text),
+        statistics.replies.as_ref().and_then(Replies::sentence),
     ];
     found.into_iter().flatten().collect()
 }
@@ -145,13 +158,16 @@ fn gaps(statistics: &Statistics) -> Option<String> {
         .then(|| format!("{count}{places} not paired, for want of exactly one episode: {}{rest}.", named.join("; ")))
 }
 
-fn losses(statistics: &Statistics) -> Option<String> {
+fn losses(statistics: &Statistics, from_text: bool) -> Option<String> {
     if !statistics.losses.recorded {
-        return Some(
-            "the traces do not record how replies came (no reply_status): episodes lost to infrastructure, if any, are \
-             counted as the model's own."
-                .to_owned(),
-        );
+        let why = if from_text {
+            "these scores do not carry"
+        } else {
+            "neither reply_status nor a list of lost episodes records"
+        };
+        return Some(format!(
+            "{why} how replies came: episodes lost to infrastructure, if any, are counted as the model's own."
+        ));
     }
     let lost: BTreeSet<(&str, &str, Option<&str>, u64)> = statistics
         .losses

@@ -156,10 +156,12 @@ pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Re
 /// # Errors
 /// The first line that is not as it must be; scores that the catalog's definitions cannot have given.
 pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
-    checked(match format {
+    let mut table = match format {
         Format::JsonLines => jsonl::read(catalog, input)?,
         Format::Csv | Format::Parquet => csv::read(catalog, input)?,
-    })
+    };
+    table.declared.from_text = true;
+    checked(table)
 }
 
 /// Reads a table and the definitions that it carries, or those of its partition.

@@ -124,7 +124,13 @@ pub fn names(count: usize, length: usize) -> Vec<String> {
 
 fn cells(groups: Vec<Group>) -> Cells {
     let text = |name: &str| name.to_owned();
-    Cells { catalog: catalog(), by: vec![text("experiment"), text("model")], metrics: METRICS.map(text).into(), groups }
+    Cells {
+        catalog: catalog(),
+        by: vec![text("experiment"), text("model")],
+        metrics: METRICS.map(text).into(),
+        ranges: Vec::new(),
+        groups,
+    }
 }
 
 fn catalog() -> Catalog {

@@ -16,7 +16,7 @@ use mirrorstats::report::style::Style;
 use mirrorstats::report::table::{Table, Value};
 use mirrorstats::report::value;
 use mirrorstats::score::score_traces::schema_columns;
-use mirrorstats::stats::cell::{Cells, Group, KeyValue};
+use mirrorstats::stats::cell::{Cell as CellOf, Cells, Group, KeyValue};
 use mirrorstats::stats::moments::Moments;
 
 /// Episodes behind every published cell.
@@ -62,11 +62,14 @@ fn find_cells() -> Cells {
             let moments = found.entry((cell.experiment.clone(), cell.model.clone())).or_default();
             if !moments.contains_key(&cell.metric) {
                 let metric = &catalog.metric[&cell.metric];
-                let prints = |m: &Moments| match value::value(m, metric, EPISODES, &print) {
-                    Value::MeanSe { mean, se: Some(se) } => {
-                        (mean.to_string(), se.to_string()) == published_numbers(&cell)
+                let prints = |m: &Moments| {
+                    let cell_of = CellOf { key: &[], name: &cell.metric, metric, moments: m, interval: None };
+                    match value::value(&cell_of, EPISODES, &print) {
+                        Value::MeanSe { mean, se: Some(se) } => {
+                            (mean.to_string(), se.to_string()) == published_numbers(&cell)
+                        }
+                        _ => false,
                     }
-                    _ => false,
                 };
                 let fitting = moments_that_print(&cell, metric, prints);
                 moments.insert(cell.metric.clone(), fitting);
@@ -83,6 +86,7 @@ fn find_cells() -> Cells {
         by: vec!["experiment".to_owned(), "model".to_owned()],
         groups: found.into_iter().map(group).collect(),
         metrics: metrics.clone(),
+        ranges: Vec::new(),
         catalog,
     }
 }

@@ -65,6 +65,7 @@ fn cells(by: &[&str], catalog: Catalog, groups: &[RowOf]) -> Cells {
     Cells {
         by: by.iter().map(|&key| key.to_owned()).collect(),
         metrics: catalog.metric.keys().cloned().collect(),
+        ranges: Vec::new(),
         groups: groups
             .iter()
             .map(|&(key, episodes, of)| Group {

@@ -35,8 +35,13 @@ pub fn render(statistics: &Statistics, metrics: &[String], length: Length, width
         statistics.episodes,
         visible(&statistics.definitions)
     );
+    if let Some(selection) = &statistics.selection {
+        push_wrapped(&mut text, &selection.sentence(), width, 0);
+    }
     push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
-    list(&mut text, "Answers, after Holm's adjustment", &answers(&statistics.answers), width);
+    let is_chosen = statistics.selection.as_ref().is_some_and(|selection| selection.by_results);
+    let of = if is_chosen { ", of episodes that the filter chose by their results" } else { "" };
+    list(&mut text, &format!("Answers, after Holm's adjustment{of}"), &answers(&statistics.answers), width);
     if length == Length::Full {
         list(&mut text, "What can be concluded", &statistics.conclusions, width);
     }
@@ -78,7 +83,7 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
         (
             format!(
                 "Models told apart: exact tests two-sided by minimum likelihood (McNemar of pairs, Fisher of independent \
-                 episodes), normal tests of restricted means; Holm over all pairs; {percent} intervals (Newcombe) not adjusted"
+                 episodes), t tests of restricted means; Holm over all pairs; {percent} intervals (Newcombe) not adjusted"
             ),
             tables::separated(statistics, shown),
         ),

@@ -26,6 +26,9 @@ pub fn render(sequential: &Sequential, metrics: &[String], width: Option<usize>)
     );
     let mut text = String::new();
     push_wrapped(&mut text, &opening, width, 0);
+    if let Some(selection) = &sequential.selection {
+        push_wrapped(&mut text, &selection.sentence(), width, 0);
+    }
     list(&mut text, "What this is for", &PURPOSE.map(str::to_owned), width);
     let pairs: Vec<&SequentialPair> = sequential.models.iter().filter(|pair| shown(&pair.metric)).collect();
     for (title, grid) in [

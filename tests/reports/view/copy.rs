@@ -55,10 +55,9 @@ fn listed(page: &str, filter: &str) -> (String, String) {
 #[test]
 fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
     let folder = tempfile::tempdir().unwrap();
-    run(folder.path(), &["view", RECORDED, "--where", "experiment = 'E1'", "--by", "distractors", "--export", "page"])
-        .done();
+    run(folder.path(), &["view", RECORDED, "--where", "experiment = 'E1'", "--export", "page"]).done();
     let page = format!("file://{}/index.html", folder.path().join("page").display());
-    let server = Server::start(folder.path(), &[RECORDED, "--where", "experiment = 'E1'", "--by", "distractors"]);
+    let server = Server::start(folder.path(), &[RECORDED, "--where", "experiment = 'E1'"]);
     for filter in [
         "where=TSA+%3D+0",
         "where=TSA+%3D+0+and+MCR+%3D+1",
@@ -66,7 +65,8 @@ fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
         "where=(model+in+('oracle',+'random')+or+TTD+>%3D+100)+and+run+%3D+1",
         "where=MTATO+is+null",
         "where=MTATO+is+not+null+and+MTATO+<>+1",
-        "where=distractors+is+null",
+        "where=scene+%3D+'7ecf958fd2506cc0'",
+        "where=scene+is+null",
         "where=TSA+%3D+1&model=oracle",
         "where=seed+%3D+1&search=guess",
         "model=oracle&model=mimic",

@@ -39,16 +39,22 @@ fn a_copy_replaces_a_copy_and_nothing_else() {
     assert_eq!(std::fs::read_dir(&other).unwrap().count(), 1);
 }
 
+/// Shows what this query names, in a page that is open.
+fn look(browser: &mut Browser, query: &str) {
+    let shown = browser.text("document.documentElement.dataset.shown");
+    let state = "document.dispatchEvent(new CustomEvent('state', { detail: { replace: false } }))";
+    browser.value(&format!("history.pushState(null, '', location.pathname + {query:?}); {state}"));
+    until(browser, &format!("document.documentElement.dataset.shown !== '{shown}'"));
+}
+
 /// The list of a copy under a filter: what it counts, or what it says in the place of episodes.
-fn listed(page: &str, filter: &str) -> (String, String) {
-    let mut browser = Browser::at(&format!("{page}?view=episodes&{filter}"));
-    until(&mut browser, "document.querySelector('#count, .notice')");
+fn listed(browser: &mut Browser, filter: &str) -> (String, String) {
+    look(browser, &format!("?view=episodes&{filter}"));
     let text = |selector: &str| format!("document.querySelector('{selector}')?.textContent ?? ''");
     let found = (browser.text(&text("#count")), browser.text(&text(".notice")));
     if !found.1.is_empty() {
         assert!(browser.holds("document.querySelector('.list .rows a') === null"), "{filter}");
     }
-    browser.close();
     found
 }
 
@@ -58,6 +64,8 @@ fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
     run(folder.path(), &["view", RECORDED, "--where", "experiment = 'E1'", "--export", "page"]).done();
     let page = format!("file://{}/index.html", folder.path().join("page").display());
     let server = Server::start(folder.path(), &[RECORDED, "--where", "experiment = 'E1'"]);
+    let mut browser = Browser::at(&page);
+    until(&mut browser, "document.documentElement.dataset.shown");
     for filter in [
         "where=TSA+%3D+0",
         "where=TSA+%3D+0+and+MCR+%3D+1",
@@ -75,7 +83,7 @@ fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
             .get(&format!("/api/episodes?{}", filter.replace('>', "%3E").replace('<', "%3C").replace('\'', "%27")))
             .json();
         let (total, all) = (&expected["total"], &expected["all"]);
-        let (count, notice) = listed(&page, filter);
+        let (count, notice) = listed(&mut browser, filter);
         let words = if total == all { format!("{all} episodes") } else { format!("{total} of {all} episodes") };
         assert_eq!((count, notice), (words, String::new()), "{filter}");
     }
@@ -86,19 +94,16 @@ fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
         "where=NOPE+%3D+1",
         "where=TSA+%3D+'1'",
     ] {
-        let (count, notice) = listed(&page, filter);
+        let (count, notice) = listed(&mut browser, filter);
         assert!(
             count.is_empty() && notice.contains("cannot filter by") && notice.contains("mirrorstats view"),
             "{filter}: {notice}"
         );
     }
-    let mut browser = Browser::at(&format!("{page}?where=TSA+%3D+0"));
-    until(&mut browser, "document.querySelector('#overview-head .notice')");
+    look(&mut browser, "?where=TSA+%3D+0");
     let words = browser.text("document.querySelector('#overview-head .notice').textContent");
     assert!(words.contains("TSA = 0") && browser.holds("document.querySelector('table.results') === null"), "{words}");
-    browser.close();
-    let mut browser = Browser::at(&format!("{page}?model=oracle"));
-    until(&mut browser, "document.querySelector('table.results')");
+    look(&mut browser, "?model=oracle");
     let rows = "[...document.querySelectorAll('#table-main tbody tr[data-group]')].filter((row) => !row.hidden).every((row) => row.dataset.model === 'oracle')";
     assert!(browser.holds(rows));
     browser.click("#section-statistics summary");

@@ -272,7 +272,7 @@ fn a_page_whose_server_has_gone_thanks_too() {
     let mut browser = Browser::at(&people.links[0]);
     practise(&mut browser);
     browser.click("button[data-action=done]");
-    until(&mut browser, "document.querySelector('#waiting')");
+    until(&mut browser, "document.querySelector('#waiting').textContent.startsWith('Thank you')");
     let _ = people.process.0.kill();
     let _ = people.process.0.wait();
     until(&mut browser, "document.querySelector('#over')");

@@ -101,6 +101,7 @@ fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
         );
     }
     look(&mut browser, "?where=TSA+%3D+0");
+    assert!(browser.holds("(({ value, offsetWidth }) => value === 'TSA = 0' && offsetWidth > 0)(document.querySelector('input[name=where]'))"));
     let words = browser.text("document.querySelector('#overview-head .notice').textContent");
     assert!(words.contains("TSA = 0") && browser.holds("document.querySelector('table.results') === null"), "{words}");
     look(&mut browser, "?model=oracle");

@@ -4,12 +4,12 @@ import { ask } from "./data.js";
 import { changed, go, link, query } from "./state.js";
 import { sight, stepPanel } from "./episode.js";
 
-function side(episode, differing) {
+function side(episode, letter) {
   const panel = make("div", { class: "panel" });
-  const head = make("h2", {}, make("a", { href: link(new URLSearchParams({ view: "episode", id: episode.id })) }, episode.name));
+  const head = make("h2", {}, `${letter}: `, make("a", { href: link(new URLSearchParams({ view: "episode", id: episode.id })) }, episode.name));
   const place = make("p", { class: "quiet" });
   const element = make("section", { class: "side" }, head, make("p", { class: "quiet" }, `${episode.length} steps`), place);
-  return { episode, element, panel, place, differing };
+  return { episode, element, panel, place };
 }
 
 async function shown(own) {
@@ -23,6 +23,22 @@ async function shown(own) {
     for (const name of columns) for (const cell of own.panel.querySelectorAll(`[data-column="${name}"]`)) cell.classList.add("differs");
   };
 }
+
+const named = (columns) => columns.join(", ").replaceAll("_", " ");
+
+/** How the rows of two episodes differ at a step. */
+function apart(t, { ended, differences, ...sides }) {
+  if (ended !== null && t > ended.t) {
+    const [short, long] = ended.side === "a" ? ["A", "B"] : ["B", "A"];
+    const end = sides[ended.side].running ? "has come no further than" : "ended at";
+    return `${short} ${end} t = ${ended.t}; ${long} goes on.`;
+  }
+  const { columns = [], also = [] } = differences.find((found) => found.t === t) ?? {};
+  if (columns.length > 0) return `Here they differ in ${named([...columns, ...also])}.`;
+  return also.length > 0 ? `Here what was done is the same; they differ in ${named(also)}.` : "Here no recorded column differs.";
+}
+
+const FRAMES = { true: " The frames are equal.", false: " The frames differ.", null: " The frames cannot be compared." };
 
 function metricTable(a, b) {
   const names = [...new Set([...a.metrics, ...b.metrics].map((metric) => metric.name))];
@@ -39,20 +55,28 @@ export async function comparePage(content) {
   const told = await ask("compare", new URLSearchParams({ a: query().get("a") ?? "", b: query().get("b") ?? "" }));
   const { a, b, first, differences } = told;
   const last = Math.max(a.length, b.length, 1);
-  const columnsAt = new Map(differences.map(({ t, columns }) => [t, columns]));
+  const acts = differences.filter(({ columns }) => columns.length > 0).map((found) => found.t);
+  if (told.ended !== null) acts.push(told.ended.t + 1);
   const limit = (t) => Math.min(last, Math.max(1, Math.round(t) || 1));
   let t = limit(query().has("t") ? Number(query().get("t")) : (first?.t ?? 1));
-  const sides = [side(a), side(b)];
+  const sides = [side(a, "A"), side(b, "B")];
   await Promise.all(sides.map(shown));
   const slider = make("input", { type: "range", min: 1, max: last, step: 1, "aria-label": "Timestep" });
   const clock = make("output", { class: "clock" });
   const where = make("p", { class: "parted" });
   const draw = () => {
-    const columns = columnsAt.get(t) ?? [];
+    const { columns = [], also = [] } = differences.find((found) => found.t === t) ?? {};
     slider.value = t;
     clock.textContent = `t = ${t} of ${last}`;
-    where.textContent = columns.length === 0 ? "Here both are alike." : `Here they differ in ${columns.join(", ").replaceAll("_", " ")}.`;
-    for (const own of sides) own.show(t, columns);
+    where.textContent = apart(t, told);
+    compareFrames(t);
+    for (const own of sides) own.show(t, [...columns, ...also]);
+  };
+  const compareFrames = async (own) => {
+    if (told.ended !== null && own > told.ended.t) return;
+    const asked = new URLSearchParams({ a: a.id, b: b.id, t: own });
+    const { is_same: isSame } = a.frames && b.frames ? await ask("same_frame", asked).catch(() => ({ is_same: null })) : { is_same: null };
+    if (own === t) where.textContent = apart(t, told) + FRAMES[isSame];
   };
   const jump = (next) => {
     t = limit(next);
@@ -60,14 +84,15 @@ export async function comparePage(content) {
     draw();
   };
   slider.addEventListener("input", () => jump(Number(slider.value)));
-  const to = make("button", { type: "button", id: "first-difference" }, first === null ? "No difference" : `First difference: t = ${first.t}`);
+  const to = make("button", { type: "button", id: "first-difference" }, first === null ? "No column of what was done differs" : `First difference: t = ${first.t}`);
   to.disabled = first === null;
   to.addEventListener("click", () => jump(first.t));
   const after = make("button", { type: "button" }, "Next difference");
-  after.addEventListener("click", () => jump(differences.find((found) => found.t > t)?.t ?? t));
+  after.addEventListener("click", () => jump(acts.find((next) => next > t) ?? t));
   const constants = told.constants.filter((name) => !["episode_id", "model", "run", "seed", "fingerprint"].includes(name));
   content.replaceChildren(make("h1", {}, "Two episodes"),
-    make("p", { class: "quiet" }, constants.length > 0 ? `The episodes differ in ${constants.join(", ").replaceAll("_", " ")}.` : ""),
+    make("p", { class: "quiet" }, constants.length > 0 ? `The episodes differ in ${named(constants)}.` : ""),
+    make("p", { class: "quiet", id: "differing" }, `What was seen and done differs at ${told.differing} of ${counted(last, "step")}.`),
     make("div", { class: "controls" }, to, after, clock, make("div", { class: "slider" }, slider)), where,
     make("div", { class: "pair-of-sides" }, sides.map((own) => own.element)), metricTable(a, b));
   draw();

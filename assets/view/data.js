@@ -1,4 +1,5 @@
 // Where data comes from: a server that is asked, or files beside the page, each loaded when it is looked at.
+import { whereOf } from "./where.js";
 
 /** Whether the page is a copy without a server. */
 export const isCopy = document.documentElement.dataset.copy !== undefined || document.querySelector("script[data-copy]") !== null;
@@ -44,6 +45,7 @@ export async function ask(name, query = new URLSearchParams(), signal = undefine
   if (name === "episode") return episodePart(query.get("id"), query);
   if (name === "map") return part(`map-${(await numberOf(query.get("id")))}`);
   if (name === "compare") return compared(query);
+  if (name === "same_frame") return sameFrame(query);
   return part(name);
 }
 
@@ -56,19 +58,29 @@ async function numberOf(id) {
 
 async function episodePart(id, query) {
   const episode = await part(`episode-${await numberOf(id)}`);
-  const { rows } = chosen(await part("list"), query);
-  const at = rows.findIndex((row) => row.id === id);
-  const neighbours = { previous: rows[at - 1]?.id ?? null, next: rows[at + 1]?.id ?? null, place: at + 1, total: rows.length };
-  return { ...episode, neighbours };
+  return { ...episode, neighbours: neighbours(await part("list"), id, query) };
+}
+
+/** The episodes around one in the list; nothing where it is not in it, or nobody knows what the list is. */
+function neighbours(list, id, query) {
+  try {
+    const { rows } = chosen(list, query);
+    const at = rows.findIndex((row) => row.id === id);
+    return at < 0 ? {} : { previous: rows[at - 1]?.id ?? null, next: rows[at + 1]?.id ?? null, place: at + 1, total: rows.length };
+  } catch {
+    return {};
+  }
 }
 
 /** The rows of a copy that its columns and a search choose. */
 function chosen({ rows, ...list }, query) {
   const wanted = ["experiment", "model", "condition"].map((column) => [column, query.getAll(column)]);
   const words = (query.get("search") ?? "").toLowerCase();
+  const holds = whereOf(query.get("where"), { rows, ...list });
   const isWanted = (row) =>
     wanted.every(([column, values]) => values.length === 0 || values.includes((row.keys ?? row)[column])) &&
-    (row.id.toLowerCase().includes(words) || row.model.toLowerCase().includes(words));
+    (row.id.toLowerCase().includes(words) || row.model.toLowerCase().includes(words)) &&
+    holds(row);
   const kept = rows.filter(isWanted);
   const sort = query.get("sort");
   if (sort !== null) kept.sort(byColumn(list.metrics.indexOf(sort), sort, query.get("order") === "descending" ? -1 : 1));
@@ -93,18 +105,31 @@ function listed(list, query) {
 
 const BY_CHANCE = new Set(["latency_ms", "prompt_tokens", "completion_tokens", "cost_usd", "reply", "view_description", "reasoning", "summary", "identification", "reply_status", "reply_repair"]);
 
-/** Two episodes of a copy, and where their rows differ. */
+/** Two episodes of a copy, and where their rows differ, as the program says it. */
 async function compared(query) {
   const [a, b] = await Promise.all(["a", "b"].map(async (side) => part(`episode-${await numberOf(query.get(side))}`)));
-  const names = [...new Set([...Object.keys(a.steps), ...Object.keys(b.steps)])].filter((name) => !BY_CHANCE.has(name));
-  const value = (episode, name, at) => episode.steps[name]?.values[at] ?? null;
+  const names = [...new Set([...Object.keys(a.steps), ...Object.keys(b.steps)])];
+  const value = (episode, name, at) => JSON.stringify(episode.steps[name]?.values[at] ?? null);
+  const both = Math.min(a.length, b.length);
+  const last = Math.max(a.length, b.length);
   const differences = [];
-  for (let at = 0; at < Math.min(a.length, b.length); at += 1) {
-    const columns = names.filter((name) => value(a, name, at) !== value(b, name, at));
-    if (columns.length > 0) differences.push({ t: at + 1, columns });
+  for (let at = 0; at < both; at += 1) {
+    const found = names.filter((name) => value(a, name, at) !== value(b, name, at));
+    const [columns, also] = [found.filter((name) => !BY_CHANCE.has(name)), found.filter((name) => BY_CHANCE.has(name))];
+    if (found.length > 0) differences.push({ t: at + 1, columns, also });
   }
-  const behind = a.length === b.length ? null : { t: Math.min(a.length, b.length) + 1, columns: ["length"] };
-  return { a, b, differences, first: differences[0] ?? behind, constants: [] };
+  const acts = differences.filter(({ columns }) => columns.length > 0);
+  const ended = both === last ? null : { side: a.length < b.length ? "a" : "b", t: both };
+  const behind = ended === null ? null : { t: both + 1, columns: ["length"] };
+  const constant = (episode, name) => JSON.stringify(episode.constants.find((column) => column.name === name)?.value ?? null);
+  const constants = [...new Set([...a.constants, ...b.constants].map(({ name }) => name))].filter((name) => constant(a, name) !== constant(b, name));
+  return { a, b, differences, ended, differing: acts.length + last - both, first: acts[0] ?? behind, constants };
+}
+
+/** Whether two episodes of a copy have the same frame at a step; null where one has none. */
+async function sameFrame(query) {
+  const [a, b] = await Promise.all(["a", "b"].map(async (side) => (await part(`episode-${await numberOf(query.get(side))}`)).frame_hashes?.[query.get("t") - 1] ?? null));
+  return { is_same: a === null || b === null ? null : a === b };
 }
 
 /** Where the frame of a step is. */

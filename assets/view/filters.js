@@ -1,6 +1,5 @@
 // The line of filters: chosen values of columns, and a condition in the language of definitions.
 import { all, make } from "./dom.js";
-import { isCopy } from "./data.js";
 import { changed, filtered, go, query } from "./state.js";
 
 const HEADINGS = { experiment: "Experiment", model: "Model", condition: "Condition" };
@@ -20,18 +19,15 @@ export function filterLine(study) {
   const now = query();
   const form = make("form", { class: "filters", "aria-label": "Filters" });
   form.append(...study.choices.map((choice) => choices(choice, now)));
-  if (!isCopy) {
-    const where = make("input", { type: "text", name: "where", value: now.get("where") ?? "", placeholder: "such as TSA = 0 and MCR = 1", autocomplete: "off", spellcheck: "false" });
-    form.append(make("label", { class: "where" }, make("span", {}, "Where"), where, make("button", { type: "submit" }, "Filter")));
-  }
+  const where = make("input", { type: "text", name: "where", value: now.get("where") ?? "", placeholder: "such as TSA = 0 and MCR = 1", autocomplete: "off", spellcheck: "false" });
+  form.append(make("label", { class: "where" }, make("span", {}, "Where"), where, make("button", { type: "submit" }, "Filter")));
   const reset = make("button", { type: "button" }, "Show all");
   reset.hidden = !["experiment", "model", "condition", "where", "search"].some((key) => now.has(key));
   reset.addEventListener("click", () => go(changed({ experiment: null, model: null, condition: null, where: null, search: null })));
   form.append(make("div", { class: "choices" }, reset));
   const apply = () => {
     const values = Object.fromEntries(study.choices.map(({ column }) => [column, all(`input[name=${column}]:checked`, form).map((box) => box.value)]));
-    const where = form.elements.where?.value.trim() ?? null;
-    go(changed({ ...values, where, offset: null }));
+    go(changed({ ...values, where: form.elements.where.value.trim(), offset: null }));
   };
   form.addEventListener("change", (event) => event.target.type === "checkbox" && apply());
   form.addEventListener("submit", (event) => {

@@ -1,7 +1,7 @@
 // The report, live: tables whose cells lead to their episodes; figures and statistics when they are opened.
 import { all, counted, make, notice, one, parsed } from "./dom.js";
 import { ask, isCopy } from "./data.js";
-import { changed, filtered, go, link, query } from "./state.js";
+import { FILTERS, changed, filtered, go, link, query } from "./state.js";
 import { filterLine, groupQuery } from "./filters.js";
 
 /** What the server is asked for: the filters alone. */
@@ -38,17 +38,19 @@ function linkCells(table, { by, groups }) {
 }
 
 /** In a copy nobody computes: rows of values that are not chosen are hidden. */
-function hideRows(sections, { choices }) {
-  // Rows have names as they are spelled.
-  const named = (column) => {
-    const { values = [] } = choices.find((choice) => choice.column === column) ?? {};
-    return query().getAll(column).map((wanted) => values.find(({ value }) => value === wanted)?.name ?? wanted);
-  };
-  const wanted = { experiment: named("experiment"), model: named("model") };
+function hideRows(sections, { by, groups }) {
   for (const row of all(".results tbody tr[data-group]", sections)) {
-    const is = (column) => wanted[column].length === 0 || wanted[column].includes(row.dataset[column]);
-    row.hidden = !is("experiment") || !is("model");
+    const values = groups[Number(row.dataset.group)];
+    row.hidden = by.some((column, at) => query().has(column) && !query().getAll(column).includes(values[at] ?? "default"));
   }
+}
+
+/** What a copy says of sections that are of all episodes, where a filter asks for fewer than hidden rows can show. */
+function unfiltered(title, columns = []) {
+  const beyond = FILTERS.filter((key) => query().has(key) && !columns.includes(key));
+  if (!isCopy || beyond.length === 0) return null;
+  const asked = beyond.map((key) => `${key}: ${query().getAll(key).join(", ")}`).join("\n  ");
+  return notice(`This copy of the page has its ${title} of all episodes, and cannot compute them of those with\n  ${asked}\nSo none is shown. \`mirrorstats view\` of the recordings can.`);
 }
 
 /** Headers sort the rows of each group by their means. */
@@ -106,8 +108,9 @@ function later(title, name) {
   details.addEventListener("toggle", async () => {
     if (!details.open || details.dataset.asked) return;
     details.dataset.asked = "yes";
-    const waiting = make("p", { class: "quiet" }, "…");
+    const waiting = unfiltered(title.toLowerCase()) ?? make("p", { class: "quiet" }, "…");
     details.append(waiting);
+    if (waiting.matches(".notice")) return;
     try {
       const { sections } = await ask(name, wanted());
       waiting.replaceWith(...(sections.length > 0 ? sections.flatMap(parsed) : [make("p", { class: "quiet" }, "There is none.")]));
@@ -149,9 +152,15 @@ export async function overview(content, study) {
     sections.append(make("p", { class: "quiet" }, "No episode is like that."));
     return;
   }
+  const stated = unfiltered("tables", told.by);
+  if (stated !== null) {
+    const next = link(changed({ view: "episodes" }, filtered({})));
+    head.replaceChildren(head.firstChild, stated, make("p", {}, make("a", { href: next }, "The episodes of this filter")));
+    return;
+  }
   const nodes = told.sections.flatMap(parsed);
   sections.append(...nodes);
-  if (isCopy) hideRows(sections, study);
+  if (isCopy) hideRows(sections, told);
   for (const table of all("table.results", sections)) {
     linkCells(table, told);
     makeSorted(table);

@@ -273,6 +273,14 @@ pub trait Player: Send + Sync {
         1
     }
 
+    /// The most episodes that can be under way at once, whatever is asked for.
+    fn most_in_flight(&self) -> usize {
+        usize::MAX
+    }
+
+    /// Hears that the recording is over, and whether all of its episodes were played.
+    fn ended(&self, _is_complete: bool) {}
+
     /// Hears that episodes of this recording are there from an earlier start.
     fn resumes(&self) {}
 

@@ -30,9 +30,10 @@ pub fn emphasise(cells: &mut [&mut Cell], better: Better, rule: EmphasisRule) {
         |of: usize| ranked[of..].iter().take_while(|cell| best_first(cell, ranked[of]) == Ordering::Equal).count();
     let bold = ties_with(0);
     let underlined = if bold < ranked.len() { ties_with(bold) } else { 0 };
-    if rule == EmphasisRule::ExactMean && bold == ranked.len() {
-        return;
-    }
+    // The last is neither the best of one nor the second best of two; the paper's tables have both.
+    let has_worse = |place: usize| rule == EmphasisRule::PrintedMean || place < ranked.len();
+    let bold = if has_worse(bold) { bold } else { 0 };
+    let underlined = if has_worse(bold + underlined) { underlined } else { 0 };
     for (at, cell) in ranked.into_iter().take(bold + underlined).enumerate() {
         cell.emphasis = if at < bold { Emphasis::Bold } else { Emphasis::Underline };
     }
@@ -106,11 +107,21 @@ mod tests {
     #[test]
     fn exact_means_tie_only_where_they_are_equal() {
         check(&[(1, 1), (13, 14), (14, 15), (0, 3)], Higher, ExactMean, "b.u.");
-        check(&[(2, 4), (1, 2), (1, 3)], Higher, ExactMean, "bbu");
+        check(&[(2, 4), (1, 2), (1, 3)], Higher, ExactMean, "bb.");
+        check(&[(2, 4), (1, 2), (1, 3), (1, 4)], Higher, ExactMean, "bbu.");
         check(&[(1, 2), (2, 4), (0, 0)], Higher, ExactMean, "...");
         check(&[(4, 21)], Higher, ExactMean, ".");
         check(&[(4, 21), (0, 0)], Higher, ExactMean, "..");
-        check(&[(-1, 2), (1, 3)], Lower, ExactMean, "bu");
+        check(&[(-1, 2), (1, 3)], Lower, ExactMean, "b.");
+    }
+
+    #[test]
+    fn the_worst_is_not_the_second_best() {
+        check(&[(1, 1), (1, 2)], Higher, ExactMean, "b.");
+        check(&[(1, 1), (1, 2), (0, 0)], Higher, ExactMean, "b..");
+        check(&[(1, 1), (1, 2), (2, 4)], Higher, ExactMean, "b..");
+        check(&[(1, 1), (1, 2), (2, 4), (1, 3)], Higher, ExactMean, "buu.");
+        check(&[(1, 1), (1, 2)], Higher, PrintedMean, "bu");
     }
 
     #[test]

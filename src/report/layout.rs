@@ -3,7 +3,7 @@
 //! The last key column, or the model where it is one, names the rows; the other keys head the groups. Every metric
 //! of the cells is in some table: those that the style names nowhere come in a table of their own.
 
-use crate::metric::catalog::{Catalog, Metric};
+use crate::metric::catalog::Catalog;
 use crate::report::emphasis::emphasise;
 use crate::report::order::{TableOrder, row_key};
 use crate::report::style::{MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
@@ -169,13 +169,8 @@ impl<'a> Layout<'a> {
         let is_zero = moments.n == 0 && sheet.undefined_as_zero.iter().any(|zero| zero == name);
         let value =
             if is_zero { value::zero(metric, &self.print) } else { value::value(&cell, group.episodes, &self.print) };
-        let is_marked = self.is_marked(metric, moments.n, &value);
+        let is_marked = moments.n < self.print.mark_n_below && value != Value::Undefined;
         Some(Cell { is_marked, ..Cell::plain(value, moments, group.episodes) })
-    }
-
-    /// Whether a conditional metric is defined in fewer episodes than the style asks for.
-    fn is_marked(&self, metric: &Metric, n: u64, value: &Value) -> bool {
-        metric.when.is_some() && n < self.print.mark_n_below && *value != Value::Undefined
     }
 
     fn emphasise(&self, groups: &mut [RowGroup], sheet: &TableSheet) {

@@ -36,6 +36,7 @@ pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<An
         "text" => episode::text(&snapshot, query),
         "map" => map::answer(&snapshot, query),
         "compare" => compare::answer(&snapshot, query),
+        "same_frame" => compare::same_frame(&snapshot, query),
         "changes" => changes::answer(&snapshot),
         _ => return None,
     };

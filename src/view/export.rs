@@ -1,6 +1,6 @@
 //! The page as files, for any web server or from a disk: the same answers, in parts that are loaded as they are looked at.
 //!
-//! Rule: what was computed stands in the files, and nothing more can be: filters choose by columns alone. From a disk browsers
+//! Rule: what was computed stands in the files, and nothing more can be: filters choose by what the list has. From a disk browsers
 //! load neither modules nor data, so that the script is a classic one and each part a script too.
 
 use std::collections::BTreeSet;
@@ -13,6 +13,7 @@ use super::error::ViewError;
 use super::snapshot::Snapshot;
 use super::{View, changes, episode, list, map, overview, page};
 use crate::base::budget::Limit;
+use crate::base::hash;
 use crate::base::replace::{Content, FolderFiles, replace_folder};
 use crate::study::Part;
 
@@ -97,17 +98,17 @@ fn add_episode(files: &mut Files, snapshot: &Snapshot, at: usize, id: &str) -> R
     let first = snapshot.moment(&opened, 1)?;
     let mut told = episode::described(snapshot, &opened, usize::MAX, first.as_ref())?;
     told["siblings"] = list::siblings(snapshot, id).into();
-    files.part(&format!("episode-{at}"), &told)?;
-    if told["log"] != true {
-        return Ok(());
-    }
-    files.part(&format!("map-{at}"), &map::of(snapshot, &opened)?)?;
-    for t in 1..=opened.episode.steps.len() {
-        if let Some(frame) = snapshot.moment(&opened, t)?.and_then(|moment| moment.frame) {
-            files.add(&format!("frames/{at}/{t}.png"), frame)?;
+    if told["log"] == true {
+        files.part(&format!("map-{at}"), &map::of(snapshot, &opened)?)?;
+        let mut hashes = Vec::new();
+        for t in 1..=opened.episode.steps.len() {
+            let frame = snapshot.moment(&opened, t)?.and_then(|moment| moment.frame);
+            hashes.push(frame.as_deref().map(hash::of_bytes));
+            frame.map_or(Ok(()), |frame| files.add(&format!("frames/{at}/{t}.png"), frame))?;
         }
+        told["frame_hashes"] = hashes.into();
     }
-    Ok(())
+    files.part(&format!("episode-{at}"), &told)
 }
 
 /// Refuses a folder that holds anything but an earlier copy.

@@ -36,6 +36,7 @@ pub(super) fn everything(snapshot: &Snapshot) -> Result<Value, ViewError> {
     let table = &snapshot.table()?.results.episodes;
     Ok(json!({
         "metrics": table.metrics.iter().map(|metric| visible(&metric.name)).collect::<Vec<_>>(),
+        "labels": table.labels.iter().map(|label| &label.name).collect::<Vec<_>>(),
         "has_conditions": table.has_conditions(),
         "rows": (0..table.len()).map(|row| with_keys(table, row)).collect::<Vec<_>>(),
     }))
@@ -48,6 +49,8 @@ fn with_keys(table: &EpisodeTable, row: usize) -> Value {
     if COLUMNS.iter().any(|column| told[column] != keys[column]) {
         told["keys"] = keys;
     }
+    let labels = table.labels.iter().map(|label| (label.name.clone(), json!(label.values.get(row))));
+    told["labels"] = labels.collect::<serde_json::Map<_, _>>().into();
     told
 }
 

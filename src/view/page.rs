@@ -13,8 +13,9 @@ const BODY: &str = include_str!("../../assets/view/body.html");
 const STYLE: &str = include_str!("../../assets/view/view.css");
 
 /// The modules, each after those that it imports.
-const MODULES: [(&str, &str); 11] = [
+const MODULES: [(&str, &str); 12] = [
     ("dom.js", include_str!("../../assets/view/dom.js")),
+    ("where.js", include_str!("../../assets/view/where.js")),
     ("data.js", include_str!("../../assets/view/data.js")),
     ("state.js", include_str!("../../assets/view/state.js")),
     ("filters.js", include_str!("../../assets/view/filters.js")),

@@ -25,7 +25,7 @@ use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, 
 use crate::base::hash;
 
 /// The version of what people are shown and asked.
-const PROTOCOL: u32 = 1;
+const PROTOCOL: u32 = 2;
 
 /// People as a player.
 #[derive(Debug)]
@@ -62,8 +62,8 @@ impl Player for Human {
                 "remaining_steps": true,
             },
             "reply": "the keys of a model's reply: actions by keys or buttons, colours from a list, free text; all but the \
-                      action may stay empty",
-            "practice": "one episode of another scene before the first, not recorded",
+                      action may stay empty; the identification stays from step to step, and is empty as an episode begins",
+            "practice": "one episode of another scene before the first, not recorded; its end is announced",
             "time_limit": null,
             "consent": self.consent,
             "identification_version": crate::trace::identification::VERSION,
@@ -72,9 +72,7 @@ impl Player for Human {
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
         let prompt = Prompt::of(task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
-        let seat = self.hub.seat(episode_id).ok_or_else(|| {
-            Lost::because("more episodes are under way than people play; --in-flight is the number of participants")
-        })?;
+        let seat = self.hub.seat(episode_id).ok_or_else(|| Lost::because("every participant plays another episode"))?;
         let code = self.hub.code(seat);
         let hub = Arc::clone(&self.hub);
         let (practice, episode_id, has_ended) = (None, episode_id.to_owned(), false);
@@ -87,6 +85,14 @@ impl Player for Human {
 
     fn in_flight(&self) -> usize {
         self.hub.seats()
+    }
+
+    fn most_in_flight(&self) -> usize {
+        self.hub.seats()
+    }
+
+    fn ended(&self, is_complete: bool) {
+        self.hub.end(is_complete);
     }
 }
 
@@ -144,7 +150,7 @@ impl HumanAgent {
     async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
         let task = self.practice.as_ref().unwrap_or(&self.task);
         let is_practice = self.practice.is_some();
-        if let Some(entry) = self.hub.answered(&self.episode_id, observation.t).filter(|_| !is_practice) {
+        if let Some(entry) = self.hub.answered(self.seat, &self.episode_id, observation.t).filter(|_| !is_practice) {
             return Ok(read(&entry.reply, task, entry.latency_ms));
         }
         let unusable = |fault: String| Lost::because(format!("the observation cannot be made: {fault}"));

@@ -60,6 +60,7 @@ fn routes(hub: Arc<Hub>) -> Router {
         .route("/state", get(state))
         .route("/frame", get(frame))
         .route("/agree", post(agree))
+        .route("/begin", post(begin))
         .route("/pause", post(pause))
         .route("/resume", post(resume))
         .route("/reply", post(reply))
@@ -101,6 +102,13 @@ async fn agree(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Respons
     for_person(&hub, &link, |seat| match hub.agree(seat) {
         Ok(()) => told(&hub.told(seat)),
         Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "it could not be written down; tell the lab").into_response(),
+    })
+}
+
+async fn begin(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    for_person(&hub, &link, |seat| {
+        hub.begin(seat);
+        told(&hub.told(seat))
     })
 }
 

@@ -74,7 +74,7 @@ pub struct RecordArgs {
     /// A world configuration in TOML over the built-in one
     #[arg(long, value_name = "FILE")]
     config: Option<PathBuf>,
-    /// Episodes under way at once [default: as many as the agent makes worth while]
+    /// Episodes under way at once, of people at most one each [default: as many as the agent makes worth while]
     #[arg(long, value_name = "N")]
     in_flight: Option<NonZeroUsize>,
     /// Stop after this many replies in a row without a decision
@@ -234,6 +234,7 @@ impl RecordArgs {
         // What is whole is put together whatever ended the recording.
         let assembled = plan.experiments.iter().try_for_each(|experiment| store.assemble(*experiment));
         bar.clear();
+        player.ended(outcome.as_ref().is_ok_and(|tally| !tally.stopped));
         let tally = outcome.map_err(Failure::input)?;
         assembled.map_err(Failure::input)?;
         let missing: BTreeSet<Key> = todo.iter().copied().collect();
@@ -273,12 +274,11 @@ impl RecordArgs {
     }
 
     fn settings(&self, player: &dyn Player) -> Settings {
+        let count = |number| NonZeroUsize::new(number).unwrap_or(NonZeroUsize::MIN);
+        let in_flight = self.in_flight.unwrap_or_else(|| count(player.in_flight()).max(self.threads.count()));
         Settings {
             threads: self.threads.count(),
-            in_flight: self.in_flight.unwrap_or_else(|| {
-                let worth_while = NonZeroUsize::new(player.in_flight()).unwrap_or(NonZeroUsize::MIN);
-                worth_while.max(self.threads.count())
-            }),
+            in_flight: in_flight.min(count(player.most_in_flight())),
             frames: !self.no_frames,
             log: !self.no_log,
             max_unusable: (!self.keep_going).then_some(self.max_unusable),

@@ -100,7 +100,7 @@ pub struct PrintSheet {
     pub emphasis: Option<EmphasisRule>,
     /// The standard error of a single value, where the sample form has none.
     pub single_se: Option<SingleSe>,
-    /// Cells of a conditional metric with fewer defined episodes than this are marked with a dagger.
+    /// Cells with fewer defined episodes than this are marked with a dagger.
     pub mark_n_below: Option<u64>,
 }
 

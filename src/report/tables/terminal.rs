@@ -49,8 +49,10 @@ pub fn render(table: &Table, terminal: Terminal) -> String {
     for sentence in table.sentences() {
         lines.extend(wrapped(&visible(sentence), room, 0));
     }
-    if terminal.emphasis == Marks::Signs && is_any_emphasised(table) {
-        lines.push("Marked as *best*, _second best_.".to_owned());
+    if terminal.emphasis == Marks::Signs {
+        let signs = [(Emphasis::Bold, "*best*"), (Emphasis::Underline, "_second best_")];
+        let used: Vec<&str> = signs.iter().filter(|(sign, _)| has(table, *sign)).map(|(_, words)| *words).collect();
+        lines.extend((!used.is_empty()).then(|| format!("Marked as {}.", used.join(", "))));
     }
     while lines.last().is_some_and(String::is_empty) {
         lines.pop();
@@ -243,7 +245,7 @@ fn spell(cell: &Cell, table: &Table, marks: Marks, shape: Shape) -> Vec<Piece> {
     }
 }
 
-fn is_any_emphasised(table: &Table) -> bool {
+fn has(table: &Table, emphasis: Emphasis) -> bool {
     let rows = table.groups.iter().flat_map(|group| &group.rows);
-    rows.flat_map(|row| &row.cells).any(|cell| cell.emphasis != Emphasis::Plain)
+    rows.flat_map(|row| &row.cells).any(|cell| cell.emphasis == emphasis)
 }

@@ -6,7 +6,7 @@ use std::fs;
 use mirrorstats::metric::catalog::{Better, Catalog, Kind, StandardError};
 use mirrorstats::report::layout;
 use mirrorstats::report::style::Style;
-use mirrorstats::report::table::{Emphasis, Table};
+use mirrorstats::report::table::{Emphasis, Table, Value};
 use mirrorstats::report::tables::terminal::{self, Marks, Terminal};
 use mirrorstats::report::tables::{csv, latex, markdown};
 use mirrorstats::stats::cell::{Cells, Group, KeyValue};
@@ -144,6 +144,46 @@ fn hostile() -> Cells {
 fn hostile_names_stay_names() {
     assert_shown!("hostile_default", counts(&hostile()), everything(&hostile(), "default"));
     assert_shown!("hostile_paper", counts(&hostile()), everything(&hostile(), "paper"));
+}
+
+#[test]
+fn marks_are_where_the_caption_says() {
+    let table = layout::tables(&hostile(), &Style::load("default").unwrap()).unwrap().remove(0);
+    let cells: Vec<_> = table.groups.iter().flat_map(|group| &group.rows).flat_map(|row| &row.cells).collect();
+    for cell in &cells {
+        assert_eq!(cell.is_marked, cell.n > 0 && cell.n < 5, "defined in fewer than 5 episodes: {cell:?}");
+        if let Value::Mean { n, .. } = cell.value {
+            assert_eq!(n.is_some(), cell.n != cell.episodes || cell.n == 1, "not all episodes, or 1: {cell:?}");
+        }
+    }
+    assert!(cells.iter().any(|cell| cell.is_marked) && cells.iter().any(|cell| cell.n > 4 && !cell.is_marked));
+    let marked = cells.iter().filter(|cell| cell.is_marked).count();
+    let (html, dagger) = (mirrorstats::report::tables::html::render(&table), "†");
+    for (format, text, mark) in [
+        ("terminal", terminal::render(&table, Terminal::default()), dagger),
+        ("markdown", markdown::render(&table), dagger),
+        ("latex", latex::render(&table), "$^{\\dagger}$"),
+        ("html", html, dagger),
+    ] {
+        assert_eq!(text.matches(mark).count(), marked + 1, "{format}: each of them, and the caption");
+        let text = text.replace('\n', " ");
+        assert!(text.contains(&format!("{mark} defined in fewer than 5 episodes.")), "{format}");
+        assert!(text.contains("n given where it is not all episodes, or is 1."), "{format}");
+    }
+}
+
+#[test]
+fn the_worst_of_two_models_is_not_second_best() {
+    let row = |name: &str, successes: i128| (vec![text("E1"), text(name)], successes);
+    let two = [row("a", 9), row("b", 1)];
+    let rows: Vec<_> =
+        two.iter().map(|(key, sum)| (key, [(9, *sum, *sum), (0, 0, 0), (9, sum * 9, 81 * sum), (0, 0, 0)])).collect();
+    let rows: Vec<RowOf> = rows.iter().map(|(key, of)| (key.as_slice(), 9, of.as_slice())).collect();
+    let all = everything(&cells(&["experiment", "model"], small_catalog(), &rows), "default");
+    for sign in ["_9/9_", "_1/9_", "<ins>", "\\underline", "_second best_", ",underline", "\u{241b}[4m"] {
+        assert!(!all.contains(sign), "{sign}: {all}");
+    }
+    assert!(all.contains("*9/9*") && all.contains("Marked as *best*.\n"), "{all}");
 }
 
 #[test]

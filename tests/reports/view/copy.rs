@@ -2,8 +2,8 @@
 
 use crate::harness::program::run;
 use crate::html::browser::Browser;
-use crate::view::RECORDED;
 use crate::view::pages::until;
+use crate::view::{RECORDED, Server};
 
 #[test]
 fn a_copy_shows_the_same_from_a_disk() {
@@ -37,4 +37,95 @@ fn a_copy_replaces_a_copy_and_nothing_else() {
     let refused = run(folder.path(), &["view", RECORDED, "--export", "other"]).refused();
     assert!(refused.contains("other files"), "{refused}");
     assert_eq!(std::fs::read_dir(&other).unwrap().count(), 1);
+}
+
+/// Shows what this query names, in a page that is open.
+fn look(browser: &mut Browser, query: &str) {
+    let shown = browser.text("document.documentElement.dataset.shown");
+    let state = "document.dispatchEvent(new CustomEvent('state', { detail: { replace: false } }))";
+    browser.value(&format!("history.pushState(null, '', location.pathname + {query:?}); {state}"));
+    until(browser, &format!("document.documentElement.dataset.shown !== '{shown}'"));
+}
+
+/// The list of a copy under a filter: what it counts, or what it says in the place of episodes.
+fn listed(browser: &mut Browser, filter: &str) -> (String, String) {
+    look(browser, &format!("?view=episodes&{filter}"));
+    let text = |selector: &str| format!("document.querySelector('{selector}')?.textContent ?? ''");
+    let found = (browser.text(&text("#count")), browser.text(&text(".notice")));
+    if !found.1.is_empty() {
+        assert!(browser.holds("document.querySelector('.list .rows a') === null"), "{filter}");
+    }
+    found
+}
+
+#[test]
+fn a_copy_filters_as_the_server_does_or_says_that_it_cannot() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), &["view", RECORDED, "--where", "experiment = 'E1'", "--export", "page"]).done();
+    let page = format!("file://{}/index.html", folder.path().join("page").display());
+    let server = Server::start(folder.path(), &[RECORDED, "--where", "experiment = 'E1'"]);
+    let mut browser = Browser::at(&page);
+    until(&mut browser, "document.documentElement.dataset.shown");
+    for filter in [
+        "where=TSA+%3D+0",
+        "where=TSA+%3D+0+and+MCR+%3D+1",
+        "where=model+%3D+'oracle'",
+        "where=(model+in+('oracle',+'random')+or+TTD+>%3D+100)+and+run+%3D+1",
+        "where=MTATO+is+null",
+        "where=MTATO+is+not+null+and+MTATO+<>+1",
+        "where=scene+%3D+'7ecf958fd2506cc0'",
+        "where=scene+is+null",
+        "where=TSA+%3D+1&model=oracle",
+        "where=seed+%3D+1&search=guess",
+        "model=oracle&model=mimic",
+    ] {
+        let expected = server
+            .get(&format!("/api/episodes?{}", filter.replace('>', "%3E").replace('<', "%3C").replace('\'', "%27")))
+            .json();
+        let (total, all) = (&expected["total"], &expected["all"]);
+        let (count, notice) = listed(&mut browser, filter);
+        let words = if total == all { format!("{all} episodes") } else { format!("{total} of {all} episodes") };
+        assert_eq!((count, notice), (words, String::new()), "{filter}");
+    }
+    for filter in [
+        "where=any(mirror_visible)",
+        "where=TSA+%2B+1+%3D+2",
+        "where=not+TSA+%3D+1",
+        "where=NOPE+%3D+1",
+        "where=TSA+%3D+'1'",
+    ] {
+        let (count, notice) = listed(&mut browser, filter);
+        assert!(
+            count.is_empty() && notice.contains("cannot filter by") && notice.contains("mirrorstats view"),
+            "{filter}: {notice}"
+        );
+    }
+    look(&mut browser, "?where=TSA+%3D+0");
+    assert!(browser.holds("(({ value, offsetWidth }) => value === 'TSA = 0' && offsetWidth > 0)(document.querySelector('input[name=where]'))"));
+    let words = browser.text("document.querySelector('#overview-head .notice').textContent");
+    assert!(words.contains("TSA = 0") && browser.holds("document.querySelector('table.results') === null"), "{words}");
+    look(&mut browser, "?model=oracle");
+    let rows = "[...document.querySelectorAll('#table-main tbody tr[data-group]')].filter((row) => !row.hidden).every((row) => row.dataset.model === 'oracle')";
+    assert!(browser.holds(rows));
+    browser.click("#section-statistics summary");
+    until(&mut browser, "document.querySelector('#section-statistics .notice')");
+    browser.close();
+}
+
+#[test]
+fn two_episodes_of_a_copy_part_where_those_of_the_server_do() {
+    let folder = tempfile::tempdir().unwrap();
+    run(folder.path(), &["view", RECORDED, "--where", "model in ('guesser', 'gullible')", "--export", "page"]).done();
+    let page = format!("file://{}/index.html", folder.path().join("page").display());
+    let server = Server::start(folder.path(), &[RECORDED]);
+    for (a, b) in [("E1/guesser/s1/r1", "E1/guesser/s1/r2"), ("E1/guesser/s1/r1", "E1/gullible/s1/r1")] {
+        let mut told = Vec::new();
+        for base in [page.as_str(), server.link.as_str()] {
+            let mut browser = Browser::at(&format!("{base}?view=compare&a={a}&b={b}"));
+            until(&mut browser, "document.querySelectorAll('.side .step').length === 2");
+            told.push(browser.texts("['#differing', '.clock', '#first-difference', 'main > p.quiet'].map((one) => document.querySelector(one).textContent)"));
+            drop(browser);
+        }
+        assert_eq!(told[0], told[1], "{a}, {b}");
+    }
 }

@@ -72,6 +72,56 @@ fn two_episodes_stand_beside_each_other_at_their_first_difference() {
 }
 
 #[test]
+fn two_episodes_are_called_alike_nowhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let server = Server::start(folder.path(), &[RECORDED]);
+    let (a, b) = ("E1/oracle/s1/r1", "E1/guesser/s1/r1");
+    let told = server.get(&format!("/api/compare?a={a}&b={b}")).json();
+    let (long, short) = (told["a"]["length"].as_u64().unwrap(), told["b"]["length"].as_u64().unwrap());
+    assert!(long > short, "the guesser is done before the oracle");
+    assert_eq!((told["ended"]["side"].as_str(), told["ended"]["t"].as_u64()), (Some("b"), Some(short)));
+    let columns = |t: u64| {
+        let steps = |side: &str| told[side]["steps"].as_object().unwrap().clone();
+        let (a, b) = (steps("a"), steps("b"));
+        let at = usize::try_from(t - 1).unwrap();
+        let names: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+        let value = |of: &serde_json::Map<String, serde_json::Value>, name: &str| {
+            of.get(name).map(|column| column["values"][at].clone()).unwrap_or_default()
+        };
+        names.into_iter().filter(|name| value(&a, name) != value(&b, name)).count()
+    };
+    let listed = told["differences"].as_array().unwrap();
+    let acts = listed.iter().filter(|found| !found["columns"].as_array().unwrap().is_empty()).count() as u64;
+    assert_eq!(told["differing"].as_u64().unwrap(), acts + long - short);
+    let mut browser = Browser::at(&format!("{}?view=compare&a={a}&b={b}", server.link));
+    until(&mut browser, "document.querySelectorAll('.side .step').length === 2");
+    browser.press("Home");
+    for t in 1..=long {
+        until(&mut browser, &format!("document.querySelector('.clock').textContent.startsWith('t = {t} ')"));
+        let said = "document.querySelector('.parted').textContent";
+        if t <= short {
+            until(&mut browser, &format!("/frames (are equal|differ|cannot)/.test({said})"));
+        }
+        let words = browser.text(said);
+        assert!(!words.contains("alike"), "t = {t}: {words}");
+        if t > short {
+            assert_eq!(words, format!("B ended at t = {short}; A goes on."), "t = {t}");
+        } else {
+            assert_eq!(words.starts_with("Here no recorded column differs"), columns(t) == 0, "t = {t}: {words}");
+            let same = server.get(&format!("/api/same_frame?a={a}&b={b}&t={t}")).json()["is_same"].clone();
+            let frame = |id: &str| server.get(&format!("/api/frame?id={id}&t={t}")).body;
+            let expected = if frame(a) == frame(b) { "equal" } else { "differ" };
+            assert!(words.contains(expected), "t = {t}: {words}");
+            assert_eq!(same, frame(a) == frame(b));
+        }
+        browser.press("ArrowRight");
+    }
+    let count = browser.text("document.querySelector('#differing').textContent");
+    assert!(count.ends_with(&format!("differs at {} of {long} steps.", told["differing"])), "{count}");
+    browser.close();
+}
+
+#[test]
 fn every_flip_of_other_definitions_leads_to_its_episode() {
     let folder = tempfile::tempdir().unwrap();
     let inclusive = concat!(env!("CARGO_MANIFEST_DIR"), "/examples/definitions/inclusive.toml");

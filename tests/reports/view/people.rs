@@ -88,6 +88,14 @@ impl Person {
         let taken = self.ask("POST", "reply", &json!({"number": told["number"], "reply": reply})).json();
         assert_eq!(taken["taken"], true);
     }
+
+    /// Has the practice behind and begins what counts.
+    fn practise(&mut self) {
+        assert_eq!(self.state(&["practice", "play"])["phase"], "practice");
+        self.act("done", "unknown", "red");
+        self.state(&["ready"]);
+        assert_eq!(self.ask("POST", "begin", &json!({})).status, 200);
+    }
 }
 
 #[test]
@@ -106,8 +114,7 @@ fn a_person_plays_and_nothing_tells_them_the_truth() {
     assert_eq!(person.state(&["consent"])["words"], "You may stop at any time.");
     assert_eq!(person.ask("GET", "frame", &Value::Null).status, 404, "nothing is shown before");
     person.ask("POST", "agree", &json!({}));
-    assert_eq!(person.state(&["practice", "play"])["phase"], "practice");
-    person.act("done", "unknown", "red");
+    person.practise();
     assert_eq!(person.state(&["play"])["t"], 1);
     person.act("a", "unknown", "none");
     person.state(&["play"]);
@@ -139,9 +146,7 @@ fn two_people_play_at_once_and_one_is_removed() {
     let folder = tempfile::tempdir().unwrap();
     let people = People::start(folder.path(), "leaver-0001,stayer-0002", &["--runs", "2"]);
     let mut both = [people.person(0), people.person(1)];
-    for person in &mut both {
-        person.act("done", "unknown", "red");
-    }
+    both.iter_mut().for_each(Person::practise);
     for person in &mut both {
         person.act("a", "unknown", "none");
         person.act("done", "blue", "blue");
@@ -172,7 +177,7 @@ fn a_recording_that_was_ended_goes_on_at_the_same_step() {
     let folder = tempfile::tempdir().unwrap();
     let mut people = People::start(folder.path(), "P3", &["--runs", "1"]);
     let mut person = people.person(0);
-    person.act("done", "unknown", "red");
+    person.practise();
     person.act("a", "unknown", "none");
     person.act("a", "unknown", "none");
     person.state(&["play"]);
@@ -192,8 +197,7 @@ fn the_page_is_played_by_keys() {
     let people = People::start(folder.path(), "P1", &["--runs", "1"]);
     let mut browser = Browser::at(&people.links[0]);
     until(&mut browser, "document.querySelector('.practice') && document.querySelector('img').naturalWidth === 640");
-    browser.click("button[data-action=done]");
-    until(&mut browser, "document.querySelector('h1').textContent === 'Step 1'");
+    practise(&mut browser);
     browser.press("ArrowLeft");
     until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
     assert!(browser.text("document.querySelector('#user').textContent").contains("the previous action was a"));
@@ -202,6 +206,179 @@ fn the_page_is_played_by_keys() {
     browser.complaints();
     drop(browser);
     assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
+}
+
+/// Ends the practice in a browser, and begins what counts.
+fn practise(browser: &mut Browser) {
+    until(browser, "document.querySelector('.practice')");
+    browser.click("button[data-action=done]");
+    until(browser, "document.querySelector('#begin')");
+    let words = browser.text("document.querySelector('#content').textContent");
+    assert!(words.contains("The practice is over; the next steps count."), "{words}");
+    browser.click("#begin");
+    until(browser, "document.querySelector('h1').textContent === 'Step 1'");
+}
+
+/// What stands in the field of the claim.
+const CLAIM: &str = "document.querySelector('input[name=identification]').value";
+
+/// Types a claim in the place of what stands there.
+fn claim(browser: &mut Browser, words: &str) {
+    browser.value("document.querySelector('input[name=identification]').select()");
+    browser.send("Input.insertText", &json!({"text": words}));
+}
+
+#[test]
+fn a_claim_belongs_to_the_episode_in_which_it_was_typed() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let people = People::start(folder.path(), "P1", &["--runs", "2"]);
+    let mut browser = Browser::at(&people.links[0]);
+    until(&mut browser, "document.querySelector('.practice')");
+    claim(&mut browser, "I am red in the practice");
+    practise(&mut browser);
+    assert_eq!(browser.text(CLAIM), "", "nothing of the practice");
+    claim(&mut browser, "I am blue in the first");
+    browser.click("button[data-action=a]");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
+    assert_eq!(browser.text(CLAIM), "I am blue in the first", "from step to step it stays");
+    browser.click("#pause");
+    until(&mut browser, "document.querySelector('#resume')");
+    browser.click("#resume");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
+    assert_eq!(browser.text(CLAIM), "I am blue in the first", "over a break too");
+    browser.click("button[data-action=done]");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 1'");
+    assert_eq!(browser.text(CLAIM), "", "nothing of the episode before");
+    browser.click("button[data-action=done]");
+    until(&mut browser, "document.querySelector('#over')");
+    people.ends();
+    // The server has gone; the page asks no more, and says the same.
+    std::thread::sleep(std::time::Duration::from_secs(2));
+    let words = browser.text("document.body.innerText");
+    assert!(words.contains("The study is over") && words.contains("Thank you"), "{words}");
+    assert!(!words.contains("does not answer") && !words.contains("fetch"), "{words}");
+    let rows = run(folder.path(), &["query", CLAIMS, "runs"]).done();
+    assert!(rows.matches("blue").count() > 0 && !rows.contains("red") && rows.contains("NULL"), "{rows}");
+}
+
+const CLAIMS: &str = "select run, t, self_color from steps order by run, t";
+
+#[test]
+fn a_page_whose_server_has_gone_thanks_too() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let mut people = People::start(folder.path(), "P1,P2", &["--runs", "2"]);
+    let mut browser = Browser::at(&people.links[0]);
+    practise(&mut browser);
+    browser.click("button[data-action=done]");
+    until(&mut browser, "document.querySelector('#waiting').textContent.startsWith('Thank you')");
+    let _ = people.process.0.kill();
+    let _ = people.process.0.wait();
+    until(&mut browser, "document.querySelector('#over')");
+    let words = browser.text("document.body.innerText");
+    assert!(words.contains("The study is over") && words.contains("Thank you"), "{words}");
+}
+
+#[test]
+fn episodes_wait_for_people() {
+    need::drawing();
+    for more in [&["--runs", "3"][..], &["--runs", "3", "--in-flight", "4", "--threads", "3"]] {
+        let folder = tempfile::tempdir().unwrap();
+        let people = People::start(folder.path(), "z1", more);
+        let mut person = people.person(0);
+        person.practise();
+        for _ in 0..3 {
+            person.act("done", "unknown", "red");
+        }
+        people.ends();
+        assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 3, "{more:?}");
+        assert!(!folder.path().join("runs/lost.jsonl").exists(), "{more:?}");
+    }
+}
+
+#[test]
+fn no_step_counts_before_the_person_has_begun() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let people = People::start(folder.path(), "z1", &["--runs", "1"]);
+    let mut person = people.person(0);
+    person.state(&["practice"]);
+    person.act("done", "", "none");
+    person.state(&["ready"]);
+    for _ in 0..10 {
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        assert_eq!(person.state(&["ready", "play"])["phase"], "ready");
+    }
+    assert_eq!(person.ask("GET", "frame", &Value::Null).status, 404, "nothing is shown before");
+    for number in 0..4 {
+        let sent = json!({"number": number, "reply": {"action": "done"}});
+        assert_eq!(person.ask("POST", "reply", &sent).json()["taken"], false);
+    }
+    person.ask("POST", "begin", &json!({}));
+    let told = person.state(&["play"]);
+    assert_eq!(told["t"], 1);
+    // Another window of the same person sends a reply during a break: nothing is taken, and nothing is lost.
+    person.ask("POST", "pause", &json!({}));
+    let sent = json!({"number": told["number"], "reply": {"action": "done"}});
+    assert_eq!(person.ask("POST", "reply", &sent).json()["taken"], false);
+    person.ask("POST", "resume", &json!({}));
+    person.act("done", "unknown", "red");
+    people.ends();
+    assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
+}
+
+#[test]
+fn a_reply_that_fails_is_told_and_sent_again() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let people = People::start(folder.path(), "P1", &["--runs", "1"]);
+    let mut browser = Browser::at(&people.links[0]);
+    practise(&mut browser);
+    claim(&mut browser, "I am green");
+    browser.send("Network.setBlockedURLs", &json!({"urls": ["*/reply*"]}));
+    browser.click("button[data-action=a]");
+    until(&mut browser, "!document.querySelector('#notice').hidden");
+    let words = browser.text("document.querySelector('#notice').textContent");
+    assert!(words.contains("was not sent") && words.contains("still here"), "{words}");
+    assert_eq!(browser.text(CLAIM), "I am green");
+    assert!(browser.holds("!document.querySelector('button[data-action=a]').disabled"));
+    browser.send("Network.setBlockedURLs", &json!({"urls": []}));
+    browser.click("#again");
+    until(&mut browser, "document.querySelector('h1').textContent === 'Step 2'");
+    assert!(browser.holds("document.querySelector('#notice').hidden"));
+    // The whole server is out of reach for a while: the form and the words in it stay.
+    claim(&mut browser, "I am yellow");
+    browser.send("Network.setBlockedURLs", &json!({"urls": ["*"]}));
+    until(&mut browser, "document.querySelector('#notice').textContent.includes('does not answer')");
+    assert_eq!(browser.text(CLAIM), "I am yellow");
+    browser.send("Network.setBlockedURLs", &json!({"urls": []}));
+    until(&mut browser, "document.querySelector('#notice').hidden");
+    browser.click("button[data-action=done]");
+    people.ends();
+    let rows = run(folder.path(), &["query", CLAIMS, "runs"]).done();
+    assert!(rows.contains("green") && rows.contains("yellow"), "{rows}");
+}
+
+#[test]
+fn nobody_is_given_the_answers_of_another_person() {
+    need::drawing();
+    let folder = tempfile::tempdir().unwrap();
+    let mut people = People::start(folder.path(), "early-01", &["--runs", "1"]);
+    let mut person = people.person(0);
+    person.practise();
+    person.act("a", "I am red", "none");
+    person.state(&["play"]);
+    let _ = people.process.0.kill();
+    let _ = people.process.0.wait();
+    let people = People::start(folder.path(), "late-02", &["--runs", "1"]);
+    let mut person = people.person(0);
+    person.practise();
+    assert_eq!(person.state(&["play"])["t"], 1, "the steps of the other one are asked again");
+    person.act("done", "", "red");
+    people.ends();
+    let rows = run(folder.path(), &["query", CLAIMS, "runs"]).done();
+    assert!(!rows.contains("red") && rows.contains("NULL"), "{rows}");
 }
 
 #[test]

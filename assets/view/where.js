@@ -1,0 +1,96 @@
+// The conditions that a copy can evaluate by itself: comparisons of what its list has, joined by `and`, `or` and brackets.
+// Without `not`, what is undefined and what is false are the same: the episode is left out.
+
+const TOKEN = /\s*(?:([A-Za-z_]\w*)|"((?:[^"]|"")+)"|'((?:[^']|'')*)'|(-?\d+(?:\.\d+)?)(?![\w.])|(<>|!=|<=|>=|[=<>(),]))/y;
+const COMPARE = { "=": (a, b) => a === b, "<>": (a, b) => a !== b, "!=": (a, b) => a !== b, "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b };
+
+function tokens(text) {
+  const found = [];
+  TOKEN.lastIndex = 0;
+  while (text.slice(TOKEN.lastIndex).trim() !== "") {
+    const match = TOKEN.exec(text);
+    if (match === null) throw new Error("unreadable");
+    const [, word, name, string, number, sign] = match;
+    if (word !== undefined) found.push({ word: word.toLowerCase(), name: word });
+    else if (name !== undefined) found.push({ name: name.replaceAll('""', '"') });
+    else if (string !== undefined) found.push({ value: string.replaceAll("''", "'") });
+    else if (number !== undefined) found.push({ value: Number(number) });
+    else found.push({ word: sign });
+  }
+  return found;
+}
+
+/** A function of a row that says whether the condition holds; `columns` has a function for each name, and throws otherwise. */
+function condition(text, columns) {
+  const left = tokens(text);
+  const take = (word) => left[0]?.word === word && left.shift() !== undefined;
+  const need = (is) => {
+    if (!is) throw new Error("unknown");
+  };
+  const either = () => {
+    const parts = [both()];
+    while (take("or")) parts.push(both());
+    return (row) => parts.some((part) => part(row));
+  };
+  const both = () => {
+    const parts = [atom()];
+    while (take("and")) parts.push(atom());
+    return (row) => parts.every((part) => part(row));
+  };
+  const atom = () => {
+    if (take("(")) {
+      const inside = either();
+      need(take(")"));
+      return inside;
+    }
+    const { kind, of } = columns.get(left.shift()?.name) ?? {};
+    need(of !== undefined);
+    const literal = () => {
+      const { value } = left.shift() ?? {};
+      // A further column is text in the list, and a number where it was one.
+      const own = kind === "label" && value !== undefined ? String(value) : value;
+      need(typeof own === (kind === "number" ? "number" : "string"));
+      return own;
+    };
+    if (take("is")) {
+      const isNull = !take("not");
+      need(take("null"));
+      return (row) => (of(row) === null) === isNull;
+    }
+    if (take("in")) {
+      need(take("("));
+      const wanted = [literal()];
+      while (take(",")) wanted.push(literal());
+      need(take(")"));
+      return (row) => wanted.includes(of(row));
+    }
+    const sign = left.shift()?.word;
+    // The order of texts is the program's.
+    need(Object.hasOwn(COMPARE, sign ?? "") && (kind === "number" || !/^[<>]=?$/.test(sign)));
+    const value = literal();
+    return (row) => of(row) !== null && COMPARE[sign](of(row), value);
+  };
+  const whole = either();
+  need(left.length === 0);
+  return whole;
+}
+
+function columnsOfList(list) {
+  const columns = new Map([["episode_id", { kind: "text", of: (row) => row.id }]]);
+  for (const name of ["experiment", "model", "condition"]) columns.set(name, { kind: "text", of: (row) => (row.keys ?? row)[name] });
+  for (const name of ["seed", "run"]) columns.set(name, { kind: "number", of: (row) => row[name] });
+  for (const name of list.labels ?? []) if (!columns.has(name)) columns.set(name, { kind: "label", of: (row) => row.labels[name] ?? null });
+  list.metrics.forEach((name, at) => columns.set(name, { kind: "number", of: (row) => (row.values[at] === null ? null : Number(row.values[at])) }));
+  return columns;
+}
+
+/** The condition of a link over the rows of a copy's list. */
+export function whereOf(text, list) {
+  if (text === null || text.trim() === "") return () => true;
+  const columns = columnsOfList(list);
+  try {
+    return condition(text, columns);
+  } catch {
+    throw new Error(`This copy of the page cannot filter by\n  ${text}\nSo no episode is shown. It compares ${[...columns.keys()].join(", ")} with values, joined by and, or and brackets;\n\`mirrorstats view\` of the recordings takes any condition.`);
+  }
+}

@@ -76,6 +76,7 @@ impl RescoreRequest {
             by: Some(manifest.by.clone()),
             pool: true,
             lost: LostAs::Nothing,
+            ..Question::default()
         }
     }
 

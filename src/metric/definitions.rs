@@ -125,7 +125,7 @@ impl Definitions {
         let names: Vec<&str> = parts.iter().map(|(part, _)| part.document.name.as_str()).collect();
         let mut whole = Document { name: names.join("+"), open: true, ..Document::default() };
         for (part, experiments) in parts {
-            let Document { columns, lets, metrics, experiments: known, .. } = part.document.clone();
+            let Document { columns, lets, metrics, experiments: known, built_on, .. } = part.document.clone();
             let same = |(name, (written, _)): (&String, &(Written, _))| {
                 whole.lets.get(name).is_none_or(|(other, _): &(Written, _)| other.text == written.text)
             };
@@ -136,6 +136,7 @@ impl Definitions {
             let quoted: Vec<String> =
                 experiments.iter().map(|name| format!("'{}'", name.replace('\'', "''"))).collect();
             let here = format!("experiment in ({})", quoted.join(", "));
+            whole.built_on.extend(built_on);
             whole.lets.extend(lets);
             whole.columns.extend(columns);
             whole.experiments.extend(known);

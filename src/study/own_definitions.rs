@@ -169,6 +169,11 @@ pub(super) fn unscored(
 }
 
 impl Study {
+    /// The experiments by their definitions, where each is scored by its own beside others; else none.
+    pub fn parts(&self) -> &[ScoredAlike] {
+        &self.question.parts
+    }
+
     /// The definitions that score all experiments of the traces, as their footers name them; `None` for the default ones.
     ///
     /// # Errors

@@ -412,8 +412,9 @@ impl Study {
     /// # Errors
     /// As [`Study::explain`].
     pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
-        let definitions = self.question.bind(self.source.traces()?)?;
+        // Bound to its own columns: beside other tasks a trace may lack those that are theirs.
         let one = TraceSet::open(std::slice::from_ref(input))?;
+        let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
         Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
     }
 

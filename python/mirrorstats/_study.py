@@ -26,8 +26,8 @@ def open(
 
     Args:
         paths: files, folders or globs, one or several.
-        definitions: `paper`, `extended`, or the path of a TOML file; `paper` where none is named, and for scores what they
-            were computed with.
+        definitions: `paper`, `extended`, or the path of a TOML file. Where none is named those that the experiments of
+            the traces name, else `paper`; for scores what they were computed with.
         where: a condition on episodes in the language of definitions, such as `seed = 1 and TSA = 1`; all if None.
         metrics: the metrics wanted, by name; all if None.
         by: the columns that cells are grouped by; experiment and model if None, and the condition where there are some.

@@ -46,7 +46,8 @@ impl Asked {
     fn open(self) -> PyResult<mirrorstats::Study> {
         let lost = if self.lost_as_failure { LostAs::Failure } else { LostAs::Nothing };
         let (definitions, filter) = (self.definitions.map(Into::into), self.r#where);
-        let question = Question { definitions, filter, metrics: self.metrics, by: self.by, pool: self.pool, lost };
+        let (metrics, by, pool) = (self.metrics, self.by, self.pool);
+        let question = Question { definitions, filter, metrics, by, pool, lost, ..Question::default() };
         let study = mirrorstats::Study::open(self.paths).map_err(error::of_study)?;
         let study = study.asked(question).map_err(error::of_study)?;
         Ok(match self.threads {

@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::num::{NonZeroU32, NonZeroUsize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::engine::spark::setting::Setting;
 
@@ -35,7 +35,7 @@ impl ThreadArgs {
 /// What to score, and how it is defined.
 #[derive(Clone, Debug, Default, clap::Args)]
 pub struct ScoringArgs {
-    /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
+    /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
     #[arg(long, value_name = "NAME|FILE")]
     pub definitions: Option<PathBuf>,
     /// Only these metrics, separated by commas [default: all of the definitions]
@@ -44,13 +44,6 @@ pub struct ScoringArgs {
     /// Only episodes where this holds, in the language of definitions, such as "seed = 1 and TSA = 1"
     #[arg(long = "where", value_name = "EXPR")]
     pub condition: Option<String>,
-}
-
-impl ScoringArgs {
-    /// The definition file asked for, or the paper's.
-    pub fn definitions_name(&self) -> &Path {
-        self.definitions.as_deref().unwrap_or(Path::new("paper"))
-    }
 }
 
 /// How episodes are grouped into cells.

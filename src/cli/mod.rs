@@ -75,7 +75,8 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     let format = ErrorFormat::asked_for(&arguments);
-    let code = outcome::exit_code(execute(arguments).and_then(flushed), format);
+    let answer = execute(arguments.clone()).map_err(|failure| scoring::with_commands(failure, &arguments));
+    let code = outcome::exit_code(answer.and_then(flushed), format);
     // What was printed before a failure is still to be seen.
     let _ = io::stdout().flush();
     code

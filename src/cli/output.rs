@@ -11,10 +11,10 @@ use serde::Serialize;
 
 use super::outcome::{Failure, Outcome};
 use crate::base::escape::visible_lines;
+use crate::base::replace::{self, Content, FolderFiles, NewFile, TemporaryFolder};
 use crate::trace::checksums::stale_note;
 use crate::trace::inputs::Input;
 use crate::trace::open::TraceFile;
-use crate::base::replace::{self, Content, FolderFiles, NewFile, TemporaryFolder};
 
 /// Prints an answer, as text for people or as JSON for programs.
 ///

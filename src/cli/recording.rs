@@ -11,6 +11,8 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::NAME;
+use super::scoring::commands;
 use super::text_table::counted;
 use crate::agent::Player;
 use crate::agent::vlm::limits::Spend;
@@ -24,7 +26,9 @@ use crate::record::queue::Held;
 use crate::record::replies::{Replies, RepliesAnswer, UnreadableReply};
 use crate::record::run::Progress;
 use crate::record::shares::Spent;
+use crate::report::html;
 use crate::sim::config::WorldConfig;
+use crate::study::{Study, StudyError};
 use crate::trace::episode::Step;
 use crate::trace::replies::ReplyCounts;
 
@@ -231,6 +235,7 @@ pub(super) fn dollars(value: f64) -> String {
 pub(super) fn say(
     answer: &RecordAnswer,
     (folder, lost_list): (&Path, &Path),
+    files: &[&Path],
     elapsed: Duration,
     times: Spent,
 ) -> io::Result<()> {
@@ -273,9 +278,24 @@ pub(super) fn say(
     match stopped(answer) {
         Some(words) => writeln!(out, "{words}")?,
         None if answer.recorded + answer.found + answer.elsewhere == 0 => {}
-        None => writeln!(out, "next: mirrorstats report {}", visible(&folder.display().to_string()))?,
+        None => writeln!(out, "next: {}", next(folder, files).join("\n      "))?,
     }
     Ok(())
+}
+
+/// What to type to see how the episodes were: a report, or one for each group of experiments that the same definitions score.
+fn next(folder: &Path, files: &[&Path]) -> Vec<String> {
+    let typed = [NAME.into(), "report".into(), folder.into()];
+    let report = format!("{NAME} report {}", html::word(&folder.to_string_lossy()));
+    match Study::open([folder]).and_then(|study| study.own_definitions()) {
+        Err(StudyError::DefinitionsDiffer { groups }) => commands(&typed, &groups),
+        Err(StudyError::DefinitionsElsewhere { group }) => {
+            let beside = files.iter().map(|file| file.with_file_name(&group.definitions)).find(|file| file.is_file());
+            let file = beside.unwrap_or_else(|| group.definitions.into());
+            vec![format!("{report} --definitions {}", html::word(&file.to_string_lossy()))]
+        }
+        _ => vec![report],
+    }
 }
 
 /// How many episodes are to go, if the recording was stopped; those under way that a limit has stopped are among them.

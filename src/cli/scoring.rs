@@ -1,12 +1,17 @@
 //! From what was typed to a study, and from its errors to what is said of them.
 
+use std::borrow::Cow;
+use std::ffi::OsString;
 use std::io;
 
+use super::NAME;
 use super::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
 use super::outcome::Failure;
 use super::output;
+use crate::base::escape::visible;
 use crate::metric::fault::Faults;
-use crate::study::{LostAs, Question, Study, StudyError, resolve};
+use crate::report::html;
+use crate::study::{LostAs, Question, ScoredAlike, Study, StudyError, resolve};
 use crate::trace::inputs::Input;
 
 impl TraceArgs {
@@ -56,6 +61,8 @@ impl ScoringArgs {
     pub fn question(&self, grouping: &GroupingArgs) -> Question {
         Question {
             definitions: self.definitions.clone(),
+            each: false,
+            parts: Vec::new(),
             filter: self.condition.clone(),
             metrics: self.metrics.clone(),
             by: grouping.by.clone(),
@@ -78,6 +85,40 @@ impl From<StudyError> for Failure {
             },
         }
     }
+}
+
+/// A refusal of experiments that need different definitions, with what to type in place of what was typed.
+pub(super) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
+    let Failure::Input(error) = &failure else { return failure };
+    let Some(StudyError::DefinitionsDiffer { groups }) = error.downcast_ref() else { return failure };
+    let words = error.to_string();
+    let found = words.split("\n").next().unwrap_or_default();
+    Failure::input(format!("{found}\n  help: ask for each by itself:\n    {}", commands(typed, groups).join("\n    ")))
+}
+
+/// A command line for the episodes of each group alone.
+pub(super) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String> {
+    let (mut kept, mut filter, mut words) = (Vec::new(), None, typed.iter().skip(1).map(|word| word.to_string_lossy()));
+    while let Some(word) = words.next() {
+        match word.strip_prefix("--where") {
+            Some("") => filter = words.next().map(Cow::into_owned),
+            Some(rest) => filter = rest.strip_prefix('=').map(str::to_owned),
+            None => kept.push(html::word(&word)),
+        }
+    }
+    let has_out = kept.iter().any(|word| word.starts_with("--out") || word.starts_with("-o"));
+    let command = |group: &ScoredAlike| {
+        let condition =
+            filter.as_ref().map_or_else(String::new, |filter| format!("({filter}) and ")) + &group.condition;
+        let is_plain = visible(&condition) == condition && !condition.contains(['$', '`', '"', '\\', '!']);
+        let condition = if is_plain { format!("\"{condition}\"") } else { html::word(&condition) };
+        let definitions = html::word(&group.definitions);
+        // Two reports in one folder would be the last one.
+        let is_report = kept.first().is_some_and(|verb| verb == "report") && !has_out;
+        let out = if is_report { format!(" --out reports/{definitions}") } else { String::new() };
+        format!("{NAME} {} --where {condition} --definitions {definitions}{out}", kept.join(" "))
+    };
+    groups.iter().map(command).collect()
 }
 
 impl Failure {

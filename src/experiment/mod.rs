@@ -118,9 +118,13 @@ impl Experiment {
     /// # Errors
     /// When the process holds too many.
     pub fn of_footer(spec: Spec) -> Result<Self, TooMany> {
+        // Footers from before experiments named their definitions do not differ in anything else.
+        let unnamed = |known: &Spec| spec.definitions.is_none() && Spec { definitions: None, ..known.clone() } == spec;
         let same = {
             let all = KNOWN.read().unwrap_or_else(PoisonError::into_inner);
-            all.iter().position(|known| known.spec == spec).and_then(|at| u16::try_from(at).ok())
+            all.iter()
+                .position(|known| known.spec == spec || unnamed(&known.spec))
+                .and_then(|at| u16::try_from(at).ok())
         };
         same.map_or_else(|| Self::register(Known { spec, templates: Templates::default() }), |at| Ok(Self(at)))
     }

@@ -56,6 +56,9 @@ pub struct ExperimentTable {
     /// The column that holds what the decision should name; `body_color` if absent, `mark_color` for `mark_report`,
     /// `start_distance` for `target_distance`.
     pub truth: Option<Truth>,
+    /// The definitions that score it: `paper`, `battery`, another built-in name, or a path relative to this file. If absent
+    /// `battery` for `mark_report`, `reach` for `target_distance`, else the default ones.
+    pub definitions: Option<String>,
     /// Columns that have no meaning for the task, and that its traces do not have; none if absent. A column that a key of
     /// the reply fills has one.
     pub absent: Option<Vec<AbsentColumn>>,

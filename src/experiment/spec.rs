@@ -48,6 +48,12 @@ pub struct Spec {
     pub prompt_hash: String,
     /// The keys of a reply, in the order of the prompt.
     pub reply: Vec<ReplyKey>,
+    /// The definitions that score it: a built-in name, or a path relative to its file; the default ones if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub definitions: Option<String>,
+    /// SHA-256 of the definition file, 64 hexadecimal digits; absent for built-in definitions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub definitions_hash: Option<String>,
     /// The column that holds the decision.
     pub decision: Decision,
     /// The column that holds what the decision should name.

@@ -18,6 +18,7 @@ use crate::base::palette::Color;
 use crate::base::ratio::Ratio;
 use crate::base::suggest::{self, nearest};
 use crate::metric::fault::{Fault, Place};
+use crate::metric::file as definitions;
 use crate::metric::keys::Keys;
 
 /// An experiment as read, and where its parts stand, for faults that only a drawing shows.
@@ -78,6 +79,7 @@ pub(super) fn read(
         Decision::TargetDistance => Truth::StartDistance,
         Decision::SelectedCube | Decision::SelfColor => Truth::BodyColor,
     });
+    let (definitions, definitions_hash) = definitions(&mut keys, decision, beside, faults);
     let stated_place = keys.value_place("stated_color").unwrap_or_else(|| place.clone());
     let stated_color = keys.choice("stated_color", &pairs(Stated::ALL, Stated::name), faults).unwrap_or_default();
     let reply = reply(&mut keys, decision, faults);
@@ -105,6 +107,8 @@ pub(super) fn read(
         prompt,
         prompt_hash: templates.hash(),
         reply,
+        definitions,
+        definitions_hash,
         decision,
         truth,
         stated_color,
@@ -342,6 +346,36 @@ fn reply(keys: &mut Keys<'_>, decision: Decision, faults: &mut Vec<Fault>) -> Ve
         }
     }
     reply
+}
+
+/// The definitions that score it, and the hash of a file of one's own.
+fn definitions(
+    keys: &mut Keys<'_>,
+    decision: Decision,
+    beside: &Beside<'_>,
+    faults: &mut Vec<Fault>,
+) -> (Option<String>, Option<String>) {
+    let Some((name, at)) = keys.text("definitions", faults) else {
+        let known = match decision {
+            Decision::MarkReport => Some("battery"),
+            Decision::TargetDistance => Some("reach"),
+            Decision::SelectedCube | Decision::SelfColor => None,
+        };
+        return (known.map(str::to_owned), None);
+    };
+    let Some(folder) = beside.folder.filter(|_| definitions::built_in(&name).is_none()) else {
+        return (Some(name), None);
+    };
+    let path = folder.join(&name);
+    match definitions::read(&path).map_err(|error| error.to_string()) {
+        Ok(document) => (Some(name), document.file_hash),
+        Err(why) => {
+            let names = definitions::built_in_names().join(", ");
+            let help = format!("definitions are built in ({names}), or a path relative to this file");
+            faults.push(Fault::new(at, why).help(help));
+            (None, None)
+        }
+    }
 }
 
 /// Columns that the traces do not have; a reply that fills one of them gives it a meaning.

@@ -108,6 +108,47 @@ impl Definitions {
         lets.or_else(|| self.plan.outputs.iter().find(|output| output.node == node).map(|output| output.name.clone()))
     }
 
+    /// Whether they score an experiment whose own definitions are `own`: they are these or include them, they have a table for
+    /// it, or they have a table for none. Where its own are a file, any other file may be what became of that one.
+    pub fn scores(&self, experiment: &str, own: &str, own_hash: Option<&str>) -> bool {
+        let document = &self.document;
+        let is_own = own_hash.map_or_else(|| document.built_on.contains(&own), |_| document.file_hash.is_some());
+        is_own || document.experiments.is_empty() || document.experiments.contains_key(experiment)
+    }
+
+    /// Several definitions in one, each for its own experiments: elsewhere its metrics are undefined. `None` where two of them
+    /// give one name another meaning.
+    ///
+    /// # Errors
+    /// Every fault over these columns.
+    pub fn side_by_side(parts: &[(Self, Vec<String>)], columns: &Columns) -> Option<Result<Self, Faults>> {
+        let names: Vec<&str> = parts.iter().map(|(part, _)| part.document.name.as_str()).collect();
+        let mut whole = Document { name: names.join("+"), open: true, ..Document::default() };
+        for (part, experiments) in parts {
+            let Document { columns, lets, metrics, experiments: known, built_on, .. } = part.document.clone();
+            let same = |(name, (written, _)): (&String, &(Written, _))| {
+                whole.lets.get(name).is_none_or(|(other, _): &(Written, _)| other.text == written.text)
+            };
+            let is_new = |name: &String| !whole.metrics.contains_key(name) && !whole.lets.contains_key(name);
+            if !lets.iter().all(same) || !metrics.keys().all(is_new) {
+                return None;
+            }
+            let quoted: Vec<String> =
+                experiments.iter().map(|name| format!("'{}'", name.replace('\'', "''"))).collect();
+            let here = format!("experiment in ({})", quoted.join(", "));
+            whole.built_on.extend(built_on);
+            whole.lets.extend(lets);
+            whole.columns.extend(columns);
+            whole.experiments.extend(known);
+            whole.metrics.extend(metrics.into_iter().map(|(name, entry)| {
+                let when = entry.when.map_or_else(|| here.clone(), |when| format!("({}) and {here}", when.text));
+                let when = Written::whole(Source { name: "the experiments".to_owned(), text: when }.into());
+                (name, file::MetricEntry { when: Some(when), ..entry })
+            }));
+        }
+        Some(Self::check(whole, columns, None))
+    }
+
     /// The definitions as written.
     pub(super) fn document(&self) -> &Document {
         &self.document

@@ -31,9 +31,9 @@ use super::include::{Includes, Kind};
 use super::keys::{Keys, key_count, parse_toml};
 use super::origin::Written;
 use crate::base::budget::Limit;
-use crate::base::input;
 use crate::base::ratio::Ratio;
 use crate::base::suggest::nearest;
+use crate::base::{hash, input};
 
 /// The built-in definition files, by name.
 const BUILT_IN: [(&str, &str); 5] = [
@@ -49,6 +49,10 @@ const BUILT_IN: [(&str, &str); 5] = [
 pub struct Document {
     /// The file's own name, without folder and ending.
     pub name: String,
+    /// SHA-256 of the file's own text; absent for a text that is no file of one's own.
+    pub file_hash: Option<String>,
+    /// The built-in definitions that it is or includes, by name.
+    pub built_on: Vec<&'static str>,
     /// Whether unlisted experiments are accepted.
     pub open: bool,
     /// Declared columns of the user's own.
@@ -194,7 +198,11 @@ impl Reading {
     /// Reads a file and all that it includes into a document of this name.
     fn of(name: String, file: DefinitionFile) -> Result<Document, FileError> {
         let mut reading = Self {
-            document: Document { name, ..Document::default() },
+            document: Document {
+                name,
+                file_hash: file.place.is_some().then(|| hash::of_bytes(file.source.text.as_bytes())),
+                ..Document::default()
+            },
             faults: Vec::new(),
             includes: Includes::new(INCLUDED),
         };
@@ -213,6 +221,8 @@ impl Reading {
             self.faults.push(Fault::new(Place { source, span: 0..0 }, exceeded.to_string()));
             return;
         }
+        let is_own = |(_, text): &&(&str, &str)| file.place.is_none() && *text == source.text;
+        self.document.built_on.extend(BUILT_IN.iter().find(is_own).map(|(name, _)| *name));
         self.includes.enter(&source.name, file.place);
         let mut root = Keys::new(&source, table.get_ref(), "a definition file");
         if let Some(includes) = root.texts("include", &mut self.faults) {

@@ -8,8 +8,8 @@ use crate::base::hash;
 
 /// Digits of a fingerprint's name: enough for all recordings of a study, and short in a table.
 const DIGITS: usize = 16;
-/// What an experiment is called and held against, which changes no episode.
-const WORDS: [&str; 4] = ["title", "order", "chance", "reference"];
+/// What an experiment is called, scored by and held against, which changes no episode.
+const WORDS: [&str; 6] = ["title", "order", "chance", "reference", "definitions", "definitions_hash"];
 /// The keys of an agent's description that are parts of their own.
 const SAMPLING: [&str; 3] = ["temperature", "max_output_tokens", "reasoning_effort"];
 

@@ -92,6 +92,15 @@ pub(super) struct Difference {
 
 /// The first key in which the metadata of two recordings differ, but for those that grow with the episodes.
 pub(super) fn difference(ours: &Value, theirs: &Value) -> Option<Difference> {
+    // Which definitions score an experiment changes no episode.
+    let recorded = |value: &Value| {
+        let mut value = value.clone();
+        if let Some(experiment) = value.get_mut("experiment").and_then(Value::as_object_mut) {
+            experiment.retain(|key, _| !["definitions", "definitions_hash"].contains(&key.as_str()));
+        }
+        value
+    };
+    let (ours, theirs) = (&recorded(ours), &recorded(theirs));
     let keys = |value: &Value| -> Vec<String> {
         value.as_object().map(|object| object.keys().cloned().collect()).unwrap_or_default()
     };

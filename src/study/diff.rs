@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use super::error::StudyError;
 use super::inputs::{ScoreFile, Source, Stamp};
-use super::{LostAs, Question, Study, scores};
+use super::{LostAs, Question, Study, own_definitions, scores};
 use crate::base::suggest::nearest;
 use crate::metric::definitions::{Definitions, UnknownMetric};
 use crate::report::order::TableOrder;
@@ -107,7 +107,11 @@ pub fn diff(old: &Side, new: &Side, traces: &[Input], request: &DiffRequest) -> 
     let mut changes = pair.changes(&request.by)?;
     TableOrder { catalog: &pair.after.table.catalog, style: &style }.sort(&mut changes);
     let notes = match &traces {
-        Some(traces) => pair.explain(&mut changes, traces, request.threads)?,
+        Some(traces) => {
+            let mut notes = pair.explain(&mut changes, traces, request.threads)?;
+            notes.extend([&pair.before, &pair.after].into_iter().filter_map(|side| side.unscored(traces)));
+            notes
+        }
         None => Vec::new(),
     };
     stamps.iter().try_for_each(Stamp::check)?;
@@ -153,6 +157,7 @@ impl Side {
             by: Some(request.by.clone()),
             pool: true,
             lost: LostAs::Nothing,
+            ..Question::default()
         }
     }
 
@@ -279,6 +284,17 @@ impl Pair {
 }
 
 impl Scored {
+    /// What there is to say where its definitions do not score an experiment that the traces have.
+    fn unscored(&self, traces: &TraceSet) -> Option<String> {
+        let is_kept = |name: &str| self.table.keys.iter().any(|key| key.experiment == name);
+        match own_definitions::unscored(self.definitions.as_ref()?, traces, is_kept)? {
+            StudyError::NotScored { experiment, definitions, own } => Some(format!(
+                "`{definitions}` does not score the experiment `{experiment}`, as `{own}` does: its zeros there mean nothing"
+            )),
+            _ => None,
+        }
+    }
+
     /// These metrics of what scored it, read back from what its scores carry if they were not computed now.
     fn definitions(&self, traces: &TraceSet, metrics: &[String]) -> Result<Definitions, ScoreError> {
         match &self.definitions {

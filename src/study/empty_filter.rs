@@ -10,7 +10,6 @@ use super::error::StudyError;
 use super::inputs::Source;
 use super::{Question, Study, scores};
 use crate::base::escape::visible;
-use crate::metric::definitions::Definitions;
 use crate::metric::names::mentioned;
 use crate::score::score_traces;
 use crate::score::table::EpisodeTable;
@@ -52,7 +51,8 @@ impl Study {
 
     /// All episodes, with the columns of these names.
     fn unfiltered(&self, names: &[String]) -> Result<EpisodeTable, StudyError> {
-        let whole = Question { definitions: self.question.definitions.clone(), ..Question::default() };
+        let Question { definitions, each, parts, .. } = self.question.clone();
+        let whole = Question { definitions, each, parts, ..Question::default() };
         let traces = match &self.source {
             Source::Scores(files) => return scores::read(files, &whole),
             Source::Traces(traces) => traces,
@@ -60,7 +60,7 @@ impl Study {
         let is_label =
             |name: &&String| !KEY_COLUMNS.contains(&name.as_str()) && score_traces::check_label(traces, name).is_ok();
         let labels: Vec<String> = names.iter().filter(is_label).cloned().collect();
-        let known = Definitions::load(whole.definitions_name(), &score_traces::trace_columns(traces))?.catalog.metric;
+        let known = whole.load(&score_traces::trace_columns(traces))?.catalog.metric;
         let metrics = names.iter().filter(|name| known.contains_key(*name)).cloned().collect();
         let question = Question { metrics: Some(metrics), ..whole };
         Ok(score_traces::score(traces, &question.bind(traces)?, &labels, self.threads)?)

@@ -3,6 +3,7 @@
 use std::error::Error;
 use std::io;
 
+use super::own_definitions::ScoredAlike;
 use super::provenance::ProvenanceError;
 use crate::base::budget::Exceeded;
 use crate::base::replace::TargetIsInput;
@@ -163,6 +164,38 @@ pub enum StudyError {
         found: String,
         /// The first digits of their hash.
         found_hash: String,
+    },
+    /// Experiments that need different definitions.
+    #[error("expected experiments that the same definitions score, found {}", differing(.groups))]
+    DefinitionsDiffer {
+        /// The experiments, by what scores them.
+        groups: Vec<ScoredAlike>,
+    },
+    /// An experiment whose definitions are a file that traces do not carry.
+    #[error(
+        "{}: expected the definition file `{}`{}, which scores these episodes, found its name alone\n  \
+         help: a trace carries no definition file: give it with --definitions FILE",
+        .group.experiments.iter().map(String::as_str).collect::<Vec<_>>().join(", "),
+        .group.definitions,
+        .group.hash.as_deref().map(|hash| format!(" (sha256 {hash})")).unwrap_or_default()
+    )]
+    DefinitionsElsewhere {
+        /// The experiments and the file.
+        group: ScoredAlike,
+    },
+    /// Definitions that do not say what decides an experiment.
+    #[error(
+        "{experiment}: expected definitions that score it, as `{own}` do, found `{definitions}`, whose zeros would mean nothing\n  \
+         help: leave --definitions out, or give --definitions {own}; a file of your own scores it with `include = [\"{own}\"]`, \
+         or with a table `[experiment.{experiment}]`; `--where` leaves its episodes out"
+    )]
+    NotScored {
+        /// The experiment.
+        experiment: String,
+        /// The definitions that were asked for.
+        definitions: String,
+        /// Those that the experiment names.
+        own: String,
     },
     /// Definitions to compare, and nothing to score with them.
     #[error(
@@ -347,6 +380,14 @@ impl StudyError {
             other => Err(other),
         }
     }
+}
+
+/// Each group with what to ask for in its place.
+fn differing(groups: &[ScoredAlike]) -> String {
+    let one = |group: &ScoredAlike| format!("`{}` for {}", group.definitions, group.condition);
+    let ask = |group: &ScoredAlike| format!("--where \"{}\" --definitions {}", group.condition, group.definitions);
+    let found = groups.iter().map(one).collect::<Vec<_>>().join(", ");
+    format!("{found}\n  help: ask for each by itself: {}", groups.iter().map(ask).collect::<Vec<_>>().join("; or "))
 }
 
 fn faults_of_scoring(error: &ScoreError) -> Option<&Faults> {

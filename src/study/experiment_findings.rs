@@ -101,6 +101,8 @@ mod tests {
             order: Some(known.order),
             chance: known.chance.clone(),
             reference: known.reference.clone(),
+            definitions: None,
+            definitions_hash: None,
             absent: Vec::new(),
         };
         declared.chance.insert("NEW".to_owned(), None);

@@ -21,6 +21,7 @@ mod input_hashes;
 mod inputs;
 mod losses;
 mod overview;
+mod own_definitions;
 mod pooled;
 mod provenance;
 mod report;
@@ -40,8 +41,9 @@ use crate::base::replace;
 use crate::figures::{Figure, FigureName};
 use crate::metric::columns::Columns;
 use crate::metric::definitions::Definitions;
-use crate::report::bundle::BundleError;
+use crate::metric::file;
 use crate::metric::names::is_about;
+use crate::report::bundle::BundleError;
 use crate::report::comparison::{Comparison, choose, compare};
 use crate::report::errata::Errata;
 use crate::report::layout;
@@ -70,6 +72,7 @@ pub use figure_inputs::{Drawings, FigureInputs};
 pub use inputs::{ScoreFile, Source, resolve};
 pub use losses::LostAs;
 pub use overview::{Overview, Part};
+pub use own_definitions::ScoredAlike;
 pub use provenance::ProvenanceError;
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
@@ -102,8 +105,12 @@ pub struct Study {
 /// What is asked of the inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Question {
-    /// Definitions by name or path; the default ones, or those that scores carry, if absent.
+    /// Definitions by name or path; those that scores carry, or that the experiments of the traces name, if absent.
     pub definitions: Option<PathBuf>,
+    /// Whether experiments that need different definitions are each scored by their own, beside each other; else refused.
+    pub each: bool,
+    /// These definitions, found in the traces.
+    pub parts: Vec<ScoredAlike>,
     /// A condition on episodes in the language of definitions; all episodes if absent.
     pub filter: Option<String>,
     /// The metrics wanted, by name; all if absent.
@@ -151,7 +158,8 @@ impl Question {
 
     /// The definitions asked for, with every column that they read in every trace, and the experiments that these declare.
     pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
-        let mut definitions = self.bind_to(&score_traces::trace_columns(traces))?;
+        let asked = self.clone().resolved(traces)?;
+        let mut definitions = asked.bind_to(&score_traces::trace_columns(traces))?;
         score_traces::check_columns(traces, &definitions)?;
         declare(&mut definitions.catalog, traces)?;
         Ok(definitions)
@@ -159,7 +167,7 @@ impl Question {
 
     /// The definitions asked for over some columns.
     pub(crate) fn bind_to(&self, columns: &Columns) -> Result<Definitions, StudyError> {
-        let mut definitions = Definitions::load(self.definitions_name(), columns)?;
+        let mut definitions = self.load(columns)?;
         if let Some(filter) = &self.filter {
             definitions = definitions.filtered("--where", filter, columns)?;
         }
@@ -197,7 +205,12 @@ impl Study {
         let stamps = inputs.iter().map(Stamp::of).collect::<Result<_, _>>()?;
         let source = Source::open(&inputs)?;
         let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
-        Ok(Self { inputs, stamps, source, question: Question::default(), backend: Backend::Native, threads })
+        let mut question = Question::default();
+        if let Source::Traces(traces) = &source {
+            // What keeps an answer from having definitions is told with the answer: others may be asked for first.
+            question = question.clone().resolved(traces).unwrap_or(question);
+        }
+        Ok(Self { inputs, stamps, source, question, backend: Backend::Native, threads })
     }
 
     /// Asks for these definitions: `paper`, `extended`, or the path of a TOML file.
@@ -267,8 +280,9 @@ impl Study {
 
     /// Faults of a definition file or of a filter are found before any row is read. Whether the traces have the columns is
     /// checked with the scan, when it is known which metrics are wanted.
-    fn checked(self) -> Result<Self, StudyError> {
+    fn checked(mut self) -> Result<Self, StudyError> {
         if let Source::Traces(traces) = &self.source {
+            self.question = self.question.resolved(traces)?;
             self.question.bind_to(&score_traces::trace_columns(traces))?;
         }
         Ok(self)
@@ -415,6 +429,11 @@ impl Study {
     pub fn explain(&self, episode_id: &str) -> Result<Evidence, StudyError> {
         let traces = self.source.traces()?;
         let definitions = self.question.bind(traces)?;
+        if own_definitions::unscored(&definitions, traces, |_| true).is_some() {
+            let filter = Some(format!("episode_id = '{}'", episode_id.replace('\'', "''")));
+            let one = Question { filter, ..self.question.clone() }.bind(traces)?;
+            own_definitions::check(&one, traces, &score_traces::score(traces, &one, &[], self.threads)?)?;
+        }
         let found = evidence::explain(traces, &definitions, episode_id, self.threads);
         self.check_unchanged()?;
         Ok(found?)
@@ -425,8 +444,9 @@ impl Study {
     /// # Errors
     /// As [`Study::explain`].
     pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
-        let definitions = self.question.bind(self.source.traces()?)?;
+        // Bound to its own columns: beside other tasks a trace may lack those that are theirs.
         let one = TraceSet::open(std::slice::from_ref(input))?;
+        let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
         Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
     }
 
@@ -451,9 +471,10 @@ impl Study {
     }
 
     /// The files that an answer is made from: inputs, definitions and, where there is one, a style. An output that is one of
-    /// them would replace what it is made from. Names of built-in definitions and styles are in it too.
+    /// them would replace what it is made from. Names of built-in styles are in it too.
     pub fn files_read(&self, style: Option<&Path>) -> Vec<PathBuf> {
-        let named = self.question.definitions.as_deref().into_iter().chain(style).map(PathBuf::from);
+        let is_file = |name: &&Path| name.to_str().is_none_or(|name| file::built_in(name).is_none());
+        let named = self.question.definitions.as_deref().filter(is_file).into_iter().chain(style).map(PathBuf::from);
         self.inputs.iter().map(|input| input.path.clone()).chain(named).collect()
     }
 

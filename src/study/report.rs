@@ -22,8 +22,8 @@ use crate::score::format::Format;
 use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
 use crate::stats::losses::LostCounts;
-use crate::trace::checksums::missing_note;
 use crate::trace::answered;
+use crate::trace::checksums::missing_note;
 use crate::trace::schema::SCHEMA_VERSION;
 
 /// The most episodes that a page lists.

@@ -77,6 +77,7 @@ impl RescoreRequest {
             by: Some(manifest.by.clone()),
             pool: true,
             lost: LostAs::Nothing,
+            ..Question::default()
         }
     }
 

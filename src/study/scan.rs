@@ -5,7 +5,7 @@ use std::thread;
 use super::error::StudyError;
 use super::inputs::Source;
 use super::results::{Outputs, Results};
-use super::{Backend, STANDING_LABELS, Study, backend, input_hashes, losses, scores};
+use super::{Backend, STANDING_LABELS, Study, backend, input_hashes, losses, own_definitions, scores};
 use crate::metric::definitions::Definitions;
 use crate::score::quality::{QualityByCell, QualityReader};
 use crate::score::score_traces::{self, Scored};
@@ -90,6 +90,9 @@ impl Study {
             (Source::Traces(traces), Backend::Native) => self.scan_traces(traces, outputs)?,
             (source, _) => {
                 let scored = Results::of(self.scored_elsewhere()?);
+                if let Source::Traces(traces) = source {
+                    own_definitions::check(&self.question.bind(traces)?, traces, &scored.episodes)?;
+                }
                 // The other engine computes scores alone; what else is asked for comes from a scan.
                 match source {
                     Source::Traces(traces) if outputs.needs_steps(traces) => {
@@ -115,10 +118,12 @@ impl Study {
         let Some(lost) = lost else {
             let Scored { tables: [episodes], timelines, quality } =
                 score_traces::score_each(traces, [&definitions], wanted, self.threads)?;
+            own_definitions::check(&definitions, traces, &episodes)?;
             return Ok(Results { timelines, quality, ..Results::of(episodes) });
         };
         let Scored { tables: [episodes, lost], timelines, quality } =
             score_traces::score_each(traces, [&definitions, &lost], wanted, self.threads)?;
+        own_definitions::check(&definitions, traces, &episodes)?;
         let lost = Some(lost.keys.iter().map(|key| key.episode_id.to_owned()).collect());
         Ok(Results { timelines, lost, quality, ..Results::of(episodes) })
     }

@@ -13,7 +13,7 @@ use super::error::StudyError;
 use super::losses::Counted;
 use super::results::Results;
 use super::scan::lost_episodes;
-use super::{Question, Study};
+use super::{Question, Study, own_definitions};
 use crate::figures::Figure;
 use crate::figures::sensitivity::{self as drawing, Stage};
 use crate::metric::columns::Columns;
@@ -110,7 +110,9 @@ impl Study {
         let outputs = Outputs { labels: &labels, ..Outputs::default() };
         let all: Vec<&Definitions> =
             trial.definitions.iter().chain([&trial.pixels]).chain(trial.lost.as_ref()).collect();
-        Ok(score_traces::score_all(traces, &all, outputs, self.threads)?.tables)
+        let tables = score_traces::score_all(traces, &all, outputs, self.threads)?.tables;
+        tables.first().map_or(Ok(()), |table| own_definitions::check(&trial.definitions[0], traces, table))?;
+        Ok(tables)
     }
 
     /// What each table says of the episodes that count.
@@ -225,7 +227,7 @@ fn metrics(definitions: &Definitions) -> impl Iterator<Item = String> + '_ {
 
 /// The definitions asked for, with evidence from so many pixels on.
 fn under(question: &Question, px: u32, columns: &Columns) -> Result<Definitions, StudyError> {
-    let as_is = Definitions::load(question.definitions_name(), columns)?;
+    let as_is = question.load(columns)?;
     let shown = format!("the threshold of {px} px");
     let replaced = as_is.with_condition_let(EVIDENCE, &shown, &format!("{PIXELS} >= {px}"), columns);
     let mut definitions = replaced.map_err(|source| match source {

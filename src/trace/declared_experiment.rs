@@ -24,6 +24,10 @@ pub struct DeclaredExperiment {
     pub chance: IndexMap<String, Option<Ratio>>,
     /// Reference levels by metric.
     pub reference: IndexMap<String, Vec<Ratio>>,
+    /// The definitions that score it, by name or by the path that its file had; `None` where it does not say.
+    pub definitions: Option<String>,
+    /// SHA-256 of the definition file, where it is a file of one's own.
+    pub definitions_hash: Option<String>,
     /// Columns of [`OF_SOME_TASKS`] that have no meaning for its task, in this order.
     pub absent: Vec<&'static str>,
 }
@@ -98,6 +102,8 @@ impl DeclaredExperiment {
             order,
             chance: levels(&format!("{key}.chance"), members.get("chance"), chance)?,
             reference: levels(&format!("{key}.reference"), members.get("reference"), reference)?,
+            definitions: text("definitions", "the name of definitions")?,
+            definitions_hash: text("definitions_hash", "a hash")?,
             absent: columns(&format!("{key}.absent"), members.get("absent"))?,
         })
     }

@@ -1,14 +1,12 @@
 //! What other definitions change: every cell and every flip.
 
-use std::path::Path;
-
 use serde_json::{Value, json};
 
 use super::error::ViewError;
 use super::snapshot::Snapshot;
 use crate::base::escape::visible;
 use crate::stats::diff::Flip;
-use crate::study::{DEFAULT_DEFINITIONS, DiffRequest, Side, diff};
+use crate::study::{DiffRequest, Side, diff};
 
 /// The definitions that are looked at against those named with them.
 pub(super) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
@@ -16,8 +14,12 @@ pub(super) fn answer(snapshot: &Snapshot) -> Result<Value, ViewError> {
     let Some(against) = &options.against else {
         return Err(ViewError::Absent("no other definitions were named; `mirrorstats view --against` does".to_owned()));
     };
-    let own = options.question.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS));
     let scored = snapshot.table()?;
+    if !scored.study.parts().is_empty() {
+        let words = "the experiments have different definitions; `mirrorstats diff` holds one against another";
+        return Err(ViewError::Absent(words.to_owned()));
+    }
+    let own = scored.study.definitions_name();
     let request = DiffRequest {
         metrics: options.question.metrics.clone(),
         filter: options.question.filter.clone(),

@@ -19,6 +19,7 @@ mod hostile;
 mod options;
 #[cfg(target_os = "linux")]
 mod outputs;
+mod own_definitions;
 #[cfg(target_os = "linux")]
 mod paths;
 mod plan;

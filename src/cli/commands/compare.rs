@@ -22,7 +22,7 @@ pub struct CompareArgs {
     /// Published cells: a CSV file with the columns experiment,model,metric,mean,se,emphasis
     #[arg(long, value_name = "FILE")]
     pub published: PathBuf,
-    /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
+    /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
     #[arg(long, value_name = "NAME|FILE")]
     pub definitions: Option<PathBuf>,
     /// The style that prints the tables: `paper` or a style file

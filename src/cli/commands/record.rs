@@ -25,7 +25,7 @@ use crate::cli::vlm::VlmArgs;
 use crate::record::error::StoreError;
 use crate::record::index::{Place, RecordingIndex};
 use crate::record::metadata::Recordings;
-use crate::record::plan::{Experiments, Key, Plan, Shard, Subject};
+use crate::record::plan::{Experiments, Key, Named, Plan, Shard, Subject};
 use crate::record::run::{Recording, Settings, Tally};
 use crate::record::shares::{Shares, Spent};
 use crate::record::store::Store;
@@ -125,7 +125,13 @@ impl RecordArgs {
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
         stop_at_interrupt(stop, Arc::clone(&player))?;
         let recorded = self.record(player.as_ref(), stop)?;
-        recording::say(&recorded.answer, (&self.out, &recorded.lost_list), recorded.elapsed, recorded.times)?;
+        recording::say(
+            &recorded.answer,
+            (&self.out, &recorded.lost_list),
+            &self.files(),
+            recorded.elapsed,
+            recorded.times,
+        )?;
         if self.json {
             output::print_json(&recorded.answer)?;
         }
@@ -133,6 +139,15 @@ impl RecordArgs {
             Some(reason) => Err(Failure::input(reason)),
             None => Ok(outcome_of(&recorded.answer)),
         }
+    }
+
+    /// The files of experiments that are named.
+    fn files(&self) -> Vec<&Path> {
+        let files = self.experiment.0.iter().filter_map(|named| match named {
+            Named::File(path) => Some(path.as_path()),
+            Named::BuiltIn(_) => None,
+        });
+        files.collect()
     }
 
     /// Who plays, as `--agent` names it.

@@ -51,12 +51,12 @@ impl SqlArgs {
     /// Faults of the definitions; a construct that the dialect cannot say.
     pub fn run(self) -> Result<Outcome, Failure> {
         let question = self.scoring.question(&GroupingArgs::default());
-        let columns = if self.traces.is_empty() {
-            schema_columns()
+        let definitions = if self.traces.is_empty() {
+            question.bind_to(&schema_columns())?
         } else {
-            trace_columns(Study::open(self.traces.clone())?.traces()?)
+            let study = Study::open(self.traces.clone())?;
+            question.resolved(study.traces()?)?.bind_to(&trace_columns(study.traces()?))?
         };
-        let definitions = question.bind_to(&columns).map_err(Failure::from)?;
         let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
         io::stdout().lock().write_all(statement.as_bytes())?;
         Ok(Outcome::Done)

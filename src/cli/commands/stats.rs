@@ -19,7 +19,7 @@ pub struct StatsArgs {
     /// Traces, or files of scores in their place.
     #[command(flatten)]
     pub traces: TraceArgs,
-    /// Definitions: `paper`, `extended`, or a TOML file [default: paper]
+    /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
     #[arg(long, value_name = "NAME|FILE")]
     pub definitions: Option<PathBuf>,
     /// Only episodes where this holds, in the language of definitions

@@ -11,6 +11,7 @@ use crate::base::web::{Guard, check_token};
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
+use crate::study::Question;
 use crate::trace::inputs;
 use crate::view::{Options, View, ViewError, export, routes};
 
@@ -66,7 +67,7 @@ impl ViewArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let view = View::open(Options {
             runs: self.runs.clone(),
-            question: self.scoring.question(&self.grouping),
+            question: Question { each: true, ..self.scoring.question(&self.grouping) },
             against: self.against.clone(),
             style: self.style.clone(),
             threads: self.threads.count(),

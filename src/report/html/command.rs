@@ -66,7 +66,7 @@ pub(super) fn quoted(id: &str) -> Option<String> {
 }
 
 /// A text as one word of a shell: bash and zsh read it back as it was, and nothing in it acts or hides.
-fn word(text: &str) -> String {
+pub fn word(text: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:@%+,".contains(c);
     if !text.is_empty() && !text.starts_with('-') && text.chars().all(is_plain) {
         return text.to_owned();

@@ -30,7 +30,7 @@ use crate::score::table::EpisodeTable;
 use crate::stats::cell::Cells;
 use crate::stats::group::GroupError;
 
-pub use command::Recordings;
+pub use command::{Recordings, word};
 
 /// What the page is made of.
 #[derive(Clone, Copy, Debug)]

@@ -10,6 +10,7 @@ mod experiments;
 mod forecasts;
 mod interruptions;
 mod mistaken;
+mod next;
 mod reaching;
 mod recordings;
 mod refusals;

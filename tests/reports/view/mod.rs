@@ -4,6 +4,7 @@ mod copy;
 mod hostile;
 #[cfg(feature = "sim")]
 mod live;
+mod mixture;
 mod pages;
 #[cfg(feature = "sim")]
 mod people;

@@ -90,6 +90,8 @@ impl Behind {
             vendor: None,
             backend: "loopback".into(),
             id: "model".into(),
+            answers_as: vec!["*".into()],
+            accepted: Vec::new(),
             prices: Prices::default(),
             contract: Contract::Schema,
             max_output_tokens: None,

@@ -5,7 +5,6 @@
 //! end in one go. An agent that cannot answer stops the recording, as Ctrl-C does.
 
 use std::cell::RefCell;
-use std::fs::File;
 use std::io;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,6 +28,7 @@ use crate::sim::camera::Camera;
 use crate::sim::config::WorldConfig;
 use crate::sim::scene::Scene;
 use crate::sim::world::World;
+use crate::trace::diagnostic::MORE_FILES;
 use crate::trace::episode::{Action, Episode, Step};
 use crate::trace::episode_hash;
 
@@ -112,9 +112,21 @@ pub struct Recording<'a> {
 fn check_descriptors(threads: usize, in_flight: usize) -> io::Result<()> {
     /// Of libraries, and of each thread and episode under way, at least.
     const LIBRARIES: usize = 16;
-    let needed = if cfg!(unix) { LIBRARIES + 8 * threads + 2 * in_flight } else { 0 };
-    let opened = (0..needed).map(|_| File::open(".")).collect::<io::Result<Vec<_>>>();
-    opened.map(drop).map_err(|error| io::Error::other(format!("a recording needs {needed} files at once: {error}")))
+    let needed = LIBRARIES + 8 * threads + 2 * in_flight;
+    match open_file_limit() {
+        Some(limit) if limit < needed as u64 => Err(io::Error::other(format!(
+            "Too many open files: a recording needs {needed} at once, and the limit is {limit}\n  help: {MORE_FILES}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The limit of open files of this process; `None` where it is not known.
+fn open_file_limit() -> Option<u64> {
+    #[cfg(unix)]
+    return nix::sys::resource::getrlimit(nix::sys::resource::Resource::RLIMIT_NOFILE).ok().map(|(soft, _)| soft);
+    #[cfg(not(unix))]
+    None
 }
 
 impl Recording<'_> {

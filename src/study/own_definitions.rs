@@ -8,13 +8,15 @@ use std::path::PathBuf;
 
 use super::error::StudyError;
 use super::{DEFAULT_DEFINITIONS, Question, Study};
-use crate::experiment::Experiment;
 use crate::metric::columns::Columns;
 use crate::metric::definitions::Definitions;
 use crate::metric::file;
 use crate::score::table::EpisodeTable;
 use crate::trace::declared_experiment::DeclaredExperiment;
 use crate::trace::open::TraceSet;
+
+/// The definitions of reaching, whose traces have no colours.
+const WITHOUT_COLORS: &str = "reach";
 
 /// Experiments that the same definitions score.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,9 +42,11 @@ fn own(declared: &DeclaredExperiment) -> Option<(String, Option<String>)> {
     if let Some(name) = &declared.definitions {
         return Some((name.clone(), declared.definitions_hash.clone()));
     }
-    // Traces from before footers named them.
-    let known = Experiment::parse(&declared.name).ok()?;
-    Some((known.definitions.clone()?, None))
+    // Traces from before footers named them: built-in definitions list the experiment, or the task has no colours.
+    let lists = |name: &&str| file::read(name).is_ok_and(|document| document.experiments.contains_key(&declared.name));
+    let listed = file::built_in_names().into_iter().find(lists);
+    let name = listed.or_else(|| (!declared.absent.is_empty()).then_some(WITHOUT_COLORS))?;
+    (name != DEFAULT_DEFINITIONS).then(|| (name.to_owned(), None))
 }
 
 /// The experiments of traces by what scores them; what includes others has theirs.

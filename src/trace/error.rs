@@ -1,6 +1,7 @@
 //! Why traces could not be read or written.
 
 use std::io;
+use std::path::Path;
 
 use arrow::error::ArrowError;
 
@@ -94,6 +95,15 @@ fn more_findings(more: usize) -> String {
 }
 
 impl TraceError {
+    /// The same error, about the output at `path` if writing failed.
+    #[must_use]
+    pub fn writing(self, path: &Path) -> Self {
+        match self {
+            Self::Write { source, .. } => Self::Write { file: path.display().to_string(), source },
+            other => other,
+        }
+    }
+
     /// The error of these findings, the earliest first; `None` for none.
     pub fn of(findings: Vec<Finding>) -> Option<Self> {
         let mut findings = findings.into_iter();

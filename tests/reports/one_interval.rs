@@ -177,7 +177,7 @@ fn every_output_has_the_interval_that_stats_has() {
     assert!(stats[&key("one", "TSA")].is_some(), "a rate has an interval from one episode on");
     // The reader of a table is told why.
     let line = |model: &str| printed.lines().find(|line| line.trim_start().starts_with(model)).unwrap();
-    assert!(line("two").contains("8.5 n=2"), "{printed}");
+    assert!(line("two").contains("8.5† n=2"), "{printed}");
     assert!(printed.contains("A mean of fewer than 12 episodes has no interval"), "{printed}");
     let paper = run(at, &["report", "a.parquet", "--style", "paper", "--out", "paper"]).done();
     assert!(!paper.contains("no interval"), "{paper}");

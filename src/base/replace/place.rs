@@ -58,14 +58,13 @@ pub fn sync_folder(folder: &Path) -> io::Result<()> {
     })
 }
 
-/// Whether bytes can only be written into `target`: it exists and is no regular file, or names an open file of the
-/// process, which may be any.
+/// Returns true if bytes can only be written into `target`: a pipe, a device, or the name of an open file of the process.
 pub fn is_stream(target: &Path) -> bool {
     let names_open_file = cfg!(unix)
         && (["/dev/stdout", "/dev/stderr"].iter().any(|name| target == Path::new(name))
             || folder_of(target) == Path::new("/dev/fd")
             || (target.starts_with("/proc") && folder_of(target).ends_with("fd")));
-    fs::metadata(target).is_ok_and(|metadata| names_open_file || !metadata.is_file())
+    fs::metadata(target).is_ok_and(|metadata| names_open_file || !metadata.is_file() && !metadata.is_dir())
 }
 
 /// What the temporary names for a target begin with; random characters and the checksum follow.

@@ -163,11 +163,9 @@ impl RenormalizeArgs {
 
 /// What changes in a trace; the new one for `place` is written to another path, if anything is written.
 fn renormalized(old: &Old, to: Option<(&Path, &Path)>) -> Result<Renormalized, Failure> {
-    let out: Box<dyn Write + Send> = match to {
-        Some((place, staged)) => Box::new(File::create(staged).map_err(|error| output::unwritable(place, error))?),
-        None => Box::new(io::sink()),
-    };
-    Ok(old.renormalize(out).map_err(Failure::input)?.1)
+    let Some((place, staged)) = to else { return Ok(old.renormalize(io::sink()).map_err(Failure::input)?.1) };
+    let out = File::create(staged).map_err(|error| output::unwritable(place, error))?;
+    Ok(old.renormalize(out).map_err(|error| Failure::input(error.writing(place)))?.1)
 }
 
 fn refused(input: &Input, expected: &str, found: &str) -> Failure {

@@ -270,7 +270,7 @@ impl TraceWriter {
     /// When no file can be made in that folder.
     pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
         let file = NewFile::create(path).map_err(|source| unwritable(path, source))?;
-        let encoder = TraceEncoder::new(file, metadata).map_err(|error| named(error, path))?;
+        let encoder = TraceEncoder::new(file, metadata).map_err(|error| error.writing(path))?;
         Ok(Self { encoder, path: path.to_owned() })
     }
 
@@ -279,7 +279,7 @@ impl TraceWriter {
     /// # Errors
     /// As [`TraceEncoder::write`].
     pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
-        self.encoder.write(episode).map_err(|error| named(error, &self.path))
+        self.encoder.write(episode).map_err(|error| error.writing(&self.path))
     }
 
     /// Completes the file, synchronises it with the disk and gives it its name.
@@ -288,7 +288,7 @@ impl TraceWriter {
     /// Whatever writing gives; the file at the path is as it was then.
     pub fn finish(self) -> Result<(), TraceError> {
         let Self { encoder, path } = self;
-        let file = encoder.finish().map_err(|error| named(error, &path))?;
+        let file = encoder.finish().map_err(|error| error.writing(&path))?;
         file.commit().map_err(|source| unwritable(&path, source))
     }
 }
@@ -312,11 +312,4 @@ pub fn write_episodes(
 
 pub(super) fn unwritable(path: &Path, source: io::Error) -> TraceError {
     TraceError::Write { file: path.display().to_string(), source: Box::new(source) }
-}
-
-fn named(error: TraceError, path: &Path) -> TraceError {
-    match error {
-        TraceError::Write { source, .. } => TraceError::Write { file: path.display().to_string(), source },
-        other => other,
-    }
 }

@@ -181,8 +181,9 @@ fn a_hand_that_has_no_place_so_far_from_the_mark_is_a_fault_of_its_file() {
     let text = built_in("reach-scheme").unwrap().replace("reach-scheme", "far").replace("most = 12", "most = 40");
     let read = |least: u32| {
         let path = folder.path().join("far.toml");
-        let text =
-            text.replace("least = 6", &format!("least = {least}")).replace("\"far\"\ncubes", "\"reach-scheme\"\ncubes");
+        let text = text
+            .replace("least = 6", &format!("least = {least}"))
+            .replace("prompt = \"far\"", "prompt = \"reach-scheme\"");
         std::fs::write(&path, text).unwrap();
         let experiment = load::load(&path).unwrap()[0].experiment;
         placement::crowded(&WorldConfig::default(), experiment)

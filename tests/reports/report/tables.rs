@@ -6,7 +6,7 @@ use std::fs;
 use mirrorstats::metric::catalog::{Better, Catalog, Kind, StandardError};
 use mirrorstats::report::layout;
 use mirrorstats::report::style::Style;
-use mirrorstats::report::table::{Emphasis, Table, Value};
+use mirrorstats::report::table::{Emphasis, Spread, Table, Value};
 use mirrorstats::report::tables::terminal::{self, Marks, Terminal};
 use mirrorstats::report::tables::{csv, latex, markdown};
 use mirrorstats::stats::cell::{Cells, Group, KeyValue};
@@ -152,8 +152,13 @@ fn marks_are_where_the_caption_says() {
     let cells: Vec<_> = table.groups.iter().flat_map(|group| &group.rows).flat_map(|row| &row.cells).collect();
     for cell in &cells {
         assert_eq!(cell.is_marked, cell.n > 0 && cell.n < 5, "defined in fewer than 5 episodes: {cell:?}");
-        if let Value::Mean { n, .. } = cell.value {
-            assert_eq!(n.is_some(), cell.n != cell.episodes || cell.n == 1, "not all episodes, or 1: {cell:?}");
+        if let Value::Mean { n, spread, .. } = cell.value {
+            let is_withheld = spread == Spread::Unknown;
+            assert_eq!(
+                n.is_some(),
+                cell.n != cell.episodes || is_withheld,
+                "not all episodes, or no interval: {cell:?}"
+            );
         }
     }
     assert!(cells.iter().any(|cell| cell.is_marked) && cells.iter().any(|cell| cell.n > 4 && !cell.is_marked));

@@ -143,7 +143,8 @@ pub fn read_rows(path: &Path, rows: Range<usize>) -> Result<Vec<EpisodeRows>, Tr
     for group in 0..footer.metadata.num_row_groups() {
         let behind = before + rows_of(footer.metadata.row_group(group));
         if behind > rows.start && before < rows.end {
-            skipped.get_or_insert(rows.start - before);
+            // Of an episode over several groups, the first alone has rows before it.
+            skipped.get_or_insert_with(|| rows.start - before);
             groups.push(group);
         }
         before = behind;

@@ -1,7 +1,6 @@
 //! Tells binaries and tests where MuJoCo's library is, so that they start without `LD_LIBRARY_PATH`. Feature `sim` only.
 
 fn main() {
-    println!("cargo::rerun-if-changed=build.rs");
     println!("cargo::rerun-if-env-changed=MUJOCO_DYNAMIC_LINK_DIR");
     if std::env::var_os("CARGO_FEATURE_SIM").is_none() {
         return;

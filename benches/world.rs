@@ -7,12 +7,12 @@ use std::num::NonZeroUsize;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::camera::Camera;
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::scene::Scene;
-use mirrorstats::sim::world::World;
-use mirrorstats::trace::episode::Action;
+use trace::episode::Action;
+use world::sim::Experiment;
+use world::sim::camera::Camera;
+use world::sim::config::WorldConfig;
+use world::sim::scene::Scene;
+use world::sim::world::World;
 
 const EPISODES: i32 = 4;
 const STEPS: i32 = 100;

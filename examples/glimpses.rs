@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::write::write_episodes;
+use trace::episode::{Action, Episode, Extra, Step};
+use trace::write::write_episodes;
 
 /// The pixels from which the recorder called the mirror visible.
 const RECORDED_THRESHOLD: i32 = 50;

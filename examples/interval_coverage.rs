@@ -4,15 +4,15 @@
 
 use std::fmt::Write as _;
 
-use mirrorstats::metric::catalog::StandardError::Sample;
-use mirrorstats::stats::bootstrap;
-use mirrorstats::stats::clustered::{clustered, clustered_rate};
-use mirrorstats::stats::competing::{Ending, Incidence, Outcome};
-use mirrorstats::stats::contrast::welch;
-use mirrorstats::stats::interval::{Interval, student_t};
-use mirrorstats::stats::moments::Moments;
-use mirrorstats::stats::restricted::{independent, paired};
-use mirrorstats::stats::survival::{Duration, End, Survival};
+use exact::moments::Moments;
+use metric::catalog::StandardError::Sample;
+use statistics::bootstrap;
+use statistics::clustered::{clustered, clustered_rate};
+use statistics::competing::{Ending, Incidence, Outcome};
+use statistics::contrast::welch;
+use statistics::interval::{Interval, student_t};
+use statistics::restricted::{independent, paired};
+use statistics::survival::{Duration, End, Survival};
 
 const SEED: u64 = 20_260_115;
 const SAMPLES: usize = 4_000;

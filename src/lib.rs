@@ -7,38 +7,35 @@
 //! # Code map
 //!
 //! ```text
-//!          trace ──────► score ───────► stats ───────► report, figures
-//!        (steps of      (one row        (cells:        (tables, statistics,
-//!         episodes)      per episode)    moments)       the folder)
-//!                          ▲
-//!                       metric
-//!                 (definitions, checked)
+//!     trace ──────► score ───────► report ───────► study ───────► this crate, its command line
+//!   (steps of      (one row       (cells, tables,  (one scan,
+//!    episodes)      per episode)   figures, pages)  every answer)
+//!        ▲             ▲               ▲
+//!        │          metric         statistics
+//!      world     (definitions,    (numbers in,
+//!   (recordings)    checked)       numbers out)
 //! ```
 //!
-//! | room | what it knows |
+//! | crate | contents |
 //! |---|---|
+//! | `exact` | exact numbers and moments, their text, hashes, limits, files that are replaced whole |
+//! | `web` | a local server: hosts, origins, tokens (feature `view`) |
+//! | `metric` | definition files: TOML, SQL expressions, types, plans |
+//! | `trace` | what an episode is: schema, reader, writer, validation, import, MCAP logs |
+//! | `score` | logical plan to physical plan to kernels over Arrow batches; the episode table |
+//! | `statistics` | intervals, tests, survival, power: numbers in, numbers out |
+//! | `report` | cells, styles, tables, figures, statistics for people, the folder of a report |
+//! | `engines` | other engines for the SQL of definitions: Polars, Spark |
+//! | `study` | inputs, definitions and a filter, opened once and scanned once; every answer is a function of it |
+//! | `world` | experiments, the MuJoCo world, agents, recordings, replays (feature `sim`) |
+//! | `view` | the local web application (feature `view`) |
 //! | [`cli`] | what was typed, standard output, exit codes |
-//! | `view` | the local web application: a study as a page, its server, its static copy (feature `view`) |
-//! | [`study`] | inputs, definitions and a filter, opened once and scanned once; every answer is a function of it |
-//! | `record` | runs episodes: a world, an agent; a trace and a log (feature `sim`) |
-//! | [`replay`] | a recorded episode again: re-simulated, as frames, as a film strip |
-//! | [`agent`] | who decides the next action: scripted, a model behind a provider, a program |
-//! | `sim` | the MuJoCo world: scene, bodies, camera, visibility from rays (feature `sim`) |
-//! | [`log`] | MCAP logs: in, out, and what can be saved of a cut one |
-//! | [`report`] | styles, tables, statistics for people, the folder of a report |
-//! | [`figures`] | one figure per file, and the kit that draws them |
-//! | [`engine`] | other engines for the SQL lowering: Polars, Spark |
-//! | [`stats`] | grouping, exact moments, intervals, tests |
-//! | [`score`] | logical plan to physical plan to kernels over Arrow batches; the episode table |
-//! | [`experiment`] | what a world shows, what an agent is asked and how the answer is decided: files, built in or of one's own |
-//! | [`metric`] | definition files: TOML, SQL expressions, types, plans |
-//! | [`trace`] | what an episode is: schema, writer, reader, validation |
-//! | [`base`] | exact numbers to text, hashes, near names, files that are replaced |
 //!
 //! # Invariants
 //!
-//! - A room imports only from rooms below it; a test resolves every path of the sources.
-//! - Only [`trace`] opens traces, only [`cli`] prints, only [`base`] rounds.
+//! - A crate depends only on crates above it in this table; `Cargo.toml` of each crate says on which.
+//! - `metric`, `statistics` and `exact` know no Arrow; `report` sees no trace; no crate of analysis depends on `world`.
+//! - `clippy.toml` of a crate lists what it must not call: clocks, files, threads. Only [`cli`] prints.
 //! - An episode's value is an integer, a cell keeps n, Σx, Σx² as integers: results do not depend on
 //!   threads, on the order of files, or on how rows are divided among them.
 //! - Missing is never zero: it is an [`Option`] until the last renderer.
@@ -50,12 +47,12 @@
 //!
 //! 1. a page: dictionary keys or bits, as runs and packed values (`trace::read::pages`)
 //! 2. a key per row (one byte), a value per run, or bits (`trace::read::column`)
-//! 3. a vector per step of the physical plan: truth values as bits ([`score::physical`], [`score::evaluate`])
+//! 3. a vector per step of the physical plan: truth values as bits (`score::physical`, `score::evaluate`)
 //! 4. a value per episode: the vector of an aggregate or of a metric
-//! 5. a column of the episode table, sorted once by a permutation ([`score::builder`], [`score::table`])
-//! 6. exact moments of a cell ([`stats::moments`])
-//! 7. a decimal, rounded once ([`base::number`])
-//! 8. text ([`report`])
+//! 5. a column of the episode table, sorted once by a permutation (`score::builder`, `score::table`)
+//! 6. exact moments of a cell (`exact::moments`)
+//! 7. a decimal, rounded once (`exact::number`)
+//! 8. text (`report`)
 //!
 //! # The main job
 //!
@@ -134,56 +131,22 @@
 //! # }
 //! ```
 
-#[doc(hidden)]
-pub mod agent;
-#[doc(hidden)]
-pub mod base;
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
 #[doc(hidden)]
 pub mod cli;
-#[doc(hidden)]
-pub mod engine;
-#[doc(hidden)]
-pub mod experiment;
-#[doc(hidden)]
-pub mod figures;
-#[doc(hidden)]
-pub mod log;
-#[doc(hidden)]
-pub mod metric;
-#[cfg(feature = "sim")]
-#[doc(hidden)]
-pub mod record;
-#[doc(hidden)]
-pub mod replay;
-#[doc(hidden)]
-pub mod report;
-#[doc(hidden)]
-pub mod score;
-#[cfg(feature = "sim")]
-#[doc(hidden)]
-pub mod sim;
-#[doc(hidden)]
-pub mod stats;
-#[doc(hidden)]
-pub mod study;
-#[doc(hidden)]
-pub mod trace;
-#[cfg(feature = "view")]
-#[doc(hidden)]
-pub mod view;
 
-// The library. What is reachable besides is for this project's own tests and examples, and may change at any time.
-pub use figures::{Figure, FigureFormat, FigureName};
+pub use exact::moments::Moments;
 pub use report::bundle::Manifest;
+pub use report::cells::columns::record_batch;
+pub use report::cells::diff::{CellChange, Changes, Flip};
+pub use report::cells::{Cells, Group, KeyValue};
+pub use report::figures::{Figure, FigureFormat, FigureName};
 pub use report::statistics::{Options as StatisticsOptions, Statistics};
 pub use report::table::Table;
 pub use score::columns::record_batch as episode_batch;
 pub use score::evidence::Evidence;
 pub use score::table::{EpisodeKey, EpisodeTable, MetricColumn};
-pub use stats::cell::{Cells, Group, KeyValue};
-pub use stats::columns::record_batch;
-pub use stats::diff::{CellChange, Changes, Flip};
-pub use stats::moments::Moments;
 pub use study::{
     Backend, Diff, DiffRequest, Outputs, Report, ReportOptions, RescoreRequest, Rescored, Results, Side, Study,
     StudyError, diff, resolve,

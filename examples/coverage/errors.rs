@@ -1,12 +1,12 @@
 //! How often tests and families of tests reject what is true.
 
-use mirrorstats::base::ratio::Ratio;
-use mirrorstats::stats::chance;
-use mirrorstats::stats::holm::holm;
-use mirrorstats::stats::paired::Pairs;
-use mirrorstats::stats::random::SplitMix64;
-use mirrorstats::stats::tarone::{Attained, tarone_holm};
-use mirrorstats::stats::unpaired::{fisher, fisher_least_p};
+use exact::ratio::Ratio;
+use statistics::chance;
+use statistics::holm::holm;
+use statistics::paired::Pairs;
+use statistics::random::SplitMix64;
+use statistics::tarone::{Attained, tarone_holm};
+use statistics::unpaired::{fisher, fisher_least_p};
 
 use crate::{LEVEL, N, SEED, binomial, happens, heading, largest, rates, row, share, successes};
 

@@ -1,9 +1,9 @@
 //! How often intervals over several experiments hold the truth.
 
-use mirrorstats::stats::improvement::probability_of_improvement;
-use mirrorstats::stats::interval::Interval;
-use mirrorstats::stats::random::SplitMix64;
-use mirrorstats::stats::stratified::{Stratum, cochran_mantel_haenszel, common_difference, exact};
+use statistics::improvement::probability_of_improvement;
+use statistics::interval::Interval;
+use statistics::random::SplitMix64;
+use statistics::stratified::{Stratum, cochran_mantel_haenszel, common_difference, exact};
 
 use crate::{CONFIDENCE, LEVEL, SEED, heading, row, share, successes, tally};
 

@@ -1,11 +1,11 @@
 //! What happens to methods that are looked at after every episode.
 
-use mirrorstats::base::ratio::Ratio;
-use mirrorstats::stats::chance;
-use mirrorstats::stats::interval::{Interval, wilson};
-use mirrorstats::stats::paired::Pairs;
-use mirrorstats::stats::random::SplitMix64;
-use mirrorstats::stats::sequential::{against_level, confidence_sequence, discordant};
+use exact::ratio::Ratio;
+use statistics::chance;
+use statistics::interval::{Interval, wilson};
+use statistics::paired::Pairs;
+use statistics::random::SplitMix64;
+use statistics::sequential::{against_level, confidence_sequence, discordant};
 
 use crate::{CONFIDENCE, LEVEL, SEED, happens, heading, row, share, tally};
 

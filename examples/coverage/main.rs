@@ -1,4 +1,4 @@
-//! Simulates once what the methods of `mirrorstats::stats` promise: errors of tests, coverage of intervals.
+//! Simulates once what the methods of `statistics` promise: errors of tests, coverage of intervals.
 //!
 //! `cargo run --release --example coverage > benches/COVERAGE.md`; seeded, the same bytes on every machine.
 
@@ -6,7 +6,7 @@ mod errors;
 mod intervals;
 mod looks;
 
-use mirrorstats::stats::random::SplitMix64;
+use statistics::random::SplitMix64;
 
 /// Every table draws from a stream of its own, so that a new table changes no other.
 const SEED: u64 = 20_260_101;

@@ -3,10 +3,10 @@
 use std::num::NonZeroUsize;
 use std::sync::LazyLock;
 
-use mirrorstats::metric::columns::Columns;
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::metric::sql::{self, Dialect};
-use mirrorstats::score::score_traces;
+use metric::columns::Columns;
+use metric::definitions::Definitions;
+use metric::sql::{self, Dialect};
+use score::score_traces;
 
 use crate::depth::reached;
 use crate::episodes;

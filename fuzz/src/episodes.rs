@@ -1,9 +1,9 @@
 //! A few episodes and the trace of them, as every target that needs some has them.
 
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
+use ::trace::episode::{Action, Episode, Extra, Step};
+use ::trace::inputs::Input;
+use ::trace::open::TraceSet;
+use ::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 
 use crate::scratch;
 

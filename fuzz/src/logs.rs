@@ -4,13 +4,13 @@ use std::io::Cursor;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use mirrorstats::log::assemble;
-use mirrorstats::log::recover::{Recovered, recover_from};
-use mirrorstats::trace::diagnostic::Severity;
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::merge;
-use mirrorstats::trace::validate::validate;
-use mirrorstats::trace::write::OptionalColumns;
+use ::trace::diagnostic::Severity;
+use ::trace::inputs::Input;
+use ::trace::log::assemble;
+use ::trace::log::recover::{Recovered, recover_from};
+use ::trace::merge;
+use ::trace::validate::validate;
+use ::trace::write::OptionalColumns;
 use serde_json::json;
 
 use crate::depth::reached;

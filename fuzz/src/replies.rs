@@ -2,11 +2,11 @@
 
 use std::fs;
 
-use mirrorstats::agent::Status;
-use mirrorstats::agent::reply::{self, Ending};
-use mirrorstats::agent::vlm::journal::{Entry, Journal, Recorded};
-use mirrorstats::agent::vlm::wire_format::Dialect;
-use mirrorstats::experiment::Experiment;
+use world::agent::Status;
+use world::agent::reply::{self, Ending};
+use world::agent::vlm::journal::{Entry, Journal, Recorded};
+use world::agent::vlm::wire_format::Dialect;
+use world::experiment::Experiment;
 
 use crate::depth::reached;
 use crate::scratch;

@@ -6,19 +6,19 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use mirrorstats::agent::vlm::journal::Entry;
-use mirrorstats::log::message::Decision;
-use mirrorstats::log::write::EpisodeLog;
-use mirrorstats::log::{assemble, topic};
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::metric::file::{built_in, built_in_names};
-use mirrorstats::report::plan::register::{NamedHash, RegisteredPlan};
-use mirrorstats::report::plan::{Given, PlanRequest, plan};
-use mirrorstats::score::format::{self, Format};
-use mirrorstats::score::score_traces;
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::stats::sample_size::Clusters;
+use ::trace::log::message::Decision;
+use ::trace::log::write::EpisodeLog;
+use ::trace::log::{assemble, topic};
+use metric::definitions::Definitions;
+use metric::file::{built_in, built_in_names};
+use report::plan::register::{NamedHash, RegisteredPlan};
+use report::plan::{Given, PlanRequest, plan};
+use score::format::{self, Format};
+use score::score_traces;
 use serde_json::{Value, json};
+use statistics::sample_size::Clusters;
+use world::agent::vlm::journal::Entry;
+use world::sim::config::WorldConfig;
 
 use crate::{episodes, pages, scratch, traces};
 
@@ -89,7 +89,7 @@ fn page_seeds() -> Vec<Vec<u8>> {
 }
 
 fn lines() -> Vec<Vec<u8>> {
-    let of_episode = |episode: &mirrorstats::trace::episode::Episode| {
+    let of_episode = |episode: &::trace::episode::Episode| {
         let line = |(t, step)| {
             let mut row = json!(episode);
             let decision = json!(Decision::of(t, step));
@@ -114,7 +114,7 @@ fn logs() -> Vec<Vec<u8>> {
     let mut parts = Vec::new();
     for (at, episode) in episodes::episodes(3).into_iter().enumerate() {
         let path = scratch::path(&format!("part-{at}.mcap"));
-        let head = mirrorstats::trace::episode::Episode { steps: Vec::new(), ..episode.clone() };
+        let head = ::trace::episode::Episode { steps: Vec::new(), ..episode.clone() };
         let mut log =
             EpisodeLog::create(&path, &head, &json!({ "type": "object" }), 1).expect("a folder for temporary files");
         for (t, step) in (1..).zip(&episode.steps) {

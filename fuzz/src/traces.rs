@@ -4,13 +4,13 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use mirrorstats::trace::diagnostic::Severity;
-use mirrorstats::trace::error::TraceError;
-use mirrorstats::trace::import::{Limits, Text, import};
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::scan::Projection;
-use mirrorstats::trace::validate::validate;
+use ::trace::diagnostic::Severity;
+use ::trace::error::TraceError;
+use ::trace::import::{Limits, Text, import};
+use ::trace::inputs::Input;
+use ::trace::open::TraceSet;
+use ::trace::scan::Projection;
+use ::trace::validate::validate;
 
 use crate::depth::reached;
 use crate::{episodes, scratch};
@@ -60,7 +60,7 @@ fn scan_and_validate(path: &Path) {
         rows += found;
         Ok(())
     };
-    let each = |batch: mirrorstats::trace::scan::EpisodeBatch| Ok::<_, TraceError>(batch.steps.num_rows() as u64);
+    let each = |batch: ::trace::scan::EpisodeBatch| Ok::<_, TraceError>(batch.steps.num_rows() as u64);
     if set.scan(&projection, NonZeroUsize::MIN, each, count).is_ok() {
         reached("rows");
         assert_eq!(report.count(Severity::Error), 0, "a scan reads what `validate` refuses: {:?}", report.findings);

@@ -9,10 +9,10 @@ use arrow::json::writer::LineDelimited;
 use mirrorstats::cli;
 use mirrorstats::cli::commands::import::ImportArgs;
 use mirrorstats::cli::commands::validate::{ValidateCommand, print};
-use mirrorstats::trace::import::Text;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
+use trace::import::Text;
 
 use crate::answer::{self, Answer};
 use crate::error;

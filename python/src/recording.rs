@@ -7,14 +7,14 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use mirrorstats::agent::Player;
-use mirrorstats::agent::exec::Images;
-use mirrorstats::agent::function::{Function, FunctionPlayer, Listener};
 use mirrorstats::cli;
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
 use mirrorstats::cli::outcome::Failure;
-use mirrorstats::record::folder_lock::parts_of;
 use pyo3::prelude::*;
+use world::agent::Player;
+use world::agent::exec::Images;
+use world::agent::function::{Function, FunctionPlayer, Listener};
+use world::record::folder_lock::parts_of;
 
 use crate::answer::{self, Answer};
 use crate::error;

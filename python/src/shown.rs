@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use mirrorstats::FigureFormat;
-use mirrorstats::report::tables::{csv, html, latex, markdown, terminal};
 use pyo3::prelude::*;
+use report::tables::{csv, html, latex, markdown, terminal};
 
 use crate::error;
 

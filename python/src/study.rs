@@ -5,11 +5,11 @@ use std::str::FromStr as _;
 use std::sync::{Arc, OnceLock};
 
 use arrow::array::RecordBatch;
-use mirrorstats::report::changes::{self, Limit};
-use mirrorstats::report::statistics::text::{self, Length};
-use mirrorstats::study::{LostAs, Question};
 use mirrorstats::{FigureName, ReportOptions, StatisticsOptions};
 use pyo3::prelude::*;
+use report::changes::{self, Limit};
+use report::statistics::text::{self, Length};
+use study::{LostAs, Question};
 
 use crate::answer::{self, Answer};
 use crate::columns::{Steps, Table};

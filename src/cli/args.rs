@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::PathBuf;
 
-use crate::engine::spark::setting::Setting;
+use engines::spark::setting::Setting;
 
 /// The traces to read.
 #[derive(Clone, Debug, clap::Args)]

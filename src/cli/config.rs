@@ -15,14 +15,13 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use toml::de::{DeTable, DeValue};
 
-use crate::base::budget::{self, Limit};
-use crate::base::escape::visible;
-use crate::base::{input, suggest};
 use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
-use crate::metric::fault::{Fault, Faults, Place, Source};
-use crate::metric::keys::parse_toml;
+use exact::budget::{self, Limit};
+use exact::escape::visible;
+use exact::{input, suggest};
+use metric::fault::{Fault, Faults, Place, Source};
+use metric::keys::parse_toml;
 
-/// The file's name.
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file, or none if it is empty.
 pub const FILE_VARIABLE: &str = "MIRRORSTATS_CONFIG_FILE";
@@ -78,9 +77,6 @@ struct Choice<'a> {
 }
 
 /// The settings that hold for a command line.
-///
-/// # Errors
-/// When the file cannot be read, and for everything in it or in the environment that is no setting.
 pub fn load(command: &Command) -> Result<Settings, Failure> {
     let choices = choices(command, "");
     let mut settings = Settings::default();

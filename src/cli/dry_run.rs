@@ -8,10 +8,10 @@ use serde::Serialize;
 use super::recording::dollars;
 use super::text_table::counted;
 use super::vlm::VlmPlayer;
-use crate::agent::vlm::estimate;
-use crate::base::escape::visible;
-use crate::record::plan::{Key, Subject};
-use crate::sim::config::WorldConfig;
+use exact::escape::visible;
+use world::agent::vlm::estimate;
+use world::record::plan::{Key, Subject};
+use world::sim::config::WorldConfig;
 
 /// The answer of `record --dry-run --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -69,9 +69,6 @@ impl ForecastAnswer {
 
 impl RequestForecast {
     /// What a model would be asked in these episodes.
-    ///
-    /// # Errors
-    /// A built-in prompt cannot be made, which a test rules out; and a journal that cannot be read.
     pub fn of(
         player: &VlmPlayer,
         subject: &Subject,

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use super::outcome::Failure;
-use crate::agent::exec::{Exec, Images, Settings};
-use crate::record::folder_lock::parts_of;
+use world::agent::exec::{Exec, Images, Settings};
+use world::record::folder_lock::parts_of;
 
 /// The folder within that of a recording for what programs say on standard error.
 const STANDARD_ERROR: &str = "stderr";
@@ -34,9 +34,6 @@ enum ExecImages {
 
 impl ExecArgs {
     /// The player that runs a command, called `model` in tables, for recordings into `out`.
-    ///
-    /// # Errors
-    /// For a command without a word, and for one that names a file which cannot be read.
     pub fn player(&self, command: &str, model: Option<&str>, out: &Path) -> Result<Exec, Failure> {
         if command.trim().is_empty() {
             return Err(Failure::input("--agent exec: needs a command, such as --agent exec:'python3 agent.py'"));

@@ -6,14 +6,12 @@ use std::path::Path;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
 use super::outcome::Failure;
-use crate::experiment::load::{self, FileError, Loaded};
+use metric::fault::{Fault, Faults};
 #[cfg(feature = "sim")]
-use crate::{
-    experiment::Experiment,
-    metric::fault::{Fault, Faults},
-    record::plan::{Experiments, Named},
-    sim::{config::WorldConfig, placement},
-};
+use world::experiment::Experiment;
+use world::experiment::load::{self, FileError, Loaded};
+use world::record::plan::{Experiments, Named};
+use world::sim::{config::WorldConfig, placement};
 
 /// Reads experiments as they are typed; the name of a file may have any bytes.
 #[cfg(feature = "sim")]
@@ -22,9 +20,6 @@ pub fn parser() -> impl TypedValueParser<Value = Experiments> {
 }
 
 /// The experiments of a file.
-///
-/// # Errors
-/// When it cannot be read, or all of its faults, underlined.
 pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
     load::load(path).map_err(|error| match error {
         FileError::Faults(faults) => Failure::of_faults(&faults),
@@ -33,9 +28,6 @@ pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
 }
 
 /// The experiments of a file, each of which has a place in a room.
-///
-/// # Errors
-/// As [`load`]; and a fault for each that leaves no room for what it places.
 #[cfg(feature = "sim")]
 pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure> {
     let loaded = load(path)?;
@@ -50,9 +42,6 @@ pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure>
 }
 
 /// What was asked for, in its order; each experiment once.
-///
-/// # Errors
-/// As [`placed`]; and two experiments of one name.
 #[cfg(feature = "sim")]
 pub fn asked(asked: &Experiments, config: &WorldConfig) -> Result<Vec<Experiment>, Failure> {
     let mut all: Vec<Experiment> = Vec::new();

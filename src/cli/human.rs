@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use super::outcome::Failure;
 use super::output;
-use crate::agent::human::hub::Hub;
-use crate::agent::human::journal::Journal;
-use crate::agent::human::{Human, server};
-use crate::base::budget::Limit;
-use crate::base::input;
-use crate::base::web::{self, Guard};
+use exact::budget::Limit;
+use exact::input;
+use web::{self, Guard};
+use world::agent::human::hub::Hub;
+use world::agent::human::journal::Journal;
+use world::agent::human::{Human, server};
 
 /// Words of consent are read by people.
 const LONGEST_CONSENT: Limit = Limit::new("bytes of the words of consent", 1 << 20);
@@ -36,9 +36,6 @@ pub struct HumanArgs {
 
 impl HumanArgs {
     /// The player of the people, whose pages are served from now on; `serves` is not set where nothing is recorded.
-    ///
-    /// # Errors
-    /// Codes that stand twice, words of consent that cannot be read, an address that cannot be had.
     pub fn player(&self, model: Option<&str>, out: &Path, serves: bool) -> Result<Human, Failure> {
         let own: BTreeSet<&String> = self.participants.iter().collect();
         if own.len() < self.participants.len() {

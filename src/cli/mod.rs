@@ -11,6 +11,7 @@ pub mod dry_run;
 #[cfg(feature = "sim")]
 pub mod exec;
 mod experiments;
+mod features;
 mod help;
 #[cfg(all(feature = "sim", feature = "view"))]
 mod human;
@@ -35,12 +36,11 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
-use crate::base::escape::visible;
-use crate::base::{budget, features};
 use commands::Command;
+use exact::budget;
+use exact::escape::visible;
 use outcome::{ErrorFormat, Failure, Outcome};
 
-/// The program's name.
 pub(crate) const NAME: &str = "mirrorstats";
 
 /// Score mirror self-recognition episodes: step traces in, exact metrics, tables and reports out.
@@ -115,9 +115,6 @@ fn budget_setting() -> Result<(), Failure> {
 
 /// The options of a command, as the command line understands them: for a program that has them from elsewhere. No settings of
 /// a file or of the environment are looked at.
-///
-/// # Errors
-/// Options that the command refuses, in its words.
 pub fn options_of<A: clap::Args>(verb: &str, options: impl IntoIterator<Item = OsString>) -> Result<A, Failure> {
     let name = format!("{NAME} {verb}");
     let command = A::augment_args(clap::Command::new(name.clone()).bin_name(&name).no_binary_name(true));

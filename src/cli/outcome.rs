@@ -16,9 +16,9 @@ use std::io::{self, Write as _};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::escape::visible_lines;
-use crate::metric::fault::{FaultRecord, Faults};
-use crate::trace::diagnostic::{MORE_FILES, is_short_of_files};
+use exact::escape::visible_lines;
+use metric::fault::{FaultRecord, Faults};
+use trace::diagnostic::{MORE_FILES, is_short_of_files};
 
 /// Which form errors have, where no option says it: decided before anything is parsed.
 pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";

@@ -10,16 +10,13 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::outcome::{Failure, Outcome};
-use crate::base::escape::visible_lines;
-use crate::base::replace::{self, Content, FolderFiles, NewFile, TemporaryFolder};
-use crate::trace::checksums::stale_note;
-use crate::trace::inputs::Input;
-use crate::trace::open::TraceFile;
+use exact::escape::visible_lines;
+use exact::replace::{self, Content, FolderFiles, NewFile, TemporaryFolder};
+use trace::checksums::stale_note;
+use trace::inputs::Input;
+use trace::open::TraceFile;
 
 /// Prints an answer, as text for people or as JSON for programs.
-///
-/// # Errors
-/// When standard output cannot be written.
 pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, Failure> {
     if json {
         return print_json(answer);
@@ -29,9 +26,6 @@ pub fn print<T: Display + Serialize>(answer: &T, json: bool) -> Result<Outcome, 
 }
 
 /// Prints an answer as JSON.
-///
-/// # Errors
-/// When standard output cannot be written.
 pub fn print_json<T: Serialize>(answer: &T) -> Result<Outcome, Failure> {
     let mut out = io::stdout().lock();
     serde_json::to_writer_pretty(&mut out, answer).map_err(io::Error::from)?;
@@ -63,17 +57,11 @@ pub fn say(words: &str) {
 }
 
 /// Replaces a file by one of these bytes.
-///
-/// # Errors
-/// When the folder is not there or not writable, or the disk is full; the error names the file.
 pub fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
     write_file_with(path, |file| Ok(file.write_all(bytes)?))
 }
 
 /// Replaces a file by one with what `write` writes.
-///
-/// # Errors
-/// When the folder is not there or not writable, or the disk is full; the error names the file. What `write` gives.
 pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T, Failure>) -> Result<T, Failure> {
     let mut file = create(path)?;
     let written = write(file.as_file_mut()).map_err(|failure| match failure {
@@ -85,18 +73,12 @@ pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T
 }
 
 /// Replaces files of a folder together, by their paths inside it; everything else in it stays.
-///
-/// # Errors
-/// When the folder or a file cannot be written; the error names it, and all files are the old ones.
 pub fn write_folder(folder: &Path, files: &[(&Path, Content<'_>)]) -> Result<(), Failure> {
     let files = FolderFiles { new: files, index: None, old: &|_| Vec::new() };
     replace::replace_folder(folder, &files).map_err(|error| unwritable(&error.path, error.source))
 }
 
 /// A temporary folder for what [`write_folder`] puts into `folder`, beside it.
-///
-/// # Errors
-/// When the folder above is not writable; the error names `folder`.
 pub fn stage_beside(folder: &Path) -> Result<TemporaryFolder, Failure> {
     let parent = replace::folder_of(folder);
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
@@ -105,17 +87,11 @@ pub fn stage_beside(folder: &Path) -> Result<TemporaryFolder, Failure> {
 }
 
 /// Begins the new content of a file.
-///
-/// # Errors
-/// When the folder is not there or not writable; the error names the file.
 pub fn create(path: &Path) -> Result<NewFile, Failure> {
     NewFile::create(path).map_err(|error| unwritable(path, error))
 }
 
 /// Makes a folder and those above it.
-///
-/// # Errors
-/// When something else is in its place, or the folder above it is not writable; the error names the folder.
 pub fn make_folder(folder: &Path) -> Result<(), Failure> {
     replace::make_folder(folder).map_err(|error| {
         let words = "help: is there a file of that name, and is the folder above it writable?";
@@ -124,17 +100,11 @@ pub fn make_folder(folder: &Path) -> Result<(), Failure> {
 }
 
 /// Replaces the file at `path`; the new one is on the disk when this returns.
-///
-/// # Errors
-/// When the disk is full or the name cannot be taken; the error names the file.
 pub fn commit(file: NewFile, path: &Path) -> Result<(), Failure> {
     file.commit().map_err(|error| unwritable(path, error))
 }
 
 /// Refuses an output that is one of the files which the command reads.
-///
-/// # Errors
-/// When it is one.
 pub fn check_target<P: AsRef<Path>>(target: &Path, read: impl IntoIterator<Item = P>) -> Result<(), Failure> {
     replace::check_target(target, read, "one that is read").map_err(Failure::input)
 }

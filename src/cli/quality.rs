@@ -4,9 +4,9 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::text_table::listing;
-use crate::report::quality::QualityTable;
-use crate::report::tables::fit::fitted;
-use crate::score::quality::{CellKey, Quality, QualityByCell};
+use report::quality::QualityTable;
+use report::tables::fit::fitted;
+use score::quality::{CellKey, Quality, QualityByCell};
 
 /// The replies of one cell.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]

@@ -14,23 +14,23 @@ use serde::Serialize;
 use super::NAME;
 use super::scoring::commands;
 use super::text_table::counted;
-use crate::agent::Player;
-use crate::agent::vlm::limits::Spend;
-use crate::base::escape::{visible, visible_lines};
-use crate::base::format::fixed;
-use crate::base::number::Decimal;
-use crate::experiment::Experiment;
-use crate::record::failures::LostEpisode;
-use crate::record::plan::{Key, Subject};
-use crate::record::queue::Held;
-use crate::record::replies::{Replies, RepliesAnswer, UnreadableReply};
-use crate::record::run::Progress;
-use crate::record::shares::Spent;
-use crate::report::html;
-use crate::sim::config::WorldConfig;
-use crate::study::{Study, StudyError};
-use crate::trace::episode::Step;
-use crate::trace::replies::ReplyCounts;
+use exact::escape::{visible, visible_lines};
+use exact::format::fixed;
+use exact::number::Decimal;
+use report::html;
+use study::{Study, StudyError};
+use trace::episode::Step;
+use trace::replies::ReplyCounts;
+use world::agent::Player;
+use world::agent::vlm::limits::Spend;
+use world::experiment::Experiment;
+use world::record::failures::LostEpisode;
+use world::record::plan::{Key, Subject};
+use world::record::queue::Held;
+use world::record::replies::{Replies, RepliesAnswer, UnreadableReply};
+use world::record::run::Progress;
+use world::record::shares::Spent;
+use world::sim::config::WorldConfig;
 
 /// The answer of `record --json`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -108,7 +108,6 @@ impl<'a> Bar<'a> {
         self.line.finish_and_clear();
     }
 
-    /// The replies so far.
     pub(super) fn replies(&self) -> RepliesAnswer {
         self.replies.answer()
     }
@@ -287,7 +286,8 @@ pub(super) fn say(
 fn next(folder: &Path, files: &[&Path]) -> Vec<String> {
     let typed = [NAME.into(), "report".into(), folder.into()];
     let report = format!("{NAME} report {}", html::word(&folder.to_string_lossy()));
-    match Study::open([folder]).and_then(|study| study.own_definitions()) {
+    let Ok(study) = Study::open([folder]) else { return vec![report] };
+    match study.own_definitions() {
         Err(StudyError::DefinitionsDiffer { groups }) => commands(&typed, &groups),
         Err(StudyError::DefinitionsElsewhere { group }) => {
             let beside = files.iter().map(|file| file.with_file_name(&group.definitions)).find(|file| file.is_file());
@@ -332,16 +332,16 @@ mod tests {
     use std::time::Duration;
 
     use super::{Bar, dollars, shares, spent, waiting};
-    use crate::agent::scripted::Scripted;
-    use crate::agent::vlm::limits::Spend;
-    use crate::agent::{Player, exec};
-    use crate::experiment::Experiment;
-    use crate::record::plan::{Key, Subject};
-    use crate::record::queue::Held;
-    use crate::record::run::Progress as _;
-    use crate::record::shares::Spent;
-    use crate::sim::config::WorldConfig;
-    use crate::trace::episode::{Extra, Step};
+    use trace::episode::{Extra, Step};
+    use world::agent::scripted::Scripted;
+    use world::agent::vlm::limits::Spend;
+    use world::agent::{Player, exec};
+    use world::experiment::Experiment;
+    use world::record::plan::{Key, Subject};
+    use world::record::queue::Held;
+    use world::record::run::Progress as _;
+    use world::record::shares::Spent;
+    use world::sim::config::WorldConfig;
 
     #[test]
     fn who_is_waited_for_is_said() {

@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use super::outcome::Failure;
-use crate::agent::prompt;
-use crate::base::budget::Limit;
-use crate::base::input;
-use crate::report::plan::register::{NamedHash, RegisteredPlan};
-use crate::sim::config::WorldConfig;
-use crate::trace::declared::Registration;
+use exact::budget::Limit;
+use exact::input;
+use report::plan::register::{NamedHash, RegisteredPlan};
+use trace::declared::Registration;
+use world::agent::prompt;
+use world::sim::config::WorldConfig;
 
 /// The largest plan that is read, bytes.
 const LARGEST: Limit = Limit::new("bytes of a plan", 1 << 20);
@@ -23,9 +23,6 @@ pub(super) fn prompts() -> Vec<NamedHash> {
 }
 
 /// The plan in a file, for the footers of a recording with this world.
-///
-/// # Errors
-/// A file that cannot be read or is no plan, a plan that was changed, and one that promises other prompts or another world.
 pub(super) fn registration(file: &Path, config: &WorldConfig) -> Result<Registration, Failure> {
     let shown = file.display();
     let text = input::text(file, LARGEST)

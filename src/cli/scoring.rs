@@ -8,25 +8,18 @@ use super::NAME;
 use super::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
 use super::outcome::Failure;
 use super::output;
-use crate::base::escape::visible;
-use crate::metric::fault::Faults;
-use crate::report::html;
-use crate::study::{LostAs, Question, ScoredAlike, Study, StudyError, resolve};
-use crate::trace::inputs::Input;
+use exact::escape::visible;
+use metric::fault::Faults;
+use report::html;
+use study::{LostAs, Question, ScoredAlike, Study, StudyError, resolve};
+use trace::inputs::Input;
 
 impl TraceArgs {
     /// The files named on the command line.
-    ///
-    /// # Errors
-    /// When an argument names none, or the list on standard input cannot be read.
     pub fn inputs(&self) -> Result<Vec<Input>, Failure> {
         Ok(resolve(&self.traces, io::stdin().lock())?)
     }
 
-    /// The files, opened.
-    ///
-    /// # Errors
-    /// As [`TraceArgs::inputs`]; the first fault of a footer.
     pub fn open(&self) -> Result<Study, Failure> {
         let study = Study::of(self.inputs()?)?.threads(self.threads.count());
         output::notes(study.stale_checksums().as_slice());
@@ -34,17 +27,11 @@ impl TraceArgs {
     }
 
     /// The files, opened, and what is asked of them.
-    ///
-    /// # Errors
-    /// As [`TraceArgs::open`]; every fault of the definitions and the condition.
     pub fn study(&self, scoring: &ScoringArgs, grouping: &GroupingArgs) -> Result<Study, Failure> {
         Ok(self.open()?.asked(scoring.question(grouping))?)
     }
 
     /// As [`TraceArgs::study`], scored by the engine asked for.
-    ///
-    /// # Errors
-    /// As [`TraceArgs::study`]; options of another engine.
     pub fn study_on(
         &self,
         engine: &EngineArgs,
@@ -92,7 +79,7 @@ pub(super) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
     let Failure::Input(error) = &failure else { return failure };
     let Some(StudyError::DefinitionsDiffer { groups }) = error.downcast_ref() else { return failure };
     let words = error.to_string();
-    let found = words.split("\n").next().unwrap_or_default();
+    let found = words.split('\n').next().unwrap_or_default();
     Failure::input(format!("{found}\n  help: ask for each by itself:\n    {}", commands(typed, groups).join("\n    ")))
 }
 

@@ -4,17 +4,13 @@ use std::path::Path;
 
 use super::args::{Engine, EngineArgs, SparkArgs};
 use super::outcome::Failure;
-use crate::base::replace::is_stream;
-use crate::engine::spark::Cluster;
-use crate::engine::spark::source::is_uri;
-use crate::score::format::Format;
-use crate::study::Backend;
+use engines::spark::Cluster;
+use engines::spark::source::is_uri;
+use exact::replace::is_stream;
+use score::format::Format;
+use study::Backend;
 
 impl EngineArgs {
-    /// The engine asked for.
-    ///
-    /// # Errors
-    /// Options for Spark where another engine is asked for.
     pub fn backend(&self) -> Result<Backend, Failure> {
         self.check()?;
         Ok(match self.engine {

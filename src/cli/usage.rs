@@ -3,7 +3,8 @@
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Command, Error};
 
-use crate::base::{features, suggest};
+use crate::cli::features;
+use exact::suggest;
 
 /// The commands of the feature `sim`.
 const OF_SIM: [&str; 4] = ["record", "replay", "filmstrip", "world"];

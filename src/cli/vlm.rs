@@ -8,15 +8,15 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use super::outcome::Failure;
-use crate::agent::vlm::limits::{Account, Limits, Spend};
-use crate::agent::vlm::models::{Choice, Contract, Models};
-use crate::agent::vlm::provider::{Patience, Provider};
-use crate::agent::vlm::secrets::Secret;
-use crate::agent::vlm::wire_format::{Dialect, Effort};
-use crate::agent::vlm::{OnOutage, Vlm, spent};
-use crate::agent::{Agent, Lost, Player, Task};
-use crate::base::model_id::OWN_SERVER;
-use crate::record::plan::slug;
+use trace::model_id::OWN_SERVER;
+use world::agent::vlm::limits::{Account, Limits, Spend};
+use world::agent::vlm::models::{Choice, Contract, Models};
+use world::agent::vlm::provider::{Patience, Provider};
+use world::agent::vlm::secrets::Secret;
+use world::agent::vlm::wire_format::{Dialect, Effort};
+use world::agent::vlm::{OnOutage, Vlm, spent};
+use world::agent::{Agent, Lost, Player, Task};
+use world::record::plan::slug;
 
 /// A model, who serves it, and what a recording with it may spend.
 #[derive(Clone, Debug, clap::Args)]
@@ -86,9 +86,6 @@ impl VlmArgs {
     }
 
     /// The player, whose journals are in the folder of the recording.
-    ///
-    /// # Errors
-    /// For a model, backend or address that is none, a key that is not there, and journals that cannot be read.
     pub fn player(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let choice = self.choice()?;
         if let Some(folder) = &self.cassette {
@@ -121,9 +118,6 @@ impl VlmArgs {
     }
 
     /// The player of a forecast: knows the journals in the folder of the recording, has no key and sends nothing.
-    ///
-    /// # Errors
-    /// For a model or backend that is none.
     pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
         Ok(VlmPlayer { vlm, at_once: 1, network: None })
@@ -177,7 +171,6 @@ fn amount(text: &str) -> Result<f64, String> {
     if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("expected a finite number from 0".to_owned()) }
 }
 
-/// An effort, as typed.
 fn effort(text: &str) -> Result<Effort, String> {
     Effort::named(text).ok_or_else(|| format!("expected one of {}", Effort::ALL.map(Effort::name).join(", ")))
 }
@@ -191,7 +184,6 @@ pub struct VlmPlayer {
 }
 
 impl VlmPlayer {
-    /// The model.
     pub fn vlm(&self) -> &Vlm {
         &self.vlm
     }
@@ -224,7 +216,6 @@ impl Player for VlmPlayer {
         self.vlm.note_answered();
     }
 
-    /// A cassette costs nothing.
     fn spend(&self) -> Option<Spend> {
         self.network.is_some().then(|| self.vlm.spend())
     }

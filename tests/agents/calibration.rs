@@ -6,10 +6,10 @@ use std::fs;
 use std::path::Path;
 use std::sync::Mutex;
 
-use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::record::plan::Key;
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::config::WorldConfig;
+use world::agent::scripted::Scripted;
+use world::record::plan::Key;
+use world::sim::Experiment;
+use world::sim::config::WorldConfig;
 
 use crate::profile::{Profiles, chance_interval};
 use crate::recorded::{record_all, record_in, score};

@@ -5,12 +5,12 @@ use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
-use mirrorstats::agent::exec::Images;
-use mirrorstats::agent::exec::message::Message;
-use mirrorstats::agent::function::{Function, FunctionPlayer, Listener};
 use mirrorstats::cli;
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
 use serde_json::Value;
+use world::agent::exec::Images;
+use world::agent::exec::message::Message;
+use world::agent::function::{Function, FunctionPlayer, Listener};
 
 use crate::harness::files::write_small_world;
 use crate::harness::need;

@@ -5,13 +5,13 @@
 
 use std::sync::Arc;
 
-use mirrorstats::agent::perception::camera::{Heading, Place, Pose};
-use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::agent::{Observation, Reply, Task};
-use mirrorstats::base::frame::Frame;
-use mirrorstats::base::palette::Color;
-use mirrorstats::experiment::Experiment;
-use mirrorstats::trace::episode::Action;
+use trace::episode::Action;
+use trace::frame::Frame;
+use trace::palette::Color;
+use world::agent::perception::camera::{Heading, Place, Pose};
+use world::agent::scripted::Scripted;
+use world::agent::{Observation, Reply, Task};
+use world::experiment::Experiment;
 
 const HALF: f64 = 4.0;
 const CEILING: f64 = 2.8;
@@ -132,7 +132,7 @@ pub fn pose(x: f64, y: f64, yaw: f64) -> Pose {
 }
 
 fn moved(pose: Pose, action: Action) -> Pose {
-    mirrorstats::agent::scripted::route::after(pose, action, STEP)
+    world::agent::scripted::route::after(pose, action, STEP)
 }
 
 fn along(from: Point, ray: Point, far: f64) -> Point {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use mirrorstats::score::table::EpisodeTable;
+use score::table::EpisodeTable;
 
 /// A metric over the episodes in which it is defined.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

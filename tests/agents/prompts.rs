@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use mirrorstats::agent::prompt::{self, Prompt};
-use mirrorstats::agent::{Observation, Past, Task};
-use mirrorstats::base::frame::Frame;
-use mirrorstats::experiment::Experiment;
-use mirrorstats::record::plan::Key;
-use mirrorstats::record::rollout;
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::scene::Scene;
-use mirrorstats::trace::episode::Action;
+use trace::episode::Action;
+use trace::frame::Frame;
+use world::agent::prompt::{self, Prompt};
+use world::agent::{Observation, Past, Task};
+use world::experiment::Experiment;
+use world::record::plan::Key;
+use world::record::rollout;
+use world::sim::config::WorldConfig;
+use world::sim::scene::Scene;
 
 fn task(experiment: Experiment, stated_color: Option<&str>) -> Task {
     Task { experiment, stated_color: stated_color.map(str::to_owned), step_budget: 100, seed: 1 }

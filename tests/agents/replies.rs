@@ -1,10 +1,10 @@
 //! Replies as models write them, and what is read from each.
 
-use mirrorstats::agent::Status;
-use mirrorstats::agent::reply::{self, Ending, Repair};
-use mirrorstats::experiment::Experiment;
-use mirrorstats::trace::episode::Action;
-use mirrorstats::trace::identification::normal_form;
+use trace::episode::Action;
+use trace::identification::normal_form;
+use world::agent::Status;
+use world::agent::reply::{self, Ending, Repair};
+use world::experiment::Experiment;
 
 const GOOD: &str = r#"{"view-description": "a wall", "reasoning": "it's a \"wall\"", "action": "a", "summary": "turned, {so far}", "selected_cube": "none", "identification": "unknown"}"#;
 
@@ -225,6 +225,6 @@ fn an_ending_counts_before_the_text() {
 #[test]
 fn the_raw_text_is_kept_whatever_it_is() {
     let raw = "no JSON at all";
-    let reply = read(raw).into_reply(raw.to_owned(), mirrorstats::agent::Usage::default());
+    let reply = read(raw).into_reply(raw.to_owned(), world::agent::Usage::default());
     assert_eq!((reply.status, reply.raw.as_deref()), (Status::ParseFailed, Some(raw)));
 }

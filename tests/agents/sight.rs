@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use mirrorstats::agent::Observation;
-use mirrorstats::agent::perception::View;
-use mirrorstats::agent::perception::camera::{Place, Pose};
-use mirrorstats::agent::scripted::knowledge::Knowledge;
-use mirrorstats::agent::scripted::room::Side;
-use mirrorstats::base::palette::Color;
+use trace::palette::Color;
+use world::agent::Observation;
+use world::agent::perception::View;
+use world::agent::perception::camera::{Place, Pose};
+use world::agent::scripted::knowledge::Knowledge;
+use world::agent::scripted::room::Side;
 
 use crate::painted::{Painted, pose};
 

@@ -1,11 +1,11 @@
 //! Whole episodes in painted rooms.
 
-use mirrorstats::agent::perception::camera::{Place, Pose};
-use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::agent::{Reply, Task};
-use mirrorstats::base::palette::Color;
-use mirrorstats::experiment::Experiment;
-use mirrorstats::trace::episode::Action;
+use trace::episode::Action;
+use trace::palette::Color;
+use world::agent::perception::camera::{Place, Pose};
+use world::agent::scripted::Scripted;
+use world::agent::{Reply, Task};
+use world::experiment::Experiment;
 
 use crate::painted::{Painted, pose, task};
 

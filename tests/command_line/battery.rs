@@ -1,7 +1,7 @@
 //! The battery's definitions, worked out by hand.
 
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::write::write_episodes;
+use trace::episode::{Action, Episode, Extra, Step};
+use trace::write::write_episodes;
 
 use crate::harness::traces;
 use crate::run;

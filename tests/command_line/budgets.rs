@@ -8,8 +8,8 @@ use std::path::Path;
 use std::process::Command;
 
 use mcap::{Compression, WriteOptions};
-use mirrorstats::trace::episode::{Extra, Step};
-use mirrorstats::trace::write::write_episodes;
+use trace::episode::{Extra, Step};
+use trace::write::write_episodes;
 
 use crate::harness::program::{answer, limited, run_with_input, succeeds};
 use crate::{Answer, episode, program, run, two_files};

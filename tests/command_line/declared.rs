@@ -5,10 +5,10 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use mirrorstats::score::score_traces::{self, Request};
-use mirrorstats::trace::episode::Episode;
-use mirrorstats::trace::write::write_episodes;
+use score::score_traces::{self, Request};
 use serde_json::{Value, json};
+use trace::episode::Episode;
+use trace::write::write_episodes;
 
 use crate::harness::traces::open;
 use crate::{contents, episode, run};

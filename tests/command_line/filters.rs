@@ -1,6 +1,6 @@
 //! Filters that keep no episode, and figures with a limit of episodes.
 
-use mirrorstats::trace::write::write_episodes;
+use trace::write::write_episodes;
 
 use crate::{episode, run, two_files};
 

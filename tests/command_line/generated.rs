@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use mirrorstats::trace::schema::COLUMNS;
+use trace::schema::COLUMNS;
 
 use crate::generation::{self, Files, Order, Study};
 use crate::harness::traces::texts;

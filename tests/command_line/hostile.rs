@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use mirrorstats::trace::write::write_episodes;
+use trace::write::write_episodes;
 
 use crate::{Answer, contents, episode, run};
 

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use mirrorstats::report::plan::register::RegisteredPlan;
+use report::plan::register::RegisteredPlan;
 
 use crate::{assert_shown, run};
 

@@ -1,6 +1,6 @@
 //! Tables in terminals of any width.
 
-use mirrorstats::trace::write::write_episodes;
+use trace::write::write_episodes;
 
 use crate::episode;
 use crate::harness::program::{answer, program};

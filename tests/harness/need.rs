@@ -52,7 +52,7 @@ pub fn python() -> &'static str {
 /// That pictures can be drawn without a display.
 #[cfg(feature = "sim")]
 pub fn drawing() {
-    use mirrorstats::sim::{camera::Camera, config::WorldConfig};
+    use world::sim::{camera::Camera, config::WorldConfig};
     static FAULT: OnceLock<Option<String>> = OnceLock::new();
     if let Some(fault) = FAULT.get_or_init(|| Camera::new(&WorldConfig::default()).err().map(|error| error.to_string()))
     {

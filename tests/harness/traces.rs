@@ -6,16 +6,16 @@ use std::path::Path;
 use arrow::array::{ArrayRef, AsArray as _, RecordBatch};
 use arrow::compute::{cast, concat_batches};
 use arrow::datatypes::DataType;
-use mirrorstats::trace::episode::{Episode, Step};
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::merge;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::schema::RECORDING_KEY;
-use mirrorstats::trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::file::properties::WriterProperties;
 use serde_json::Value;
+use trace::episode::{Episode, Step};
+use trace::inputs::Input;
+use trace::merge;
+use trace::open::TraceSet;
+use trace::schema::RECORDING_KEY;
+use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 
 /// An episode of model `m` in E1.
 pub fn episode(id: &str, steps: Vec<Step>) -> Episode {

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use mirrorstats::record::folder_lock::FolderLock;
+use world::record::folder_lock::FolderLock;
 
 #[test]
 fn the_last_to_leave_takes_away_what_nobody_needs() {

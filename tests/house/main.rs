@@ -2,6 +2,5 @@
 
 #[cfg(feature = "sim")]
 mod claim;
-mod rooms;
 mod schemas;
 mod surface;

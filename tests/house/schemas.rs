@@ -3,7 +3,8 @@
 use std::fs;
 use std::path::PathBuf;
 
-use mirrorstats::agent::reply;
+use metric::explain::Explanation;
+use metric::shape::DefinitionFile;
 use mirrorstats::cli::commands::check::QualityCheckAnswer;
 use mirrorstats::cli::commands::definitions::CheckAnswer;
 use mirrorstats::cli::commands::experiments::ExperimentsAnswer;
@@ -13,27 +14,26 @@ use mirrorstats::cli::commands::renormalize::RenormalizeAnswer;
 use mirrorstats::cli::commands::report::ReportAnswer;
 use mirrorstats::cli::commands::rescore::RescoreAnswer;
 use mirrorstats::cli::commands::schema::Name;
-use mirrorstats::experiment::Experiment;
-use mirrorstats::log::message::{Decision, EpisodeMessage};
-use mirrorstats::metric::explain::Explanation;
-use mirrorstats::metric::shape::DefinitionFile;
-use mirrorstats::report::audit::Audit;
-use mirrorstats::report::bundle::Manifest;
-use mirrorstats::report::comparison::Comparison;
-use mirrorstats::report::errata::Errata;
-use mirrorstats::report::plan::Plan;
-use mirrorstats::report::plan::register::RegisteredPlan;
-use mirrorstats::report::sensitivity::Sensitivity;
-use mirrorstats::report::statistics::{Sequential, Statistics};
-use mirrorstats::report::style::shape::StyleFile;
-use mirrorstats::score::evidence::Evidence;
-use mirrorstats::stats::diff::Changes;
-use mirrorstats::study::verify::Verification;
-use mirrorstats::trace::describe::SchemaDocument;
-use mirrorstats::trace::info::Info;
-use mirrorstats::trace::validate::Validation;
+use report::audit::Audit;
+use report::bundle::Manifest;
+use report::cells::diff::Changes;
+use report::comparison::Comparison;
+use report::errata::Errata;
+use report::plan::Plan;
+use report::plan::register::RegisteredPlan;
+use report::sensitivity::Sensitivity;
+use report::statistics::{Sequential, Statistics};
+use report::style::shape::StyleFile;
 use schemars::schema_for;
+use score::evidence::Evidence;
 use serde_json::{Value, json};
+use study::verify::Verification;
+use trace::describe::SchemaDocument;
+use trace::info::Info;
+use trace::log::message::{Decision, EpisodeMessage};
+use trace::validate::Validation;
+use world::agent::reply;
+use world::experiment::Experiment;
 
 fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("schemas")
@@ -79,15 +79,15 @@ fn current() -> Vec<(&'static str, Value)> {
     ];
     #[cfg(feature = "sim")]
     schemas.extend([
-        ("participants-remove", json!(schema_for!(mirrorstats::record::participants::Removed))),
+        ("participants-remove", json!(schema_for!(world::record::participants::Removed))),
         ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
-        ("census", json!(schema_for!(mirrorstats::sim::visibility::Visibility))),
-        ("replay", json!(schema_for!(mirrorstats::replay::verify::ReplayAnswer))),
-        ("exec-message", json!(schema_for!(mirrorstats::agent::exec::message::Message))),
-        ("lost", json!(schema_for!(mirrorstats::record::failures::LostEpisode))),
+        ("census", json!(schema_for!(world::sim::visibility::Visibility))),
+        ("replay", json!(schema_for!(world::replay::verify::ReplayAnswer))),
+        ("exec-message", json!(schema_for!(world::agent::exec::message::Message))),
+        ("lost", json!(schema_for!(world::record::failures::LostEpisode))),
         ("record-forecast", json!(schema_for!(mirrorstats::cli::dry_run::ForecastAnswer))),
-        ("scene", json!(schema_for!(mirrorstats::sim::scene::Scene))),
-        ("world-config", json!(schema_for!(mirrorstats::sim::config::WorldConfig))),
+        ("scene", json!(schema_for!(world::sim::scene::Scene))),
+        ("world-config", json!(schema_for!(world::sim::config::WorldConfig))),
     ]);
     schemas
 }

@@ -6,11 +6,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use cast::Cast;
-use mirrorstats::base::number;
-use mirrorstats::figures::{FigureError, FigureName, Input, draw, sensitivity};
-use mirrorstats::stats::interval::wilson;
+use exact::number;
+use report::figures::{FigureError, FigureName, Input, draw, sensitivity};
 use resvg::usvg::roxmltree::{Document, Node};
 use resvg::usvg::{self, Rect, fontdb};
+use statistics::interval::wilson;
 
 fn svg(name: FigureName, cast: &Cast) -> String {
     draw(name, &cast.input()).unwrap_or_else(|error| panic!("{name}: {error}")).inline_svg()
@@ -134,7 +134,7 @@ fn marks(svg: &str) -> Vec<BTreeMap<String, String>> {
 /// What the cells say: (experiment, model, metric) to the mean in full, empty where there is none, and n.
 fn expected(cast: &Cast) -> BTreeMap<(String, String, String), (String, String)> {
     let cells = &cast.cells;
-    let of_group = |group: &mirrorstats::stats::cell::Group| {
+    let of_group = |group: &report::cells::Group| {
         let key = [0, 1].map(|at| group.key[at].to_string());
         let values = cells.metrics.iter().zip(group.moments.clone());
         let values = values.map(move |(metric, moments)| {
@@ -381,7 +381,7 @@ fn the_order_of_groups_does_not_matter() {
 #[test]
 fn what_cannot_be_drawn_is_said() {
     let check = |found: Result<_, FigureError>, expected: &str| {
-        assert_eq!(found.map(|_: mirrorstats::figures::Figure| ()).unwrap_err().to_string(), expected);
+        assert_eq!(found.map(|_: report::figures::Figure| ()).unwrap_err().to_string(), expected);
     };
     let cast = cast::paper();
     let bare = Input::of_cells(&cast.cells);

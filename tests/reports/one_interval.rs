@@ -6,9 +6,9 @@ use std::path::Path;
 
 use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Float64Type;
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::write::OptionalColumns;
 use serde_json::Value;
+use trace::episode::{Action, Episode, Extra, Step};
+use trace::write::OptionalColumns;
 
 use crate::harness::program::run;
 use crate::harness::traces::{episode, write_trace};
@@ -51,7 +51,7 @@ fn played(model: &str, run: usize, steps: usize) -> Episode {
     let done = |t| t == steps && steps < 100;
     let step = |t: usize| Step {
         action: Some(if done(t) { Action::Done } else { Action::TurnLeft }),
-        selected_cube: done(t).then(|| if run % 3 == 0 { "red" } else { "blue" }.to_owned()),
+        selected_cube: done(t).then(|| if run.is_multiple_of(3) { "red" } else { "blue" }.to_owned()),
         ..Step::default()
     };
     let own = episode(&format!("{model}-{run}"), (1..=steps).map(step).collect());

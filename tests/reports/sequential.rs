@@ -3,9 +3,9 @@
 #![expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 
 use indexmap::IndexMap;
-use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
-use mirrorstats::report::statistics::{Options, Sequential, Verdict, text};
-use mirrorstats::score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use report::statistics::{Options, Sequential, Verdict, text};
+use score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 
 use crate::assert_shown;
 

@@ -3,18 +3,18 @@
 mod design;
 mod durations;
 
+use exact::moments::Moments;
 use indexmap::IndexMap;
-use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
-use mirrorstats::report::statistics::text::{self, Length};
-use mirrorstats::report::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
-use mirrorstats::score::quality::CellKey;
-use mirrorstats::score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
-use mirrorstats::stats::cell::{Cells, Group, KeyValue};
-use mirrorstats::stats::cell_interval::ranges;
-use mirrorstats::stats::design::{Cluster, Design, DesignKind};
-use mirrorstats::stats::interval::Interval;
-use mirrorstats::stats::losses::LostCounts;
-use mirrorstats::stats::moments::Moments;
+use metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use report::cells::interval::ranges;
+use report::cells::{Cells, Group, KeyValue};
+use report::statistics::text::{self, Length};
+use report::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
+use score::lost_counts::LostCounts;
+use score::quality::CellKey;
+use score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
+use statistics::design::{Cluster, Design, DesignKind};
+use statistics::interval::Interval;
 
 use crate::assert_shown;
 
@@ -179,7 +179,7 @@ fn cells_carry_counts_and_the_intervals_of_their_kind() {
     let found = statistics(&study());
     let cell = |experiment: &str, model: &str, metric: &str| {
         let key = [("experiment", experiment), ("model", model)];
-        let is_it = |cell: &&mirrorstats::report::statistics::CellRow| {
+        let is_it = |cell: &&report::statistics::CellRow| {
             cell.metric == metric && key.iter().all(|(name, value)| cell.key[*name] == KeyValue::Text((*value).into()))
         };
         found.cells.iter().find(is_it).unwrap()

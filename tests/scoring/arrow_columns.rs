@@ -4,11 +4,11 @@ use std::path::Path;
 
 use arrow::array::{Array as _, AsArray as _, RecordBatch};
 use arrow::compute::concat_batches;
-use mirrorstats::score::format::Format;
-use mirrorstats::study::write_scores;
-use mirrorstats::trace::episode::{Action, Extra, Step};
-use mirrorstats::trace::write::{OptionalColumns, write_episodes};
 use mirrorstats::{DiffRequest, Side, Study, StudyError, diff, episode_batch, resolve};
+use score::format::Format;
+use study::write_scores;
+use trace::episode::{Action, Extra, Step};
+use trace::write::{OptionalColumns, write_episodes};
 
 use crate::harness::traces::{episode, rows, write_trace};
 

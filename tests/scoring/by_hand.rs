@@ -1,8 +1,8 @@
 //! The ten metrics of the paper on the edges of its definitions; `by_hand.txt` holds steps and expected values.
 
-use mirrorstats::metric::catalog::StandardError;
-use mirrorstats::stats::group::group;
-use mirrorstats::trace::episode::{Action, Episode, Step};
+use exact::moments::StandardError;
+use report::cells::group::group;
+use trace::episode::{Action, Episode, Step};
 
 use crate::harness;
 use crate::traces::{score_paper, values};

@@ -1,7 +1,7 @@
 //! The ten metrics as plain loops over steps, read off the paper, against the definitions and their engine.
 
-use mirrorstats::trace::episode::{Action, Episode, Step};
 use proptest::prelude::*;
+use trace::episode::{Action, Episode, Step};
 
 use crate::random::episodes;
 use crate::traces::{score_paper, values};

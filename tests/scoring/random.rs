@@ -1,10 +1,10 @@
 //! Random episodes: every column null or not, rows after `done`, episodes of one step.
 
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
+use trace::episode::{Action, Episode, Extra, Step};
 
 /// Null, one of two colours, or one of the words that a column may hold besides.
 fn color(words: &[&'static str]) -> impl Strategy<Value = Option<String>> {

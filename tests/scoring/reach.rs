@@ -3,17 +3,17 @@
 use std::fs;
 use std::path::Path;
 
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::score::score_traces::trace_columns;
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::write::write_episodes;
+use metric::definitions::Definitions;
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
+use score::score_traces::trace_columns;
+use trace::episode::{Action, Episode, Extra, Step};
+use trace::inputs::Input;
+use trace::open::TraceSet;
+use trace::write::write_episodes;
 
 use crate::harness::traces;
 use crate::metamorphic::engines::{Engine, Rows, answers_about};

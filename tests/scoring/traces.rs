@@ -3,12 +3,12 @@
 use std::num::NonZeroUsize;
 use std::path::Path;
 
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::score::score_traces;
-use mirrorstats::score::table::EpisodeTable;
-use mirrorstats::trace::episode::Episode;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::write::OptionalColumns;
+use metric::definitions::Definitions;
+use score::score_traces;
+use score::table::EpisodeTable;
+use trace::episode::Episode;
+use trace::open::TraceSet;
+use trace::write::OptionalColumns;
 
 use crate::harness::traces::{open, write_trace};
 

@@ -13,7 +13,7 @@ mod stand_in;
 use harness::files::fixture;
 use harness::program::{Answer, answer, program};
 use harness::traces::write_trace as write;
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use trace::episode::{Action, Episode, Extra, Step};
 
 /// An episode with texts that are easy to get wrong, seen at t = 2, decided at t = 3.
 fn episode(id: &str, experiment: &str, run: i32) -> Episode {

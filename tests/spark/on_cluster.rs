@@ -5,9 +5,9 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use mirrorstats::trace::episode::{Episode, Extra};
-use mirrorstats::trace::write::OptionalColumns;
 use serde_json::Value;
+use trace::episode::{Episode, Extra};
+use trace::write::OptionalColumns;
 
 use crate::cluster::{Cluster, get, word_after};
 use crate::harness::files::{assert_same, contents};

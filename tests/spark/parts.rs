@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use arrow::array::{ArrayRef, Float64Array, Int32Array, Int64Array, RecordBatch, StringArray};
-use mirrorstats::trace::write::OptionalColumns;
+use trace::write::OptionalColumns;
 
 use crate::harness::program::run;
 use crate::harness::traces::write_rows;

@@ -4,7 +4,7 @@ use std::fs;
 use std::net::TcpListener;
 use std::path::Path;
 
-use mirrorstats::trace::write::{OptionalColumns, write_episodes};
+use trace::write::{OptionalColumns, write_episodes};
 
 use crate::{Answer, answer, episode, program, write};
 

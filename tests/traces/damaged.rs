@@ -5,12 +5,12 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-use mirrorstats::trace::diagnostic::{Code, Severity};
-use mirrorstats::trace::error::TraceError;
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::scan::Projection;
-use mirrorstats::trace::schema;
+use trace::diagnostic::{Code, Severity};
+use trace::error::TraceError;
+use trace::inputs::Input;
+use trace::open::TraceSet;
+use trace::scan::Projection;
+use trace::schema;
 
 use crate::harness::files::fixture;
 use crate::harness::program::{answer, program, run};

@@ -10,13 +10,13 @@ use arrow::array::{
     UInt32Array, UInt64Array,
 };
 use arrow::datatypes::{Float64Type, Int8Type, Int32Type, Int64Type};
-use mirrorstats::trace::diagnostic::Code;
-use mirrorstats::trace::error::TraceError;
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::scan::{EpisodeBatch, Projection};
 use parquet::file::properties::WriterProperties;
 use proptest::prelude::*;
+use trace::diagnostic::Code;
+use trace::error::TraceError;
+use trace::inputs::Input;
+use trace::open::TraceSet;
+use trace::scan::{EpisodeBatch, Projection};
 
 use crate::harness::traces::write_rows;
 

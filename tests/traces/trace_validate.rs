@@ -7,11 +7,11 @@ use std::sync::Arc;
 use arrow::array::{ArrayRef, Int64Array, RecordBatch, StringArray};
 use arrow::compute::cast;
 use arrow::datatypes::DataType;
-use mirrorstats::trace::diagnostic::{Code, Severity};
-use mirrorstats::trace::episode::{Action, Episode, Step};
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::validate::{Validation, validate};
-use mirrorstats::trace::write::OptionalColumns;
+use trace::diagnostic::{Code, Severity};
+use trace::episode::{Action, Episode, Step};
+use trace::inputs::Input;
+use trace::validate::{Validation, validate};
+use trace::write::OptionalColumns;
 
 use crate::harness::traces;
 

@@ -6,16 +6,16 @@ use std::sync::Arc;
 
 use arrow::array::{Int64Array, RecordBatch};
 use arrow::datatypes::{DataType, Field, Schema};
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::score::score_traces;
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::merge;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
+use metric::definitions::Definitions;
 use parquet::file::metadata::{KeyValue, RowGroupMetaData};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader, SerializedFileReader};
+use score::score_traces;
+use trace::episode::{Action, Episode, Extra, Step};
+use trace::inputs::Input;
+use trace::merge;
+use trace::open::TraceSet;
+use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata, TraceWriter, write_episodes};
 
 use crate::harness::traces;
 

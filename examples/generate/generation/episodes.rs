@@ -1,6 +1,6 @@
 //! The generated study: models by experiments by seeds by runs, and what happens in an episode.
 
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use trace::episode::{Action, Episode, Extra, Step};
 
 use super::draw::Draw;
 use super::extras;

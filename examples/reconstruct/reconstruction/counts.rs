@@ -1,6 +1,6 @@
 //! How many of a pair's 21 episodes have which property: the integers behind its rates.
 
-use mirrorstats::stats::moments::Moments;
+use exact::moments::Moments;
 
 use super::EPISODES;
 use super::contradiction::Contradiction;

@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 
-use mirrorstats::stats::moments::Moments;
+use exact::moments::Moments;
 
 use super::contradiction::Contradiction;
 use super::generator::Generator;

@@ -1,6 +1,6 @@
 //! An outline played out, step by step.
 
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
+use trace::episode::{Action, Episode, Extra, Step};
 
 use super::attribution::{self, UNKNOWN};
 use super::generator::Generator;

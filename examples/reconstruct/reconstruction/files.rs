@@ -6,10 +6,10 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-use mirrorstats::trace::episode::Episode;
-use mirrorstats::trace::error::TraceError;
-use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 use serde_json::{Value, json};
+use trace::episode::Episode;
+use trace::error::TraceError;
+use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 
 use super::contradiction::Contradiction;
 use super::published::{self, Pair, Reading};

@@ -3,7 +3,7 @@
 //! `SplitMix64` (Steele, Lea and Flood, 2014), written out here so that no release of a library can change the
 //! fixture. Not for statistics: a bound is applied by multiplication, which is a little uneven and does not matter.
 
-use mirrorstats::base::hash;
+use exact::hash;
 
 /// The generator's state.
 pub struct Generator(u64);

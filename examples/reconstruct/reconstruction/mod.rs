@@ -22,7 +22,7 @@ pub mod printing;
 pub mod published;
 pub mod scene;
 
-use mirrorstats::trace::episode::Episode;
+use trace::episode::Episode;
 
 use contradiction::Contradiction;
 use errata::Erratum;

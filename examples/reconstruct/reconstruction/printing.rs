@@ -1,7 +1,7 @@
 //! How the paper turns exact moments into print: its two rounding rules and its two standard errors.
 
-use mirrorstats::metric::catalog::StandardError;
-use mirrorstats::stats::moments::Moments;
+use exact::moments::Moments;
+use metric::catalog::StandardError;
 
 use super::published::{Pair, Source, Value};
 

@@ -13,10 +13,10 @@ mod thrift;
 
 use std::sync::LazyLock;
 
+use ::trace::fuzz::{OneColumn, Refusal};
 use arrow::array::{Array as _, ArrayRef, AsArray as _, new_empty_array};
 use arrow::compute::{cast, concat};
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
-use mirrorstats::trace::fuzz::{OneColumn, Refusal};
 
 use crate::depth::reached;
 use crate::quiet;

@@ -5,17 +5,17 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
-use crate::base::rounding::Rounding;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
-use crate::metric::definitions::Definitions;
-use crate::metric::implied::implied;
-use crate::report::audit::episodes::Episodes;
-use crate::report::audit::{NamedTable, Terms, audit, text};
-use crate::report::published;
-use crate::report::style::Style;
-use crate::score::score_traces::{has_value, schema_columns};
-use crate::study::StudyError;
+use exact::rounding::Rounding;
+use metric::definitions::Definitions;
+use metric::implied::implied;
+use report::audit::episodes::Episodes;
+use report::audit::{NamedTable, Terms, audit, text};
+use report::published;
+use report::style::Style;
+use score::score_traces::{has_value, schema_columns};
+use study::StudyError;
 
 /// Name the cells of published tables that no data can give, and say why
 #[derive(Clone, Debug, clap::Args)]
@@ -45,9 +45,6 @@ pub struct AuditArgs {
 
 impl AuditArgs {
     /// Audits; the check holds if some data can give every cell.
-    ///
-    /// # Errors
-    /// For files, definitions and numbers of episodes that are not as they must be.
     pub fn run(self) -> Result<Outcome, Failure> {
         let tables = self.tables.iter().map(|path| table(path)).collect::<Result<Vec<_>, _>>()?;
         let definitions = Definitions::load(&self.definitions, &schema_columns()).map_err(StudyError::from)?;

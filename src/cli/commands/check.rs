@@ -5,14 +5,14 @@ use std::io::{self, Write as _};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::escape::visible;
-use crate::base::format::fixed;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::quality::{self, CellAnswer};
-use crate::score::quality::{CellKey, Quality, QualityByCell};
-use crate::stats::losses::INFRASTRUCTURE;
+use exact::escape::visible;
+use exact::format::fixed;
+use score::quality::{CellKey, Quality, QualityByCell};
+use statistics::losses::INFRASTRUCTURE;
 
 /// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
 ///
@@ -90,10 +90,6 @@ pub struct NotRecorded {
 }
 
 impl CheckArgs {
-    /// Reads and checks.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the traces; no limit at all.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let limits = [self.max_unreadable, self.max_refused, self.max_truncated, self.max_repaired];
         if limits.iter().all(Option::is_none) && self.max_lost.is_none() && self.max_latency.is_none() {

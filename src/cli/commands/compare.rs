@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
-use crate::report::comparison::Comparison;
-use crate::report::errata::Errata;
-use crate::report::tables::side_by_side;
+use report::comparison::Comparison;
+use report::errata::Errata;
+use report::tables::side_by_side;
 
 /// The style that printed the published tables.
 const PAPER_STYLE: &str = "paper";
@@ -44,9 +44,6 @@ pub struct CompareArgs {
 
 impl CompareArgs {
     /// Scores the traces and compares; the check holds if every difference is excused.
-    ///
-    /// # Errors
-    /// For files and definitions that are not as they must be.
     pub fn run(self) -> Result<Outcome, Failure> {
         let errata = self.errata()?;
         let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };

@@ -16,10 +16,6 @@ pub struct CompletionsArgs {
 }
 
 impl CompletionsArgs {
-    /// Prints them.
-    ///
-    /// # Errors
-    /// When standard output cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut Cli::command(), NAME, &mut text);

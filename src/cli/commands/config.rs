@@ -6,11 +6,11 @@ use clap::CommandFactory as _;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::escape::visible;
 use crate::cli::config::{self, Setting};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::text_table::listing;
 use crate::cli::{Cli, output};
+use exact::escape::visible;
 
 /// Show the defaults that hold here, and where they come from
 ///
@@ -37,10 +37,6 @@ pub struct ConfigAnswer {
 }
 
 impl ConfigArgs {
-    /// Shows them.
-    ///
-    /// # Errors
-    /// For a file or a variable that cannot be used, and when standard output cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let command = Cli::command();
         let config::Settings { file, all } = config::load(&command)?;

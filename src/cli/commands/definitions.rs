@@ -9,15 +9,15 @@ use serde::Serialize;
 
 use super::super::outcome::{Failure, Outcome};
 use super::super::output;
-use crate::base::escape::visible;
-use crate::base::suggest::nearest;
-use crate::metric::definitions::{Definitions, UnknownMetric};
-use crate::metric::fault::FaultRecord;
-use crate::metric::file::{FileError, built_in, built_in_names};
-use crate::score::score_traces;
-use crate::study::StudyError;
-use crate::trace::inputs;
-use crate::trace::open::TraceSet;
+use exact::escape::visible;
+use exact::suggest::nearest;
+use metric::definitions::{Definitions, UnknownMetric};
+use metric::fault::FaultRecord;
+use metric::file::{FileError, built_in, built_in_names};
+use score::score_traces;
+use study::StudyError;
+use trace::inputs;
+use trace::open::TraceSet;
 
 /// Check, explain and show metric definitions
 #[derive(Clone, Debug, clap::Args)]
@@ -76,10 +76,6 @@ pub struct CheckAnswer {
 }
 
 impl DefinitionsArgs {
-    /// Does it.
-    ///
-    /// # Errors
-    /// A file that cannot be read; faults of definitions; a metric that is not there.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.action {
             Action::Check { file, traces, json } => check(&file, &traces, json),

@@ -7,10 +7,10 @@ use std::path::PathBuf;
 use super::super::args::ThreadArgs;
 use super::super::outcome::{Failure, Outcome};
 use super::super::{output, terminal};
-use crate::report::changes::{self, Limit};
-use crate::stats::diff::Changes;
-use crate::stats::group::DEFAULT_BY;
-use crate::study::{DiffRequest, Side, diff, resolve};
+use report::cells::diff::Changes;
+use report::cells::group::DEFAULT_BY;
+use report::changes::{self, Limit};
+use study::{DiffRequest, Side, diff, resolve};
 
 /// Tell which cells and episodes change between two sets of definitions, or of scores
 #[derive(Clone, Debug, clap::Args)]
@@ -51,10 +51,6 @@ pub struct DiffArgs {
 }
 
 impl DiffArgs {
-    /// Compares.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the definitions, the scores or the traces.
     pub fn run(self) -> Result<Outcome, Failure> {
         let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
         let traces = resolve(&self.traces, io::stdin().lock())?;

@@ -9,11 +9,11 @@ use serde::Serialize;
 use super::super::experiments;
 use super::super::outcome::{Failure, Outcome};
 use super::super::output;
-use crate::base::escape::visible;
-use crate::base::suggest::hint;
-use crate::experiment::explain::explained;
-use crate::experiment::load::Loaded;
-use crate::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
+use exact::escape::visible;
+use exact::suggest::hint;
+use world::experiment::explain::explained;
+use world::experiment::load::Loaded;
+use world::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_names};
 
 /// Check, explain and show experiments
 #[derive(Clone, Debug, clap::Args)]
@@ -60,10 +60,6 @@ pub struct ExperimentsAnswer {
 }
 
 impl ExperimentsArgs {
-    /// Does it.
-    ///
-    /// # Errors
-    /// A file that cannot be read; faults of experiments; a name that is not there.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.action {
             Action::Check { file, json } => check(&file, json),
@@ -75,7 +71,7 @@ impl ExperimentsArgs {
 
 #[cfg(feature = "sim")]
 fn placed(file: &Path) -> Result<Vec<Loaded>, Failure> {
-    experiments::placed(file, &crate::sim::config::WorldConfig::default())
+    experiments::placed(file, &world::sim::config::WorldConfig::default())
 }
 
 #[cfg(not(feature = "sim"))]

@@ -9,7 +9,7 @@ use clap::builder::PossibleValue;
 use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::figures::{FigureFormat, FigureName};
+use report::figures::{FigureFormat, FigureName};
 
 /// Draw one figure.
 #[derive(Clone, Debug, clap::Args)]
@@ -31,7 +31,7 @@ pub struct FigureArgs {
     pub style: PathBuf,
     /// The file format [default: by the ending of FILE; svg on standard output]
     #[arg(long, value_enum)]
-    pub format: Option<FigureFormat>,
+    pub format: Option<Format>,
     /// Where to write it [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     pub output: Option<PathBuf>,
@@ -40,28 +40,38 @@ pub struct FigureArgs {
     pub pool: bool,
 }
 
-impl ValueEnum for FigureFormat {
+/// A file format, as clap lists it.
+#[derive(Clone, Copy, Debug)]
+pub struct Format(FigureFormat);
+
+/// Every format that this build has.
+const FORMATS: &[Format] = &[
+    Format(FigureFormat::Svg),
+    #[cfg(feature = "raster")]
+    Format(FigureFormat::Png),
+    #[cfg(feature = "raster")]
+    Format(FigureFormat::Pdf),
+];
+
+impl ValueEnum for Format {
     fn value_variants<'a>() -> &'a [Self] {
-        Self::ALL
+        FORMATS
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        let help = match self {
-            Self::Svg => "Vectors for the web, values on hover",
+        let help = match self.0 {
+            FigureFormat::Svg => "Vectors for the web, values on hover",
             #[cfg(feature = "raster")]
-            Self::Png => "Pixels, about 300 per inch at a width of 7 inches",
+            FigureFormat::Png => "Pixels, about 300 per inch at a width of 7 inches",
             #[cfg(feature = "raster")]
-            Self::Pdf => "Vectors for LaTeX",
+            FigureFormat::Pdf => "Vectors for LaTeX",
         };
-        Some(PossibleValue::new(self.ending()).help(help))
+        Some(PossibleValue::new(self.0.ending()).help(help))
     }
 }
 
 impl FigureArgs {
     /// Scores the traces and draws.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the traces, the definitions, the style or the output.
     pub fn run(self) -> Result<Outcome, Failure> {
         // An ending of no known format should not cost a pass over the traces.
         let format = self.format()?;
@@ -84,7 +94,7 @@ impl FigureArgs {
 
     fn format(&self) -> Result<FigureFormat, Failure> {
         match (self.format, &self.output) {
-            (Some(format), _) => Ok(format),
+            (Some(Format(format)), _) => Ok(format),
             (None, Some(path)) => FigureFormat::of(path).map_err(Failure::input),
             (None, None) => Ok(FigureFormat::Svg),
         }

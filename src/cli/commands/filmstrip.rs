@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::figures::{Figure, FigureFormat};
-use crate::replay::film_strip::{Steps, Strip};
-use crate::trace::inputs;
+use report::figures::{Figure, FigureFormat};
+use trace::inputs;
+use world::replay::film_strip::{Steps, Strip};
 
 /// Draw one episode as a row of frames: what was done and claimed at each, and when the mirror was in view
 ///
@@ -33,10 +33,6 @@ pub struct FilmstripArgs {
 }
 
 impl FilmstripArgs {
-    /// Draws.
-    ///
-    /// # Errors
-    /// When the episode is nowhere, a step is not in it, its frames are not to be had, or the file cannot be written.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let format = self.format()?;
         let figure = self.figure()?;

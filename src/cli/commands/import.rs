@@ -7,19 +7,19 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::budget::Limit;
-use crate::base::escape::visible;
-use crate::base::input;
-use crate::base::replace;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
-use crate::study::known_experiments;
-use crate::trace::colors::palette::Palette;
-use crate::trace::declared::Cluster;
-use crate::trace::import::{self, Limits, Text};
-use crate::trace::inputs::Input;
-use crate::trace::schema::Kind;
+use exact::budget::Limit;
+use exact::escape::visible;
+use exact::input;
+use exact::replace;
+use study::known_experiments;
+use trace::colors::palette::Palette;
+use trace::declared::Cluster;
+use trace::import::{self, Limits, Text};
+use trace::inputs::Input;
+use trace::schema::Kind;
 
 /// Make a trace of JSON lines of steps, so that episodes of any harness can be scored
 ///
@@ -87,10 +87,6 @@ pub struct OwnColumn {
 }
 
 impl ImportArgs {
-    /// Imports.
-    ///
-    /// # Errors
-    /// Lines that are no steps, episodes that are not whole, a file that cannot be read or written.
     pub fn run(&self) -> Result<Outcome, Failure> {
         self.check_places()?;
         let texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
@@ -98,9 +94,6 @@ impl ImportArgs {
     }
 
     /// Makes a trace of the steps in these texts, wherever they are from.
-    ///
-    /// # Errors
-    /// As [`ImportArgs::run`].
     pub fn import(&self, mut texts: Vec<Text>) -> Result<ImportAnswer, Failure> {
         let experiments = known_experiments(&self.definitions)?;
         let palette = self.palette.as_deref().map(palette).transpose()?;

@@ -7,18 +7,18 @@ use comfy_table::Table;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::quality::{self, CellAnswer};
 use crate::cli::terminal;
 use crate::cli::text_table::{aligned_right, counted, listing};
-use crate::report::tables::fit::{fitted, wrapped};
-use crate::score::quality::QualityByCell;
-use crate::trace::answered::by_others;
-use crate::trace::checksums::Checksums;
-use crate::trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
+use exact::escape::visible;
+use report::tables::fit::{fitted, wrapped};
+use score::quality::QualityByCell;
+use trace::answered::by_others;
+use trace::checksums::Checksums;
+use trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
 
 /// Summarise traces: episodes, steps, models, experiments, coverage, files
 #[derive(Clone, Debug, clap::Args)]
@@ -45,9 +45,6 @@ pub struct InfoAnswer {
 
 impl InfoCommand {
     /// Reads the traces and prints what they hold.
-    ///
-    /// # Errors
-    /// When the traces are not as they must be, or the output cannot be written.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let study = self.input.open()?;
         let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };

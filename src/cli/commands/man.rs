@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::CommandFactory as _;
 
-use crate::base::replace::Content;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{Cli, help, output};
+use exact::replace::Content;
 
 /// Write manual pages into a folder, one per command
 #[derive(Clone, Debug, clap::Args)]
@@ -16,10 +16,6 @@ pub struct ManArgs {
 }
 
 impl ManArgs {
-    /// Writes them.
-    ///
-    /// # Errors
-    /// When the folder or a page cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let mut command = help::with_examples_alone(Cli::command());
         command.build();

@@ -91,10 +91,6 @@ impl Command {
         matches!(self, Self::Config(_) | Self::Completions(_) | Self::Man(_))
     }
 
-    /// Does it.
-    ///
-    /// # Errors
-    /// Whatever keeps the command from running to its end.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Self::Report(args) => args.run(),

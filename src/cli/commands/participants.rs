@@ -6,11 +6,11 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::escape::visible;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
-use crate::record::participants::{self, Removed};
+use exact::escape::visible;
+use world::record::participants::{self, Removed};
 
 /// What is to be done about the people of a recording
 #[derive(Clone, Debug, clap::Args)]
@@ -52,10 +52,6 @@ impl fmt::Display for RemovedAnswer {
 }
 
 impl ParticipantsArgs {
-    /// Does it.
-    ///
-    /// # Errors
-    /// A folder that cannot be read or written, and a code that it does not have.
     pub fn run(self) -> Result<Outcome, Failure> {
         let ParticipantsCommand::Remove { code, folder, json } = self.command;
         let removed = participants::remove(&folder, &code).map_err(Failure::input)?;

@@ -3,19 +3,19 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use crate::base::ratio::Ratio;
 use crate::cli::outcome::{Failure, Outcome};
 #[cfg(feature = "sim")]
 use crate::cli::registration;
 use crate::cli::{output, terminal};
-use crate::metric::definitions::Definitions;
-use crate::report::plan::register::{NamedHash, RegisteredPlan};
-use crate::report::plan::{Given, Plan, PlanRequest, plan, text};
-use crate::score::score_traces::schema_columns;
+use exact::ratio::Ratio;
+use metric::definitions::Definitions;
+use report::plan::register::{NamedHash, RegisteredPlan};
+use report::plan::{Given, Plan, PlanRequest, plan, text};
+use score::score_traces::schema_columns;
+use statistics::sample_size::Clusters;
+use study::StudyError;
 #[cfg(feature = "sim")]
-use crate::sim::config::WorldConfig;
-use crate::stats::sample_size::Clusters;
-use crate::study::StudyError;
+use world::sim::config::WorldConfig;
 
 /// Plan a study: episodes for a wanted difference, or the difference that given episodes can show
 #[derive(Clone, Debug, clap::Args)]
@@ -82,9 +82,6 @@ enum UsageError {
 
 impl PlanArgs {
     /// Plans, prints, and registers where asked to.
-    ///
-    /// # Errors
-    /// For numbers that cannot be, definitions that cannot be read, and a file that is there already.
     pub fn run(self) -> Result<Outcome, Failure> {
         let plan = plan(self.request()?).map_err(Failure::input)?;
         if let Some(file) = &self.register {

@@ -47,18 +47,11 @@ pub enum AnswerFormat {
 
 impl QueryArgs {
     /// Refuses: the work needs Polars.
-    ///
-    /// # Errors
-    /// Always.
     #[cfg(not(feature = "polars"))]
     pub fn run(self) -> Result<Outcome, Failure> {
-        Err(crate::study::StudyError::WithoutPolars { what: "query" }.into())
+        Err(study::StudyError::WithoutPolars { what: "query" }.into())
     }
 
-    /// Runs the query.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the query, the traces, the definitions or the output.
     #[cfg(feature = "polars")]
     pub fn run(self) -> Result<Outcome, Failure> {
         rows::answer(&self)
@@ -76,23 +69,22 @@ mod rows {
     use polars::prelude::LazyFrame;
 
     use super::{AnswerFormat, Failure, Outcome, QueryArgs};
-    use crate::base::escape::visible;
-    use crate::base::replace::is_stream;
     use crate::cli::args::GroupingArgs;
     use crate::cli::text_table::listing;
     use crate::cli::{output, terminal};
-    use crate::engine::polars::answer::{Excerpt, Format, QueryError, excerpt, plan, write};
-    use crate::engine::polars::run::PolarsError;
-    use crate::engine::polars::statement::{self, Checked, Table};
-    use crate::engine::polars::tables;
-    use crate::metric::fault::Faults;
-    use crate::report::tables::fit::fitted;
-    use crate::study::StudyError;
+    use engines::polars::answer::{Excerpt, Format, QueryError, excerpt, plan, write};
+    use engines::polars::run::PolarsError;
+    use engines::polars::statement::{self, Checked, Table};
+    use engines::polars::tables;
+    use exact::escape::visible;
+    use exact::replace::is_stream;
+    use metric::fault::Faults;
+    use report::tables::fit::fitted;
+    use study::StudyError;
 
     /// What stands for null in a table.
     const NULL: &str = "NULL";
 
-    /// Runs a query.
     pub(super) fn answer(args: &QueryArgs) -> Result<Outcome, Failure> {
         let format = format(args)?;
         // A slip in the query should not cost a look at the traces.
@@ -203,10 +195,6 @@ mod rows {
             Self(Arc::new(Mutex::new(Shared { out: BufWriter::new(file), fault: None })))
         }
 
-        /// Writes what is left.
-        ///
-        /// # Errors
-        /// The first error there was.
         fn finish(&self) -> io::Result<()> {
             let mut shared = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             shared.fault.take().map_or_else(|| shared.out.flush(), Err)

@@ -7,10 +7,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::agent::Player;
-use crate::agent::scripted::{Renamed, Scripted};
-use crate::base::escape::visible;
-use crate::base::suggest::hint;
 use crate::cli::args::ThreadArgs;
 use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
 use crate::cli::exec::ExecArgs;
@@ -22,15 +18,19 @@ use crate::cli::output;
 use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
-use crate::record::error::StoreError;
-use crate::record::index::{Place, RecordingIndex};
-use crate::record::metadata::Recordings;
-use crate::record::plan::{Experiments, Key, Named, Plan, Shard, Subject};
-use crate::record::run::{Recording, Settings, Tally};
-use crate::record::shares::{Shares, Spent};
-use crate::record::store::Store;
-use crate::sim::Experiment;
-use crate::sim::config::WorldConfig;
+use exact::escape::visible;
+use exact::suggest::hint;
+use world::agent::Player;
+use world::agent::scripted::{Renamed, Scripted};
+use world::record::error::StoreError;
+use world::record::index::{Place, RecordingIndex};
+use world::record::metadata::Recordings;
+use world::record::plan::{Experiments, Key, Named, Plan, Shard, Subject};
+use world::record::run::{Recording, Settings, Tally};
+use world::record::shares::{Shares, Spent};
+use world::record::store::Store;
+use world::sim::Experiment;
+use world::sim::config::WorldConfig;
 
 /// Record episodes of an agent in the mirror world: step traces for `report`, logs with the frames
 ///
@@ -111,10 +111,6 @@ pub struct RecordArgs {
 }
 
 impl RecordArgs {
-    /// Records.
-    ///
-    /// # Errors
-    /// For an agent or a configuration that cannot be used, and whatever the world, the eye or the disk refuse.
     pub fn run(self) -> Result<Outcome, Failure> {
         let config = self.world()?;
         let plan = self.planned(&config)?;
@@ -151,9 +147,6 @@ impl RecordArgs {
     }
 
     /// Who plays, as `--agent` names it.
-    ///
-    /// # Errors
-    /// For an agent that cannot be used.
     pub fn player(&self) -> Result<Arc<dyn Player>, Failure> {
         if let Some(command) = self.agent.strip_prefix("exec:") {
             return Ok(Arc::new(self.exec.player(command, self.vlm.name(), &self.out)?));
@@ -223,9 +216,6 @@ impl RecordArgs {
     }
 
     /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is told.
-    ///
-    /// # Errors
-    /// For a configuration that cannot be used, and whatever the world, the eye or the disk refuse.
     pub fn record(&self, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
         let config = &self.world()?;
         let plan = &self.planned(config)?;
@@ -283,7 +273,6 @@ impl RecordArgs {
         Ok(Recordings::new(&plan.experiments, config, player, self.condition.as_deref(), registered.as_ref()))
     }
 
-    /// Whose episodes they are.
     fn subject(&self, player: &dyn Player) -> Subject {
         Subject { model: player.model().to_owned(), condition: self.condition.clone() }
     }

@@ -12,14 +12,14 @@ use serde_json::Value;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
-use crate::log::recover::{Losses, recover};
-use crate::trace::diagnostic::Severity;
-use crate::trace::inputs::Input;
-use crate::trace::merge::{self, EpisodeRows};
-use crate::trace::open::TraceFile;
-use crate::trace::schema::RECORDING_KEY;
-use crate::trace::validate::validate;
-use crate::trace::write::OptionalColumns;
+use trace::diagnostic::Severity;
+use trace::inputs::Input;
+use trace::log::recover::{Losses, recover};
+use trace::merge::{self, EpisodeRows};
+use trace::open::TraceFile;
+use trace::schema::RECORDING_KEY;
+use trace::validate::validate;
+use trace::write::OptionalColumns;
 
 /// Make a trace of a log, also of one that was cut off or damaged
 ///
@@ -53,10 +53,6 @@ pub struct RecoverAnswer {
 }
 
 impl RecoverArgs {
-    /// Recovers.
-    ///
-    /// # Errors
-    /// When the log cannot be read or is none, the trace cannot be written, or what was written breaks a rule.
     pub fn run(&self) -> Result<Outcome, Failure> {
         output::check_target(&self.out, [&self.log])?;
         let recovered = recover(&self.log).map_err(Failure::input)?;

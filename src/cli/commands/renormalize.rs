@@ -3,25 +3,25 @@
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::base::escape::visible;
-use crate::base::replace::{Content, is_same_file};
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::text_table::{aligned_right, counted, listing};
 use crate::cli::{output, terminal};
-use crate::report::tables::fit::fitted;
-use crate::trace::diagnostic::Severity;
-use crate::trace::error::TraceError;
-use crate::trace::identification::VERSION;
-use crate::trace::inputs::Input;
-use crate::trace::renormalize::{Old, Renormalized};
-use crate::trace::validate::validate;
+use exact::escape::visible;
+use exact::replace::{Content, is_same_file};
+use report::tables::fit::fitted;
+use trace::diagnostic::Severity;
+use trace::error::TraceError;
+use trace::identification::VERSION;
+use trace::inputs::Input;
+use trace::renormalize::{Old, Renormalized};
+use trace::validate::validate;
 
 /// Make the attributions of old traces anew from the texts of `identification`
 ///
@@ -94,10 +94,6 @@ pub struct Flip {
 }
 
 impl RenormalizeArgs {
-    /// Renormalizes.
-    ///
-    /// # Errors
-    /// Traces that break a rule or have no texts, an output that would be an input, whatever writing gives.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let inputs = self.input.inputs()?;
         let places = self.places(&inputs)?;

@@ -5,16 +5,17 @@ use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use crate::base::replace::{self, is_same_file};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
-use crate::log::read::{episode_hashes, other_episode};
-use crate::replay::again::MOST_RAYS;
-use crate::replay::divergence::Divergence;
-use crate::replay::error::ReplayError;
-use crate::replay::verify::{Outputs, Recorded, Recount, ReplayAnswer, frame_path};
-use crate::trace::inputs;
+use exact::replace::{self, is_same_file};
+use serde::Serialize;
+use trace::inputs;
+use trace::log::read::{episode_hashes, other_episode};
+use world::replay::again::MOST_RAYS;
+use world::replay::divergence::Divergence;
+use world::replay::error::ReplayError;
+use world::replay::verify::{Outputs, Recorded, Recount, ReplayAnswer, frame_path};
 
 /// Repeat a trace's episodes in the worlds that it describes, and hold every step against what was recorded
 ///
@@ -61,10 +62,6 @@ fn grid(text: &str) -> Result<(u32, u32), String> {
 }
 
 impl ReplayArgs {
-    /// Replays.
-    ///
-    /// # Errors
-    /// When a trace cannot be read or does not say how its world was made, and whatever writing gives.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let files = inputs::resolve(&self.traces, io::stdin()).map_err(Failure::input)?;
         output::note_stale_checksums(&files);
@@ -77,7 +74,7 @@ impl ReplayArgs {
         for trace in &traces {
             trace.replay(&self.outputs(), &mut answer, save)?;
         }
-        output::print(&answer, self.json)?;
+        output::print(&Shown(&answer), self.json)?;
         Ok(if answer.divergences.is_empty() { Outcome::Done } else { Outcome::CheckFailed })
     }
 
@@ -156,18 +153,23 @@ fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
     output::write_file(path, png)
 }
 
-impl fmt::Display for ReplayAnswer {
+/// The answer, with its words for people.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Shown<'a>(&'a ReplayAnswer);
+
+impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for Divergence { episode_id, t, column, expected, found } in &self.divergences {
+        for Divergence { episode_id, t, column, expected, found } in &self.0.divergences {
             writeln!(f, "{episode_id}, t = {t}: {column}: recorded {expected}, replayed {found}")?;
         }
-        write!(f, "{}, {} replayed", counted(self.episodes as u64, "episode"), counted(self.steps as u64, "step"))?;
-        match self.divergences.len() {
+        write!(f, "{}, {} replayed", counted(self.0.episodes as u64, "episode"), counted(self.0.steps as u64, "step"))?;
+        match self.0.divergences.len() {
             0 => write!(f, ": all match")?,
             1 => write!(f, ": 1 of the episodes parts from the trace")?,
             parted => write!(f, ": {parted} of the episodes part from the trace")?,
         }
-        match self.flipped {
+        match self.0.flipped {
             Some(flipped) => writeln!(f, "; mirror_visible is another at {}", counted(flipped as u64, "step")),
             None => writeln!(f),
         }

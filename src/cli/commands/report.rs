@@ -10,9 +10,9 @@ use super::super::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use super::super::outcome::{Failure, Outcome};
 use super::super::output;
 use super::super::text_table::counted;
-use crate::report::bundle::Manifest;
-use crate::report::tables::terminal;
-use crate::study::{Report, ReportOptions, WrittenReport};
+use report::bundle::Manifest;
+use report::tables::terminal;
+use study::{Report, ReportOptions, WrittenReport};
 
 /// Compute the tables and figures of traces, print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
@@ -59,10 +59,6 @@ pub struct ReportAnswer {
 }
 
 impl ReportArgs {
-    /// Reports.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the traces, the definitions, the style or the folder.
     pub fn run(self) -> Result<Outcome, Failure> {
         let study = self.traces.study_on(&self.engine, &self.scoring, &self.grouping)?;
         let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };

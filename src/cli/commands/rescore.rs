@@ -10,10 +10,10 @@ use super::super::args::ThreadArgs;
 use super::super::outcome::{Failure, Outcome};
 use super::super::text_table::counted;
 use super::super::{output, terminal};
-use crate::report::bundle::Manifest;
-use crate::report::changes::{self, Limit};
-use crate::stats::diff::Changes;
-use crate::study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored};
+use report::bundle::Manifest;
+use report::cells::diff::Changes;
+use report::changes::{self, Limit};
+use study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored};
 
 /// Make a report again from the traces that it was made of, under other definitions
 ///
@@ -67,10 +67,6 @@ pub struct RescoreAnswer {
 }
 
 impl RescoreArgs {
-    /// Makes the report again.
-    ///
-    /// # Errors
-    /// A folder that is no report, traces that are not what they were, whatever is wrong with the definitions.
     pub fn run(self) -> Result<Outcome, Failure> {
         let out = folder_of_rescored(&self.report, self.out.as_deref())?;
         let rescored = self.request(&out).run()?;

@@ -7,15 +7,15 @@ use comfy_table::{ContentArrangement, Table};
 use schemars::schema_for;
 use serde_json::{Value, json};
 
-use crate::agent::reply;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use crate::cli::text_table::listing;
-use crate::experiment::schema::ExperimentFile;
-use crate::experiment::{Experiment, Spec};
-use crate::trace::describe::SchemaDocument;
-use crate::trace::import;
-use crate::trace::schema::Column;
+use trace::describe::SchemaDocument;
+use trace::import;
+use trace::schema::Column;
+use world::agent::reply;
+use world::experiment::schema::ExperimentFile;
+use world::experiment::{Experiment, Spec};
 
 /// Print what a trace is: columns, footer metadata, rules; or a JSON Schema by its name
 #[derive(Clone, Copy, Debug, clap::Args)]
@@ -64,10 +64,6 @@ impl Name {
 const WIDTH: usize = 110;
 
 impl SchemaCommand {
-    /// Prints the schema.
-    ///
-    /// # Errors
-    /// When the output cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         let mut out = io::stdout().lock();
         if self.json || self.name != Name::Trace {

@@ -7,10 +7,10 @@ use super::super::args::{Engine, EngineArgs, GroupingArgs, ScoringArgs, TraceArg
 use super::super::outcome::{Failure, Outcome};
 use super::super::text_table::counted;
 use super::super::{output, spark};
-use crate::base::replace::is_stream;
-use crate::score::format::Format;
-use crate::score::table::EpisodeTable;
-use crate::study::{SparkJob, are_uris, write_scores};
+use exact::replace::is_stream;
+use score::format::Format;
+use score::table::EpisodeTable;
+use study::{SparkJob, are_uris, write_scores};
 
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
@@ -37,10 +37,6 @@ pub struct ScoreArgs {
 }
 
 impl ScoreArgs {
-    /// Scores.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the traces, the definitions or the output.
     pub fn run(self) -> Result<Outcome, Failure> {
         if self.engine.engine == Engine::Spark {
             return self.run_on_spark();

@@ -3,12 +3,12 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use crate::base::replace::Content;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
-use crate::figures::FigureFormat;
-use crate::study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
+use exact::replace::Content;
+use report::figures::FigureFormat;
+use study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
 
 /// Tell how every cell moves with the threshold of mirror evidence, and where a conclusion changes
 ///
@@ -44,9 +44,6 @@ const TABLES: [&str; 3] = ["sensitivity.csv", "sensitivity.md", "sensitivity.tex
 
 impl SensitivityArgs {
     /// Scores under every threshold, prints and writes.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the traces, the definitions, the thresholds or the outputs.
     pub fn run(self) -> Result<Outcome, Failure> {
         // A name of no known format should not cost a pass over the traces.
         let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;

@@ -5,9 +5,9 @@ use std::io::{self, Write as _};
 
 use super::super::args::{GroupingArgs, ScoringArgs};
 use super::super::outcome::{Failure, Outcome};
-use crate::metric::sql::{self, Dialect};
-use crate::score::score_traces::{schema_columns, trace_columns};
-use crate::study::Study;
+use metric::sql::{self, Dialect};
+use score::score_traces::{schema_columns, trace_columns};
+use study::Study;
 
 /// Print the SQL statement that computes the episode table from a table `steps`
 #[derive(Clone, Debug, clap::Args)]
@@ -45,10 +45,6 @@ impl From<DialectArg> for Dialect {
 }
 
 impl SqlArgs {
-    /// Prints the statement.
-    ///
-    /// # Errors
-    /// Faults of the definitions; a construct that the dialect cannot say.
     pub fn run(self) -> Result<Outcome, Failure> {
         let question = self.scoring.question(&GroupingArgs::default());
         let definitions = if self.traces.is_empty() {

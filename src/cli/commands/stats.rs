@@ -3,12 +3,12 @@
 use std::io::Write as _;
 use std::path::PathBuf;
 
-use crate::base::suggest::hint;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
-use crate::report::statistics::text::{self, Length};
-use crate::report::statistics::{Options, Sequential, Statistics};
+use exact::suggest::hint;
+use report::statistics::text::{self, Length};
+use report::statistics::{Options, Sequential, Statistics};
 
 /// The word that stands for every metric.
 const ALL: &str = "all";
@@ -59,10 +59,6 @@ struct UnknownMetric {
 }
 
 impl StatsArgs {
-    /// Scores and prints.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the traces, the definitions or the options.
     pub fn run(self) -> Result<Outcome, Failure> {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };

@@ -3,13 +3,13 @@
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
-use crate::base::escape::visible;
-use crate::base::suggest::hint;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::metric::definitions::Definitions;
-use crate::report::style::{Style, built_in, built_in_names};
-use crate::score::score_traces::schema_columns;
-use crate::study::StudyError;
+use exact::escape::visible;
+use exact::suggest::hint;
+use metric::definitions::Definitions;
+use report::style::{Style, built_in, built_in_names};
+use score::score_traces::schema_columns;
+use study::StudyError;
 
 /// Show and check styles: how tables look
 #[derive(Clone, Debug, clap::Args)]
@@ -40,10 +40,6 @@ enum Action {
 }
 
 impl StyleArgs {
-    /// Does it.
-    ///
-    /// # Errors
-    /// A name that is no style; a file that cannot be read; faults of style or definitions.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.action {
             Action::Show { name } => show(&name),

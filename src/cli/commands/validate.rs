@@ -3,18 +3,18 @@
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-use crate::base::escape::visible;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
-use crate::study::{experiment_findings, known_experiments};
-use crate::trace::answered::by_others;
-use crate::trace::checksums::Checksums;
-use crate::trace::diagnostic::Severity;
-use crate::trace::inputs;
-use crate::trace::open::TraceFile;
-use crate::trace::validate::{Validation, validate};
+use exact::escape::visible;
+use study::{experiment_findings, known_experiments};
+use trace::answered::by_others;
+use trace::checksums::Checksums;
+use trace::diagnostic::Severity;
+use trace::inputs;
+use trace::open::TraceFile;
+use trace::validate::{Validation, validate};
 
 /// Check traces against every rule of the schema and report all that is wrong
 ///
@@ -35,10 +35,6 @@ pub struct ValidateCommand {
 const SHOWN: usize = 10;
 
 impl ValidateCommand {
-    /// Checks the traces.
-    ///
-    /// # Errors
-    /// When an argument gives no file, for faults of the definitions, or when the output cannot be written.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let report = self.findings()?;
         let mut out = io::stdout().lock();
@@ -50,10 +46,6 @@ impl ValidateCommand {
         Ok(if report.count(Severity::Error) == 0 { Outcome::Done } else { Outcome::CheckFailed })
     }
 
-    /// Everything that is found.
-    ///
-    /// # Errors
-    /// When an argument gives no file, and for faults of the definitions.
     pub fn findings(&self) -> Result<Validation, Failure> {
         let experiments = known_experiments(&self.definitions)?;
         let inputs = inputs::resolve(&self.input.traces, io::stdin()).map_err(Failure::input)?;
@@ -67,9 +59,6 @@ impl ValidateCommand {
 }
 
 /// The findings for people, some of each kind, and how many there are.
-///
-/// # Errors
-/// When `out` cannot be written.
 pub fn print(out: &mut impl Write, report: &Validation) -> io::Result<()> {
     let (shown, rest) = report.abridged(SHOWN);
     for finding in shown {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::study::verify::verify;
+use study::verify::verify;
 
 /// Hold the files of a report against the hashes in its manifest
 ///
@@ -21,10 +21,6 @@ pub struct VerifyArgs {
 }
 
 impl VerifyArgs {
-    /// Verifies.
-    ///
-    /// # Errors
-    /// For a folder that is no report, a manifest that is damaged, and files that cannot be read.
     pub fn run(&self) -> Result<Outcome, Failure> {
         let found = verify(&self.report).map_err(Failure::input)?;
         output::print(&found, self.json)?;

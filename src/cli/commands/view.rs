@@ -6,14 +6,14 @@ use std::path::PathBuf;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
 
-use crate::base::escape::visible;
-use crate::base::web::{Guard, check_token};
 use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::study::Question;
-use crate::trace::inputs;
-use crate::view::{Options, View, ViewError, export, routes};
+use exact::escape::visible;
+use study::Question;
+use trace::inputs;
+use view::{Options, View, ViewError, export, routes};
+use web::{Guard, check_token};
 
 /// Look at recordings in the browser: the report, every episode step by step, two beside each other
 ///
@@ -61,9 +61,6 @@ pub struct ViewArgs {
 
 impl ViewArgs {
     /// Shows recordings, until the process is ended.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the arguments, the traces or the definitions; an address that cannot be had.
     pub fn run(self) -> Result<Outcome, Failure> {
         let view = View::open(Options {
             runs: self.runs.clone(),

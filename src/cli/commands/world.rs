@@ -7,11 +7,11 @@ use crate::cli::experiments;
 use crate::cli::outcome::{Failure, Outcome};
 #[cfg(feature = "raster")]
 use crate::cli::output;
-use crate::record::plan::Experiments;
-use crate::sim::config::WorldConfig;
+use world::record::plan::Experiments;
+use world::sim::config::WorldConfig;
 #[cfg(feature = "raster")]
-use crate::sim::contact_sheet;
-use crate::sim::scene::Scene;
+use world::sim::contact_sheet;
+use world::sim::scene::Scene;
 
 /// Show what worlds are made of: the configuration, a scene, a contact sheet of pictures
 #[derive(Clone, Debug, clap::Args)]
@@ -72,10 +72,6 @@ fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
 }
 
 impl WorldArgs {
-    /// Shows it.
-    ///
-    /// # Errors
-    /// When the configuration is at fault, nothing can be drawn, or the output cannot be written.
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.verb {
             WorldVerb::Config => io::stdout().lock().write_all(WorldConfig::default_text().as_bytes())?,

@@ -1,7 +1,7 @@
 //! What each scripted agent does in the battery, as its module predicts.
 
-use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::sim::Experiment;
+use world::agent::scripted::Scripted;
+use world::sim::Experiment;
 
 use super::{chance_interval, episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum};

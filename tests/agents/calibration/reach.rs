@@ -1,7 +1,7 @@
 //! What each scripted agent does where a hand is to reach a mark, as its module predicts.
 
-use mirrorstats::agent::scripted::Scripted;
-use mirrorstats::sim::Experiment;
+use world::agent::scripted::Scripted;
+use world::sim::Experiment;
 
 use super::{episodes, profiles, write_table};
 use crate::profile::{Profiles, Sum};

@@ -1,8 +1,8 @@
 //! A model behind a server on loopback, from the command line: what was spent is told, and a failing server loses an
 //! episode under the name of its failure.
 
-use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::Value;
+use world::agent::vlm::wire_format::Dialect;
 
 use super::recordings::{Bench, FORWARD, done, outcome};
 use crate::vlm::server::{JSON, Server, http, spoken};

@@ -4,18 +4,18 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::Duration;
 
-use mirrorstats::agent::vlm::limits::{Account, Limits, Spend};
-use mirrorstats::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
-use mirrorstats::agent::vlm::provider::{Patience, Provider};
-use mirrorstats::agent::vlm::secrets::Secret;
-use mirrorstats::agent::vlm::wire_format::Dialect;
-use mirrorstats::agent::vlm::{OnOutage, Vlm};
-use mirrorstats::agent::{Agent as _, Lost, Observation, Reply, Task};
-use mirrorstats::base::frame::Frame;
-use mirrorstats::experiment::Experiment;
-use mirrorstats::experiment::spec::Stated;
 use tempfile::TempDir;
 use tokio::runtime::Runtime;
+use trace::frame::Frame;
+use world::agent::vlm::limits::{Account, Limits, Spend};
+use world::agent::vlm::models::{Backend, Choice, Contract, Model, Prices};
+use world::agent::vlm::provider::{Patience, Provider};
+use world::agent::vlm::secrets::Secret;
+use world::agent::vlm::wire_format::Dialect;
+use world::agent::vlm::{OnOutage, Vlm};
+use world::agent::{Agent as _, Lost, Observation, Reply, Task};
+use world::experiment::Experiment;
+use world::experiment::spec::Stated;
 
 use super::server::Server;
 

@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 use std::num::NonZeroU32;
 
-use mirrorstats::agent::prompt::{Prompt, Rendered};
-use mirrorstats::agent::reply;
-use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::wire_format::{Dialect, Effort};
-use mirrorstats::experiment::{Experiment, built_in_names};
 use serde_json::{Value, json};
+use world::agent::prompt::{Prompt, Rendered};
+use world::agent::reply;
+use world::agent::vlm::OnOutage;
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::wire_format::{Dialect, Effort};
+use world::experiment::{Experiment, built_in_names};
 
 use super::bench::{Bench, choice, observation, patience, task};
 use super::server::{Server, decision, whole};

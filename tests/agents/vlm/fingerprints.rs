@@ -1,7 +1,7 @@
 //! The model that answers is part of what an episode was recorded with.
 
-use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::Value;
+use world::agent::vlm::wire_format::Dialect;
 
 use super::recordings::Folder;
 use super::server::{Server, decision, ok, spoken};

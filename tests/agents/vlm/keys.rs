@@ -4,9 +4,9 @@ use std::fs;
 use std::path::Path;
 use std::process::Output;
 
-use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::wire_format::Dialect;
+use world::agent::vlm::OnOutage;
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::wire_format::Dialect;
 
 use super::bench::{Bench, KEY};
 use super::recordings::Folder;

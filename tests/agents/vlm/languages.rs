@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::wire_format::Dialect;
-use mirrorstats::agent::{Status, reply};
-use mirrorstats::experiment::Experiment;
-use mirrorstats::trace::episode::Action;
 use serde_json::Value;
+use trace::episode::Action;
+use world::agent::vlm::OnOutage;
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::wire_format::Dialect;
+use world::agent::{Status, reply};
+use world::experiment::Experiment;
 
 use super::bench::{Bench, KEY};
 use super::recordings::Folder;

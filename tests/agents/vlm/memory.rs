@@ -3,11 +3,11 @@
 use std::num::NonZeroU32;
 use std::sync::Arc;
 
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::models::Model;
-use mirrorstats::agent::vlm::wire_format::{Dialect, Effort};
-use mirrorstats::agent::vlm::{OnOutage, Vlm};
-use mirrorstats::trace::episode::Action;
+use trace::episode::Action;
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::models::Model;
+use world::agent::vlm::wire_format::{Dialect, Effort};
+use world::agent::vlm::{OnOutage, Vlm};
 
 use super::bench::{Bench, choice};
 use super::server::{Server, decision, http, whole};

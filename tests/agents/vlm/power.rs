@@ -5,9 +5,9 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::process::Stdio;
 
-use mirrorstats::agent::vlm::journal::Entry;
-use mirrorstats::agent::vlm::wire_format::Dialect;
-use mirrorstats::base::hash;
+use exact::hash;
+use world::agent::vlm::journal::Entry;
+use world::agent::vlm::wire_format::Dialect;
 
 use super::recordings::{Folder, counting};
 use super::server::{Request, Server, whole};

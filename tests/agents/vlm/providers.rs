@@ -3,11 +3,11 @@
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use mirrorstats::agent::Status;
-use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::{Value, json};
+use world::agent::Status;
+use world::agent::vlm::OnOutage;
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::wire_format::Dialect;
 
 use super::bench::{Bench, KEY};
 use super::recordings::{Folder, counting};

@@ -2,10 +2,10 @@
 
 use std::net::TcpListener;
 
-use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::json;
+use world::agent::vlm::OnOutage;
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::wire_format::Dialect;
 
 use super::bench::{Bench, KEY};
 use super::recordings::{Folder, counting};

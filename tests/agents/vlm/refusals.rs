@@ -2,11 +2,11 @@
 
 use std::fs;
 
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::wire_format::Dialect;
-use mirrorstats::agent::vlm::{OnOutage, Vlm};
-use mirrorstats::agent::{Lost, Reply, Status};
 use serde_json::{Value, json};
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::wire_format::Dialect;
+use world::agent::vlm::{OnOutage, Vlm};
+use world::agent::{Lost, Reply, Status};
 
 use super::bench::{Bench, KEY, choice};
 use super::recordings::{Folder, counting, rows};

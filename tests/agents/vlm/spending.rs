@@ -1,8 +1,8 @@
 //! Limits hold over all episodes of a recording and all times that it is started.
 
-use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::wire_format::Dialect;
+use world::agent::vlm::OnOutage;
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::wire_format::Dialect;
 
 use serde_json::{Value, json};
 

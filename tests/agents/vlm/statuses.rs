@@ -2,13 +2,13 @@
 
 use std::time::{Duration, Instant};
 
-use mirrorstats::agent::Status;
-use mirrorstats::agent::reply::Repair;
-use mirrorstats::agent::vlm::OnOutage;
-use mirrorstats::agent::vlm::limits::Limits;
-use mirrorstats::agent::vlm::provider::Patience;
-use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::json;
+use world::agent::Status;
+use world::agent::reply::Repair;
+use world::agent::vlm::OnOutage;
+use world::agent::vlm::limits::Limits;
+use world::agent::vlm::provider::Patience;
+use world::agent::vlm::wire_format::Dialect;
 
 use super::bench::{Bench, KEY, patience};
 use super::server::{Conduct, JSON, Server, decision, endings, http, ok, spoken, whole};

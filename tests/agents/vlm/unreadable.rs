@@ -1,7 +1,7 @@
 //! Replies that cannot be read are told while they come, at the end, and of the trace that they leave.
 
-use mirrorstats::agent::vlm::wire_format::Dialect;
 use serde_json::{Value, json};
+use world::agent::vlm::wire_format::Dialect;
 
 use super::bench::KEY;
 use super::recordings::Folder;

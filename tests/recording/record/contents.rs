@@ -2,8 +2,8 @@
 
 use arrow::array::{Array, AsArray, BooleanArray, RecordBatch};
 use arrow::datatypes::{Float32Type, Int32Type, Int64Type};
-use mirrorstats::trace::schema::COLUMNS;
 use serde_json::{Value, json};
+use trace::schema::COLUMNS;
 
 use super::recordings::Bench;
 use crate::harness::files::{Contents, fixture, write_small_world};

@@ -43,7 +43,7 @@ fn it_reports_the_episodes_under_the_definitions_of_their_experiments() {
     assert_eq!(cell(&bench, "reports/latest", "TSA"), "2");
 
     let both = "--agent oracle --experiment E1,mark,reach-hand --seeds 1 --runs 1 --no-log";
-    let said = succeeds(&mut bench.record("my runs", "").args(both.split(' ')));
+    let said = succeeds(bench.record("my runs", "").args(both.split(' ')));
     assert_eq!(typed(&bench, &stderr(&said)), 2);
     assert_eq!(cell(&bench, "reports/battery", "TSA"), "1");
     assert_eq!(cell(&bench, "reports/reach", "SUCCESS"), "1");

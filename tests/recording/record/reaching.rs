@@ -126,9 +126,11 @@ fn levels_and_arms_are_pairs_and_stand_in_one_report() {
     assert!(["self_color", "selected_cube"].iter().all(|name| columns.column_with_name(name).is_none()), "{columns}");
     run(at, &["validate", "runs"]).done();
     bench.recorded("both", "--experiment E1,reach-bare --seeds 1 --runs 2 --no-log --agent random");
+    // Each has definitions of its own; a file that includes both scores the mixture.
+    fs::write(bench.path("both.toml"), "include = [\"paper\", \"reach\"]\n").unwrap();
     let scores = |engine: &str| {
         let out = format!("{engine}.csv");
-        run(at, &["score", "both", "--engine", engine, "-o", &out]).done();
+        run(at, &["score", "both", "--definitions", "both.toml", "--engine", engine, "-o", &out]).done();
         fs::read_to_string(bench.path(&out)).unwrap()
     };
     let native = scores("native");

@@ -6,9 +6,9 @@ use std::process::{Child, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-use mirrorstats::record::folder_lock::FolderLock;
-use mirrorstats::record::lock::{Attempt, EpisodeLock};
 use serde_json::Value;
+use world::record::folder_lock::FolderLock;
+use world::record::lock::{Attempt, EpisodeLock};
 
 use super::recordings::Bench;
 use crate::harness::files::{Contents, assert_same, write_small_world};

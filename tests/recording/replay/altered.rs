@@ -1,7 +1,7 @@
 //! A trace in which one value is another than was recorded parts from its replay there.
 
-use mirrorstats::trace::episode::{Action, Episode};
 use serde_json::Value;
+use trace::episode::{Action, Episode};
 
 use super::traces::{copy, recorded, replay};
 use crate::harness::program::{stderr, stdout};

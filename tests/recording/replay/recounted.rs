@@ -1,6 +1,6 @@
 //! Ground truth under another threshold or another grid.
 
-use mirrorstats::trace::episode_hash;
+use trace::episode_hash;
 
 use super::traces::{WITH_SIGHT, copy, replay};
 use crate::harness::program::{program, stderr, stdout, succeeds};

@@ -1,14 +1,14 @@
 //! The agent's own body: never in its own view, always within its cylinder, always within the room.
 
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::body::{Figure, Pose, Stride};
-use mirrorstats::sim::camera::LabelCamera;
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::model::Item;
-use mirrorstats::sim::rng::Rng;
-use mirrorstats::sim::snapshot::{Shape, Solid};
-use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
-use mirrorstats::sim::world::World;
+use world::sim::Experiment;
+use world::sim::body::{Figure, Pose, Stride};
+use world::sim::camera::LabelCamera;
+use world::sim::config::WorldConfig;
+use world::sim::model::Item;
+use world::sim::rng::Rng;
+use world::sim::snapshot::{Shape, Solid};
+use world::sim::visibility::{Shown, labels, labels_by_mujoco};
+use world::sim::world::World;
 
 use super::poses::{scatter, world};
 use crate::harness::need;
@@ -36,7 +36,7 @@ fn a_body_never_shows_directly_in_its_own_view() {
 #[test]
 fn a_body_that_did_show_would_be_found() {
     let config = WorldConfig {
-        eye: mirrorstats::sim::config::EyeConfig { forward: 0.0, ..WorldConfig::default().eye },
+        eye: world::sim::config::EyeConfig { forward: 0.0, ..WorldConfig::default().eye },
         ..WorldConfig::default()
     };
     let scene = world(Experiment::E1, 4).scene().clone();
@@ -50,7 +50,7 @@ fn the_margin_of_the_eye_is_wide_at_every_stride() {
     // Straight below or behind is out of view; how steeply is what matters: a part may come no nearer to the edge of
     // the view than half of its own distance ahead.
     let mut world = world(Experiment::E1, 1);
-    let pose = Pose { x: 0.0, y: 0.0, heading: mirrorstats::sim::angle::Heading::new(0) };
+    let pose = Pose { x: 0.0, y: 0.0, heading: world::sim::angle::Heading::new(0) };
     let eye = [0.14, 0.0, 1.52];
     for stride in [Stride::Standing, Stride::Left, Stride::Right] {
         world.place(&[Figure { pose, stride, steps: 0 }]);
@@ -69,7 +69,7 @@ fn a_body_is_within_its_cylinder_at_every_stride() {
     let mut world = world(Experiment::E1, 1);
     for thirties in 0..12 {
         for stride in [Stride::Standing, Stride::Left, Stride::Right] {
-            let pose = Pose { x: 0.0, y: 0.0, heading: mirrorstats::sim::angle::Heading::new(thirties) };
+            let pose = Pose { x: 0.0, y: 0.0, heading: world::sim::angle::Heading::new(thirties) };
             world.place(&[Figure { pose, stride, steps: 0 }]);
             for solid in own(&world) {
                 for ([x, y, z], radius) in ends(&solid) {

@@ -1,10 +1,10 @@
 //! How large a reflection is, by the field of view.
 
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::body::{Figure, Pose};
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::scene::Scene;
-use mirrorstats::sim::world::World;
+use world::sim::Experiment;
+use world::sim::body::{Figure, Pose};
+use world::sim::config::WorldConfig;
+use world::sim::scene::Scene;
+use world::sim::world::World;
 
 /// Pixels of the own body of somebody who stands 1.6 m before the mirror.
 fn own_pixels(fovy: f64) -> f64 {

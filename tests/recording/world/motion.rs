@@ -1,20 +1,20 @@
 //! What actions do, what is in the way, and that nothing ever goes through anything.
 
-use mirrorstats::base::palette::Color;
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::angle::Heading;
-use mirrorstats::sim::body::{Figure, Pose, Stride};
-use mirrorstats::sim::floor::distance;
-use mirrorstats::sim::rng::Rng;
-use mirrorstats::sim::world::World;
-use mirrorstats::trace::episode::Action;
+use trace::episode::Action;
+use trace::palette::Color;
+use world::sim::Experiment;
+use world::sim::angle::Heading;
+use world::sim::body::{Figure, Pose, Stride};
+use world::sim::floor::distance;
+use world::sim::rng::Rng;
+use world::sim::world::World;
 
 use super::poses::world;
 
 /// An empty place to walk in: E1 without cubes.
 fn empty() -> World {
     let drawn = world(Experiment::E2, 1);
-    let scene = mirrorstats::sim::scene::Scene { cubes: Vec::new(), ..drawn.scene().clone() };
+    let scene = world::sim::scene::Scene { cubes: Vec::new(), ..drawn.scene().clone() };
     let mut world = World::new(drawn.config(), scene).unwrap();
     stand(&mut world, [0.0, 0.0], 0);
     world

@@ -1,13 +1,13 @@
 //! The ten colours can be told apart in the picture, directly and in the mirror, from one another and from the room.
 
-use mirrorstats::base::palette::Color;
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::camera::Camera;
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::label_image::LabelImage;
-use mirrorstats::sim::model::Item;
-use mirrorstats::sim::visibility::{Shown, labels};
-use mirrorstats::sim::world::World;
+use trace::palette::Color;
+use world::sim::Experiment;
+use world::sim::camera::Camera;
+use world::sim::config::WorldConfig;
+use world::sim::label_image::LabelImage;
+use world::sim::model::Item;
+use world::sim::visibility::{Shown, labels};
+use world::sim::world::World;
 
 use super::poses::{face_mirror, world};
 use crate::harness::need;

@@ -1,20 +1,20 @@
 //! What is seen through panes of every kind: the census against drawn labels and MuJoCo's rays, and against what each kind
 //! must show.
 
-use mirrorstats::base::palette::Color;
-use mirrorstats::experiment::Experiment;
-use mirrorstats::experiment::file;
-use mirrorstats::metric::fault::Source;
-use mirrorstats::sim::camera::{Camera, LabelCamera};
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::label_image::LabelImage;
-use mirrorstats::sim::model::Item;
-use mirrorstats::sim::passage;
-use mirrorstats::sim::rng::Rng;
-use mirrorstats::sim::scene::{HungPane, Scene};
-use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
-use mirrorstats::sim::world::World;
-use mirrorstats::trace::episode::Action;
+use metric::fault::Source;
+use trace::episode::Action;
+use trace::palette::Color;
+use world::experiment::Experiment;
+use world::experiment::file;
+use world::sim::camera::{Camera, LabelCamera};
+use world::sim::config::WorldConfig;
+use world::sim::label_image::LabelImage;
+use world::sim::model::Item;
+use world::sim::passage;
+use world::sim::rng::Rng;
+use world::sim::scene::{HungPane, Scene};
+use world::sim::visibility::{Shown, labels, labels_by_mujoco};
+use world::sim::world::World;
 
 use super::poses::scatter;
 use crate::harness::need;
@@ -220,7 +220,7 @@ fn a_late_mirror_shows_the_past() {
 fn marks_appear_at_their_step_and_later_in_a_late_mirror() {
     let mut world = world(kind("late"), 5);
     let is_shown = |world: &World| {
-        let shown = |stage: &mirrorstats::sim::model::Stage| {
+        let shown = |stage: &world::sim::model::Stage| {
             stage.items().iter().enumerate().any(|(geom, item)| *item == Item::Mark(0) && stage.is_shown(geom))
         };
         [shown(world.stage()), shown(&world.beyond()[0])]
@@ -257,8 +257,7 @@ fn a_mark_has_a_colour_that_its_wearer_and_the_own_body_have_not() {
 fn paint_of(world: &World, eye: &mut Camera, shown: Shown) -> Option<Color> {
     let frame = eye.frame(world).unwrap();
     let pixels = world.labels().codes.iter().enumerate().filter(|(_, code)| **code == shown.code());
-    let named =
-        pixels.filter_map(|(at, _)| mirrorstats::agent::perception::paint::color(&frame.rgb[3 * at..3 * at + 3]));
+    let named = pixels.filter_map(|(at, _)| world::agent::perception::paint::color(&frame.rgb[3 * at..3 * at + 3]));
     let mut counts = std::collections::BTreeMap::new();
     named.for_each(|color| *counts.entry(color).or_insert(0_usize) += 1);
     counts.into_iter().filter(|(_, count)| *count >= 60).max_by_key(|(_, count)| *count).map(|(color, _)| color)

@@ -1,13 +1,13 @@
 //! Worlds with everybody at random places that do not overlap.
 
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::angle::Heading;
-use mirrorstats::sim::body::{Figure, Pose, Stride};
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::floor::{FloorPlan, distance};
-use mirrorstats::sim::rng::Rng;
-use mirrorstats::sim::scene::Scene;
-use mirrorstats::sim::world::World;
+use world::sim::Experiment;
+use world::sim::angle::Heading;
+use world::sim::body::{Figure, Pose, Stride};
+use world::sim::config::WorldConfig;
+use world::sim::floor::{FloorPlan, distance};
+use world::sim::rng::Rng;
+use world::sim::scene::Scene;
+use world::sim::world::World;
 
 /// The world of an experiment and a seed, at its start.
 pub fn world(experiment: Experiment, seed: i32) -> World {

@@ -1,15 +1,15 @@
 //! The reaching task: where body, camera, mirror, mark and hand are, what stops the hand, and that only the mirror shows
 //! the mark.
 
-use mirrorstats::experiment::{Experiment, built_in, built_in_names, load};
-use mirrorstats::sim::camera::LabelCamera;
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::model::Item;
-use mirrorstats::sim::placement;
-use mirrorstats::sim::scene::Scene;
-use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
-use mirrorstats::sim::world::World;
-use mirrorstats::trace::episode::Action;
+use trace::episode::Action;
+use world::experiment::{Experiment, built_in, built_in_names, load};
+use world::sim::camera::LabelCamera;
+use world::sim::config::WorldConfig;
+use world::sim::model::Item;
+use world::sim::placement;
+use world::sim::scene::Scene;
+use world::sim::visibility::{Shown, labels, labels_by_mujoco};
+use world::sim::world::World;
 
 use crate::harness::need;
 

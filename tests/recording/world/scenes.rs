@@ -3,16 +3,16 @@
 use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
-use mirrorstats::base::hash;
-use mirrorstats::base::palette::Color;
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::body::{Figure, Pose};
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::floor::distance;
-use mirrorstats::sim::model::Item;
-use mirrorstats::sim::scene::Scene;
-use mirrorstats::sim::visibility::{Shown, labels};
-use mirrorstats::sim::world::World;
+use exact::hash;
+use trace::palette::Color;
+use world::sim::Experiment;
+use world::sim::body::{Figure, Pose};
+use world::sim::config::WorldConfig;
+use world::sim::floor::distance;
+use world::sim::model::Item;
+use world::sim::scene::Scene;
+use world::sim::visibility::{Shown, labels};
+use world::sim::world::World;
 
 use crate::assert_shown;
 

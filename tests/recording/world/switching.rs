@@ -1,10 +1,10 @@
 //! One eye draws many worlds by turns, and none leaves a trace in the next.
 
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::camera::Camera;
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::rng::Rng;
-use mirrorstats::trace::episode::Action;
+use trace::episode::Action;
+use world::sim::Experiment;
+use world::sim::camera::Camera;
+use world::sim::config::WorldConfig;
+use world::sim::rng::Rng;
 
 use super::poses::{face_mirror, scatter, world};
 use crate::harness::need;

@@ -2,15 +2,15 @@
 
 use std::ops::Range;
 
-use mirrorstats::base::frame::Frame;
-use mirrorstats::base::palette::Color;
-use mirrorstats::sim::Experiment;
-use mirrorstats::sim::camera::{Camera, LabelCamera};
-use mirrorstats::sim::config::WorldConfig;
-use mirrorstats::sim::label_image::LabelImage;
-use mirrorstats::sim::model::Item;
-use mirrorstats::sim::visibility::{Shown, labels, labels_by_mujoco};
-use mirrorstats::sim::world::World;
+use trace::frame::Frame;
+use trace::palette::Color;
+use world::sim::Experiment;
+use world::sim::camera::{Camera, LabelCamera};
+use world::sim::config::WorldConfig;
+use world::sim::label_image::LabelImage;
+use world::sim::model::Item;
+use world::sim::visibility::{Shown, labels, labels_by_mujoco};
+use world::sim::world::World;
 
 use super::poses::for_scattered;
 use crate::harness::need;

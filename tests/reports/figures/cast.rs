@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use exact::moments::Moments;
+use exact::ratio::Ratio;
 use indexmap::IndexMap;
-use mirrorstats::base::ratio::Ratio;
-use mirrorstats::figures::Input;
-use mirrorstats::figures::e5_outcomes::{OutcomeRow, Outcomes};
-use mirrorstats::metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
-use mirrorstats::score::table::{Declared, EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
-use mirrorstats::score::timeline::Timeline;
-use mirrorstats::stats::cell::{Cells, Group, KeyValue};
-use mirrorstats::stats::moments::Moments;
+use metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
+use report::cells::{Cells, Group, KeyValue};
+use report::figures::Input;
+use report::figures::e5_outcomes::{OutcomeRow, Outcomes};
+use score::table::{Declared, EpisodeKey, EpisodeTable, KeyRef, MetricColumn};
+use score::timeline::Timeline;
 
 const METRICS: [&str; 7] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR", "TSA-C"];
 const TITLES: [(&str, &str); 5] = [

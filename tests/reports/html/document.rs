@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use mirrorstats::report::bundle::cells_csv;
-use mirrorstats::report::html::HtmlError;
+use report::bundle::cells_csv;
+use report::html::HtmlError;
 
 use crate::html::scored::{PAPER, PAPER_PAGE, Report};
 

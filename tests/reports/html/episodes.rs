@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use mirrorstats::score::table::MetricColumn;
+use score::table::MetricColumn;
 use serde_json::json;
 
 use crate::harness::files::fixture;

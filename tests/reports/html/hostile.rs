@@ -1,7 +1,7 @@
 //! Names that would like to be markup, script or an order of letters.
 
-use mirrorstats::score::builder::TableBuilder;
-use mirrorstats::score::table::{EpisodeTable, KeyRef};
+use score::builder::TableBuilder;
+use score::table::{EpisodeTable, KeyRef};
 
 use crate::html::browser::Browser;
 use crate::html::document::tags;

@@ -1,6 +1,6 @@
 //! Two models against each other: the numbers of the statistics, whichever way the two are chosen.
 
-use mirrorstats::report::statistics::{PairTest, Statistics};
+use report::statistics::{PairTest, Statistics};
 
 use crate::html::browser::Browser;
 use crate::html::scored::{PAPER_PAGE, Report};

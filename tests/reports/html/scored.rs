@@ -4,18 +4,18 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::LazyLock;
 
-use mirrorstats::figures::{self, FigureName};
-use mirrorstats::report::bundle::{Input, Manifest};
-use mirrorstats::report::html::{self, Figure, HtmlError, Page, Recordings};
-use mirrorstats::report::layout;
-use mirrorstats::report::statistics::{Options, Statistics};
-use mirrorstats::report::style::Style;
-use mirrorstats::report::table::Table;
-use mirrorstats::score::score_traces::{self, Request};
-use mirrorstats::score::table::EpisodeTable;
-use mirrorstats::stats::cell::Cells;
-use mirrorstats::stats::group::group;
-use mirrorstats::trace::{inputs, open::TraceSet};
+use report::bundle::{Input, Manifest};
+use report::cells::Cells;
+use report::cells::group::group;
+use report::figures::{self, FigureName};
+use report::html::{self, Figure, HtmlError, Page, Recordings};
+use report::layout;
+use report::statistics::{Options, Statistics};
+use report::style::Style;
+use report::table::Table;
+use score::score_traces::{self, Request};
+use score::table::EpisodeTable;
+use trace::{inputs, open::TraceSet};
 
 use crate::harness::files::fixture;
 

@@ -3,10 +3,10 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use mirrorstats::report::bundle::{Bundle, BundleError, Input, Manifest, OutputFile, cells_csv, write};
-use mirrorstats::report::style::Style;
-use mirrorstats::report::table::Table;
-use mirrorstats::stats::cell::Cells;
+use report::bundle::{Bundle, BundleError, Input, Manifest, OutputFile, cells_csv, write};
+use report::cells::Cells;
+use report::style::Style;
+use report::table::Table;
 
 use crate::assert_shown;
 use crate::report::published;

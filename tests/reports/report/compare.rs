@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::Path;
 
-use mirrorstats::report::comparison::{Comparison, choose, compare};
-use mirrorstats::report::errata::Errata;
-use mirrorstats::report::published::{Published, read};
-use mirrorstats::report::style::Style;
-use mirrorstats::report::tables::side_by_side;
+use report::comparison::{Comparison, choose, compare};
+use report::errata::Errata;
+use report::published::{Published, read};
+use report::style::Style;
+use report::tables::side_by_side;
 
 use crate::assert_shown;
 use crate::report::published;

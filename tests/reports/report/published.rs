@@ -8,16 +8,16 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::sync::LazyLock;
 
+use exact::moments::Moments;
 use indexmap::IndexMap;
-use mirrorstats::metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::report::layout;
-use mirrorstats::report::style::Style;
-use mirrorstats::report::table::{Table, Value};
-use mirrorstats::report::value;
-use mirrorstats::score::score_traces::schema_columns;
-use mirrorstats::stats::cell::{Cell as CellOf, Cells, Group, KeyValue};
-use mirrorstats::stats::moments::Moments;
+use metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
+use metric::definitions::Definitions;
+use report::cells::{Cell as CellOf, Cells, Group, KeyValue};
+use report::layout;
+use report::style::Style;
+use report::table::{Table, Value};
+use report::value;
+use score::score_traces::schema_columns;
 
 /// Episodes behind every published cell.
 pub const EPISODES: u64 = 21;

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use mirrorstats::report::style::Style;
+use report::style::Style;
 
 use crate::assert_shown;
 use crate::report::published;

@@ -3,14 +3,14 @@
 use std::fmt::Write as _;
 use std::fs;
 
-use mirrorstats::metric::catalog::{Better, Catalog, Kind, StandardError};
-use mirrorstats::report::layout;
-use mirrorstats::report::style::Style;
-use mirrorstats::report::table::{Emphasis, Spread, Table, Value};
-use mirrorstats::report::tables::terminal::{self, Marks, Terminal};
-use mirrorstats::report::tables::{csv, latex, markdown};
-use mirrorstats::stats::cell::{Cells, Group, KeyValue};
-use mirrorstats::stats::moments::Moments;
+use exact::moments::Moments;
+use metric::catalog::{Better, Catalog, Kind, StandardError};
+use report::cells::{Cells, Group, KeyValue};
+use report::layout;
+use report::style::Style;
+use report::table::{Emphasis, Spread, Table, Value};
+use report::tables::terminal::{self, Marks, Terminal};
+use report::tables::{csv, latex, markdown};
 
 use crate::assert_shown;
 use crate::report::published::{self, metric_of};
@@ -163,7 +163,7 @@ fn marks_are_where_the_caption_says() {
     }
     assert!(cells.iter().any(|cell| cell.is_marked) && cells.iter().any(|cell| cell.n > 4 && !cell.is_marked));
     let marked = cells.iter().filter(|cell| cell.is_marked).count();
-    let (html, dagger) = (mirrorstats::report::tables::html::render(&table), "†");
+    let (html, dagger) = (report::tables::html::render(&table), "†");
     for (format, text, mark) in [
         ("terminal", terminal::render(&table, Terminal::default()), dagger),
         ("markdown", markdown::render(&table), dagger),

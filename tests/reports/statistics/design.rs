@@ -1,8 +1,8 @@
 //! What is compared with what follows from the declared design: pairs, clusters, conditions, strata.
 
-use mirrorstats::report::statistics::text::{self, Length};
-use mirrorstats::report::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
-use mirrorstats::stats::design::{Cluster, Design, DesignKind};
+use report::statistics::text::{self, Length};
+use report::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
+use statistics::design::{Cluster, Design, DesignKind};
 
 use super::{RECORDED, Row, block, by_place, cells, contrast, labelled, recorded, statistics, study, with_scenes};
 

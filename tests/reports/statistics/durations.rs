@@ -1,9 +1,9 @@
 //! Durations are compared by restricted means, and intervals are given only where they hold what they promise.
 
-use mirrorstats::report::statistics::text::{self, Length};
-use mirrorstats::report::statistics::{Intervals, Options, Statistics};
-use mirrorstats::stats::coverage::{self, Withheld};
-use mirrorstats::stats::interval::Interval;
+use report::statistics::text::{self, Length};
+use report::statistics::{Intervals, Options, Statistics};
+use statistics::coverage::{self, Withheld};
+use statistics::interval::Interval;
 
 use super::{Row, block, cells, contrast, recorded, statistics, study, table};
 use crate::html::scored::PAPER;
@@ -30,7 +30,7 @@ fn chance_is_tested_among_finished_episodes_too() {
     let of =
         |metric: &'static str| found.chance.iter().filter(move |row| row.metric == metric && row.experiment != "E5");
     let changed = of("TSA").filter(|row| {
-        let same = |other: &&mirrorstats::report::statistics::ChanceRow| {
+        let same = |other: &&report::statistics::ChanceRow| {
             (&other.experiment, &other.model, other.level) == (&row.experiment, &row.model, row.level)
         };
         of("TSA-C").find(same).is_some_and(|other| other.verdict != row.verdict)

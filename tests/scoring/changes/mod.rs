@@ -4,8 +4,8 @@ mod diff;
 mod rescore;
 mod worked;
 
-use mirrorstats::trace::episode::{Action, Episode, Step};
-use mirrorstats::trace::write::write_episodes;
+use trace::episode::{Action, Episode, Step};
+use trace::write::write_episodes;
 
 use crate::harness::program::run;
 use crate::harness::traces;

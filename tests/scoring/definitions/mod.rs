@@ -6,12 +6,12 @@ use std::error::Error as _;
 use std::fs;
 use std::path::Path;
 
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::metric::file::FileError;
-use mirrorstats::score::score_traces::schema_columns;
+use metric::definitions::Definitions;
+use metric::file::FileError;
 use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::select;
+use score::score_traces::schema_columns;
 
 fn check(text: &str) -> Result<Definitions, FileError> {
     Definitions::from_toml("test", text, &schema_columns())

@@ -3,17 +3,17 @@
 use std::fmt::Write as _;
 use std::num::NonZeroUsize;
 
-use mirrorstats::engine::polars::run::PolarsError;
-use mirrorstats::engine::polars::score;
-use mirrorstats::metric::columns::{Column, Columns, Level, Type};
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::metric::sql::{self, Dialect};
-use mirrorstats::score::error::EngineError;
-use mirrorstats::score::score_traces::{self, ScoreError};
-use mirrorstats::score::table::{EpisodeKey, EpisodeTable};
-use mirrorstats::trace::open::TraceSet;
+use ::score::error::EngineError;
+use ::score::score_traces::{self, ScoreError};
+use ::score::table::{EpisodeKey, EpisodeTable};
+use engines::polars::run::PolarsError;
+use engines::polars::score;
+use metric::columns::{Column, Columns, Level, Type};
+use metric::definitions::Definitions;
+use metric::sql::{self, Dialect};
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestRunner};
+use trace::open::TraceSet;
 
 use crate::author::definitions;
 use crate::differential::trace::{Sheet, open, sheets};

@@ -7,14 +7,14 @@ use std::num::NonZeroUsize;
 use std::path::Path;
 use std::process::Command;
 
-use mirrorstats::engine::polars::score as polars;
-use mirrorstats::metric::columns::{Columns, Type};
-use mirrorstats::metric::definitions::Definitions;
-use mirrorstats::metric::sql::{self, Dialect};
-use mirrorstats::score::score_traces;
-use mirrorstats::score::table::EpisodeTable;
-use mirrorstats::trace::open::TraceSet;
+use engines::polars::score as polars;
+use metric::columns::{Columns, Type};
+use metric::definitions::Definitions;
+use metric::sql::{self, Dialect};
+use score::score_traces;
+use score::table::EpisodeTable;
 use serde_json::{Value, json};
+use trace::open::TraceSet;
 
 use crate::differential::property::{columns, load};
 use crate::differential::trace::{Sheet, open};

@@ -6,12 +6,12 @@ use std::sync::Arc;
 
 use arrow::array::{Array, Int32Array, RecordBatch, StringArray, TimestampMicrosecondArray};
 use arrow::datatypes::{DataType, Field, Schema};
-use mirrorstats::trace::episode::{Action, Extra, Step};
-use mirrorstats::trace::write::write_episodes;
 use parquet::basic::Compression;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
 use serde_json::{Value, json};
+use trace::episode::{Action, Extra, Step};
+use trace::write::write_episodes;
 
 use crate::assert_shown;
 use crate::harness::files::fixture;

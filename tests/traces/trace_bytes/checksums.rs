@@ -4,14 +4,14 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use mirrorstats::score::format::{self, Format};
-use mirrorstats::score::score_traces::{self, Request};
-use mirrorstats::trace::diagnostic::{Code, Finding};
-use mirrorstats::trace::error::TraceError;
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::merge;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::verify::verify_pages;
+use score::format::{self, Format};
+use score::score_traces::{self, Request};
+use trace::diagnostic::{Code, Finding};
+use trace::error::TraceError;
+use trace::inputs::Input;
+use trace::merge;
+use trace::open::TraceSet;
+use trace::verify::verify_pages;
 
 use crate::harness::files;
 use crate::harness::program::program;
@@ -139,7 +139,7 @@ fn every_page_with_a_wrong_checksum_is_found_on_every_way_to_read_it() {
             assert_eq!(finding.column.as_ref(), Some(&page.column));
             let merged = merge::read(&path).unwrap_err().to_string();
             assert!(merged.contains("CRC-32") && merged.contains(&page.column), "{name}, {page:?}: {merged}");
-            if mirrorstats::trace::schema::column(&page.column).is_none() {
+            if trace::schema::column(&page.column).is_none() {
                 // A column of their own, which `validate` does not read.
                 assert_eq!(page.column, "description");
                 continue;

@@ -4,12 +4,12 @@ use std::fs;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use mirrorstats::trace::diagnostic::Severity;
-use mirrorstats::trace::episode::Episode;
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::merge;
-use mirrorstats::trace::validate::validate;
-use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
+use trace::diagnostic::Severity;
+use trace::episode::Episode;
+use trace::inputs::Input;
+use trace::merge;
+use trace::validate::validate;
+use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 
 use super::checksums::{draws, scores};
 use super::{encoded, episodes, trace};

@@ -7,16 +7,16 @@ use std::sync::Arc;
 
 use arrow::array::RecordBatch;
 use arrow::datatypes::Schema;
-use mirrorstats::trace::diagnostic::Severity;
-use mirrorstats::trace::episode::{Action, Episode, Extra, Step};
-use mirrorstats::trace::error::TraceError;
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::scan::Projection;
-use mirrorstats::trace::validate::validate;
-use mirrorstats::trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 use parquet::arrow::ArrowWriter;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder, WriterVersion};
+use trace::diagnostic::Severity;
+use trace::episode::{Action, Episode, Extra, Step};
+use trace::error::TraceError;
+use trace::inputs::Input;
+use trace::open::TraceSet;
+use trace::scan::Projection;
+use trace::validate::validate;
+use trace::write::{OptionalColumns, TraceEncoder, TraceMetadata};
 
 use crate::harness::traces::{self, reader};
 

@@ -12,13 +12,13 @@ use arrow::compute::cast;
 use arrow::datatypes::DataType;
 use arrow::util::display::array_value_to_string;
 use bytes::Bytes;
-use mirrorstats::trace::error::TraceError;
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceSet;
-use mirrorstats::trace::scan::{EpisodeBatch, Projection};
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use parquet::basic::Compression;
 use parquet::file::properties::{WriterProperties, WriterVersion};
+use trace::error::TraceError;
+use trace::inputs::Input;
+use trace::open::TraceSet;
+use trace::scan::{EpisodeBatch, Projection};
 
 use crate::trace_bytes::pages::pages;
 use crate::trace_bytes::stored;

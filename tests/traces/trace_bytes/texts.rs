@@ -1,8 +1,8 @@
 //! Texts that are UTF-8 together and not one by one.
 
-use mirrorstats::trace::episode::{Episode, Extra, Step};
 use parquet::basic::{Compression, Encoding};
 use parquet::file::properties::{WriterProperties, WriterVersion};
+use trace::episode::{Episode, Extra, Step};
 
 use crate::harness::traces;
 use crate::trace_bytes::{read, stored_as, trace_of};

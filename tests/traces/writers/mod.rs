@@ -7,14 +7,14 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use arrow::util::display::array_value_to_string;
-use mirrorstats::score::format::Format;
-use mirrorstats::study::write_scores;
-use mirrorstats::trace::checksums::Checksums;
-use mirrorstats::trace::diagnostic::Severity;
-use mirrorstats::trace::inputs::Input;
-use mirrorstats::trace::open::TraceFile;
-use mirrorstats::trace::validate::validate;
 use mirrorstats::{Study, StudyError};
+use score::format::Format;
+use study::write_scores;
+use trace::checksums::Checksums;
+use trace::diagnostic::Severity;
+use trace::inputs::Input;
+use trace::open::TraceFile;
+use trace::validate::validate;
 
 use crate::harness::files::{fixture, repository};
 use crate::harness::need;
@@ -78,11 +78,11 @@ fn written(folder: &Path) -> BTreeMap<PathBuf, PathBuf> {
     files
 }
 
-fn scores(path: &Path) -> Result<String, StudyError> {
+fn scores(path: &Path) -> Result<String, Box<StudyError>> {
     scores_by(path, repository().join("tests/traces/writers/definitions.toml").to_str().unwrap())
 }
 
-fn scores_by(path: &Path, definitions: &str) -> Result<String, StudyError> {
+fn scores_by(path: &Path, definitions: &str) -> Result<String, Box<StudyError>> {
     let table = Study::open([path])?.definitions(definitions)?.score()?.episodes;
     let mut bytes = Vec::new();
     write_scores(&table, Format::Csv, &mut bytes, NonZeroUsize::MIN).unwrap();

@@ -1,0 +1,193 @@
+//! A query's rows, batch by batch as they are computed: into CSV, JSON lines, Parquet, or the head and tail of a table.
+//!
+//! Rule: rows come in the order of the query; what is null stays apart from what is empty.
+
+use std::collections::VecDeque;
+use std::io::Write;
+use std::num::NonZeroUsize;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use polars::prelude::{
+    AnyValue, CsvWriter, DataFrame, Engine, JsonFormat, JsonWriter, LazyFrame, ParquetWriter, PlanCallback,
+    PolarsError as Inner, PolarsResult, Schema, SerWriter as _,
+};
+use polars::sql::SQLContext;
+
+use super::run::{self, PolarsError};
+use super::statement::{Checked, Table};
+use metric::fault::Faults;
+use trace::catch_panic::contained_on_all_threads;
+
+/// Rows of one batch at most.
+const BATCH: NonZeroUsize = NonZeroUsize::new(1 << 17).expect("not zero");
+
+/// Why a query has no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum QueryError {
+    /// It cannot be run as it is.
+    #[error(transparent)]
+    Faults(#[from] Faults),
+    /// It could not be run to its end.
+    #[error(transparent)]
+    Polars(#[from] PolarsError),
+}
+
+/// The formats that are written as they come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Comma-separated with a header; null is empty, an empty text `""`.
+    Csv,
+    /// A JSON object a line.
+    JsonLines,
+    /// Parquet.
+    Parquet,
+}
+
+/// The beginning and the end of an answer, for people.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Excerpt {
+    /// Names and types of the columns.
+    pub columns: Vec<(String, String)>,
+    /// The first rows, `None` for null.
+    pub head: Vec<Vec<Option<String>>>,
+    /// The last rows that are not among the first.
+    pub tail: VecDeque<Vec<Option<String>>>,
+    /// How many rows there are.
+    pub rows: usize,
+}
+
+/// The lazy answer to a checked query.
+pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFrame, QueryError> {
+    let mut context = SQLContext::new();
+    let mut columns = Vec::new();
+    for (table, mut frame) in tables {
+        let schema = frame.collect_schema().map_err(PolarsError::from)?;
+        columns.extend(schema.iter_names().map(polars::prelude::PlSmallStr::to_string));
+        context.register(table.name(), frame);
+    }
+    let planned = run::plan(&mut context, &query.text).and_then(|mut frame| {
+        // Names and types are resolved here, before a row is read.
+        contained_on_all_threads(|| frame.collect_schema()).map_err(PolarsError::Failed)??;
+        Ok(frame)
+    });
+    planned.map_err(|error| match error {
+        PolarsError::Failed(words) => QueryError::Faults(query.fault(&words, &columns)),
+        other => QueryError::Polars(other),
+    })
+}
+
+pub fn write(frame: LazyFrame, format: Format, out: impl Write + Send + 'static) -> Result<(), PolarsError> {
+    let mut frame = frame;
+    let schema = frame.collect_schema()?;
+    match format {
+        Format::Csv => {
+            let writer = CsvWriter::new(out).batched(&schema)?;
+            let writer = each(frame, writer, |writer, batch| Ok(writer.write_batch(&batch)?))?;
+            with(writer, |mut writer| Ok(writer.finish()?))
+        }
+        Format::JsonLines => {
+            let writer = each(frame, out, |out, mut batch| {
+                Ok(JsonWriter::new(out).with_json_format(JsonFormat::JsonLines).finish(&mut batch)?)
+            })?;
+            with(writer, |mut out| Ok(out.flush().map_err(Inner::from)?))
+        }
+        Format::Parquet => {
+            let writer = ParquetWriter::new(out).batched(&schema)?;
+            let writer = each(frame, writer, |writer, batch| Ok(writer.write_batch(&batch)?))?;
+            with(writer, |writer| Ok(writer.finish().map(|_| ())?))
+        }
+    }
+}
+
+/// The first and last rows, `most` together; all of them where there is no limit.
+pub fn excerpt(frame: LazyFrame, most: Option<usize>) -> Result<Excerpt, PolarsError> {
+    let mut frame = frame;
+    let schema = frame.collect_schema()?;
+    let (head, tail) = most.map_or((usize::MAX, 0), |most| (most.div_ceil(2), most / 2));
+    let empty = Excerpt { columns: columns(&schema), ..Excerpt::default() };
+    let filled = each(frame, empty, move |excerpt, batch| excerpt.add(&batch, head, tail))?;
+    with(filled, Ok)
+}
+
+fn columns(schema: &Schema) -> Vec<(String, String)> {
+    schema.iter().map(|(name, ty)| (name.to_string(), ty.to_string())).collect()
+}
+
+impl Excerpt {
+    fn add(&mut self, batch: &DataFrame, head: usize, tail: usize) -> Result<(), PolarsError> {
+        let height = batch.height();
+        let skipped = height.saturating_sub(tail);
+        for row in 0..height {
+            if self.head.len() < head {
+                self.head.push(cells(batch, row)?);
+            } else if tail > 0 && row >= skipped {
+                if self.tail.len() == tail {
+                    self.tail.pop_front();
+                }
+                self.tail.push_back(cells(batch, row)?);
+            }
+        }
+        self.rows += height;
+        Ok(())
+    }
+}
+
+fn cells(batch: &DataFrame, row: usize) -> Result<Vec<Option<String>>, PolarsError> {
+    let cell = |value: AnyValue| match value {
+        AnyValue::Null => None,
+        AnyValue::String(text) => Some(text.to_owned()),
+        AnyValue::StringOwned(text) => Some(text.to_string()),
+        AnyValue::Float32(value) => Some(value.to_string()),
+        AnyValue::Float64(value) => Some(value.to_string()),
+        other => Some(other.to_string()),
+    };
+    batch.columns().iter().map(|column| Ok(cell(column.get(row)?))).collect()
+}
+
+/// Runs a frame and does something with each batch, in order; gives what the batches went into.
+fn each<T: Send + 'static>(
+    frame: LazyFrame,
+    into: T,
+    work: impl Fn(&mut T, DataFrame) -> Result<(), PolarsError> + Send + Sync + 'static,
+) -> Result<T, PolarsError> {
+    let shared = Arc::new(Mutex::new((Some(into), None)));
+    let (inner, work) = (Arc::clone(&shared), Arc::new(work));
+    let receive = move |batch: DataFrame| {
+        let mut state = inner.lock().unwrap_or_else(PoisonError::into_inner);
+        let (into, failed) = &mut *state;
+        if let Some(into) = into.as_mut().filter(|_| failed.is_none()) {
+            *failed = work(into, batch).err();
+        }
+        Ok(failed.is_some())
+    };
+    match run_into(frame.clone(), receive.clone()) {
+        // `SELECT COUNT(*)` over several files, which Polars adds up in a type that it was not built with. It stops
+        // before the first batch; with every column read there is no such sum.
+        Err(PolarsError::Failed(words)) if words.contains("UInt128") => {
+            run_into(frame.with_projection_pushdown(false), receive)?;
+        }
+        other => other?,
+    }
+    let mut state = shared.lock().unwrap_or_else(PoisonError::into_inner);
+    match (state.0.take(), state.1.take()) {
+        (_, Some(error)) => Err(error),
+        (Some(into), None) => Ok(into),
+        (None, None) => Err(PolarsError::Failed("its answer is gone".to_owned())),
+    }
+}
+
+/// Runs a frame, its batches in order to `receive`, which says whether it has had enough.
+fn run_into(
+    frame: LazyFrame,
+    receive: impl Fn(DataFrame) -> PolarsResult<bool> + Send + Sync + 'static,
+) -> Result<(), PolarsError> {
+    let sink = frame.sink_batches(PlanCallback::new(receive), true, Some(BATCH))?;
+    let run = || sink.collect_with_engine(Engine::Streaming);
+    contained_on_all_threads(run).map_err(PolarsError::Failed)??;
+    Ok(())
+}
+
+/// The last step with what the batches went into.
+fn with<T, R>(into: T, finish: impl FnOnce(T) -> Result<R, PolarsError>) -> Result<R, PolarsError> {
+    contained_on_all_threads(|| finish(into)).map_err(PolarsError::Failed)?
+}

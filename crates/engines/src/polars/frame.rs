@@ -1,0 +1,87 @@
+//! Traces as one lazy frame: the same columns of the same types from every file, null where a file has none.
+
+use std::fs;
+
+use polars::prelude::{
+    DataType, Expr, HiveOptions, LazyFrame, NULL, PlRefPath, ScanArgsParquet, ScanSources, UnionArgs, col, concat, lit,
+};
+
+use super::run::PolarsError;
+use score::score_traces::ScoreError;
+use trace::open::{TraceFile, TraceSet};
+use trace::schema::{self, Kind, Stored};
+use trace::verify::verify_pages;
+
+/// A column of the frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FrameColumn {
+    /// Its name in the files.
+    pub name: String,
+    /// The type that every file's values are brought to.
+    pub stored: Stored,
+}
+
+impl FrameColumn {
+    /// A column as wide as the native engine's.
+    pub fn wide(name: &str, kind: Kind) -> Option<Self> {
+        let stored = match kind {
+            Kind::Bool => Stored::Bool,
+            Kind::Int => Stored::Int64,
+            Kind::Float => Stored::Float64,
+            Kind::String => Stored::String,
+            Kind::Unsupported => return None,
+        };
+        Some(Self { name: name.to_owned(), stored })
+    }
+
+    /// A column as the schema has it; as wide as can be where the schema does not know it.
+    pub fn natural(name: &str, kind: Kind) -> Option<Self> {
+        match schema::column(name) {
+            Some(known) => Some(Self { name: name.to_owned(), stored: known.stored }),
+            None => Self::wide(name, kind),
+        }
+    }
+
+    fn data_type(&self) -> DataType {
+        match self.stored {
+            Stored::Bool => DataType::Boolean,
+            Stored::Int8 => DataType::Int8,
+            Stored::Int32 => DataType::Int32,
+            Stored::Int64 => DataType::Int64,
+            Stored::Float32 => DataType::Float32,
+            Stored::Float64 => DataType::Float64,
+            Stored::String => DataType::String,
+        }
+    }
+
+    /// The column of one file.
+    fn of(&self, file: &TraceFile) -> Expr {
+        let present = file.column(&self.name).is_some_and(|column| column.kind.is_some());
+        let values = if present { col(self.name.as_str()) } else { lit(NULL) };
+        values.strict_cast(self.data_type()).alias(self.name.as_str())
+    }
+}
+
+/// The steps of all files in their order; no row is read before the frame is collected. Polars does not verify the
+/// checksums of pages, so that they are verified here.
+pub fn steps(traces: &TraceSet, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
+    verify_pages(traces).map_err(ScoreError::from)?;
+    let frames = traces.files().iter().map(|file| scan(file, columns)).collect::<Result<Vec<_>, _>>()?;
+    Ok(concat(frames, UnionArgs { rechunk: false, ..UnionArgs::default() })?)
+}
+
+fn scan(file: &TraceFile, columns: &[FrameColumn]) -> Result<LazyFrame, PolarsError> {
+    let gone = |source| PolarsError::Unreadable { file: file.name().to_owned(), source };
+    // A path from the root cannot be taken for an address on the network.
+    let path = fs::canonicalize(file.path()).map_err(gone)?;
+    let options = ScanArgsParquet { glob: false, cache: false, ..ScanArgsParquet::default() };
+    let frame = if path.to_str().is_some() {
+        LazyFrame::scan_parquet(PlRefPath::try_from_path(&path)?, options)?
+    } else {
+        // Polars takes paths as text; what has no such path is opened here.
+        let opened = file.reader().map_err(gone)?;
+        let options = ScanArgsParquet { hive_options: HiveOptions::new_disabled(), ..options };
+        LazyFrame::scan_parquet_sources(ScanSources::Files([opened].into()), options)?
+    };
+    Ok(frame.select(columns.iter().map(|column| column.of(file)).collect::<Vec<_>>()))
+}

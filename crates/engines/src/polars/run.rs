@@ -1,0 +1,106 @@
+//! Runs a frame on the streaming engine, and says what went wrong in the words of this program.
+
+use std::io;
+use std::thread;
+
+use polars::prelude::{DataFrame, Engine, LazyFrame, PolarsError as Inner};
+use polars::sql::SQLContext;
+
+use exact::budget::Exceeded;
+use metric::sql::LoweringError;
+use score::score_traces::ScoreError;
+use trace::catch_panic::contained_on_all_threads;
+
+/// What keeps Polars from answering.
+#[derive(Debug, thiserror::Error)]
+pub enum PolarsError {
+    /// The traces or definitions are not as they must be.
+    #[error(transparent)]
+    Score(#[from] ScoreError),
+    /// The definitions cannot be said in SQL.
+    #[error(transparent)]
+    Lowering(#[from] LoweringError),
+    /// A file that was there a moment ago.
+    #[error("{file}: expected a file that can be read; was it moved?")]
+    Unreadable {
+        /// Its name.
+        file: String,
+        /// What the operating system says.
+        source: io::Error,
+    },
+    /// A result beyond 64 bits.
+    #[error("`{metric}` leaves 64-bit integers; use smaller numbers in its definition")]
+    Overflow {
+        /// The first metric that needs the number.
+        metric: String,
+    },
+    /// A metric that declares itself a rate has another value than 0 or 1.
+    #[error("`{metric}` declares the unit `rate`, but an episode has {value}; a rate is 0 or 1 an episode")]
+    NotARate {
+        /// The metric.
+        metric: String,
+        /// The value found.
+        value: i64,
+    },
+    /// More episodes than Polars can hold for files of their size.
+    #[error("{0}\n  help: without `--engine polars` they are scored in less memory")]
+    OverBudget(#[from] Exceeded),
+    /// Nobody reads the answer any more.
+    #[error("the reader of the answer is gone")]
+    ReaderGone,
+    /// Polars' own words.
+    #[error("Polars cannot do this: {0}")]
+    Failed(String),
+}
+
+impl From<Inner> for PolarsError {
+    fn from(error: Inner) -> Self {
+        match &error {
+            Inner::IO { error, .. } if error.kind() == io::ErrorKind::BrokenPipe => Self::ReaderGone,
+            other => Self::Failed(cause(&other.to_string())),
+        }
+    }
+}
+
+/// The lazy answer to a statement over the tables of a context.
+pub(super) fn plan(context: &mut SQLContext, statement: &str) -> Result<LazyFrame, PolarsError> {
+    Ok(contained_on_all_threads(|| context.execute(statement)).map_err(PolarsError::Failed)??)
+}
+
+/// The stack on which Polars plans: it recurses over the statement, one frame for each of its constructs. Of the memory that
+/// is set aside as much is used as the statement needs.
+const STACK: usize = 256 << 20;
+
+/// What `run` gives, on a stack for statements as deep as definitions may be.
+pub(super) fn on_deep_stack<R: Send>(run: impl FnOnce() -> Result<R, PolarsError> + Send) -> Result<R, PolarsError> {
+    thread::scope(|scope| {
+        let thread = thread::Builder::new().stack_size(STACK).spawn_scoped(scope, run);
+        let thread = thread.map_err(|error| PolarsError::Failed(format!("no thread for it: {error}")))?;
+        thread.join().unwrap_or_else(|_| Err(PolarsError::Failed("it ended in a panic".into())))
+    })
+}
+
+/// The rows of a frame.
+pub(super) fn collect(frame: LazyFrame) -> Result<DataFrame, PolarsError> {
+    let run = || frame.collect_with_engine(Engine::Streaming);
+    Ok(contained_on_all_threads(run).map_err(PolarsError::Failed)??.unwrap_single())
+}
+
+/// The cause in a message of Polars: its first paragraph, without the plan that it may print after that.
+fn cause(message: &str) -> String {
+    let first = message.split("\n\n").find(|part| !part.trim().is_empty()).unwrap_or(message);
+    first.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::cause;
+
+    #[test]
+    fn the_cause_comes_without_the_plan() {
+        assert_eq!(
+            cause("unable to find column \"x\";\nvalid: [\"y\"]\n\nResolved plan: ..."),
+            "unable to find column \"x\"; valid: [\"y\"]"
+        );
+    }
+}

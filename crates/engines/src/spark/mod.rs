@@ -1,0 +1,219 @@
+//! Spark: the SQL lowering submitted to a cluster through the user's own installation.
+//!
+//! ```text
+//! locate ──► submit ──► driver.py on the user's Spark ──► answer
+//! (whose      (a request,                                   (the table, a folder of Parquet,
+//!  Spark)      a child process)                              or what was refused)
+//! ```
+//!
+//! Rules: the statement reads nothing but the view `steps`, which the driver makes of the named traces alone. What the
+//! scan of traces refuses is refused here too, by one more aggregation (`check`), save for what only files and their
+//! order can tell: that an episode's rows lie together, in order, in one file. Nothing is left out quietly: files that
+//! Spark would pass over and columns that it would read as null are refused.
+
+mod answer;
+mod cause;
+mod check;
+mod locate;
+mod place;
+mod request;
+pub mod setting;
+pub mod source;
+mod submit;
+
+use std::fs;
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+
+use metric::definitions::Definitions;
+use metric::sql::LoweringError;
+use score::table::EpisodeTable;
+use trace::diagnostic::Finding;
+
+use self::answer::{Answer, Done};
+use self::request::Request;
+use self::setting::Setting;
+use self::source::Sources;
+
+/// The cluster, and how to submit to it.
+#[derive(Clone, Debug, Default)]
+pub struct Cluster {
+    /// `spark://host:port`, `yarn`, `local[2]`, ...; what Spark's own configuration says if absent.
+    pub master: Option<String>,
+    /// Settings for this submission.
+    pub settings: Vec<Setting>,
+    /// Give up after so many seconds; never if absent.
+    pub timeout_s: Option<NonZeroU32>,
+    /// Where Spark's own log goes; nowhere if absent.
+    pub log: Option<PathBuf>,
+}
+
+/// What to compute.
+#[derive(Clone, Copy, Debug)]
+pub struct Job<'a> {
+    /// The definitions, checked.
+    pub definitions: &'a Definitions,
+    /// Further columns that are constant in an episode.
+    pub labels: &'a [String],
+    /// What to read.
+    pub sources: &'a Sources,
+}
+
+/// A folder that Spark has written.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// The number of episodes in it.
+    pub episodes: u64,
+}
+
+/// Why Spark gave no scores.
+#[derive(Debug, thiserror::Error)]
+pub enum SparkError {
+    /// There is no Spark to submit with.
+    #[error(
+        "no Spark found: SPARK_HOME is not set, there is no `spark-submit` on PATH, and `{python}` has no package \
+         `pyspark`; install one of them, such as with `pip install pyspark`"
+    )]
+    NoSpark {
+        /// The Python that was asked.
+        python: String,
+    },
+    /// `SPARK_HOME` leads nowhere.
+    #[error("SPARK_HOME is `{home}`, where there is no bin/spark-submit; set it to the folder of a Spark, or unset it")]
+    Home {
+        /// The variable.
+        home: String,
+    },
+    /// Spark runs on Java.
+    #[error("Spark found no Java that it can run on; install Java 17 or newer, or set JAVA_HOME ({words})")]
+    Java {
+        /// What was said.
+        words: String,
+    },
+    /// Nobody listens at the master's address.
+    #[error("cannot connect to the master `{master}`: {words}; is it running, and is this the URL on its web page?")]
+    Master {
+        /// As typed.
+        master: String,
+        /// The system's or Spark's words.
+        words: String,
+    },
+    /// Something on this machine could not be read, written or started.
+    #[error("cannot {what}")]
+    System {
+        /// What was tried.
+        what: String,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The definitions cannot be said in Spark's SQL.
+    #[error(transparent)]
+    Lowering(#[from] LoweringError),
+    /// The output is there already.
+    #[error("`{folder}` is there already; Spark writes a folder of its own: remove it or name another")]
+    Exists {
+        /// The folder, as typed.
+        folder: String,
+    },
+    /// A URI gives no trace.
+    #[error(
+        "`{uri}`: expected Parquet files, or folders with *.parquet in them, found none; files that begin with `_` or `.` are passed over"
+    )]
+    Empty {
+        /// The URI.
+        uri: String,
+    },
+    /// A file's column is not as the definitions need it.
+    #[error(
+        "column `{column}` of {file}: expected {expected}, found {found}; write it with this type in all traces, or choose other metrics with --metrics"
+    )]
+    Column {
+        /// The file, as Spark names it.
+        file: String,
+        /// The column.
+        column: String,
+        /// What is needed.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// Spark has read other rows than the footers tell of.
+    #[error(
+        "the footers of the traces tell of {expected} rows, Spark read {found}; every worker must see the same files \
+         under the same path, and none may begin with `_` or `.`"
+    )]
+    Rows {
+        /// By the footers.
+        expected: u64,
+        /// By Spark.
+        found: u64,
+    },
+    /// A rule of the traces does not hold.
+    #[error("{finding}{}", more_episodes(*.more))]
+    Rule {
+        /// What was found, in the first episode by id.
+        finding: Box<Finding>,
+        /// How many more episodes break a rule.
+        more: u64,
+    },
+    /// It took too long.
+    #[error("Spark has not answered in {seconds} s (--spark-timeout), and was stopped")]
+    Late {
+        /// The time given.
+        seconds: u32,
+    },
+    /// Spark failed.
+    #[error("Spark: {cause}\n  help: --spark-log FILE keeps Spark's own log")]
+    Failed {
+        /// The innermost cause, in one line.
+        cause: String,
+    },
+    /// What came back makes no sense.
+    #[error("cannot read what the driver on Spark answered: {words}; report this as a fault of mirrorstats")]
+    Answer {
+        /// What is wrong with it.
+        words: String,
+    },
+}
+
+fn more_episodes(more: u64) -> String {
+    match more {
+        0 => String::new(),
+        1 => "\n  and 1 more episode breaks a rule".to_owned(),
+        more => format!("\n  and {more} more episodes break a rule"),
+    }
+}
+
+/// Scores on Spark and brings the table here, ordered as any table of scores.
+pub fn score(job: Job<'_>, cluster: &Cluster) -> Result<EpisodeTable, SparkError> {
+    let place = place::Place::new()?;
+    let request = Request::new(job, cluster, &place, None)?;
+    finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
+    answer::table(&place.table(), job)
+}
+
+/// Scores on Spark and has Spark write the table as a folder of Parquet, its definitions in every file.
+pub fn write(job: Job<'_>, cluster: &Cluster, folder: &str) -> Result<Written, SparkError> {
+    let target = if source::is_uri(folder) {
+        folder.to_owned()
+    } else {
+        if fs::symlink_metadata(folder).is_ok() {
+            return Err(SparkError::Exists { folder: folder.to_owned() });
+        }
+        source::local_uri(Path::new(folder))
+            .map_err(|source| SparkError::System { what: format!("resolve `{folder}`"), source })?
+    };
+    let place = place::Place::new()?;
+    let request = Request::new(job, cluster, &place, Some(target))?;
+    let done = finished(submit::submit(&request, cluster, &place)?, job, cluster)?;
+    Ok(Written { episodes: done.episodes })
+}
+
+fn finished(answer: Answer, job: Job<'_>, cluster: &Cluster) -> Result<Done, SparkError> {
+    match answer {
+        Answer::Done(done) => Ok(done),
+        Answer::Refused(refused) => Err(refused.error(job)),
+        Answer::Failed(failed) => Err(cause::of_failure(&failed, cluster)),
+        Answer::Late {} => Err(SparkError::Late { seconds: cluster.timeout_s.map_or(0, NonZeroU32::get) }),
+    }
+}

@@ -1,0 +1,41 @@
+//! The private folder of one submission: its request, and what the driver answers.
+
+use std::fs;
+use std::path::PathBuf;
+
+use super::SparkError;
+use exact::replace::TemporaryFolder;
+
+/// The private folder of one submission.
+pub(super) struct Place(TemporaryFolder);
+
+impl Place {
+    pub(super) fn new() -> Result<Self, SparkError> {
+        // The request may hold secrets.
+        let made = TemporaryFolder::private("spark");
+        made.map(Self).map_err(|source| SparkError::System { what: "make a temporary folder".into(), source })
+    }
+
+    /// Where the driver writes the table, if Spark does not.
+    pub(super) fn table(&self) -> PathBuf {
+        self.0.path().join("table.jsonl")
+    }
+
+    /// Where the driver writes what happened.
+    pub(super) fn answer(&self) -> PathBuf {
+        self.0.path().join("answer.json")
+    }
+
+    /// Where the log of Spark goes, unless it is kept elsewhere.
+    pub(super) fn log(&self) -> PathBuf {
+        self.0.path().join("log")
+    }
+
+    /// Writes a file into it.
+    pub(super) fn file(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, SparkError> {
+        let path = self.0.path().join(name);
+        fs::write(&path, bytes)
+            .map_err(|source| SparkError::System { what: "write a temporary file".into(), source })?;
+        Ok(path)
+    }
+}

@@ -1,0 +1,105 @@
+//! Settings of Spark as they are typed, `key=value`, and which of them are secrets.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// One setting. Its value shows nowhere: not in messages, not in `{:?}`.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Setting {
+    key: String,
+    value: String,
+}
+
+/// Why a text is no setting.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum SettingError {
+    /// No `=`, or no key before it.
+    #[error("expected `spark.key=value`")]
+    Form,
+    /// A setting that mirrorstats makes itself.
+    #[error("`{key}` cannot be set: {why}")]
+    Fixed {
+        /// The key.
+        key: String,
+        /// What depends on it.
+        why: &'static str,
+    },
+}
+
+/// Keys that would break what the driver relies on.
+const FIXED: [(&str, &str); 2] = [
+    ("spark.submit.deployMode", "the driver runs here, where the answer is read"),
+    ("spark.master", "give the master with --master"),
+];
+
+impl Setting {
+    pub fn key(&self) -> &str {
+        &self.key
+    }
+
+    /// Its value, for Spark alone.
+    pub(super) fn value(&self) -> &str {
+        &self.value
+    }
+
+    /// Whether the value must not stand on a command line, which others on this machine can read.
+    pub(super) fn is_secret(&self) -> bool {
+        let key = self.key.to_ascii_lowercase();
+        ["secret", "password", "token", "credential", "access.key", "accesskey", "account.key", "apikey", "api.key"]
+            .iter()
+            .any(|word| key.contains(word))
+    }
+}
+
+impl fmt::Debug for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}=...", self.key)
+    }
+}
+
+impl FromStr for Setting {
+    type Err = SettingError;
+
+    fn from_str(text: &str) -> Result<Self, SettingError> {
+        let (key, value) = text.split_once('=').ok_or(SettingError::Form)?;
+        let key = key.trim();
+        if !key.starts_with("spark.") || key.contains(char::is_whitespace) {
+            return Err(SettingError::Form);
+        }
+        match FIXED.iter().find(|(fixed, _)| *fixed == key) {
+            Some((_, why)) => Err(SettingError::Fixed { key: key.to_owned(), why }),
+            None => Ok(Self { key: key.to_owned(), value: value.to_owned() }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Setting;
+
+    #[test]
+    fn a_setting_is_a_key_and_whatever_follows_the_first_sign() {
+        let setting: Setting = "spark.driver.extraJavaOptions=-Da=b -Dc=d".parse().unwrap();
+        assert_eq!((setting.key(), setting.value()), ("spark.driver.extraJavaOptions", "-Da=b -Dc=d"));
+        for wrong in
+            ["", "spark.x", "=1", "x=1", "spark.a b=1", "spark.master=local", "spark.submit.deployMode=cluster"]
+        {
+            assert!(wrong.parse::<Setting>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn secrets_are_known_by_their_keys_and_never_shown() {
+        for (text, secret) in [
+            ("spark.hadoop.fs.s3a.secret.key=hush", true),
+            ("spark.hadoop.fs.s3a.access.key=hush", true),
+            ("spark.hadoop.fs.azure.account.key.x.net=hush", true),
+            ("spark.ssl.keyPassword=hush", true),
+            ("spark.executor.memory=hush", false),
+        ] {
+            let setting: Setting = text.parse().unwrap();
+            assert_eq!(setting.is_secret(), secret, "{text}");
+            assert!(!format!("{setting:?}").contains("hush"));
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! What Spark reads: files of this machine, or URIs that it alone understands.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+
+use trace::colors::palette::Palette;
+use trace::inputs::Input;
+use trace::open::{TraceFile, TraceSet};
+
+/// The traces.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Sources {
+    /// Files of this machine, whose footers have been read and are good.
+    Files {
+        /// What they are called, for messages.
+        names: Vec<String>,
+        /// The same files, by what they have.
+        groups: Vec<Group>,
+        /// How many rows they have together.
+        rows: u64,
+        /// The colours of all of them, if each declares a palette.
+        palette: Option<Palette>,
+    },
+    /// URIs, as typed; nothing is known of them here.
+    Uris(Vec<String>),
+}
+
+/// Traces that are read alike.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Group {
+    /// URIs; of files of this machine `file://` and no wildcard.
+    pub(super) paths: Vec<String>,
+    /// Columns that are declared to hold nothing but nulls, and so have no type to be read by.
+    pub(super) void: Vec<String>,
+}
+
+impl Sources {
+    /// Files of this machine.
+    ///
+    /// `traces` are these inputs, opened.
+    pub fn files(inputs: &[Input], traces: &TraceSet) -> io::Result<Self> {
+        let mut groups: BTreeMap<Vec<String>, Vec<String>> = BTreeMap::new();
+        for (input, file) in inputs.iter().zip(traces.files()) {
+            let void = file.columns().iter().filter(|column| column.kind.is_none()).map(|column| column.name.clone());
+            groups.entry(void.collect()).or_default().push(literal(&local_uri(&input.path)?));
+        }
+        Ok(Self::Files {
+            names: inputs.iter().map(|input| input.name.clone()).collect(),
+            groups: groups.into_iter().map(|(void, paths)| Group { paths, void }).collect(),
+            rows: traces.files().iter().map(TraceFile::rows).sum(),
+            palette: Palette::of_all(traces.files().iter().map(TraceFile::palette)),
+        })
+    }
+
+    pub(super) fn palette(&self) -> Option<&Palette> {
+        match self {
+            Self::Files { palette, .. } => palette.as_ref(),
+            Self::Uris(_) => None,
+        }
+    }
+
+    pub(super) fn groups(&self) -> Vec<Group> {
+        match self {
+            Self::Files { groups, .. } => groups.clone(),
+            Self::Uris(uris) => vec![Group { paths: uris.clone(), void: Vec::new() }],
+        }
+    }
+
+    /// What the traces are called in a message about all of them.
+    pub(super) fn name(&self) -> String {
+        let names = match self {
+            Self::Files { names, .. } => names.clone(),
+            Self::Uris(uris) => uris.iter().map(|uri| without_user(uri)).collect(),
+        };
+        match names.as_slice() {
+            [one] => one.clone(),
+            [first, others @ ..] => format!("{first} and {} more", others.len()),
+            [] => "no trace".to_owned(),
+        }
+    }
+}
+
+/// Whether an argument is a URI for Spark (`s3a://bucket/runs`, `hdfs:/runs`, `file:///runs`) and no file here.
+pub fn is_uri(argument: &str) -> bool {
+    let scheme = argument.split_once(":/").map_or("", |(scheme, _)| scheme);
+    // A single letter is a drive.
+    scheme.len() > 1
+        && scheme.starts_with(|c: char| c.is_ascii_alphabetic())
+        && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+        && !Path::new(argument).exists()
+}
+
+/// The URI of a path of this machine, whether there is something or not.
+pub(super) fn local_uri(path: &Path) -> io::Result<String> {
+    let absolute: PathBuf = std::path::absolute(path)?;
+    let text = absolute.to_str().ok_or_else(|| io::Error::other("the path is not UTF-8, as Spark needs it"))?;
+    Ok(format!("file://{text}"))
+}
+
+/// A path for a reader that expands globs.
+fn literal(path: &str) -> String {
+    let mut text = String::with_capacity(path.len());
+    for c in path.chars() {
+        if r"\*?[]{}".contains(c) {
+            text.push('\\');
+        }
+        text.push(c);
+    }
+    text
+}
+
+/// The URI without a user and password in it.
+pub(super) fn without_user(uri: &str) -> String {
+    let Some((scheme, rest)) = uri.split_once("://") else { return uri.to_owned() };
+    let (authority, path) = rest.split_at(rest.find('/').unwrap_or(rest.len()));
+    match authority.rsplit_once('@') {
+        Some((_, host)) => format!("{scheme}://{host}{path}"),
+        None => uri.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{is_uri, literal, without_user};
+
+    #[test]
+    fn a_uri_has_a_scheme() {
+        for uri in ["s3a://bucket/runs", "hdfs:/runs/*.parquet", "file:///runs", "abfss://a@b.net/x"] {
+            assert!(is_uri(uri), "{uri}");
+        }
+        for path in ["runs", "./a:b/c", "C:/runs", "runs/x:/y", "-", "://x", "/a/b"] {
+            assert!(!is_uri(path), "{path}");
+        }
+    }
+
+    #[test]
+    fn a_file_name_is_no_glob() {
+        assert_eq!(literal("file:///a/x[1]{b}*.parquet"), r"file:///a/x\[1\]\{b\}\*.parquet");
+    }
+
+    #[test]
+    fn users_and_passwords_are_left_out() {
+        assert_eq!(without_user("s3a://KEY:SECRET@bucket/x@y"), "s3a://bucket/x@y");
+        assert_eq!(without_user("s3a://bucket/x@y"), "s3a://bucket/x@y");
+    }
+}

@@ -1,0 +1,99 @@
+//! A folder replaced by exchanging its name with that of a complete new one.
+//!
+//! Done in place instead: on systems that cannot exchange; where the folder is a link, a mount point, holds one, or holds
+//! the current folder, which would be gone from under the user; where something in it cannot be linked or would change
+//! its owner; where the folder is not writable, so that this refuses as any other writing does.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File, Metadata};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::super::place::{folder_of, sync_folder};
+use super::platform;
+use super::stage::{FolderFiles, Stage, old_files, step};
+
+/// Replaces the files of the existing folder `out`. The result within tells whether their names are on the disk.
+pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> io::Result<io::Result<()>> {
+    check(out)?;
+    let stage = Stage::beside(out)?;
+    stage.write(files, out).map_err(|error| error.source)?;
+    link_others(out, stage.path(), files)?;
+    make_alike(&fs::symlink_metadata(out)?, stage.path())?;
+    sync_folder(stage.path())?;
+    // The old folder is this process's to remove, also under its new name. Nobody waits for this lock.
+    let old = File::open(out)?;
+    let _ = old.try_lock();
+    step();
+    platform::exchange(stage.path(), out)?;
+    // From here on the new files are there, and errors are no reason to replace them again.
+    let synced = sync_folder(folder_of(out));
+    step();
+    // Whatever others put into the old folder in the meantime.
+    let _ = link_others(stage.path(), out, files);
+    step();
+    if synced.is_err() {
+        // After a loss of power the old folder may have its name again, and must have its files then.
+        stage.keep();
+    }
+    Ok(synced)
+}
+
+/// That the folder can be exchanged.
+fn check(out: &Path) -> io::Result<()> {
+    let is_folder = out.file_name().is_some() && fs::symlink_metadata(out)?.is_dir();
+    let here = std::env::current_dir()?;
+    if !is_folder || platform::is_mount_point(out)? || here.starts_with(out.canonicalize()?) {
+        return Err(io::ErrorKind::Unsupported.into());
+    }
+    platform::check_writable(out)
+}
+
+/// Links everything below `from` that is no old file, and not in `to` yet, into `to`.
+fn link_others(from: &Path, to: &Path, files: &FolderFiles<'_>) -> io::Result<()> {
+    link_below(from, to, Path::new(""), &old_files(from, files))
+}
+
+fn link_below(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) -> io::Result<()> {
+    for entry in fs::read_dir(from.join(inside))? {
+        let entry = entry?;
+        let inside = inside.join(entry.file_name());
+        let target = to.join(&inside);
+        if entry.file_type()?.is_dir() {
+            link_folder(from, to, &inside, old)?;
+        } else if target.is_dir() {
+            // A link to a folder that new files are in.
+            return Err(io::ErrorKind::Unsupported.into());
+        } else if !old.contains(&inside) && fs::symlink_metadata(&target).is_err() {
+            step();
+            fs::create_dir_all(folder_of(&target))?;
+            fs::hard_link(entry.path(), target)?;
+        }
+    }
+    Ok(())
+}
+
+/// A folder below; one that had old files alone is not made.
+fn link_folder(from: &Path, to: &Path, inside: &Path, old: &BTreeSet<PathBuf>) -> io::Result<()> {
+    let (source, target) = (from.join(inside), to.join(inside));
+    if platform::is_mount_point(&source)? {
+        return Err(io::ErrorKind::Unsupported.into());
+    }
+    if fs::read_dir(&source)?.next().is_none() {
+        fs::create_dir_all(&target)?;
+    }
+    link_below(from, to, inside, old)?;
+    if !target.is_dir() {
+        return Ok(());
+    }
+    make_alike(&fs::symlink_metadata(&source)?, &target)?;
+    sync_folder(&target)
+}
+
+/// Gives a new folder the permissions of an old one.
+fn make_alike(old: &Metadata, new: &Path) -> io::Result<()> {
+    if !platform::has_same_owner(old, &fs::symlink_metadata(new)?) {
+        return Err(io::ErrorKind::Unsupported.into());
+    }
+    fs::set_permissions(new, old.permissions())
+}

@@ -1,0 +1,84 @@
+//! The files of a folder replaced one by one, with a note and without an index in between.
+
+use std::collections::BTreeSet;
+use std::fs::{self, File, TryLockError};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::super::new_file::replace as replace_bytes;
+use super::super::place::{folder_of, sync_folder};
+use super::stage::{FolderError, FolderFiles, NOTE, Stage, old_files, step, sync_folders};
+
+/// Replaces the files of the existing folder `out`.
+pub(super) fn replace(out: &Path, files: &FolderFiles<'_>) -> Result<(), FolderError> {
+    let _lock = lock(out).map_err(FolderError::at(out))?;
+    // Inside the folder, which may be a volume of its own.
+    let stage = Stage::create(out, files.index.unwrap_or(out)).map_err(FolderError::at(out))?;
+    stage.write(files, out)?;
+    let old = old_files(out, files);
+    note(out, &old, files).map_err(FolderError::at(out))?;
+    files.index.map_or(Ok(()), |index| remove(out, index))?;
+    sync_folder(out).map_err(FolderError::at(out))?;
+    let is_new = |path: &Path| files.new.iter().any(|(new, _)| *new == path);
+    for path in old.iter().filter(|path| !is_new(path) && *path != Path::new(NOTE)) {
+        remove(out, path)?;
+        remove_empty(out, path);
+    }
+    for (path, _) in files.new.iter().filter(|(path, _)| Some(*path) != files.index) {
+        put(&stage, out, path)?;
+    }
+    sync_folders(out, files).map_err(FolderError::at(out))?;
+    files.index.map_or(Ok(()), |index| put(&stage, out, index))?;
+    remove(out, Path::new(NOTE))?;
+    step();
+    sync_folder(out).map_err(FolderError::at(out))
+}
+
+/// Notes every old and new file, for whoever finds the folder without an index.
+fn note(out: &Path, old: &BTreeSet<PathBuf>, files: &FolderFiles<'_>) -> io::Result<()> {
+    let new = files.new.iter().map(|(path, _)| *path);
+    let paths: BTreeSet<&Path> = old.iter().map(PathBuf::as_path).chain(new).collect();
+    let names: Vec<_> = paths.iter().map(|path| path.to_string_lossy()).collect();
+    step();
+    replace_bytes(&out.join(NOTE), names.join("\0").as_bytes())
+}
+
+fn put(stage: &Stage, out: &Path, path: &Path) -> Result<(), FolderError> {
+    let target = out.join(path);
+    let folder = folder_of(&target);
+    step();
+    fs::create_dir_all(folder)
+        .and_then(|()| fs::rename(stage.path().join(path), &target))
+        .map_err(FolderError::at(&target))
+}
+
+fn remove(out: &Path, inside: &Path) -> Result<(), FolderError> {
+    let path = out.join(inside);
+    step();
+    match fs::remove_file(&path) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(FolderError::at(&path)(error)),
+        _ => Ok(()),
+    }
+}
+
+/// Removes the folders above a file that was removed, up to `out`, for as long as they are empty.
+fn remove_empty(out: &Path, path: &Path) {
+    let above = path.ancestors().skip(1).filter(|inside| !inside.as_os_str().is_empty());
+    for inside in above {
+        if fs::remove_dir(out.join(inside)).is_err() {
+            break;
+        }
+    }
+}
+
+/// Refuses while another process replaces files in the folder: their files would mix. Where the file system has no
+/// locks, that is not seen.
+fn lock(out: &Path) -> io::Result<Option<File>> {
+    let Ok(folder) = File::open(out) else { return Ok(None) };
+    match folder.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            Err(io::Error::new(io::ErrorKind::ResourceBusy, "another process writes to it"))
+        }
+        _ => Ok(Some(folder)),
+    }
+}

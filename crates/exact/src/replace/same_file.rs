@@ -1,0 +1,73 @@
+//! Whether an output would replace one of the inputs.
+
+use std::fs;
+use std::path::Path;
+
+use super::place::is_stream;
+
+/// A target that is one of the files which the command reads.
+#[derive(Debug, thiserror::Error)]
+#[error("`{target}`: expected another file to write, found {what}\n  help: give the output another name")]
+pub struct TargetIsInput {
+    /// The target, as typed.
+    target: String,
+    /// What it is to the command.
+    what: String,
+}
+
+/// Refuses a target that is one of `inputs`, under whatever name, link or path; `what` says what the inputs are, such
+/// as `a trace that is read`.
+///
+/// A device, a pipe or a standard stream is no file that is replaced, and is not refused.
+pub fn check_target<P: AsRef<Path>>(
+    target: &Path,
+    inputs: impl IntoIterator<Item = P>,
+    what: &str,
+) -> Result<(), TargetIsInput> {
+    if !target.is_file() || is_stream(target) {
+        return Ok(());
+    }
+    match inputs.into_iter().find(|input| is_same_file(target, input.as_ref())) {
+        None => Ok(()),
+        Some(_) => Err(TargetIsInput { target: target.display().to_string(), what: what.to_owned() }),
+    }
+}
+
+/// A folder for outputs that holds one of the inputs.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "`{folder}`: expected a folder for outputs, found an input in it (`{input}`): both would be read together from then \
+     on\n  help: name another folder; it may be a new one inside this one"
+)]
+pub struct FolderHoldsInput {
+    /// The folder, as typed.
+    folder: String,
+    /// The first input in it.
+    input: String,
+}
+
+/// Refuses a folder for outputs that one of `inputs` is in, or below, under whatever name.
+pub fn check_folder<P: AsRef<Path>>(
+    folder: &Path,
+    inputs: impl IntoIterator<Item = P>,
+) -> Result<(), FolderHoldsInput> {
+    let Ok(place) = fs::canonicalize(folder) else { return Ok(()) };
+    let is_inside = |input: &P| fs::canonicalize(input).is_ok_and(|input| input.starts_with(&place));
+    let Some(input) = inputs.into_iter().find(is_inside) else { return Ok(()) };
+    let name = input.as_ref().file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Err(FolderHoldsInput { folder: folder.display().to_string(), input: name })
+}
+
+/// Whether two paths lead to one existing file: links are followed, and hard links are one file.
+#[cfg(unix)]
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt as _;
+    let place = |path: &Path| fs::metadata(path).map(|metadata| (metadata.dev(), metadata.ino()));
+    matches!((place(a), place(b)), (Ok(a), Ok(b)) if a == b)
+}
+
+/// Whether two paths lead to one existing file: links are followed.
+#[cfg(not(unix))]
+pub fn is_same_file(a: &Path, b: &Path) -> bool {
+    matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
+}

@@ -1,0 +1,170 @@
+//! Temporary files and folders: each has a name of its own, is locked for as long as its process lives, and is removed
+//! when dropped.
+//!
+//! They are made by calls of the standard library alone, which `tests/harness/faults.c` can fail one by one.
+
+use std::collections::hash_map::RandomState;
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File, OpenOptions};
+use std::hash::BuildHasher as _;
+use std::io;
+use std::mem;
+use std::path::{Path, PathBuf};
+
+use super::leftover;
+use super::place::{RANDOM, checksum};
+
+/// The characters, which are no others where a file system does not tell capitals apart.
+const CHARACTERS: &[u8; 36] = b"abcdefghijklmnopqrstuvwxyz0123456789";
+
+/// A temporary file, open for reading and writing.
+#[derive(Debug)]
+pub(super) struct TemporaryFile {
+    file: File,
+    path: PathBuf,
+}
+
+impl TemporaryFile {
+    /// Makes one in `folder`, with a name of this prefix and the permissions of an ordinary new file.
+    pub(super) fn create(folder: &Path, prefix: &OsStr) -> io::Result<Self> {
+        let made = make(folder, prefix, |path| {
+            OpenOptions::new().read(true).write(true).create_new(true).open(path).map(Some)
+        })?;
+        let (path, Some(file)) = made else { return Err(io::ErrorKind::NotFound.into()) };
+        Ok(Self { file, path })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub(super) const fn file(&self) -> &File {
+        &self.file
+    }
+
+    pub(super) const fn file_mut(&mut self) -> &mut File {
+        &mut self.file
+    }
+
+    /// Gives the file another name, in place of what has it.
+    pub(super) fn rename(mut self, target: &Path) -> io::Result<()> {
+        fs::rename(&self.path, target)?;
+        self.path = PathBuf::new();
+        Ok(())
+    }
+
+    /// Gives the file another name, which nothing may have.
+    pub(super) fn rename_new(self, target: &Path) -> io::Result<()> {
+        match fs::hard_link(&self.path, target) {
+            // Some file systems have no links.
+            Err(error) if error.kind() != io::ErrorKind::AlreadyExists && fs::symlink_metadata(target).is_err() => {
+                self.rename(target)
+            }
+            linked => linked,
+        }
+    }
+}
+
+impl Drop for TemporaryFile {
+    fn drop(&mut self) {
+        if !self.path.as_os_str().is_empty() {
+            // What stays is swept by a later run.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// A temporary folder, which is removed with all that is in it.
+#[derive(Debug)]
+pub struct TemporaryFolder {
+    path: PathBuf,
+    _lock: Option<File>,
+}
+
+impl TemporaryFolder {
+    /// Makes one in `parent`, after removing what killed processes have left there; `name` is part of its name. Others may
+    /// look into it as into any new folder.
+    pub fn create(parent: &Path, name: &str) -> io::Result<Self> {
+        leftover::sweep(parent);
+        Self::with_mode(parent, &super::place::prefix_for(Path::new(name)), 0o777)
+    }
+
+    /// Makes one in the system's folder for temporary files that no other user may look into.
+    pub fn private(name: &str) -> io::Result<Self> {
+        let parent = std::env::temp_dir();
+        leftover::sweep(&parent);
+        Self::with_mode(&parent, &super::place::prefix_for(Path::new(name)), 0o700)
+    }
+
+    /// Makes one with a name of this prefix and these permissions, from which the process's umask takes away.
+    pub(super) fn with_mode(parent: &Path, prefix: &OsStr, mode: u32) -> io::Result<Self> {
+        let (path, lock) = make(parent, prefix, |path| {
+            make_folder(path, mode)?;
+            Ok(File::open(path).ok())
+        })?;
+        Ok(Self { path, _lock: lock })
+    }
+
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Leaves the folder where it is.
+    pub(super) fn keep(mut self) {
+        self.path = PathBuf::new();
+    }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        let path = mem::take(&mut self.path);
+        if !path.as_os_str().is_empty() {
+            // What stays is swept by a later run.
+            let _ = fs::remove_dir_all(path);
+        }
+    }
+}
+
+/// Makes something under a name that nothing has yet, and locks it.
+fn make(
+    folder: &Path,
+    prefix: &OsStr,
+    at: impl Fn(&Path) -> io::Result<Option<File>>,
+) -> io::Result<(PathBuf, Option<File>)> {
+    loop {
+        let path = folder.join(name(prefix));
+        let file = match at(&path) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => continue,
+            made => made?,
+        };
+        // Another process may have taken it for a leftover, in the moment before it was locked.
+        if file.as_ref().is_none_or(|file| leftover::lock(file, &path)) {
+            return Ok((path, file));
+        }
+    }
+}
+
+/// A name that no other process will think of: what is random is drawn by the system.
+pub(super) fn name(prefix: &OsStr) -> OsString {
+    let mut drawn = RandomState::new().hash_one(std::process::id());
+    let mut name = prefix.to_owned();
+    for _ in 0..RANDOM {
+        let at = usize::try_from(drawn % CHARACTERS.len() as u64).unwrap_or_default();
+        name.push(char::from(CHARACTERS[at]).encode_utf8(&mut [0; 4]));
+        drawn /= CHARACTERS.len() as u64;
+    }
+    let end = checksum(name.as_encoded_bytes());
+    name.push(end);
+    name
+}
+
+#[cfg(unix)]
+fn make_folder(path: &Path, mode: u32) -> io::Result<()> {
+    use std::os::unix::fs::DirBuilderExt as _;
+    fs::DirBuilder::new().mode(mode).create(path)
+}
+
+#[cfg(not(unix))]
+fn make_folder(path: &Path, _: u32) -> io::Result<()> {
+    fs::create_dir(path)
+}

@@ -1,0 +1,164 @@
+//! Types and levels: constants, conversions that lose nothing, operands brought together.
+
+use super::super::fault::Fault;
+use super::super::plan::{Constant, NodeId, Op};
+use super::super::syntax::{Expr, Literal};
+use super::Bound;
+use super::scope::Scope;
+use crate::columns::{Level, Type};
+
+impl Scope<'_, '_> {
+    pub(super) fn literal(&mut self, literal: &Literal) -> Bound {
+        let (constant, ty) = match literal {
+            Literal::Null => (Constant::Null, None),
+            Literal::Bool(value) => (Constant::Bool(*value), Some(Type::Bool)),
+            Literal::Int(value) => (Constant::Int(*value), Some(Type::Int)),
+            Literal::Float(value) => (Constant::Float(value.to_bits()), Some(Type::Float)),
+            Literal::Text(value) => (Constant::Text(value.clone()), Some(Type::Text)),
+        };
+        let node = self.binder.builder.add(Op::Constant(constant), ty.unwrap_or(Type::Bool), Level::Constant);
+        Bound { node, ty, level: Level::Constant, rate: false }
+    }
+
+    pub(super) fn unary(&mut self, op: Op, ty: Type, level: Level) -> Bound {
+        // An operation on constants alone is carried out once per episode.
+        let (op, level) = match (level, op) {
+            (Level::Constant, op @ Op::Constant(_)) => (op, level),
+            (Level::Constant, op) => (op.with_operands(|operand| self.once_an_episode(operand)), Level::Episode),
+            (level, op) => (op, level),
+        };
+        Bound { node: self.binder.builder.add(op, ty, level), ty: Some(ty), level, rate: false }
+    }
+
+    fn once_an_episode(&mut self, constant: NodeId) -> NodeId {
+        let ty = self.binder.builder.node(constant).ty;
+        self.binder.spread(constant, ty, Level::Constant, Level::Episode)
+    }
+
+    /// An operation over several operands of known types, brought to one level (constants stay as they are).
+    pub(super) fn combine(&mut self, operands: &[Bound], ty: Type, op: impl FnOnce(&[NodeId]) -> Op) -> Bound {
+        let level = operands.iter().map(|operand| operand.level).max().unwrap_or(Level::Constant);
+        let all_constant = level == Level::Constant;
+        let level = level.max(Level::Episode);
+        let nodes: Vec<NodeId> = operands
+            .iter()
+            .map(|operand| match operand.level {
+                Level::Constant if !all_constant => operand.node,
+                from => {
+                    let ty = self.binder.builder.node(operand.node).ty;
+                    self.binder.spread(operand.node, ty, from, level)
+                }
+            })
+            .collect();
+        Bound { node: self.binder.builder.add(op(&nodes), ty, level), ty: Some(ty), level, rate: false }
+    }
+
+    pub(super) fn negated_if(&mut self, negated: bool, bound: Bound) -> Bound {
+        if negated { self.unary(Op::Not(bound.node), Type::Bool, bound.level) } else { bound }
+    }
+
+    /// An operand that must be a truth value.
+    pub(super) fn truth(&mut self, expr: &Expr) -> Option<Bound> {
+        let bound = self.bind(expr)?;
+        match bound.ty {
+            Some(Type::Bool) => Some(bound),
+            None => Some(self.null_of(Type::Bool)),
+            Some(ty) => {
+                let fault = Fault::new(self.place(expr), format!("expected true or false, found {}", ty.name()));
+                self.binder.refuse(fault.label(ty.name()).help("compare it: `x = 1`, `x is not null`, ..."))
+            }
+        }
+    }
+
+    /// An operand that must be a number.
+    pub(super) fn number(&mut self, expr: &Expr) -> Option<Bound> {
+        let bound = self.bind(expr)?;
+        self.as_number(bound, expr)
+    }
+
+    /// What `expr` came to, as a number.
+    pub(super) fn as_number(&mut self, bound: Bound, expr: &Expr) -> Option<Bound> {
+        match bound.ty {
+            Some(Type::Int | Type::Float) => Some(bound),
+            Some(Type::Bool) if bound.rate => Some(self.as_int(bound)),
+            None => Some(self.null_of(Type::Int)),
+            Some(ty) => {
+                let fault = Fault::new(self.place(expr), format!("expected a number, found {}", ty.name()));
+                let help = (ty == Type::Bool).then(|| "write `case when p then 1 else 0 end`".to_owned());
+                self.binder.refuse(fault.label(ty.name()).help_if(help))
+            }
+        }
+    }
+
+    pub(super) fn null_of(&mut self, ty: Type) -> Bound {
+        let node = self.binder.builder.add(Op::Constant(Constant::Null), ty, Level::Constant);
+        Bound { node, ty: Some(ty), level: Level::Constant, rate: false }
+    }
+
+    pub(super) fn as_int(&mut self, bound: Bound) -> Bound {
+        self.unary(Op::IntFromBool(bound.node), Type::Int, bound.level)
+    }
+
+    /// The same value as another type, where that loses nothing.
+    pub(super) fn converted(&mut self, bound: Bound, ty: Type) -> Option<Bound> {
+        match (bound.ty, ty) {
+            (None, ty) => Some(self.null_of(ty)),
+            (Some(from), to) if from == to => Some(bound),
+            (Some(Type::Bool), Type::Int) if bound.rate => Some(self.as_int(bound)),
+            (Some(Type::Bool), Type::Float) if bound.rate => {
+                let int = self.as_int(bound);
+                self.converted(int, Type::Float)
+            }
+            (Some(Type::Int), Type::Float) => Some(match self.constant_int(bound.node) {
+                #[expect(clippy::cast_precision_loss, reason = "an integer literal beside a float is a float")]
+                Some(value) => self.literal(&Literal::Float(value as f64)),
+                None => self.unary(Op::FloatFromInt(bound.node), Type::Float, bound.level),
+            }),
+            _ => None,
+        }
+    }
+
+    pub(super) fn constant_int(&self, node: NodeId) -> Option<i64> {
+        match self.binder.builder.node(node).op {
+            Op::Constant(Constant::Int(value)) => Some(value),
+            _ => None,
+        }
+    }
+
+    /// The type that all of these can take: equal types, numbers widened, rates as 0 and 1 beside numbers.
+    pub(super) fn common_type(bounds: &[Bound]) -> Option<Type> {
+        let typed = || bounds.iter().filter_map(|bound| Some((bound.ty?, bound.rate)));
+        let first = typed().next().map_or(Type::Bool, |(ty, _)| ty);
+        if typed().all(|(ty, _)| ty == first) {
+            return Some(first);
+        }
+        let numeric = |(ty, rate): (Type, bool)| matches!(ty, Type::Int | Type::Float) || rate;
+        if !typed().all(numeric) {
+            return None;
+        }
+        Some(if typed().any(|(ty, _)| ty == Type::Float) { Type::Float } else { Type::Int })
+    }
+
+    /// Operands of one type; `what` happens to them, for the message.
+    pub(super) fn unified(&mut self, bounds: &[Bound], expr: &Expr, what: &str) -> Option<(Vec<Bound>, Type)> {
+        let Some(ty) = Self::common_type(bounds) else {
+            let mut names: Vec<&str> = bounds.iter().filter_map(|bound| bound.ty.map(Type::name)).collect();
+            names.dedup();
+            let fault = Fault::new(self.place(expr), format!("{} cannot be {what}", names.join(" and ")));
+            let truth = bounds.iter().any(|bound| bound.ty == Some(Type::Bool));
+            let help = truth.then(|| "a condition needs no comparison: write `p` or `not p`".to_owned());
+            return self.binder.refuse(fault.label("different types").help_if(help));
+        };
+        let bounds: Option<Vec<Bound>> = bounds.iter().map(|bound| self.converted(*bound, ty)).collect();
+        Some((bounds?, ty))
+    }
+
+    /// Two operands that are asked to be the same.
+    pub(super) fn pair(&mut self, left: &Expr, right: &Expr, whole: &Expr) -> Option<(Bound, Bound)> {
+        let (a, b) = (self.bind(left), self.bind(right));
+        let (a, b) = (a?, b?);
+        self.check_equality((a, left), (b, right))?;
+        let (both, _) = self.unified(&[a, b], whole, "compared")?;
+        Some((both[0], both[1]))
+    }
+}

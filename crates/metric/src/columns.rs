@@ -1,0 +1,151 @@
+//! The names that expressions may use for a trace's columns: type and level, nothing of a file.
+
+use indexmap::IndexMap;
+
+/// The type of an expression. Integers are 64-bit, floats IEEE doubles whose NaN equals itself and exceeds every number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Type {
+    /// True, false or null.
+    Bool,
+    /// A 64-bit integer or null.
+    Int,
+    /// A double or null.
+    Float,
+    /// Text or null; ordered by its UTF-8 bytes.
+    Text,
+}
+
+impl Type {
+    /// As a message names it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bool => "true or false",
+            Self::Int => "an integer",
+            Self::Float => "a float",
+            Self::Text => "text",
+        }
+    }
+}
+
+/// How often an expression has a value. The order is the order of spreading: one value per episode serves as one value
+/// per step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Level {
+    /// The same value everywhere.
+    Constant,
+    /// One value per episode.
+    Episode,
+    /// One value per step.
+    Step,
+}
+
+/// A column as expressions see it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// The type of its values.
+    pub ty: Type,
+    /// [`Level::Episode`] where the schema says that it is constant in an episode.
+    pub level: Level,
+}
+
+/// The columns by name: those of the schema in its order, then those that some traces have beside it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Columns {
+    schema: IndexMap<String, Column>,
+    own: IndexMap<String, Column>,
+    fallbacks: IndexMap<String, Fallback>,
+    /// Columns of the schema whose names definitions may use for something else.
+    free: Vec<String>,
+    /// The only values of a column of the schema, where there is a list of them.
+    values: IndexMap<String, &'static [&'static str]>,
+    stranger: Option<&'static str>,
+}
+
+/// What a column of the schema means where a trace, or a row, has no value in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fallback {
+    /// An expression over columns that every trace has.
+    pub expression: &'static str,
+    /// Whether some trace has the column.
+    pub is_read: bool,
+}
+
+impl Columns {
+    /// The same columns; `help` says what to do about a name that is like none of them.
+    #[must_use]
+    pub fn with_help(self, help: &'static str) -> Self {
+        Self { stranger: Some(help), ..self }
+    }
+
+    /// The same columns; these of the schema take the values listed and no others, null apart.
+    #[must_use]
+    pub fn with_values<N: Into<String>>(self, lists: impl IntoIterator<Item = (N, &'static [&'static str])>) -> Self {
+        let values = lists.into_iter().map(|(name, values)| (name.into(), values)).collect();
+        Self { values, ..self }
+    }
+
+    /// The only values of a column, null apart; `None` where any is possible.
+    pub fn values(&self, name: &str) -> Option<&'static [&'static str]> {
+        self.values.get(name).copied()
+    }
+
+    /// What to do about a name that is like none of these.
+    pub fn help(&self) -> &'static str {
+        self.stranger.unwrap_or("a column of your own is declared with [column.NAME] and `type`")
+    }
+
+    /// The column of this name.
+    pub fn get(&self, name: &str) -> Option<Column> {
+        self.schema.get(name).or_else(|| self.own.get(name)).copied()
+    }
+
+    /// The schema's column of this name: one that every trace means the same by.
+    pub fn of_schema(&self, name: &str) -> Option<Column> {
+        self.schema.get(name).copied()
+    }
+
+    /// Whether a column of the schema keeps its name for itself.
+    pub fn is_reserved(&self, name: &str) -> bool {
+        self.schema.contains_key(name) && !self.free.iter().any(|free| free == name)
+    }
+
+    /// Lets definitions use the name of a column of the schema for something else.
+    pub fn set_free(&mut self, name: impl Into<String>) {
+        self.free.push(name.into());
+    }
+
+    /// Takes a column out of the schema: these traces use its name for something else.
+    pub fn forget(&mut self, name: &str) {
+        self.schema.shift_remove(name);
+    }
+
+    /// What the column of this name means where there is no value; `None` where that is null.
+    pub fn fallback_of(&self, name: &str) -> Option<Fallback> {
+        self.fallbacks.get(name).copied().filter(|_| self.schema.contains_key(name))
+    }
+
+    /// Says what a column of the schema means where there is no value.
+    pub fn set_fallback(&mut self, name: impl Into<String>, fallback: Fallback) {
+        self.fallbacks.insert(name.into(), fallback);
+    }
+
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.schema.keys().chain(self.own.keys()).map(String::as_str)
+    }
+
+    /// Sets what a column beside the schema is; a column of the schema stays as it is.
+    pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
+        let name = name.into();
+        if !self.schema.contains_key(&name) {
+            self.own.insert(name, column);
+        }
+    }
+}
+
+impl<N: Into<String>> FromIterator<(N, Column)> for Columns {
+    /// The columns of a schema.
+    fn from_iter<I: IntoIterator<Item = (N, Column)>>(columns: I) -> Self {
+        let schema = columns.into_iter().map(|(name, column)| (name.into(), column)).collect();
+        Self { schema, ..Self::default() }
+    }
+}

@@ -1,0 +1,364 @@
+//! A definition file, checked: its catalog for readers, its plan for the kernels.
+
+use std::path::Path;
+
+use indexmap::IndexMap;
+
+use super::bind::{self, Binding};
+use super::catalog::{Catalog, Experiment, Kind, Metric, by_order};
+use super::columns::{Columns, Level, Type};
+use super::fault::{Fault, Faults, Source};
+use super::file::{self, Document, FileError};
+use super::origin::Written;
+use super::plan::{NodeId, Output, Plan};
+use exact::hash;
+use exact::ratio::Ratio;
+use exact::suggest::nearest;
+
+/// Checked definitions.
+#[derive(Clone, Debug)]
+pub struct Definitions {
+    /// What tables, figures and files of scores carry along.
+    pub catalog: Catalog,
+    /// What computes the metrics.
+    pub plan: Plan,
+    document: Document,
+}
+
+impl Definitions {
+    /// Reads and checks a built-in file by name (`paper`, `extended`, `battery`, `reach`, `reach-fallback`), or any other by path.
+    ///
+    /// `columns` are those of the traces; columns that the file declares are added to them.
+    pub fn load(name_or_path: impl AsRef<Path>, columns: &Columns) -> Result<Self, FileError> {
+        Ok(Self::check(file::read(name_or_path.as_ref())?, columns, None)?)
+    }
+
+    /// Checks definitions given as text, for tests and for other programs.
+    pub fn from_toml(name: &str, text: &str, columns: &Columns) -> Result<Self, FileError> {
+        let source = Source { name: format!("{name}.toml"), text: text.to_owned() };
+        Ok(Self::check(file::read_source(name.to_owned(), source, None)?, columns, None)?)
+    }
+
+    /// The same definitions, counting only episodes where `condition` holds.
+    pub fn filtered(self, shown: &str, condition: &str, columns: &Columns) -> Result<Self, Faults> {
+        let source = Source { name: shown.to_owned(), text: condition.to_owned() };
+        Self::check(self.document, columns, Some(&Written::whole(source.into())))
+    }
+
+    /// The same definitions with the expression of the `let` of this name replaced, every check made anew; without a filter
+    /// and with all metrics.
+    pub fn with_condition_let(
+        &self,
+        name: &str,
+        shown: &str,
+        expression: &str,
+        columns: &Columns,
+    ) -> Result<Self, ReplaceError> {
+        let node = self.plan.lets.iter().find(|(known, _)| known == name).map(|(_, node)| self.plan.node(*node));
+        match node {
+            Some(node) if node.ty == Type::Bool && node.level == Level::Step => {}
+            Some(node) => {
+                let found = format!("{}, {}", node.ty.name(), per(node.level));
+                return Err(ReplaceError::NoCondition { name: name.to_owned(), found });
+            }
+            None => {
+                let known: Vec<&str> = self.plan.lets.iter().map(|(known, _)| known.as_str()).collect();
+                let found = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
+                return Err(ReplaceError::NoLet { name: name.to_owned(), found });
+            }
+        }
+        let mut document = self.document.clone();
+        let written = Written::whole(Source { name: shown.to_owned(), text: expression.to_owned() }.into());
+        if let Some((text, place)) = document.lets.get_mut(name) {
+            *place = written.everywhere();
+            *text = written;
+        }
+        Ok(Self::check(document, columns, None)?)
+    }
+
+    /// Keeps the metrics of these names.
+    pub fn select(&mut self, names: &[String]) -> Result<(), UnknownMetric> {
+        if let Some(name) = names.iter().find(|name| !self.catalog.metric.contains_key(*name)) {
+            let known: Vec<String> = self.catalog.metric.keys().cloned().collect();
+            let near = nearest(name, known.iter().map(String::as_str)).map(str::to_owned);
+            return Err(UnknownMetric { name: name.clone(), near, known });
+        }
+        self.plan.select(names);
+        Ok(())
+    }
+
+    /// The `let` or metric that is exactly this node, a `let` first.
+    pub fn name_of(&self, node: NodeId) -> Option<String> {
+        let lets = self.plan.lets.iter().find(|(_, known)| *known == node).map(|(name, _)| name.clone());
+        lets.or_else(|| self.plan.outputs.iter().find(|output| output.node == node).map(|output| output.name.clone()))
+    }
+
+    /// Whether they score an experiment whose own definitions are `own`: they are these or include them, they have a table for
+    /// it, or they have a table for none. Where its own are a file, any other file may be what became of that one.
+    pub fn scores(&self, experiment: &str, own: &str, own_hash: Option<&str>) -> bool {
+        let document = &self.document;
+        let is_own = own_hash.map_or_else(|| document.built_on.contains(&own), |_| document.file_hash.is_some());
+        is_own || document.experiments.is_empty() || document.experiments.contains_key(experiment)
+    }
+
+    /// Several definitions in one, each for its own experiments: elsewhere its metrics are undefined. `None` where two of them
+    /// give one name another meaning.
+    pub fn side_by_side(parts: &[(Self, Vec<String>)], columns: &Columns) -> Option<Result<Self, Faults>> {
+        let names: Vec<&str> = parts.iter().map(|(part, _)| part.document.name.as_str()).collect();
+        let mut whole = Document { name: names.join("+"), open: true, ..Document::default() };
+        for (part, experiments) in parts {
+            let Document { columns, lets, metrics, experiments: known, built_on, .. } = part.document.clone();
+            let same = |(name, (written, _)): (&String, &(Written, _))| {
+                whole.lets.get(name).is_none_or(|(other, _): &(Written, _)| other.text == written.text)
+            };
+            let is_new = |name: &String| !whole.metrics.contains_key(name) && !whole.lets.contains_key(name);
+            if !lets.iter().all(same) || !metrics.keys().all(is_new) {
+                return None;
+            }
+            let quoted: Vec<String> =
+                experiments.iter().map(|name| format!("'{}'", name.replace('\'', "''"))).collect();
+            let here = format!("experiment in ({})", quoted.join(", "));
+            whole.built_on.extend(built_on);
+            whole.lets.extend(lets);
+            whole.columns.extend(columns);
+            whole.experiments.extend(known);
+            whole.metrics.extend(metrics.into_iter().map(|(name, entry)| {
+                let when = entry.when.map_or_else(|| here.clone(), |when| format!("({}) and {here}", when.text));
+                let when = Written::whole(Source { name: "the experiments".to_owned(), text: when }.into());
+                (name, file::MetricEntry { when: Some(when), ..entry })
+            }));
+        }
+        Some(Self::check(whole, columns, None))
+    }
+
+    pub(super) fn document(&self) -> &Document {
+        &self.document
+    }
+
+    fn check(document: Document, columns: &Columns, filter: Option<&Written>) -> Result<Self, Faults> {
+        let mut columns = columns.clone();
+        let mut faults = declare(&document, &mut columns);
+        faults.extend(experiment_faults(&document));
+        let binding = match bind::bind(&document, &columns, filter) {
+            Ok(binding) => {
+                faults.extend(level_faults(&document, &binding));
+                binding
+            }
+            Err(more) => {
+                faults.extend(more);
+                return Err(Faults(faults).in_order());
+            }
+        };
+        if !faults.is_empty() {
+            return Err(Faults(faults).in_order());
+        }
+        let catalog = catalog(&document, &binding);
+        let mut plan = binding.plan;
+        let outputs = binding.metrics.into_iter().map(|(name, (node, kind))| Output { name, kind, node });
+        plan.outputs = outputs.collect();
+        plan.lets = binding.lets;
+        plan.filter = binding.filter;
+        Ok(Self { catalog, plan, document })
+    }
+}
+
+/// Why a `let` cannot be replaced by a condition on steps.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplaceError {
+    /// There is none of this name.
+    #[error(
+        "expected a `let` named `{name}`, which says at which steps there is evidence, found {found}\n  \
+         help: name the condition in the definition file, `{name} = \"mirror_visible\"` under `[let]`, and use it in the metrics"
+    )]
+    NoLet {
+        /// The name.
+        name: String,
+        /// Those that there are.
+        found: String,
+    },
+    /// It is something else.
+    #[error(
+        "expected the `let` `{name}` to be true or false, one value per step, found {found}\n  \
+         help: let `{name}` say at which steps there is evidence, such as \"mirror_visible\""
+    )]
+    NoCondition {
+        /// The name.
+        name: String,
+        /// Its type and level.
+        found: String,
+    },
+    /// The definitions have faults with the new expression.
+    #[error(transparent)]
+    Faults(#[from] Faults),
+}
+
+/// How often an expression has a value, in words.
+const fn per(level: Level) -> &'static str {
+    match level {
+        Level::Constant => "a constant",
+        Level::Episode => "one value per episode",
+        Level::Step => "one value per step",
+    }
+}
+
+/// A name that is no metric of the definitions.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("unknown metric `{name}`: {}", advice(.near.as_deref(), .known))]
+pub struct UnknownMetric {
+    /// The name given.
+    pub name: String,
+    /// The metric whose name is most like it.
+    pub near: Option<String>,
+    /// All metrics.
+    pub known: Vec<String>,
+}
+
+fn advice(near: Option<&str>, known: &[String]) -> String {
+    match near {
+        Some(near) => format!("did you mean `{near}`?"),
+        None => format!("metrics are {}", known.join(", ")),
+    }
+}
+
+/// Adds the columns that a document declares; they must not contradict the schema or the traces.
+fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for (name, (declared, place)) in &document.columns {
+        if name == "t" || columns.of_schema(name).is_some_and(|known| known != *declared) {
+            let message = format!("`{name}` is a column of every trace and cannot be declared as another");
+            faults.push(Fault::new(place.clone(), message).help("remove the declaration: `mirrorstats schema` has it"));
+        } else if let Some(found) = columns.get(name).filter(|found| found.ty != declared.ty) {
+            let (declared, found) = (declared.ty.name(), found.ty.name());
+            let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");
+            faults.push(Fault::new(place.clone(), message).help("declare it as the traces have it"));
+        } else {
+            columns.set_own(name.clone(), *declared);
+        }
+    }
+    faults
+}
+
+/// Chance levels must be those of metrics.
+fn experiment_faults(document: &Document) -> Vec<Fault> {
+    let mut faults = Vec::new();
+    for entry in document.experiments.values() {
+        let chance = entry.chance.iter().map(|(name, (_, place))| (name, place));
+        let reference = entry.reference.iter().map(|(name, (_, place))| (name, place));
+        for (name, place) in chance.chain(reference).filter(|(name, _)| !document.metrics.contains_key(*name)) {
+            let near = nearest(name, document.metrics.keys().map(String::as_str));
+            let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
+            faults.push(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))));
+        }
+    }
+    faults
+}
+
+/// A level of chance of a rate is a probability.
+fn level_faults(document: &Document, binding: &Binding) -> Vec<Fault> {
+    let metrics = document.metrics.iter().map(|(name, entry)| (name, entry.chance, &entry.place));
+    let experiments = document.experiments.values().flat_map(|entry| {
+        let chance = entry.chance.iter().map(|(name, (level, place))| (name, *level, place));
+        let reference = entry.reference.iter();
+        chance.chain(reference.flat_map(|(name, (levels, place))| levels.iter().map(move |l| (name, Some(*l), place))))
+    });
+    let improbable = |level: Ratio| level.numerator() < 0 || level.numerator() > level.denominator();
+    let mut faults = Vec::new();
+    for (name, level, place) in metrics.chain(experiments) {
+        let is_rate = binding.metrics.get(name).is_some_and(|(_, kind)| *kind == Kind::Rate);
+        if let Some(level) = level.filter(|level| is_rate && improbable(*level)) {
+            let message = format!("the chance level of the rate `{name}` is {level}; expected a fraction from 0 to 1");
+            faults.push(Fault::new(place.clone(), message));
+        }
+    }
+    faults
+}
+
+fn catalog(document: &Document, binding: &Binding) -> Catalog {
+    let mut catalog = Catalog {
+        name: document.name.clone(),
+        hash: String::new(),
+        // A file that lists no experiment at all restricts none.
+        open: document.open || document.experiments.is_empty(),
+        lets: document.lets.iter().map(|(name, (written, _))| (name.clone(), written.text.clone())).collect(),
+        metric: metrics(document, binding),
+        experiment: experiments(document),
+    };
+    catalog.hash = content_hash(&catalog);
+    catalog
+}
+
+/// The hash of what the definitions say: comments, layout and the file's name do not count.
+fn content_hash(catalog: &Catalog) -> String {
+    let nameless = Catalog { name: String::new(), hash: String::new(), ..catalog.without_declared() };
+    let text = serde_json::to_string(&nameless).expect("a catalog holds texts, integers and maps with text keys");
+    hash::of_bytes(text.as_bytes())
+}
+
+fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
+    let metric = |(name, entry): (&String, &file::MetricEntry)| {
+        let kind = binding.metrics[name].1;
+        let unit = entry.unit.as_ref().map_or_else(|| kind.default_unit().to_owned(), |(unit, _)| unit.clone());
+        let metric = Metric {
+            title: entry.title.clone().unwrap_or_else(|| name.clone()),
+            kind,
+            unit,
+            better: entry.better,
+            section: entry.section.clone(),
+            help: entry.help.clone(),
+            value: entry.value.text.clone(),
+            when: entry.when.as_ref().map(|when| when.text.clone()),
+            se: entry.se,
+            chance: entry.chance,
+        };
+        (name.clone(), metric)
+    };
+    document.metrics.iter().map(metric).collect()
+}
+
+fn experiments(document: &Document) -> IndexMap<String, Experiment> {
+    let mut experiments: IndexMap<String, Experiment> = document
+        .experiments
+        .iter()
+        .enumerate()
+        .map(|(position, (name, entry))| {
+            let position = i64::try_from(position).unwrap_or(i64::MAX);
+            let experiment = Experiment {
+                title: entry.title.clone(),
+                order: entry.order.unwrap_or(position.saturating_add(1)),
+                chance: entry.chance.iter().map(|(name, (level, _))| (name.clone(), *level)).collect(),
+                reference: entry.reference.iter().map(|(name, (levels, _))| (name.clone(), levels.clone())).collect(),
+                is_declared: false,
+            };
+            (name.clone(), experiment)
+        })
+        .collect();
+    experiments.sort_by(by_order);
+    experiments
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Definitions, ReplaceError};
+    use crate::schema_columns::schema_columns;
+
+    #[test]
+    fn a_replaced_condition_is_what_an_edited_file_says() {
+        let columns = schema_columns();
+        let paper = Definitions::load("paper", &columns).unwrap();
+        let replaced = paper.with_condition_let("visible", "test", "mirror_self_px >= 7", &columns).unwrap();
+        let text = "include = [\"paper\"]\n[let]\nvisible = \"mirror_self_px >= 7\"\n";
+        let edited = Definitions::from_toml("edited", text, &columns).unwrap();
+        assert_eq!((&replaced.catalog.hash, &replaced.plan), (&edited.catalog.hash, &edited.plan));
+        assert_ne!(replaced.catalog.hash, paper.catalog.hash);
+    }
+
+    #[test]
+    fn only_a_condition_on_steps_is_replaced_and_by_no_fault() {
+        let columns = schema_columns();
+        let paper = Definitions::load("paper", &columns).unwrap();
+        let error = |name: &str, text: &str| paper.with_condition_let(name, "test", text, &columns).unwrap_err();
+        assert!(matches!(error("seen", "true"), ReplaceError::NoLet { .. }));
+        assert!(matches!(error("done", "true"), ReplaceError::NoCondition { .. }));
+        assert!(matches!(error("visible", "mirror_self_pix > 1"), ReplaceError::Faults(_)));
+    }
+}

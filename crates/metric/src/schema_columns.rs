@@ -1,0 +1,38 @@
+//! The columns of a trace, for unit tests.
+
+use trace::schema::{self, COLUMNS, Kind};
+
+use crate::columns::{Column, Columns, Fallback, Level, Type};
+
+/// The columns of the schema, as scoring declares them where every required column is present.
+pub(crate) fn schema_columns() -> Columns {
+    let column = |column: &schema::Column| {
+        let level = if column.constant { Level::Episode } else { Level::Step };
+        type_of(column.stored.kind()).map(|ty| (column.name, Column { ty, level }))
+    };
+    let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
+    let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
+    let mut columns = columns.with_values(lists);
+    for column in COLUMNS {
+        if let Some(expression) = column.default {
+            columns.set_fallback(column.name, Fallback { expression, is_read: column.required });
+        }
+    }
+    COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
+    columns
+}
+
+/// Returns true if every row of every trace has a value in this column.
+pub(crate) fn has_value(name: &str) -> bool {
+    COLUMNS.iter().any(|column| column.name == name && column.required && !column.nullable)
+}
+
+fn type_of(kind: Kind) -> Option<Type> {
+    match kind {
+        Kind::Bool => Some(Type::Bool),
+        Kind::Int => Some(Type::Int),
+        Kind::Float => Some(Type::Float),
+        Kind::String => Some(Type::Text),
+        Kind::Unsupported => None,
+    }
+}

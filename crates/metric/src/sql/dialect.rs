@@ -1,0 +1,204 @@
+//! What engines write differently: names, constants, patterns, and the few functions that not all of them have.
+
+use sqlparser::keywords::ALL_KEYWORDS;
+
+use super::pattern::java;
+use crate::columns::Type;
+use crate::plan::{Arithmetic, Constant};
+
+/// Whose SQL to write.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Dialect {
+    /// What all engines share.
+    #[default]
+    Portable,
+    /// Spark SQL.
+    Spark,
+    /// `DuckDB`.
+    Duckdb,
+    /// Polars SQL, which `--engine polars` runs.
+    Polars,
+}
+
+/// The functions of a dialect that spare a pass over the steps.
+pub(super) struct Functions {
+    /// The value at the smallest and at the largest t that is not null; a null value counts.
+    pub(super) value_at: [&'static str; 2],
+    /// The number of items of a list, the smallest and the largest one.
+    pub(super) of_list: [&'static str; 3],
+}
+
+/// The smallest integer, which has no literal of its own.
+pub(super) const SMALLEST: &str = "(-9223372036854775807 - 1)";
+
+impl Dialect {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Spark => "spark",
+            Self::Duckdb => "duckdb",
+            Self::Polars => "polars",
+        }
+    }
+
+    /// A name as it stands in a statement.
+    pub(super) fn quoted(self, name: &str) -> String {
+        match self {
+            Self::Portable | Self::Duckdb if is_plain(name) => name.to_owned(),
+            Self::Spark if is_plain(name) && !is_keyword(name) => name.to_owned(),
+            Self::Spark => format!("`{}`", name.replace('`', "``")),
+            Self::Polars | Self::Portable | Self::Duckdb => format!("\"{}\"", name.replace('"', "\"\"")),
+        }
+    }
+
+    /// The column of a metric.
+    pub fn output_name(self, metric: &str) -> String {
+        match self {
+            Self::Portable => metric.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect(),
+            Self::Spark | Self::Duckdb | Self::Polars => self.quoted(metric),
+        }
+    }
+
+    /// The column of a metric as an engine names it in its answer.
+    pub fn output_alias(self, metric: &str) -> String {
+        match self {
+            Self::Portable => self.output_name(metric),
+            Self::Spark | Self::Duckdb | Self::Polars => metric.to_owned(),
+        }
+    }
+
+    /// The function that says whether a text has a match of a regular expression.
+    pub(super) const fn matches(self) -> Option<&'static str> {
+        match self {
+            Self::Portable => None,
+            Self::Spark | Self::Polars => Some("regexp_like"),
+            Self::Duckdb => Some("regexp_matches"),
+        }
+    }
+
+    /// The functions that spare a pass, where the dialect has them.
+    pub(super) const fn functions(self) -> Option<Functions> {
+        match self {
+            Self::Portable | Self::Polars => None,
+            Self::Spark => {
+                Some(Functions { value_at: ["min_by", "max_by"], of_list: ["size", "array_min", "array_max"] })
+            }
+            Self::Duckdb => {
+                Some(Functions { value_at: ["arg_min_null", "arg_max_null"], of_list: ["len", "list_min", "list_max"] })
+            }
+        }
+    }
+
+    /// The aggregate of a column that is the same at every step of an episode.
+    pub(super) const fn any_value(self) -> &'static str {
+        match self {
+            Self::Duckdb => "any_value",
+            Self::Portable | Self::Spark | Self::Polars => "MIN",
+        }
+    }
+
+    /// The list of the timesteps at which a condition holds.
+    pub(super) fn list(self, condition: &str) -> String {
+        match self {
+            Self::Duckdb => format!("list(s.t) FILTER (WHERE {condition})"),
+            _ => format!("collect_list(CASE WHEN {condition} THEN s.t END)"),
+        }
+    }
+
+    /// The items of a list for which a condition holds; `item` is the name of an item in it.
+    pub(super) fn filtered(self, list: &str, item: &str, condition: &str) -> String {
+        match self {
+            Self::Duckdb => format!("[{item} for {item} in {list} if {condition}]"),
+            _ => format!("filter({list}, {item} -> {condition})"),
+        }
+    }
+
+    /// A text as it stands in a statement.
+    pub fn text(self, value: &str) -> String {
+        match self {
+            // Spark reads backslashes in texts as escapes.
+            Self::Spark => format!("'{}'", value.replace('\\', "\\\\").replace('\'', "\\'")),
+            Self::Portable | Self::Duckdb | Self::Polars => format!("'{}'", value.replace('\'', "''")),
+        }
+    }
+
+    /// An integer as it stands in a statement. Spark's have 32 bits unless they say that they have 64.
+    fn integer(self, value: i64) -> String {
+        let suffix = if self == Self::Spark { "L" } else { "" };
+        match value {
+            i64::MIN => format!("(-{}{suffix} - 1)", i64::MAX),
+            value if value < 0 => format!("({value}{suffix})"),
+            value => format!("{value}{suffix}"),
+        }
+    }
+
+    /// A pattern of the `regex` crate as it stands in a statement.
+    pub fn pattern(self, pattern: &str) -> String {
+        match self {
+            Self::Spark => self.text(&java(pattern).unwrap_or_else(|| unreachable!("the binder has read the pattern"))),
+            Self::Portable | Self::Duckdb | Self::Polars => self.text(pattern),
+        }
+    }
+
+    pub(super) fn constant(self, constant: &Constant, ty: Type) -> String {
+        match constant {
+            Constant::Null => format!("CAST(NULL AS {})", self.type_name(ty)),
+            Constant::Bool(value) => i64::from(*value).to_string(),
+            Constant::Int(value) => self.integer(*value),
+            // Polars takes no exponent without a point.
+            Constant::Float(bits) if self == Self::Polars => format!("CAST('{:?}' AS DOUBLE)", f64::from_bits(*bits)),
+            Constant::Float(bits) => format!("CAST({:e} AS DOUBLE)", f64::from_bits(*bits)),
+            Constant::Text(value) => self.text(value),
+        }
+    }
+
+    const fn type_name(self, ty: Type) -> &'static str {
+        match (ty, self) {
+            (Type::Text, Self::Spark) => "STRING",
+            (Type::Text, _) => "VARCHAR",
+            (Type::Float, _) => "DOUBLE",
+            (Type::Int | Type::Bool, _) => "BIGINT",
+        }
+    }
+
+    /// Quotient and remainder without a division of integers, which engines disagree about: the remainder is exact
+    /// everywhere, and what is left divides without a fraction. Spark divides as doubles, and has a word of its own.
+    pub(super) fn arithmetic(self, op: Arithmetic, x: &str, y: &str) -> String {
+        match op {
+            Arithmetic::Add => format!("({x} + {y})"),
+            Arithmetic::Subtract => format!("({x} - {y})"),
+            Arithmetic::Multiply => format!("({x} * {y})"),
+            Arithmetic::Remainder => format!("CASE WHEN {y} <> 0 THEN {} END", self.remainder(x, y)),
+            Arithmetic::Quotient => match self {
+                Self::Polars | Self::Duckdb => {
+                    format!("CASE WHEN {y} <> 0 THEN ({x} - {}) // {y} END", self.remainder(x, y))
+                }
+                Self::Spark => format!("CASE WHEN {y} <> 0 THEN ({x} DIV {y}) END"),
+                Self::Portable => format!("CASE WHEN {y} <> 0 THEN CAST(({x} - {x} % {y}) / {y} AS BIGINT) END"),
+            },
+        }
+    }
+
+    /// The remainder with the sign of x. Polars gives it that of y, so that y is given that of x; the smallest integer
+    /// has no other sign.
+    fn remainder(self, x: &str, y: &str) -> String {
+        if self != Self::Polars {
+            return format!("{x} % {y}");
+        }
+        format!(
+            "CASE WHEN {y} = {SMALLEST} AND {x} <> {SMALLEST} THEN {x} \
+             ELSE {x} % (CASE WHEN ({x} < 0) = ({y} < 0) THEN {y} ELSE (0 - {y}) END) END"
+        )
+    }
+}
+
+/// Whether every engine takes a name without quotes.
+pub(super) fn is_plain(name: &str) -> bool {
+    let starts = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
+    starts && name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+/// Whether a name may also be a word of SQL.
+fn is_keyword(name: &str) -> bool {
+    ALL_KEYWORDS.binary_search(&name.to_ascii_uppercase().as_str()).is_ok()
+}

@@ -1,0 +1,209 @@
+//! What is computed where: in which pass over the steps, as which column, and what is written out once for all its users.
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
+
+use super::Dialect;
+use super::dialect::is_plain;
+use super::one_pass::Windowed;
+use crate::columns::{Level, Type};
+use crate::plan::{Aggregate, NodeId, Op, Plan};
+use exact::budget::Limit;
+
+/// The columns of an episode that every statement gives, in the order of the episode table, after `episode_id`.
+pub(super) const KEYS: [&str; 4] = ["model", "experiment", "seed", "run"];
+
+/// Where the nodes of a plan stand in a statement.
+#[derive(Clone)]
+pub(super) struct Layout<'p> {
+    pub(super) plan: &'p Plan,
+    pub(super) dialect: Dialect,
+    /// The nodes to compute, operands before their users.
+    pub(super) needed: Vec<NodeId>,
+    /// The pass after which each is known; 0 for what one step says.
+    passes: BTreeMap<NodeId, usize>,
+    /// The searches that a list of timesteps answers, a column of the first pass.
+    lists: BTreeMap<NodeId, Windowed>,
+    /// The values per step that several others need: columns of a table of steps.
+    pub(super) shared: BTreeSet<NodeId>,
+    /// How many steps before `s` the step is of which is written.
+    pub(super) lag: Cell<usize>,
+    /// Bytes that were written of nodes, those of nodes in other nodes counted each time.
+    written: Rc<Cell<usize>>,
+}
+
+/// A node that others read is written out for each of them, so that what is written may double with every definition.
+/// The longest statement, each of its bytes within some five nodes.
+const MOST_WRITTEN: Limit = Limit::new("bytes written of a statement", 20 << 20);
+
+impl<'p> Layout<'p> {
+    pub(super) fn new(
+        plan: &'p Plan,
+        dialect: Dialect,
+        roots: &[NodeId],
+        windowed: &BTreeMap<NodeId, Windowed>,
+    ) -> Self {
+        let needed = plan.needed_by(roots.iter().copied());
+        let lists = if dialect.functions().is_some() { lists(plan, &needed, windowed) } else { BTreeMap::new() };
+        let conditions = lists.values().map(|list| list.condition);
+        let needed = plan.needed_by(roots.iter().copied().chain(conditions));
+        let mut layout = Self {
+            plan,
+            dialect,
+            needed,
+            passes: BTreeMap::new(),
+            lists,
+            shared: BTreeSet::new(),
+            lag: Cell::new(0),
+            written: Rc::default(),
+        };
+        for id in layout.needed.clone() {
+            layout.passes.insert(id, layout.find_pass(id));
+        }
+        layout.shared = layout.find_shared();
+        layout
+    }
+
+    fn find_pass(&self, id: NodeId) -> usize {
+        let node = self.plan.node(id);
+        let after = |nodes: &[NodeId]| nodes.iter().map(|node| self.passes[node]).max().unwrap_or(0);
+        match &node.op {
+            Op::Aggregate(..) if let Some(list) = self.lists.get(&id) => {
+                list.windows.iter().map(|(_, moment)| self.passes[moment]).max().unwrap_or(1).max(1)
+            }
+            Op::At(..) if self.landmark(id).is_some() => 1,
+            op @ (Op::Aggregate(..) | Op::At(..)) => after(&op.operands()) + 1,
+            Op::Length => 1,
+            Op::Column(_) if node.level == Level::Episode => 1,
+            op => after(&op.operands()),
+        }
+    }
+
+    fn find_shared(&self) -> BTreeSet<NodeId> {
+        let mut users: BTreeMap<NodeId, usize> = BTreeMap::new();
+        for id in &self.needed {
+            self.plan.node(*id).op.operands().into_iter().for_each(|operand| *users.entry(operand).or_default() += 1);
+        }
+        let mut lagging = BTreeSet::new();
+        for id in &self.needed {
+            let op = &self.plan.node(*id).op;
+            let looks_back = matches!(op, Op::Lag(_)) || op.operands().iter().any(|operand| lagging.contains(operand));
+            if looks_back && self.plan.node(*id).level == Level::Step {
+                lagging.insert(*id);
+            }
+        }
+        let is_shared = |id: &NodeId| {
+            let node = self.plan.node(*id);
+            let simple = matches!(node.op, Op::Column(_) | Op::Time | Op::Constant(_) | Op::Spread(_));
+            node.level == Level::Step
+                && !simple
+                // The steps before are joined to the table of steps.
+                && !lagging.contains(id)
+                && self.passes[id] == 0
+                && users.get(id).is_some_and(|&count| count > 1)
+        };
+        self.needed.iter().copied().filter(is_shared).collect()
+    }
+
+    /// Whether a value is a column of the table of steps, and read there: of the steps before there is no such table.
+    pub(super) fn is_shared(&self, id: NodeId) -> bool {
+        self.lag.get() == 0 && self.shared.contains(&id)
+    }
+
+    /// A column of the steps so many before, where no column of the traces has its name.
+    pub(super) fn lag_column(&self, lag: usize, word: &str) -> String {
+        self.free_name(format!("lag{lag}_{word}"))
+    }
+
+    /// Counts what is written; `false` once that is too much.
+    pub(super) fn spend(&self, bytes: usize) -> bool {
+        self.written.set(self.written.get().saturating_add(bytes));
+        self.is_within_budget()
+    }
+
+    /// Whether all that was asked for was written.
+    pub(super) fn is_within_budget(&self) -> bool {
+        MOST_WRITTEN.check(self.written.get() as u64).is_ok()
+    }
+
+    /// The same without a table of steps: every value is written out where it is read.
+    pub(super) fn without_shared(mut self) -> Self {
+        self.shared.clear();
+        self
+    }
+
+    /// The pass after which a node is known; 0 for what one step says.
+    pub(super) fn pass(&self, id: NodeId) -> usize {
+        self.passes[&id]
+    }
+
+    /// Whether a node is an aggregate of its pass.
+    pub(super) fn is_aggregate(&self, id: NodeId) -> bool {
+        let node = self.plan.node(id);
+        match &node.op {
+            Op::Aggregate(..) => !self.lists.contains_key(&id),
+            Op::At(..) | Op::Length => true,
+            Op::Column(name) => node.level == Level::Episode && !KEYS.contains(&name.as_str()),
+            _ => false,
+        }
+    }
+
+    /// The list that answers a search.
+    pub(super) fn list(&self, id: NodeId) -> Option<&Windowed> {
+        self.lists.get(&id)
+    }
+
+    /// The conditions whose timesteps the first pass lists.
+    pub(super) fn listed(&self) -> BTreeSet<NodeId> {
+        self.lists.values().map(|list| list.condition).collect()
+    }
+
+    /// The search that a lookup follows, where its pass can look up too: first or last, and the condition, if any.
+    pub(super) fn landmark(&self, id: NodeId) -> Option<(Aggregate, Option<NodeId>)> {
+        let node = self.plan.node(id);
+        let Op::At(x, moment) = node.op else { return None };
+        let found = match self.plan.node(moment).op {
+            Op::Aggregate(landmark @ (Aggregate::First | Aggregate::Last), condition) => (landmark, Some(condition)),
+            Op::Length => (Aggregate::Last, None),
+            _ => return None,
+        };
+        let at_once = self.passes[&x] == 0 && found.1.is_none_or(|condition| self.passes[&condition] == 0);
+        (at_once && node.ty != Type::Bool && self.dialect.functions().is_some()).then_some(found)
+    }
+
+    /// The column of a node: the name of its definition and its number, else a letter and its number.
+    pub(super) fn column(&self, letter: char, id: NodeId) -> String {
+        let lets = self.plan.lets.iter().map(|(name, node)| (name, *node));
+        let metrics = self.plan.outputs.iter().map(|output| (&output.name, output.node));
+        let own = lets.chain(metrics).find(|(name, node)| *node == id && is_plain(name));
+        own.map_or_else(|| format!("{letter}{}", id.index()), |(name, _)| format!("{name}_{}", id.index()))
+    }
+
+    /// The column of a value per step in the table of steps, where no column of the traces has its name.
+    pub(super) fn step_column(&self, id: NodeId) -> String {
+        self.free_name(self.column('c', id))
+    }
+
+    /// The name, or one like it that no column of the traces has.
+    fn free_name(&self, mut name: String) -> String {
+        let columns = self.plan.columns(&self.needed);
+        while columns.iter().any(|(column, _)| column.eq_ignore_ascii_case(&name)) {
+            name.push('_');
+        }
+        name
+    }
+}
+
+/// The searches that lists answer: those of which only the episode's values are made. Others are read at each step,
+/// where a list would be searched as often.
+fn lists(plan: &Plan, needed: &[NodeId], windowed: &BTreeMap<NodeId, Windowed>) -> BTreeMap<NodeId, Windowed> {
+    let read_at_steps = needed.iter().filter_map(|id| match &plan.node(*id).op {
+        Op::Spread(x) if plan.node(*id).level == Level::Step => Some(*x),
+        Op::At(_, moment) => Some(*moment),
+        _ => None,
+    });
+    let read_at_steps: BTreeSet<NodeId> = plan.needed_by(read_at_steps).into_iter().collect();
+    let answered = windowed.iter().filter(|(id, _)| needed.contains(id) && !read_at_steps.contains(id));
+    answered.map(|(id, list)| (*id, list.clone())).collect()
+}

@@ -1,0 +1,234 @@
+//! A plan as one SQL statement over a table `steps`: the second lowering, for other engines.
+//!
+//! ```text
+//! plan ──► one_pass.rs ──► layout.rs ───────► statement.rs (passes and columns)
+//!          (landmarks of   (which pass, which  expression.rs (nodes)
+//!           one pass)       column)            dialect.rs (what engines write differently)
+//! ```
+//!
+//! A pass over the steps is a common table expression with one row per episode. An aggregate belongs to the first pass
+//! in which everything it reads is known; most definitions need one pass, which reads as one writes it by hand:
+//!
+//! ```text
+//! WITH e1 AS (SELECT s.episode_id, MIN(CASE WHEN ... THEN s.t END) AS done_4, ... FROM (...) s GROUP BY s.episode_id)
+//! SELECT ... FROM e1 ORDER BY ...
+//! ```
+//!
+//! The portable form uses nothing but CASE, COALESCE, MIN, MAX, SUM, COUNT, JOIN (LEFT JOIN for `lag`) and arithmetic, so that Polars SQL,
+//! `DuckDB`, Spark SQL and `DataFusion` run it as it is. Of a search between two landmarks it makes a second pass, as
+//! Polars does, which has no filters of lists; `DuckDB` and Spark have them.
+//!
+//! Sums beyond 64 bits, which the native engine refuses, are an error or a wrap of the engine that
+//! runs the statement.
+
+mod checks;
+mod dialect;
+mod expression;
+mod layout;
+mod one_pass;
+mod pattern;
+mod statement;
+
+use std::collections::BTreeSet;
+
+pub use self::checks::lower_checks;
+pub use self::dialect::Dialect;
+use self::dialect::is_plain;
+use self::layout::Layout;
+use self::one_pass::OnePass;
+use self::statement::Statement;
+use super::plan::{NodeId, Op, Plan};
+
+use exact::budget::SETTING;
+
+/// A plan that a dialect cannot say.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum LoweringError {
+    /// Regular expressions.
+    #[error("`{metric}` uses regexp_like, which has no form that all engines share; choose --dialect spark or duckdb")]
+    Regexp {
+        /// The first metric that needs it.
+        metric: String,
+    },
+    /// A name that needs quotes, which engines write differently.
+    #[error("the name `{name}` needs quotes, which engines write differently; choose --dialect spark or duckdb")]
+    Name {
+        /// The column.
+        name: String,
+    },
+    /// Two metrics whose names are one without quotes.
+    #[error("two metrics would both be called `{name}`; choose --dialect spark or duckdb")]
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// Too long a statement.
+    #[error(
+        "the statement exceeds {limit} bytes; choose fewer metrics with --metrics, or raise the limit: {SETTING}=10 in the environment"
+    )]
+    Length {
+        /// The longest statement written.
+        limit: u64,
+    },
+}
+
+/// The statement that computes the episode table: `episode_id, model, experiment, seed, run`, then the metrics.
+///
+/// Engines differ in how they quote names, so the portable form quotes none: a metric's `-` becomes `_` there.
+pub fn lower(plan: &Plan, dialect: Dialect) -> Result<String, LoweringError> {
+    check_patterns(plan, dialect)?;
+    check_names(plan, dialect)?;
+    let OnePass { plan, windowed } = OnePass::of(plan);
+    let layout = Layout::new(&plan, dialect, &roots(&plan), &windowed);
+    let mut statement = Statement::new(&layout);
+    statement.passes(&[])?;
+    statement.episodes()?;
+    Ok(statement.text)
+}
+
+/// The nodes that the episode table is made of.
+fn roots(plan: &Plan) -> Vec<NodeId> {
+    plan.outputs.iter().map(|output| output.node).chain(plan.filter).collect()
+}
+
+fn check_patterns(plan: &Plan, dialect: Dialect) -> Result<(), LoweringError> {
+    if dialect.matches().is_some() {
+        return Ok(());
+    }
+    let uses = |root: NodeId| plan.needed_by([root]).into_iter().any(|id| matches!(plan.node(id).op, Op::Matches(..)));
+    let output = plan.outputs.iter().find(|output| uses(output.node)).map(|output| output.name.clone());
+    let filter = plan.filter.filter(|&node| uses(node)).map(|_| "the filter".to_owned());
+    output.or(filter).map_or(Ok(()), |metric| Err(LoweringError::Regexp { metric }))
+}
+
+fn check_names(plan: &Plan, dialect: Dialect) -> Result<(), LoweringError> {
+    if dialect != Dialect::Portable {
+        return Ok(());
+    }
+    let needed = plan.needed_by(roots(plan));
+    if let Some((name, _)) = plan.columns(&needed).into_iter().find(|(name, _)| !is_plain(name)) {
+        return Err(LoweringError::Name { name: name.to_owned() });
+    }
+    let mut seen = BTreeSet::new();
+    for name in plan.outputs.iter().map(|output| dialect.output_name(&output.name)) {
+        // Some engines fold the case of names without quotes.
+        if !seen.insert(name.to_lowercase()) {
+            return Err(LoweringError::SameName { name });
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::columns::{Column, Columns, Level, Type};
+    use crate::definitions::Definitions;
+    use crate::file::built_in_names;
+    use crate::schema_columns::schema_columns;
+
+    fn plan(text: &str) -> Plan {
+        let columns = [
+            ("action", Type::Text, Level::Step),
+            ("mirror_visible", Type::Bool, Level::Step),
+            ("pose_x", Type::Float, Level::Step),
+            ("grip force", Type::Int, Level::Step),
+            ("body_color", Type::Text, Level::Episode),
+        ];
+        let columns: Columns = columns.map(|(name, ty, level)| (name, Column { ty, level })).into_iter().collect();
+        Definitions::from_toml("test", text, &columns).unwrap().plan
+    }
+
+    fn metric(value: &str) -> Plan {
+        plan(&format!("[metric.M]\nvalue = \"{value}\""))
+    }
+
+    #[test]
+    fn each_aggregate_stands_in_the_first_pass_that_knows_what_it_reads() {
+        let plan = plan(
+            r#"
+            [let]
+            done = "first(action = 'done')"
+            [metric.SEEN]
+            value = "any(mirror_visible and t < coalesce(done, length()))"
+            [metric.X-Y]
+            value = "count(pose_x > 1)"
+            when = "SEEN = 1 and body_color <> 'it''s'"
+            [metric.BETWEEN]
+            value = "count(mirror_visible and t between first(mirror_visible) and done)"
+            [metric.AT]
+            value = "at(\"grip force\", done) + at(t, done - 1)"
+            "#,
+        );
+        insta::assert_snapshot!("spark", lower(&plan, Dialect::Spark).unwrap());
+        insta::assert_snapshot!("duckdb", lower(&plan, Dialect::Duckdb).unwrap());
+        insta::assert_snapshot!("polars", lower(&plan, Dialect::Polars).unwrap());
+    }
+
+    #[test]
+    fn the_built_in_definitions_take_one_pass_where_lists_can_be_searched() {
+        for name in built_in_names() {
+            let plan = Definitions::load(name, &schema_columns()).unwrap().plan;
+            let passes = |dialect| lower(&plan, dialect).unwrap().matches("GROUP BY").count();
+            assert_eq!([Dialect::Duckdb, Dialect::Spark, Dialect::Polars].map(passes), [1, 1, 2], "{name}");
+        }
+    }
+
+    #[test]
+    fn a_column_of_the_traces_keeps_its_name_beside_those_of_the_statement() {
+        let statements = (0..10).map(|n| {
+            let column = Column { ty: Type::Text, level: Level::Step };
+            let text = "[metric.M]\nvalue = \"first(c = 'a') - last(c = 'a' and t > 1) + count(c is null)\"";
+            let text = text.replace("(c ", &format!("(c{n} "));
+            let plan = Definitions::from_toml("test", &text, &[(format!("c{n}"), column)].into_iter().collect());
+            let statement = lower(&plan.unwrap().plan, Dialect::Portable).unwrap();
+            assert!(!statement.contains(&format!(" AS c{n}\n")), "{statement}");
+            statement.contains(&format!(" AS c{n}_\n"))
+        });
+        assert_eq!(statements.filter(|renamed| *renamed).count(), 1);
+    }
+
+    #[test]
+    fn what_a_dialect_cannot_say_is_refused_by_name() {
+        let pattern = metric("any(regexp_like(action, 'd.n[e]'))");
+        assert_eq!(lower(&pattern, Dialect::Portable), Err(LoweringError::Regexp { metric: "M".into() }));
+        assert!(lower(&pattern, Dialect::Duckdb).unwrap().contains("regexp_matches(s.action, 'd.n[e]')"));
+        let odd = metric(r#"max(\"grip force\")"#);
+        assert_eq!(lower(&odd, Dialect::Portable), Err(LoweringError::Name { name: "grip force".into() }));
+        assert!(lower(&odd, Dialect::Spark).unwrap().contains("MAX(s.`grip force`)"));
+        let same = plan("[metric.A-B]\nvalue = \"length()\"\n[metric.a_b]\nvalue = \"1\"");
+        assert_eq!(lower(&same, Dialect::Portable), Err(LoweringError::SameName { name: "a_b".into() }));
+    }
+
+    #[test]
+    fn the_step_before_is_joined_on_its_time() {
+        let text = "count(lag(action) = action and lag(lag(t)) > 1) + length()";
+        let statement = lower(&metric(text), Dialect::Portable).unwrap();
+        for (lag, columns) in [(1, "t AS lag1_t,\n      action AS lag1_0"), (2, "t AS lag2_t\n")] {
+            assert_eq!(statement.matches(&format!("LEFT JOIN (\n    SELECT episode_id AS lag{lag}_id")).count(), 1);
+            assert!(statement.contains(columns), "{statement}");
+            let on = format!("ON s.episode_id = lag{lag}.lag{lag}_id AND s.t = lag{lag}.lag{lag}_next");
+            assert!(statement.contains(&on), "{statement}");
+        }
+        assert!(statement.contains("CASE WHEN lag1.lag1_t IS NOT NULL THEN lag1.lag1_0 END = s.action"), "{statement}");
+    }
+
+    #[test]
+    fn an_expression_looks_back_by_so_many_steps() {
+        let nested = |depth: usize| format!("max({}t{})", "lag(".repeat(depth), ")".repeat(depth));
+        assert_eq!(lower(&metric(&nested(8)), Dialect::Duckdb).unwrap().matches("LEFT JOIN").count(), 8);
+        let text =
+            format!("[let]\nx = \"{}\"\n[metric.M]\nvalue = \"max(lag(x))\"", &nested(8)[4..nested(8).len() - 1]);
+        let refused = Definitions::from_toml("test", &text, &Columns::default()).unwrap_err().to_string();
+        assert!(refused.contains("`lag` looks back by 8 steps at most"), "{refused}");
+        // An aggregate is one value, from which lags are counted anew.
+        lower(&metric(&format!("count(lag(t) < {})", nested(8))), Dialect::Duckdb).unwrap();
+    }
+
+    #[test]
+    fn texts_cannot_leave_their_quotes() {
+        let quoted = metric(r"any(action = 'a\\'' or 1=1 --')");
+        assert!(lower(&quoted, Dialect::Portable).unwrap().contains(r"'a\'' or 1=1 --'"));
+        assert!(lower(&quoted, Dialect::Spark).unwrap().contains(r"'a\\\' or 1=1 --'"));
+    }
+}

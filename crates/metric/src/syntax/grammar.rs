@@ -1,0 +1,146 @@
+//! The words and the grammar of SQL as `sqlparser` reads them: limits, and faults at their places.
+//!
+//! For expressions of definitions and for whole queries alike.
+
+use std::ops::Range;
+
+use sqlparser::dialect::GenericDialect;
+use sqlparser::parser::{Parser, ParserError};
+use sqlparser::tokenizer::{Location, Span, Token, TokenWithSpan, Tokenizer};
+
+/// Texts below this many bytes make no tree that is too deep for any thread.
+const SHALLOW: usize = 1024;
+
+/// The stack for a tree that is as deep as the longest text can make it, in bytes; only what is used of it is memory.
+const STACK: usize = 128 << 20;
+
+/// What is wrong with a text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SyntaxFault {
+    /// What is wrong.
+    pub message: String,
+    /// Its bytes in the text.
+    pub span: Range<usize>,
+    /// What to write instead.
+    pub help: Option<String>,
+}
+
+/// What is read, and how long it may be: the parser nests as deeply as a chain of operators is long, and takes its tree
+/// apart again by recursion.
+#[derive(Clone, Copy, Debug)]
+pub struct Grammar {
+    /// `expression`, `query`.
+    pub noun: &'static str,
+    /// The same with its article.
+    pub one: &'static str,
+    /// The longest text, in bytes.
+    pub longest: usize,
+    /// The most words and signs.
+    pub most_tokens: usize,
+    /// What to do about one that is too long or too deep.
+    pub help: Option<&'static str>,
+}
+
+impl Grammar {
+    /// A parser of a text, its words changed by `edit`.
+    pub fn parser(
+        self,
+        text: &str,
+        edit: impl FnOnce(Vec<TokenWithSpan>) -> Vec<TokenWithSpan>,
+    ) -> Result<Parser<'static>, SyntaxFault> {
+        let too_long = |amount: usize, unit: &str, most: usize| {
+            let message = format!("{} of {amount} {unit} is too long: the most is {most}", self.one);
+            Err(SyntaxFault { message, span: 0..text.len(), help: self.help.map(str::to_owned) })
+        };
+        if text.len() > self.longest {
+            return too_long(text.len(), "bytes", self.longest);
+        }
+        let tokens =
+            Tokenizer::new(&GenericDialect {}, text).tokenize_with_location().map_err(|error| SyntaxFault {
+                message: format!("not {}: {}", self.one, lowercase_first(&error.message)),
+                span: byte_of(text, error.location)..text.len(),
+                help: None,
+            })?;
+        let count = tokens.iter().filter(|token| !matches!(token.token, Token::Whitespace(_))).count();
+        if count > self.most_tokens {
+            return too_long(count, "words and signs", self.most_tokens);
+        }
+        Ok(Parser::new(&GenericDialect {}).with_tokens_with_locations(edit(tokens)))
+    }
+
+    /// The parser's own words, its position turned into a span.
+    pub fn fault(self, text: &str, error: &ParserError) -> SyntaxFault {
+        let (message, help) = match error {
+            ParserError::ParserError(message) | ParserError::TokenizerError(message) => (message.clone(), None),
+            ParserError::RecursionLimitExceeded => {
+                (format!("the {} is nested too deeply", self.noun), self.help.map(str::to_owned))
+            }
+        };
+        let (words, span) = match split_location(&message) {
+            Some((words, location)) => {
+                let start = byte_of(text, location);
+                (words.to_owned(), start..end_of_word(text, start))
+            }
+            None => (message.clone(), 0..text.len()),
+        };
+        let words = words.replace("EOF", &format!("the end of the {}", self.noun));
+        SyntaxFault { message: format!("not {}: {}", self.one, lowercase_first(&words)), span, help }
+    }
+}
+
+/// Does work on the parser's tree of a text, on a stack that is large enough for it: the tree of `a + b + c` is as deep as
+/// the chain is long, and the parser's own functions walk it by recursion.
+pub fn with_stack<T>(text: &str, work: impl FnOnce() -> T) -> T {
+    if text.len() < SHALLOW { work() } else { stacker::grow(STACK, work) }
+}
+
+/// `Expected: x, found: y at Line: 1, Column: 2` -> the words and the location.
+fn split_location(message: &str) -> Option<(&str, Location)> {
+    let (words, place) = message.rsplit_once(" at Line: ")?;
+    let (line, column) = place.split_once(", Column: ")?;
+    Some((words, Location::new(line.parse().ok()?, column.parse().ok()?)))
+}
+
+fn lowercase_first(text: &str) -> String {
+    let mut characters = text.chars();
+    characters.next().map_or_else(String::new, |first| first.to_lowercase().chain(characters).collect())
+}
+
+fn end_of_word(text: &str, start: usize) -> usize {
+    let rest = &text[start..];
+    let word = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+    start + word.max(rest.chars().next().map_or(0, char::len_utf8))
+}
+
+/// The byte of a 1-based line and column (in characters); the end of the text for a place beyond it.
+pub(super) fn byte_of(text: &str, location: Location) -> usize {
+    if location.line == 0 {
+        return text.len();
+    }
+    let mut lines = text.split_inclusive('\n');
+    let mut start = 0;
+    for _ in 1..location.line {
+        start += lines.next().map_or(0, str::len);
+    }
+    let line = lines.next().unwrap_or("");
+    let column = usize::try_from(location.column.saturating_sub(1)).unwrap_or(usize::MAX);
+    start + line.char_indices().nth(column).map_or(line.len(), |(at, _)| at)
+}
+
+/// The bytes of a span; all of them where the parser does not know it.
+pub fn bytes_of(text: &str, span: Span) -> Range<usize> {
+    if span.start.line == 0 {
+        return 0..text.len();
+    }
+    let start = byte_of(text, span.start);
+    start..byte_of(text, span.end).max(start)
+}
+
+/// The beginning of a text that may be as long as an expression.
+pub fn shortened(text: &str) -> String {
+    const ENOUGH: usize = 60;
+    match text.char_indices().nth(ENOUGH) {
+        Some((end, _)) => format!("{}...", &text[..end]),
+        None => text.to_owned(),
+    }
+}

@@ -1,0 +1,90 @@
+//! An audit as text: the infeasible cells, the reasons, one line per table, a line that sums up.
+
+use std::fmt::Write as _;
+
+use comfy_table::{LineStyle, Table, presets};
+
+use super::{Audit, AuditedTable, InfeasibleCell};
+use crate::tables::fit::{fitted, wrapped};
+use exact::escape::visible;
+use exact::rounding::Rounding;
+
+/// The columns that name a cell.
+const NAMES: usize = 4;
+
+/// The whole answer, in lines of at most `width` columns.
+pub fn render(audit: &Audit, width: Option<usize>) -> String {
+    let mut text = String::new();
+    if !audit.infeasible.is_empty() {
+        push_cells(&mut text, audit, width);
+        text.push('\n');
+    }
+    for zero in &audit.undefined_as_zero {
+        let cell = &zero.cell;
+        let [experiment, model, metric] = [&cell.experiment, &cell.model, &cell.metric].map(|name| visible(name));
+        let words = format!(
+            "note: {}, {experiment}, {model}, {metric}: zero is printed where no episode counts, as tables of the style `{}` do",
+            visible(&zero.table),
+            visible(&audit.style)
+        );
+        push_wrapped(&mut text, &words, width, 2);
+    }
+    for table in &audit.tables {
+        push_wrapped(&mut text, &summary(table), width, 2);
+    }
+    let _ = writeln!(text, "{} of {} cells are feasible", audit.feasible, audit.cells);
+    text
+}
+
+fn push_cells(text: &mut String, audit: &Audit, width: Option<usize>) {
+    let mut table = Table::new();
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
+    table.set_header(["table", "experiment", "model", "metric", "published", "infeasible"]);
+    for (at, cell) in audit.infeasible.iter().enumerate() {
+        let names = [&cell.table, &cell.cell.experiment, &cell.cell.model, &cell.cell.metric, &cell.published];
+        let names = names.map(|name| visible(name)).into_iter();
+        table.add_row(names.chain([format!("{} [{}]", cell.field.name(), at + 1)]).collect::<Vec<_>>());
+    }
+    let _ = writeln!(text, "{}", fitted(&table, NAMES, width));
+    for (at, cell) in audit.infeasible.iter().enumerate() {
+        let number = format!("[{}] ", at + 1);
+        push_wrapped(
+            text,
+            &format!("{number}{}{}", visible(&cell.reason), other_roundings(cell, audit)),
+            width,
+            number.len(),
+        );
+    }
+}
+
+/// What the cell would take to be feasible, and what that would cost.
+fn other_roundings(cell: &InfeasibleCell, audit: &Audit) -> String {
+    let Some(table) = audit.tables.iter().find(|table| table.table == cell.table) else { return String::new() };
+    let costs = cell.feasible_rounded.iter().map(|rounding| match infeasible_under(table, *rounding) {
+        1 => format!("{}, with 1 other cell infeasible", rounding.name()),
+        others => format!("{}, with {others} other cells infeasible", rounding.name()),
+    });
+    let costs: Vec<String> = costs.collect();
+    if costs.is_empty() { String::new() } else { format!("; feasible in a table rounded {}", costs.join("; or ")) }
+}
+
+fn infeasible_under(table: &AuditedTable, rounding: Rounding) -> usize {
+    table.roundings.iter().find(|count| count.rounding == rounding).map_or(0, |count| count.infeasible)
+}
+
+fn summary(table: &AuditedTable) -> String {
+    let counts = table.roundings.iter().map(|count| format!("{} {}", count.rounding.name(), count.infeasible));
+    format!(
+        "{}: feasible {} of {} cells, rounded {} (infeasible numbers by rounding: {})",
+        visible(&table.table),
+        table.feasible,
+        table.cells,
+        table.rounding.name(),
+        counts.collect::<Vec<_>>().join(", ")
+    )
+}
+
+fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
+    let lines = wrapped(words, width.unwrap_or(usize::MAX), indent);
+    let _ = writeln!(text, "{}", lines.join("\n"));
+}

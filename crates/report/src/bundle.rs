@@ -1,0 +1,269 @@
+//! The folder of a report: the whole new report in place of the whole old one, or the old one unchanged.
+//!
+//! The files of the old report are those that its manifest lists as outputs. They are replaced, or removed where the new
+//! report does not have them; whatever else is in the folder stays.
+
+mod old;
+
+use std::collections::BTreeSet;
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::cells::{Cell, Cells};
+use crate::style::Style;
+use crate::table::Table;
+use crate::tables::{csv, latex, markdown};
+use exact::hash;
+use exact::number::full_precision;
+use exact::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput};
+use metric::catalog::Catalog;
+pub use old::MANIFEST;
+
+/// What goes into the folder.
+#[derive(Clone, Copy, Debug)]
+pub struct Bundle<'a> {
+    /// For `cells.csv`.
+    pub cells: &'a Cells,
+    /// For `tables/<name>.{tex,md,csv}`.
+    pub tables: &'a [Table],
+    /// The bytes of `episodes.parquet`.
+    pub episodes: &'a [u8],
+    /// For `manifest.json`, which gets its outputs when they are written.
+    pub manifest: &'a Manifest,
+    /// The files that are read, which no output may replace.
+    pub read: &'a [PathBuf],
+    /// Figures and whatever else, by their path inside the folder.
+    pub others: &'a [OutputFile],
+}
+
+/// A file of the folder.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutputFile {
+    /// Its path inside the folder.
+    pub path: PathBuf,
+    /// Its content.
+    pub bytes: Vec<u8>,
+}
+
+/// Where a report comes from: enough to make it again, and nothing that differs between two makings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Manifest {
+    /// The version of mirrorstats.
+    pub version: String,
+    /// The version of the trace schema.
+    pub schema_version: u32,
+    /// The style of the tables.
+    pub style: StyleOrigin,
+    /// The columns that the cells are grouped by.
+    pub by: Vec<String>,
+    /// The metrics that were computed, in the order of the definitions.
+    pub metrics: Vec<String>,
+    /// The filter over episodes, as typed.
+    #[serde(rename = "where")]
+    pub filter: Option<String>,
+    /// What was read, ordered by path, then hash.
+    pub inputs: Vec<Input>,
+    /// What was written beside this manifest, ordered by path. Absent in reports of earlier versions, and in the copy
+    /// inside `report.html`, whose own hash would have to be in it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub outputs: Vec<Output>,
+    /// The definitions that gave the values.
+    pub definitions: Catalog,
+}
+
+/// The style of a report.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct StyleOrigin {
+    /// Its name; never a path.
+    pub name: String,
+    /// SHA-256 of the style file.
+    pub sha256: String,
+}
+
+/// One file that was read.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct Input {
+    /// The path as given if that is relative, else the file's name alone.
+    pub path: String,
+    /// SHA-256 of its content.
+    pub sha256: String,
+    /// Its size.
+    pub bytes: u64,
+}
+
+/// One file of the report.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+pub struct Output {
+    /// The path inside the folder, `/` between its parts.
+    pub path: String,
+    /// SHA-256 of its content.
+    pub sha256: String,
+    /// Its size.
+    pub bytes: u64,
+}
+
+/// Why a report cannot be written.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum BundleError {
+    #[error("cannot write the report to {}: it is not a folder; give another one with --out", path.display())]
+    NotAFolder { path: PathBuf },
+    #[error("cannot write the report: `{}` is not a path of its own inside the folder", path.display())]
+    BadPath { path: PathBuf },
+    #[error("cannot write the report: {0}, or the report another --out")]
+    Input(#[from] TargetIsInput),
+    #[error(transparent)]
+    Folder(#[from] FolderHoldsInput),
+    #[error("cannot write the report to {}; is the folder writable?", path.display())]
+    Unwritable { path: PathBuf, source: io::Error },
+}
+
+impl Manifest {
+    /// The manifest of a report made now, by this version.
+    pub fn new(cells: &Cells, style: &Style, schema_version: u32, filter: Option<String>, inputs: Vec<Input>) -> Self {
+        let mut inputs = inputs;
+        inputs.sort();
+        Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            schema_version,
+            style: StyleOrigin { name: style.name.clone(), sha256: style.hash.clone() },
+            by: cells.by.clone(),
+            metrics: cells.metrics.clone(),
+            filter,
+            inputs,
+            outputs: Vec::new(),
+            definitions: cells.catalog.clone(),
+        }
+    }
+
+    /// The manifest of a report with these files beside it.
+    fn with_outputs(&self, files: &[OutputFile]) -> Self {
+        let mut outputs: Vec<Output> = files.iter().map(Output::new).collect();
+        outputs.sort();
+        Self { outputs, ..self.clone() }
+    }
+
+    /// The text of `manifest.json`.
+    pub fn json(&self) -> String {
+        let json = serde_json::to_string_pretty(self).expect("a manifest holds only strings, integers and lists");
+        json + "\n"
+    }
+}
+
+impl Input {
+    /// An input named as a manifest may name it: no absolute path, no way up, `/` between folders.
+    pub fn new(path: &Path, sha256: String, bytes: u64) -> Self {
+        let is_plain = |part: &Component| matches!(part, Component::Normal(_) | Component::CurDir);
+        let is_inside = path.components().all(|part| is_plain(&part));
+        let shown = if is_inside { path } else { Path::new(path.file_name().unwrap_or(path.as_os_str())) };
+        let parts = shown.components().filter(|part| matches!(part, Component::Normal(_)));
+        let parts: Vec<_> = parts.map(|part| part.as_os_str().to_string_lossy()).collect();
+        Self { path: parts.join("/"), sha256, bytes }
+    }
+}
+
+impl Output {
+    fn new(file: &OutputFile) -> Self {
+        Self {
+            path: Input::new(&file.path, String::new(), 0).path,
+            sha256: hash::of_bytes(&file.bytes),
+            bytes: file.bytes.len() as u64,
+        }
+    }
+}
+
+/// A report that was written.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Written {
+    /// Its files, ordered by path.
+    pub files: Vec<PathBuf>,
+    /// Its manifest, with the outputs.
+    pub manifest: Manifest,
+}
+
+/// Writes the report into the folder `out`, in place of the report that is there.
+///
+/// # Errors
+/// Where `out` is no folder or cannot be written, and where a file that is read is in the way. The folder is then as it
+/// was; where the system cannot exchange folders, and an error comes while files are moved, it has no manifest.
+pub fn write(out: &Path, bundle: &Bundle) -> Result<Written, BundleError> {
+    let mut files = files(bundle);
+    let manifest = bundle.manifest.with_outputs(&files);
+    files.push(OutputFile { path: MANIFEST.into(), bytes: manifest.json().into_bytes() });
+    files.sort_by(|a, b| a.path.cmp(&b.path));
+    check_paths(&files)?;
+    if out.exists() && !out.is_dir() {
+        return Err(BundleError::NotAFolder { path: out.to_owned() });
+    }
+    check_old(out, bundle.read)?;
+    let new: Vec<_> = files.iter().map(|file| (file.path.as_path(), Content::Bytes(&file.bytes))).collect();
+    check_inputs(out, &new.iter().map(|(path, _)| path).collect::<Vec<_>>(), bundle.read)?;
+    replace::replace_folder(out, &FolderFiles { new: &new, index: Some(Path::new(MANIFEST)), old: &old::files })
+        .map_err(|error| BundleError::Unwritable { path: error.path, source: error.source })?;
+    Ok(Written { files: files.into_iter().map(|file| out.join(file.path)).collect(), manifest })
+}
+
+/// That no file of the report which is in `out` is among those that are read: a new report there would replace it.
+///
+/// # Errors
+/// When one is.
+pub fn check_old(out: &Path, read: &[PathBuf]) -> Result<(), BundleError> {
+    check_inputs(out, &old::files(out), read)
+}
+
+fn check_inputs<P: AsRef<Path>>(out: &Path, targets: &[P], read: &[PathBuf]) -> Result<(), BundleError> {
+    let mut targets = targets.iter().map(|path| out.join(path));
+    Ok(targets.try_for_each(|target| replace::check_target(&target, read, "one that is read"))?)
+}
+
+/// Every file of the folder but the manifest.
+fn files(bundle: &Bundle) -> Vec<OutputFile> {
+    let file = |path: &str, bytes: &[u8]| OutputFile { path: PathBuf::from(path), bytes: bytes.to_vec() };
+    let mut files =
+        vec![file("cells.csv", cells_csv(bundle.cells).as_bytes()), file("episodes.parquet", bundle.episodes)];
+    for table in bundle.tables {
+        for (ending, text) in
+            [("tex", latex::render(table)), ("md", markdown::render(table)), ("csv", csv::render(table))]
+        {
+            files.push(file(&format!("tables/{}.{ending}", table.name), text.as_bytes()));
+        }
+    }
+    files.extend_from_slice(bundle.others);
+    files
+}
+
+/// The text of `cells.csv`: the key columns, then `metric,n,sum,sum_sq,mean,se,ci_low,ci_high` in full precision.
+///
+/// The standard error is the one that the definition asks for; the interval is Wilson's for a rate, Student's for a
+/// quantity, at 95 %. What is undefined or withheld is empty. The header's keys are those that the cells are grouped by.
+pub fn cells_csv(cells: &Cells) -> String {
+    const TAIL: [&str; 8] = ["metric", "n", "sum", "sum_sq", "mean", "se", "ci_low", "ci_high"];
+    let mut writer = ::csv::Writer::from_writer(Vec::new());
+    csv::write(&mut writer, cells.by.iter().cloned().chain(TAIL.map(str::to_owned)));
+    cells.all().for_each(|cell| csv::write(&mut writer, cell_record(cell)));
+    csv::finish(writer)
+}
+
+fn cell_record(Cell { key, name, metric, moments, interval }: Cell) -> Vec<String> {
+    let of = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
+    let mut record: Vec<String> = key.iter().map(csv::key_field).collect();
+    record.extend([name.to_owned(), moments.n.to_string(), moments.sum.to_string(), moments.sum_sq.to_string()]);
+    record.extend([of(moments.mean()), of(moments.se(metric.se))]);
+    record.extend([of(interval.map(|i| i.low)), of(interval.map(|i| i.high))]);
+    record
+}
+
+/// That every file is inside the folder, and no two are one.
+fn check_paths(files: &[OutputFile]) -> Result<(), BundleError> {
+    let mut seen = BTreeSet::new();
+    for OutputFile { path, .. } in files {
+        let is_inside = path.components().all(|part| matches!(part, Component::Normal(_)));
+        if !is_inside || path.as_os_str().is_empty() || !seen.insert(path) {
+            return Err(BundleError::BadPath { path: path.clone() });
+        }
+    }
+    Ok(())
+}

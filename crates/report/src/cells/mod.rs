@@ -1,0 +1,100 @@
+//! Cells: the episodes of one group under one metric.
+
+use std::fmt;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use exact::moments::Moments;
+use metric::catalog::{Catalog, Metric};
+use statistics::interval::Interval;
+
+use interval::{CONFIDENCE, cell_interval};
+
+pub mod columns;
+pub mod diff;
+pub mod group;
+pub mod interval;
+
+/// All cells of a report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cells {
+    /// The definitions that gave the values.
+    pub catalog: Catalog,
+    /// The key columns that were grouped by, `experiment, model` unless asked otherwise.
+    pub by: Vec<String>,
+    /// The metrics, in the order of the episode table.
+    pub metrics: Vec<String>,
+    /// The least and the largest mean that each metric can have; without bounds where it is empty.
+    pub ranges: Vec<Interval>,
+    /// The groups, ascending by key; each has one cell per metric.
+    pub groups: Vec<Group>,
+}
+
+/// One cell of [`Cells`].
+#[derive(Clone, Copy, Debug)]
+pub struct Cell<'c> {
+    /// A value for each column of [`Cells::by`].
+    pub key: &'c [KeyValue],
+    /// The metric's name.
+    pub name: &'c str,
+    /// Its definition.
+    pub metric: &'c Metric,
+    /// The moments of its values.
+    pub moments: &'c Moments,
+    /// The 95 % interval of the mean; `None` where it is withheld.
+    pub interval: Option<Interval>,
+}
+
+impl Cells {
+    /// Every cell, by group and metric.
+    pub fn all(&self) -> impl Iterator<Item = Cell<'_>> {
+        self.groups.iter().flat_map(|group| (0..self.metrics.len()).filter_map(|at| self.at(group, at)))
+    }
+
+    /// The cell of a metric in a group.
+    pub fn of_metric<'c>(&'c self, group: &'c Group, name: &str) -> Option<Cell<'c>> {
+        self.at(group, self.metrics.iter().position(|metric| metric == name)?)
+    }
+
+    fn at<'c>(&'c self, group: &'c Group, at: usize) -> Option<Cell<'c>> {
+        let (name, moments) = (self.metrics[at].as_str(), &group.moments[at]);
+        let metric = self.catalog.metric.get(name)?;
+        let range = self.ranges.get(at).copied().unwrap_or(Interval::UNBOUNDED);
+        let (interval, _) = cell_interval(moments, metric, range, CONFIDENCE);
+        Some(Cell { key: &group.key, name, metric, moments, interval })
+    }
+}
+
+/// The episodes that share a key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Group {
+    /// A value for each column of `by`.
+    pub key: Vec<KeyValue>,
+    /// How many episodes there are, defined or not.
+    pub episodes: u64,
+    /// The moments of each metric, in the order of [`Cells::metrics`].
+    pub moments: Vec<Moments>,
+}
+
+/// A value of a key column; integers order as integers, before text. In JSON: null, a number or a string.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum KeyValue {
+    /// A null of an optional key column.
+    Missing,
+    /// `seed`, `run`.
+    Int(i64),
+    /// `experiment`, `model`, ...
+    Text(String),
+}
+
+impl fmt::Display for KeyValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Missing => Ok(()),
+            Self::Int(value) => value.fmt(f),
+            Self::Text(value) => value.fmt(f),
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! What changed from one scoring to another, as text for people: `lists` are its tables, `words` their fields.
+//!
+//! Rule: a list that is cut says how many lines it leaves out; a number stands beside the exact counts it comes from.
+
+mod lists;
+mod words;
+
+use std::fmt::Write as _;
+
+use crate::cells::diff::{Changes, DefinitionsName, Overlap};
+use exact::escape::visible;
+
+/// How much of each list is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limit(pub usize);
+
+/// Digits of a hash that tell definitions apart.
+const SHORT_HASH: usize = 12;
+
+/// The whole answer of `diff`, its tables at most `width` columns wide; the last line sums up.
+pub fn render(changes: &Changes, limit: Limit, width: Option<usize>) -> String {
+    let mut text = String::new();
+    let names = &changes.definitions;
+    let _ = writeln!(text, "before: {}\nafter:  {}", origin(&names.before), origin(&names.after));
+    push_section(&mut text, "Written differently", lists::rewritten(&changes.rewritten, limit, width));
+    push_alone(&mut text, "metric", &changes.metrics, limit, |name| visible(name));
+    push_alone(&mut text, "episode", &changes.episodes, limit, |name| visible(&name.episode_id));
+    push_section(&mut text, "Cells that moved", lists::cells(changes, limit, width));
+    push_section(&mut text, "Values that flipped, by metric", lists::flips_by_metric(&changes.flips));
+    push_section(&mut text, "Episodes that flipped", lists::flips(&changes.flips, limit, width));
+    let _ = writeln!(text, "\n{}", sum(changes));
+    text
+}
+
+fn origin(name: &DefinitionsName) -> String {
+    let hash = name.sha256.get(..SHORT_HASH).unwrap_or(&name.sha256);
+    format!("{} ({hash})", visible(&name.name))
+}
+
+fn push_section(text: &mut String, title: &str, section: Option<String>) {
+    if let Some(section) = section {
+        let _ = writeln!(text, "\n{title}\n{section}");
+    }
+}
+
+fn push_alone<T>(text: &mut String, noun: &str, overlap: &Overlap<T>, limit: Limit, name: impl Fn(&T) -> String) {
+    for (side, alone) in [("before", &overlap.only_before), ("after", &overlap.only_after)] {
+        if !alone.is_empty() {
+            let names: Vec<String> = alone.iter().take(limit.0).map(&name).collect();
+            let rest = words::left_out(alone.len(), limit).map_or_else(String::new, |rest| format!("; {rest}"));
+            let _ = writeln!(text, "\nOnly {side}: {}: {}{rest}", words::counted(alone.len(), noun), names.join(", "));
+        }
+    }
+}
+
+/// One line: what moved, out of how much.
+fn sum(changes: &Changes) -> String {
+    let over = format!(
+        "{} in both, {} in both",
+        words::counted_u64(changes.episodes.both, "episode"),
+        words::counted_u64(changes.metrics.both, "metric")
+    );
+    if changes.is_empty() {
+        return format!("Nothing changed: {over}, {} compared.", words::counted_u64(changes.cells_compared, "cell"));
+    }
+    format!(
+        "{} of {} moved; {} in {}; {over}.",
+        changes.cells.len(),
+        words::counted_u64(changes.cells_compared, "cell"),
+        words::counted(changes.flips.len(), "flip"),
+        words::counted(changes.flipped_episodes().len(), "episode"),
+    )
+}

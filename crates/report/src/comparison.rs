@@ -1,0 +1,228 @@
+//! A table of ours beside a published one, cell by cell: printed mean, printed standard error, emphasis.
+//!
+//! Numbers are equal as values: a published `0.1` is our `0.10`. Every published cell is either as published,
+//! excused (errata name all its differences) or differing; a published cell that we do not have differs.
+//! Cells that only we have are listed and held against nobody.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::errata::{Errata, Erratum, Field};
+use crate::published::{CellLabel, PrintedCell, Published};
+use crate::style::Style;
+use crate::table::{Cell, Emphasis, Table, Value};
+use exact::number::Decimal;
+
+/// What a comparison found.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Comparison {
+    /// The table of ours.
+    pub table: String,
+    /// How many cells the published table has.
+    pub cells: usize,
+    /// How many of them are as published.
+    pub same: usize,
+    /// How many differ only as errata say.
+    pub excused: usize,
+    /// How many differ.
+    pub differing: usize,
+    /// Every difference, in the order of the published table.
+    pub differences: Vec<Difference>,
+    /// Cells of ours that the published table has not.
+    pub unpublished: Vec<CellLabel>,
+    /// Errata of this table that excused nothing.
+    pub unused_errata: Vec<Erratum>,
+}
+
+/// One field of one cell that is not as published.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Difference {
+    /// Which cell.
+    #[serde(flatten)]
+    pub cell: CellLabel,
+    /// What of it; none where we do not have the cell at all.
+    pub field: Option<Field>,
+    /// What is published; empty for undefined and for no emphasis.
+    pub published: String,
+    /// What we print.
+    pub computed: String,
+    /// Why that is the publication's slip, where errata say so.
+    pub excused_by: Option<String>,
+}
+
+/// Why tables cannot be compared.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum ComparisonError {
+    #[error(
+        "no table of the style `{style}` has all the published metrics ({metrics}): expected those of {tables}; \
+         name the table with --table, or give another --style"
+    )]
+    NoTable { style: String, metrics: String, tables: String },
+    #[error("the style `{style}` makes no table `{name}` of these scores: expected one of {tables}")]
+    UnknownTable { style: String, name: String, tables: String },
+    #[error(
+        "the style `{style}` prints no standard errors in its table `{table}`: compare with a style of mean and standard error, such as `paper`"
+    )]
+    NoStandardErrors { style: String, table: String },
+}
+
+impl Comparison {
+    /// Whether every difference is excused.
+    pub fn holds(&self) -> bool {
+        self.differing == 0
+    }
+}
+
+/// The table to compare: the one called `name`, else the first that has all the published metrics.
+pub fn choose<'t>(
+    tables: &'t [Table],
+    published: &Published,
+    name: Option<&str>,
+    style: &Style,
+) -> Result<&'t Table, ComparisonError> {
+    let style = style.name.clone();
+    let metrics: BTreeSet<&str> = published.cells.iter().map(|(cell, _)| cell.metric.as_str()).collect();
+    let table = match name {
+        Some(name) => tables.iter().find(|table| table.name == name).ok_or_else(|| ComparisonError::UnknownTable {
+            style: style.clone(),
+            name: name.to_owned(),
+            tables: tables.iter().map(|table| table.name.as_str()).collect::<Vec<_>>().join(", "),
+        })?,
+        None => tables.iter().find(|table| has_all(table, &metrics)).ok_or_else(|| ComparisonError::NoTable {
+            style: style.clone(),
+            metrics: metrics.iter().copied().collect::<Vec<_>>().join(", "),
+            tables: tables.iter().map(described).collect::<Vec<_>>().join(", "),
+        })?,
+    };
+    let prints_se = table.form == crate::style::CellForm::MeanSe;
+    if prints_se { Ok(table) } else { Err(ComparisonError::NoStandardErrors { style, table: table.name.clone() }) }
+}
+
+fn has_all(table: &Table, metrics: &BTreeSet<&str>) -> bool {
+    metrics.iter().all(|metric| table.columns.iter().any(|column| column.metric == *metric))
+}
+
+fn described(table: &Table) -> String {
+    let metrics: Vec<&str> = table.columns.iter().map(|column| column.metric.as_str()).collect();
+    format!("`{}` ({})", table.name, metrics.join(", "))
+}
+
+/// Compares `table`, made of cells by experiment and model, with the published cells.
+pub fn compare(table: &Table, published: &Published, errata: &Errata) -> Comparison {
+    let ours = our_cells(table);
+    let about_table: Vec<&Erratum> = errata.erratum.iter().filter(|erratum| erratum.table == table.name).collect();
+    let mut used = vec![false; about_table.len()];
+    let mut comparison = Comparison {
+        table: table.name.clone(),
+        cells: published.cells.len(),
+        same: 0,
+        excused: 0,
+        differing: 0,
+        differences: Vec::new(),
+        unpublished: unpublished(&ours, published),
+        unused_errata: Vec::new(),
+    };
+    for (name, theirs) in &published.cells {
+        let mut found = differences(name, theirs, ours.get(name));
+        for difference in &mut found {
+            let excuse = about_table.iter().position(|e| e.is_about(&table.name, name) && excuses(e, difference));
+            if let Some(at) = excuse {
+                used[at] = true;
+                difference.excused_by = Some(about_table[at].reason.clone());
+            }
+        }
+        let count = match () {
+            () if found.is_empty() => &mut comparison.same,
+            () if found.iter().all(|difference| difference.excused_by.is_some()) => &mut comparison.excused,
+            () => &mut comparison.differing,
+        };
+        *count += 1;
+        comparison.differences.extend(found);
+    }
+    let unused = about_table.into_iter().zip(used).filter(|(_, used)| !used);
+    comparison.unused_errata = unused.map(|(erratum, _)| erratum.clone()).collect();
+    comparison
+}
+
+fn our_cells(table: &Table) -> BTreeMap<CellLabel, PrintedCell> {
+    let place = |key: &str| table.keys.iter().position(|of| of == key);
+    let text = |row: &crate::table::Row, key: &str| place(key).map(|at| row.key[at].to_string()).unwrap_or_default();
+    let rows = table.groups.iter().flat_map(|group| &group.rows);
+    rows.flat_map(|row| {
+        let (experiment, model) = (text(row, "experiment"), text(row, "model"));
+        table.columns.iter().zip(&row.cells).map(move |(column, cell)| {
+            let metric = column.metric.clone();
+            (CellLabel { experiment: experiment.clone(), model: model.clone(), metric }, printed(cell))
+        })
+    })
+    .collect()
+}
+
+fn printed(cell: &Cell) -> PrintedCell {
+    let se = match cell.value {
+        Value::MeanSe { se, .. } => se,
+        Value::Undefined | Value::Count { .. } | Value::Mean { .. } => None,
+    };
+    PrintedCell { mean: cell.value.mean(), se, emphasis: cell.emphasis }
+}
+
+fn unpublished(ours: &BTreeMap<CellLabel, PrintedCell>, published: &Published) -> Vec<CellLabel> {
+    let theirs: BTreeSet<&CellLabel> = published.cells.iter().map(|(name, _)| name).collect();
+    ours.keys().filter(|name| !theirs.contains(name)).cloned().collect()
+}
+
+fn differences(name: &CellLabel, theirs: &PrintedCell, ours: Option<&PrintedCell>) -> Vec<Difference> {
+    let difference = |field: Option<Field>, published: String, computed: String| Difference {
+        cell: name.clone(),
+        field,
+        published,
+        computed,
+        excused_by: None,
+    };
+    let Some(ours) = ours else {
+        return vec![difference(None, shown(theirs), String::new())];
+    };
+    let mut found = Vec::new();
+    for (field, theirs, ours) in [(Field::Mean, theirs.mean, ours.mean), (Field::Se, theirs.se, ours.se)] {
+        if !is_same(theirs, ours) {
+            found.push(difference(Some(field), text(theirs), text(ours)));
+        }
+    }
+    if theirs.emphasis != ours.emphasis {
+        let word = |emphasis: Emphasis| emphasis.word().to_owned();
+        found.push(difference(Some(Field::Emphasis), word(theirs.emphasis), word(ours.emphasis)));
+    }
+    found
+}
+
+fn is_same(a: Option<Decimal>, b: Option<Decimal>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a.cmp_value(b).is_eq(),
+        (a, b) => a.is_none() && b.is_none(),
+    }
+}
+
+fn text(value: Option<Decimal>) -> String {
+    value.map(|value| value.to_string()).unwrap_or_default()
+}
+
+fn shown(cell: &PrintedCell) -> String {
+    match (cell.mean, cell.se) {
+        (Some(mean), Some(se)) => format!("{mean} ± {se}"),
+        (mean, _) => text(mean),
+    }
+}
+
+/// Whether the erratum states exactly this difference; numbers as values, words as they are.
+fn excuses(erratum: &Erratum, difference: &Difference) -> bool {
+    let is_stated = |stated: &str, found: &str| match (stated.parse::<Decimal>(), found.parse::<Decimal>()) {
+        (Ok(stated), Ok(found)) => stated.cmp_value(found).is_eq(),
+        _ => stated == found,
+    };
+    difference.field == Some(erratum.field)
+        && is_stated(&erratum.published, &difference.published)
+        && is_stated(&erratum.computed, &difference.computed)
+}

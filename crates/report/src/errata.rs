@@ -1,0 +1,131 @@
+//! Errata: the slips of a published table, each named with both values and a reason.
+//!
+//! An erratum excuses exactly the difference that it states: the published and the computed value must both be as
+//! it says. Those of the paper are built in.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::published::CellLabel;
+use exact::budget::Limit;
+use exact::input;
+
+const PAPER: &str = include_str!("../../../assets/errata/paper.toml");
+
+/// An errata file.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Errata {
+    /// The slips.
+    #[serde(default)]
+    pub erratum: Vec<Erratum>,
+}
+
+/// One slip.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Erratum {
+    /// The table, `main` or `appendix` in the paper.
+    pub table: String,
+    /// The experiment of the cell.
+    pub experiment: String,
+    /// The model of the cell.
+    pub model: String,
+    /// The metric of the cell.
+    pub metric: String,
+    /// What of the cell.
+    pub field: Field,
+    /// What is printed; empty for undefined and for no emphasis.
+    pub published: String,
+    /// What follows from the data.
+    pub computed: String,
+    /// Why the difference is the publication's.
+    pub reason: String,
+}
+
+/// A part of a printed cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Field {
+    /// The mean.
+    Mean,
+    /// The standard error.
+    Se,
+    /// How it stands out.
+    Emphasis,
+}
+
+/// Why an errata file cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum ErrataError {
+    #[error("errata {}: cannot read the file: {source}", path.display())]
+    Unreadable { path: PathBuf, source: io::Error },
+    #[error("errata {}: {source}", path.display())]
+    Malformed { path: PathBuf, source: Box<toml::de::Error> },
+    #[error("errata {}: {experiment}, {model}, {metric}: expected a reason, found none; say why the publication errs", path.display())]
+    NoReason { path: PathBuf, experiment: String, model: String, metric: String },
+}
+
+/// A slip takes some hundred bytes.
+const LARGEST: Limit = Limit::new("bytes of errata", 1 << 20);
+
+impl Errata {
+    /// The slips of the paper.
+    pub fn of_paper() -> Self {
+        toml::from_str(PAPER).expect("the built-in errata are well-formed: a test reads them")
+    }
+
+    /// The errata in a file.
+    pub fn read(path: &Path) -> Result<Self, ErrataError> {
+        let text =
+            input::text(path, LARGEST).map_err(|source| ErrataError::Unreadable { path: path.to_owned(), source })?;
+        let errata: Self = toml::from_str(&text)
+            .map_err(|source| ErrataError::Malformed { path: path.to_owned(), source: Box::new(source) })?;
+        match errata.erratum.iter().find(|erratum| erratum.reason.trim().is_empty()) {
+            None => Ok(errata),
+            Some(Erratum { experiment, model, metric, .. }) => Err(ErrataError::NoReason {
+                path: path.to_owned(),
+                experiment: experiment.clone(),
+                model: model.clone(),
+                metric: metric.clone(),
+            }),
+        }
+    }
+}
+
+impl Erratum {
+    /// Whether it is about this cell of this table.
+    pub fn is_about(&self, table: &str, cell: &CellLabel) -> bool {
+        let CellLabel { experiment, model, metric } = cell;
+        (self.table.as_str(), &self.experiment, &self.model, &self.metric) == (table, experiment, model, metric)
+    }
+}
+
+impl Field {
+    /// Its column in a published table.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Mean => "mean",
+            Self::Se => "se",
+            Self::Emphasis => "emphasis",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Errata;
+
+    #[test]
+    fn the_built_in_errata_are_the_two_slips_of_the_paper() {
+        let errata = Errata::of_paper().erratum;
+        let named: Vec<String> =
+            errata.iter().map(|e| format!("{} {} {} {}", e.table, e.experiment, e.model, e.metric)).collect();
+        assert_eq!(named, ["main E3 Gemma4 26B TTD", "main E5 Ministral 3 14B MTATO"]);
+        assert!(errata.iter().all(|e| !e.reason.is_empty()));
+    }
+}

@@ -1,0 +1,77 @@
+//! SVG to PNG and to PDF, both from one parsed tree and with the embedded font alone (feature `raster`).
+
+use std::sync::{Arc, LazyLock};
+
+use krilla::geom::Size;
+use krilla::page::PageSettings;
+use krilla::{Document, SerializeSettings};
+use krilla_svg::{SurfaceExt, SvgSettings};
+use resvg::tiny_skia::{Pixmap, Transform};
+use resvg::usvg::fontdb::{Database, Source};
+use resvg::usvg::{Options, Tree};
+
+use super::font;
+
+/// Pixels of a PNG to a px of the figure: about 300 dots an inch where the figure is 7 inches wide.
+const PNG_SCALE: f32 = 3.0;
+
+const POINTS_PER_PX: f32 = 0.75;
+
+/// The embedded font and no other: an installed one cannot be found in there.
+static FONTS: LazyLock<Arc<Database>> = LazyLock::new(|| {
+    let mut fonts = Database::new();
+    for data in font::FILES {
+        fonts.load_font_source(Source::Binary(Arc::new(data)));
+    }
+    fonts.set_sans_serif_family(font::FAMILY);
+    Arc::new(fonts)
+});
+
+/// A figure that could not be converted.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum ConvertError {
+    #[error("the figure's SVG cannot be read back; please report this with the model names of the data")]
+    Svg(#[from] resvg::usvg::Error),
+    #[error("a picture of {width} x {height} px cannot be made; take svg or pdf, or fewer models")]
+    Size { width: f32, height: f32 },
+    #[error("the figure cannot be encoded as PNG: {0}")]
+    Png(String),
+    #[error("the figure cannot be written as PDF: {0}")]
+    Pdf(String),
+}
+
+/// The SVG as both converters see it.
+pub fn tree(svg: &str) -> Result<Tree, ConvertError> {
+    let options = Options { fontdb: FONTS.clone(), font_family: font::FAMILY.to_owned(), ..Options::default() };
+    Ok(Tree::from_str(svg, &options)?)
+}
+
+/// The picture as PNG bytes, three pixels to a px.
+pub fn png(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
+    let (width, height) = (tree.size().width() * PNG_SCALE, tree.size().height() * PNG_SCALE);
+    let mut pixels = Pixmap::new(whole(width), whole(height)).ok_or(ConvertError::Size { width, height })?;
+    resvg::render(tree, Transform::from_scale(PNG_SCALE, PNG_SCALE), &mut pixels.as_mut());
+    pixels.encode_png().map_err(|error| ConvertError::Png(error.to_string()))
+}
+
+/// The picture as a PDF of one page, its text selectable; no date and no random identifier inside.
+pub fn pdf(tree: &Tree) -> Result<Vec<u8>, ConvertError> {
+    let (width, height) = (tree.size().width() * POINTS_PER_PX, tree.size().height() * POINTS_PER_PX);
+    let fault = || ConvertError::Size { width, height };
+    let page = PageSettings::from_wh(width, height).ok_or_else(fault)?;
+    let size = Size::from_wh(width, height).ok_or_else(fault)?;
+    let settings = SerializeSettings { xmp_metadata: false, ..SerializeSettings::default() };
+    let mut document = Document::new_with(settings);
+    let mut page = document.start_page_with(page);
+    let mut surface = page.surface();
+    surface.draw_svg(tree, size, SvgSettings::default()).ok_or_else(fault)?;
+    surface.finish();
+    page.finish();
+    document.finish().map_err(|error| ConvertError::Pdf(format!("{error:?}")))
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "`as` clamps; 0 is refused by Pixmap")]
+fn whole(size: f32) -> u32 {
+    size.ceil() as u32
+}

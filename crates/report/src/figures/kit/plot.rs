@@ -1,0 +1,126 @@
+//! A plot with two linear axes: from values to places, with grid lines and numbers beside them.
+
+use std::ops::Range;
+
+use plotters::coord::CoordTranslate;
+use plotters::coord::cartesian::Cartesian2d;
+use plotters::coord::ranged1d::{BoldPoints, Ranged};
+use plotters::coord::types::RangedCoordf64;
+
+use super::frame::{Frame, Point};
+use super::ink::UNITS_PER_PX;
+use super::lettering::{self, Align};
+use super::look::Stroke;
+use super::palette::PALETTE;
+use super::sheet::Sheet;
+use exact::number::Decimal;
+
+/// Two linear axes over a frame; y grows upwards.
+pub struct Plot {
+    /// Where it lies.
+    pub frame: Frame,
+    spec: Cartesian2d<RangedCoordf64, RangedCoordf64>,
+}
+
+/// A place on an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tick {
+    /// The value.
+    pub at: f64,
+    /// Its text; empty for a grid line alone.
+    pub text: String,
+}
+
+impl Plot {
+    /// Axes over `frame`.
+    pub fn new(frame: Frame, x: Range<f64>, y: Range<f64>) -> Self {
+        let across = units(frame.left)..units(frame.right());
+        let upwards = units(frame.bottom())..units(frame.top);
+        Self { frame, spec: Cartesian2d::new(x, y, (across, upwards)) }
+    }
+
+    /// The place of a pair of values.
+    pub fn at(&self, x: f64, y: f64) -> Point {
+        let (x, y) = self.spec.translate(&(x, y));
+        (f64::from(x) / UNITS_PER_PX, f64::from(y) / UNITS_PER_PX)
+    }
+
+    /// Upright grid lines, with numbers below the plot.
+    pub fn x_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
+        let lettering = lettering::tick().aligned(Align::Middle);
+        for tick in ticks {
+            let x = self.at(tick.at, 0.0).0;
+            sheet.line(&[(x, self.frame.top), (x, self.frame.bottom())], grid());
+            if !tick.text.is_empty() {
+                sheet.text((x, self.frame.bottom() + 8.0), &tick.text, lettering);
+            }
+        }
+    }
+
+    /// Level grid lines, with numbers to the left of the plot.
+    pub fn y_axis(&self, sheet: &mut Sheet, ticks: &[Tick]) {
+        let lettering = lettering::tick().aligned(Align::End);
+        for tick in ticks {
+            let y = self.at(0.0, tick.at).1;
+            sheet.line(&[(self.frame.left, y), (self.frame.right(), y)], grid());
+            if !tick.text.is_empty() {
+                sheet.text((self.frame.left - 5.0, y), &tick.text, lettering);
+            }
+        }
+    }
+
+    /// What the axis below says.
+    pub fn x_title(&self, sheet: &mut Sheet, text: &str) {
+        let at = (self.frame.center().0, self.frame.bottom() + 20.0);
+        sheet.text(at, text, lettering::label().aligned(Align::Middle));
+    }
+
+    /// What the axis at the left says, `away` px from the plot.
+    pub fn y_title(&self, sheet: &mut Sheet, text: &str, away: f64) {
+        let at = (self.frame.left - away, self.frame.center().1);
+        sheet.text(at, text, lettering::label().aligned(Align::Middle).upwards());
+    }
+}
+
+/// 0, 0.5 and 1 with numbers, the quarters as grid lines alone.
+pub fn rate_ticks() -> Vec<Tick> {
+    let tick = |(at, text): (f64, &str)| Tick { at, text: text.to_owned() };
+    [(0.0, "0"), (0.25, ""), (0.5, "0.5"), (0.75, ""), (1.0, "1")].map(tick).into()
+}
+
+/// At most `most` whole numbers from 0 to `last`, at even distances.
+pub fn whole_ticks(last: u32, most: usize) -> Vec<Tick> {
+    let axis = RangedCoordf64::from(0.0..f64::from(last));
+    let whole = axis.key_points(BoldPoints(most)).into_iter().filter(|at| at.fract() == 0.0);
+    whole.filter_map(|at| Some(Tick { at, text: Decimal::of_float(at, 0)?.to_string() })).collect()
+}
+
+fn grid() -> Stroke {
+    Stroke::solid(PALETTE.surface.rule, 0.7)
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "`as` clamps, and sheets are small")]
+fn units(px: f64) -> i32 {
+    (px * UNITS_PER_PX).round() as i32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Plot, whole_ticks};
+    use crate::figures::kit::frame::Frame;
+
+    #[test]
+    fn the_corners_of_the_values_are_the_corners_of_the_frame() {
+        let plot = Plot::new(Frame::new(10.0, 20.0, 100.0, 50.0), 0.0..2.0, 0.0..1.0);
+        assert_eq!((plot.at(0.0, 0.0), plot.at(2.0, 1.0)), ((10.0, 70.0), (110.0, 20.0)));
+        assert_eq!(plot.at(1.0, 0.5), (60.0, 45.0));
+    }
+
+    #[test]
+    fn ticks_are_whole_and_few() {
+        for end in [1, 2, 7, 100, 12345, u32::MAX] {
+            let ticks = whole_ticks(end, 6);
+            assert!(!ticks.is_empty() && ticks.len() <= 6 && ticks[0].at == 0.0, "{end}: {ticks:?}");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! Figures: from cells to one SVG, and from that SVG to PNG and PDF.
+//!
+//! Rule: a figure reads cells, the episode table and what else [`Input`] holds, and nothing besides; the same
+//! input gives the same bytes. Every mark of data is a `<g class="mark">` with a title for the reader who hovers
+//! and its values in full as `data-*` attributes. What is missing is shown as missing, never as zero.
+//!
+//! One file per figure. They share `matrix` (the cells as figures see them), `missing` (what a plot cannot show) and the
+//! drawing [`kit`].
+
+pub mod e5_outcomes;
+pub mod film_strip;
+pub mod gaze;
+pub mod kit;
+pub mod sensitivity;
+
+mod completion_gap;
+mod decision_curve;
+mod error;
+mod heatmap;
+mod intervals;
+mod matrix;
+mod missing;
+mod name;
+mod scatter;
+mod slopes;
+mod spider;
+
+pub use error::FigureError;
+#[cfg(feature = "raster")]
+pub use kit::convert::ConvertError;
+pub use kit::font::style_sheet as font_style_sheet;
+pub use kit::format::{EncodeError, FigureFormat, UnknownEnding};
+pub use kit::picture::Figure;
+pub use name::FigureName;
+
+use crate::cells::Cells;
+use e5_outcomes::Outcomes;
+use kit::{Roster, Sheet};
+use matrix::{Matrix, SUCCESS};
+use score::table::EpisodeTable;
+use score::timeline::Timeline;
+
+/// What figures are drawn from.
+#[derive(Clone, Copy, Debug)]
+pub struct Input<'a> {
+    /// The cells by experiment and model.
+    pub cells: &'a Cells,
+    /// Models in the order to show them, a style's `row_order`; those not named follow in the palette's order, then by name.
+    pub order: &'a [String],
+    /// One row per episode: for `decision-curve`.
+    pub episodes: Option<&'a EpisodeTable>,
+    /// How episodes of an open question ended: for `e5-outcomes`.
+    pub outcomes: Option<&'a Outcomes>,
+    /// Landmarks of each episode: for `gaze`.
+    pub timelines: Option<&'a [Timeline]>,
+}
+
+impl<'a> Input<'a> {
+    /// Cells and nothing else: enough for all figures but `decision-curve`, `e5-outcomes` and `gaze`.
+    pub const fn of_cells(cells: &'a Cells) -> Self {
+        Self { cells, order: &[], episodes: None, outcomes: None, timelines: None }
+    }
+}
+
+pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> {
+    let matrix = Matrix::new(input.cells)?;
+    let roster = Roster::new(&matrix.models, input.order);
+    let scene = Scene { matrix: &matrix, roster: &roster };
+    let missing = |needed| FigureError::MissingInput { figure: name, needed };
+    let (sheet, height) = match name {
+        FigureName::Spider => spider::draw(scene)?,
+        FigureName::Heatmap => heatmap::draw(scene),
+        FigureName::Scatter => scatter::draw(scene)?,
+        FigureName::CompletionGap => completion_gap::draw(scene)?,
+        FigureName::Intervals => intervals::draw(scene)?,
+        FigureName::Slopes => slopes::draw(scene)?,
+        FigureName::E5Outcomes => {
+            e5_outcomes::draw(scene, input.outcomes.ok_or_else(|| missing("the outcomes of an open question"))?)
+        }
+        FigureName::DecisionCurve => {
+            decision_curve::draw(scene, input.episodes.ok_or_else(|| missing("the episode table"))?)?
+        }
+        FigureName::Gaze => {
+            let found = input.episodes.map_or(0, EpisodeTable::len);
+            let most = gaze::MOST_EPISODES;
+            if input.timelines.is_none() && found > most {
+                return Err(FigureError::TooManyEpisodes { figure: name, most, found });
+            }
+            gaze::draw(scene, input.timelines.ok_or_else(|| missing("the steps of each episode"))?)
+        }
+    };
+    let caption = match name {
+        FigureName::Intervals | FigureName::Slopes => name.caption().replace(SUCCESS, matrix.success(name)?.name),
+        _ => name.caption().to_owned(),
+    };
+    Ok(Figure::new(sheet, height, name.title(), caption))
+}
+
+/// What every figure is drawn from.
+#[derive(Clone, Copy, Debug)]
+struct Scene<'a> {
+    matrix: &'a Matrix<'a>,
+    roster: &'a Roster<'a>,
+}
+
+/// A drawn sheet and the height to cut it at, px.
+type Drawn = (Sheet, f64);

@@ -1,0 +1,115 @@
+//! The commands that look into one episode, for whoever reads the page at a terminal.
+//!
+//! Rule: names as a manifest has them, so that no page tells where its maker keeps things; each is one word of a shell,
+//! whatever its characters.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Value as Json, json};
+
+use exact::escape::visible;
+
+/// The most folders or files that a command names; more are named by the folder that they are in.
+const MOST_NAMED: usize = 3;
+
+/// What other commands are told, so that they read what the page was made of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Recordings {
+    /// The traces, as the manifest names them.
+    pub paths: Vec<String>,
+    /// The definitions, by name or path; none for the default ones.
+    pub definitions: Option<String>,
+}
+
+impl Recordings {
+    /// Each command in two parts, between which the episode's id stands.
+    pub(super) fn commands(&self) -> Json {
+        let runs = self.runs();
+        let definitions = self.definitions.as_deref().map(|name| format!(" --definitions {}", word(name)));
+        let definitions = definitions.unwrap_or_default();
+        let command =
+            |title: &str, before: String, after: String| json!({ "title": title, "before": before, "after": after });
+        json!([
+            command(
+                "why it has its values",
+                format!("mirrorstats score {runs}{definitions} --explain "),
+                String::new()
+            ),
+            command(
+                "step by step in the browser",
+                format!("mirrorstats view {runs}{definitions} --episode "),
+                String::new()
+            ),
+            command("a film strip", "mirrorstats filmstrip ".to_owned(), format!(" {runs} --out filmstrip.png")),
+        ])
+    }
+
+    /// The files, or the folders that they are in.
+    fn runs(&self) -> String {
+        let folder = |path: &str| path.rsplit_once('/').map_or(".", |(folder, _)| folder).to_owned();
+        let mut named: BTreeSet<String> = self.paths.iter().cloned().collect();
+        while named.len() > MOST_NAMED {
+            let fewer: BTreeSet<String> = named.iter().map(|path| folder(path)).collect();
+            if fewer == named {
+                break;
+            }
+            named = fewer;
+        }
+        named.iter().map(|name| word(name)).collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// An id as a word of a shell, where it is not one as it stands.
+pub(super) fn quoted(id: &str) -> Option<String> {
+    let word = word(id);
+    (word != id).then_some(word)
+}
+
+/// A text as one word of a shell: bash and zsh read it back as it was, and nothing in it acts or hides.
+pub fn word(text: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./:@%+,".contains(c);
+    if !text.is_empty() && !text.starts_with('-') && text.chars().all(is_plain) {
+        return text.to_owned();
+    }
+    if visible(text) == text {
+        return format!("'{}'", text.replace('\'', r"'\''"));
+    }
+    let spelled = |c: char| match c {
+        '\'' | '\\' => format!("\\{c}"),
+        c if visible(c.encode_utf8(&mut [0; 4])) == c.to_string() => c.to_string(),
+        c => format!("\\U{:08X}", u32::from(c)),
+    };
+    format!("$'{}'", text.chars().map(spelled).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Recordings, word};
+
+    #[test]
+    fn a_word_is_one_word_and_nothing_in_it_acts() {
+        for (text, expected) in [
+            ("E1/gpt-5-1/s1/r1", "E1/gpt-5-1/s1/r1"),
+            ("a b", "'a b'"),
+            ("$(rm -rf ~)", "'$(rm -rf ~)'"),
+            ("it's", r"'it'\''s'"),
+            ("", "''"),
+            ("--json", "'--json'"),
+            ("a\u{202e}b'c\n", r"$'a\U0000202Eb\'c\U0000000A'"),
+        ] {
+            assert_eq!(word(text), expected);
+        }
+    }
+
+    #[test]
+    fn many_files_are_named_by_their_folders() {
+        let runs = |paths: &[&str]| {
+            Recordings { paths: paths.iter().map(|path| (*path).to_owned()).collect(), definitions: None }.runs()
+        };
+        assert_eq!(runs(&["a.parquet"]), "a.parquet");
+        assert_eq!(runs(&["x/a", "x/b", "x/c", "x/d"]), "x");
+        assert_eq!(runs(&["x/a/1", "x/b/1", "y/a/1", "y/b/1", "y/b/2"]), "x y");
+        assert_eq!(runs(&["a", "b", "c", "d"]), ".");
+        assert_eq!(runs(&["my runs/a"]), "'my runs/a'");
+    }
+}

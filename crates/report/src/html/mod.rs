@@ -1,0 +1,105 @@
+//! `report.html`: tables, figures and provenance of a report as one page that needs nothing but itself.
+//!
+//! ```text
+//! page.rs ──► cell.rs, filter.rs, definitions.rs, command.rs    template.rs
+//! (the whole   (what the templates say, as text)            ──► (assets/templates: markup,
+//!  page)        embedded.rs, pair.rs (JSON for the script)        style and script become one)
+//! ```
+//!
+//! Rule: numbers arrive here finished; a cell's attributes carry the text of `cells.csv`. Names from traces are text:
+//! templates escape them, and what acts on a reader is spelled out first ([`visible`]). The page forbids itself every
+//! request and every script but its own. It is complete without its script; the script adds sorting, filters, search,
+//! values on hover, the episodes behind a cell, and two models beside each other. What is chosen stands in the address.
+//!
+//! [`visible`]: exact::escape
+
+mod cell;
+mod command;
+mod definitions;
+mod embedded;
+mod filter;
+mod page;
+mod pair;
+mod template;
+
+use crate::bundle::Manifest;
+use crate::cells::Cells;
+use crate::cells::group::GroupError;
+use crate::quality::QualityTable;
+use crate::statistics::Statistics;
+use crate::table::Table;
+use score::table::EpisodeTable;
+
+pub use command::{Recordings, word};
+
+/// What the page is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Page<'a> {
+    /// The tables, in order.
+    pub tables: &'a [Table],
+    /// The cells that the tables show.
+    pub cells: &'a Cells,
+    /// The episodes that the cells are of.
+    pub episodes: &'a EpisodeTable,
+    /// Where everything comes from.
+    pub manifest: &'a Manifest,
+    /// The figures, in order; none leaves the section out.
+    pub figures: &'a [Figure<'a>],
+    /// What can be concluded; none leaves the section out.
+    pub statistics: Option<&'a Statistics>,
+    /// What became of the replies; none leaves the section out.
+    pub quality: Option<&'a QualityTable>,
+    /// What the episodes are of; none where no command looks into them, as into scores.
+    pub recordings: Option<&'a Recordings>,
+}
+
+/// A figure to set into the page.
+#[derive(Clone, Copy, Debug)]
+pub struct Figure<'a> {
+    /// `spider`, ...: the name of its files.
+    pub name: &'a str,
+    /// Its heading.
+    pub title: &'a str,
+    /// How to read it.
+    pub caption: &'a str,
+    /// An `<svg>` element, taken as it is: it must have escaped the names in it.
+    pub svg: &'a str,
+}
+
+/// Why a page cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum HtmlError {
+    #[error(transparent)]
+    Grouping(#[from] GroupError),
+    #[error("expected the cells of the episodes given, found other ones; group the same episode table")]
+    OtherEpisodes,
+    #[error("table `{table}`: the row `{row}` is of no cell; lay the tables out from the same cells")]
+    StrayRow { table: String, row: String },
+    #[error("the page cannot be rendered: {0}")]
+    Template(#[from] minijinja::Error),
+}
+
+/// Some sections of the page by themselves, for a page that is put together in the browser: `tables`, `figures`, `statistics`,
+/// `quality`, `definitions`, each as its element.
+pub fn sections(page: &Page<'_>, names: &[&str]) -> Result<Vec<String>, HtmlError> {
+    let content = page::content(page)?;
+    names.iter().map(|name| Ok(template::section(name, &content)?)).collect()
+}
+
+/// The style sheet of the page, with its font.
+pub fn style_sheet() -> String {
+    format!("{}\n{}", crate::figures::font_style_sheet(), template::STYLE)
+}
+
+/// Every metric of a catalog with its sentence, for a page.
+pub fn metrics(catalog: &metric::catalog::Catalog) -> Vec<serde_json::Value> {
+    definitions::metrics(catalog)
+}
+
+/// The text of `report.html`.
+///
+/// The same input gives the same text.
+pub fn render(page: &Page<'_>) -> Result<String, HtmlError> {
+    Ok(template::render(page::content(page)?)?)
+}

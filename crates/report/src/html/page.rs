@@ -1,0 +1,168 @@
+//! The page as its templates take it: text in order, every decision taken.
+
+use std::collections::BTreeSet;
+
+use minijinja::context;
+use minijinja::value::{Serde, Value};
+use serde_json::{Value as Json, json};
+
+use super::cell::cell;
+use super::filter::{Filters, shown};
+use super::template::markup;
+use super::{Figure, HtmlError, Page, definitions, embedded, pair};
+use crate::bundle::Manifest;
+use crate::cells::Cells;
+use crate::cells::group::group;
+use crate::figures;
+use crate::layout::heading;
+use crate::order::row_key;
+use crate::quality::QualityTable;
+use crate::statistics::Statistics;
+use crate::statistics::text::{self, Length};
+use crate::table::{Column, Row, RowGroup, Table};
+use exact::escape::visible;
+use metric::catalog::Better;
+use score::table::{EpisodeTable, KeyRef};
+
+/// Everything that a report puts into its page.
+pub(super) fn content(page: &Page<'_>) -> Result<Value, HtmlError> {
+    if group(page.episodes, &page.cells.by)? != *page.cells {
+        return Err(HtmlError::OtherEpisodes);
+    }
+    let undefined = page.tables.first().map_or("", |table| table.undefined.as_str());
+    let catalog = &page.cells.catalog;
+    let filters = Filters::of(page.tables, page.cells, undefined);
+    let metrics = definitions::metrics(catalog);
+    let data = embedded::json(page, &metrics, undefined)?;
+    let tables = page.tables.iter().map(|of| table(of, page.cells, &filters)).collect::<Result<Vec<_>, _>>()?;
+    Ok(context! {
+        font => markup(&figures::font_style_sheet()),
+        counts => Serde(counts(page.episodes)),
+        filters => Serde(filters.filters),
+        tables => Serde(tables),
+        figures => page.figures.iter().map(figure).collect::<Vec<_>>(),
+        pair => Serde(pair::heading(page.statistics)),
+        statistics => Serde(page.statistics.map(statistics)),
+        quality => Serde(page.quality.map(quality)),
+        metrics => Serde(metrics),
+        lets => Serde(definitions::lets(catalog)),
+        experiments => Serde(definitions::experiments(catalog)),
+        provenance => Serde(provenance(page.manifest)),
+        data => markup(&data),
+    })
+}
+
+fn counts(episodes: &EpisodeTable) -> Json {
+    let distinct = |of: fn(KeyRef<'_>) -> &str| episodes.keys.iter().map(of).collect::<BTreeSet<_>>().len();
+    let (models, experiments) = (distinct(|key| key.model), distinct(|key| key.experiment));
+    json!({ "episodes": episodes.len(), "models": models, "experiments": experiments })
+}
+
+fn table(table: &Table, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
+    let group_keys: Vec<&str> = others(&table.keys, row_key(&table.keys)).map(String::as_str).collect();
+    let rows = |group: &RowGroup| row_group(group, table, cells, filters);
+    Ok(json!({
+        "name": table.name,
+        "title": visible(&table.title),
+        "sentences": table.sentences().map(visible).collect::<Vec<_>>(),
+        "row_heading": visible(&table.row_heading),
+        // What heads the groups in words, empty where all rows are of one: `Experiment`.
+        "group_heading": heading(&visible(&group_keys.join(", "))),
+        "columns": table.columns.iter().map(column).collect::<Vec<_>>(),
+        "groups": table.groups.iter().map(rows).collect::<Result<Vec<_>, _>>()?,
+    }))
+}
+
+fn column(column: &Column) -> Json {
+    // The direction to sort by first.
+    let best_first = match column.better {
+        Better::Higher | Better::Neither => "descending",
+        Better::Lower => "ascending",
+    };
+    json!({ "metric": visible(&column.metric), "arrow": column.better.arrow(), "best_first": best_first })
+}
+
+fn row_group(group: &RowGroup, table: &Table, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
+    let first = group.rows.first().map_or(&[][..], |row| &row.key);
+    // The heading's keys alone: `E1`.
+    let short = others(first, row_key(&table.keys)).map(|value| shown(value, &table.undefined));
+    let short = short.collect::<Vec<_>>().join(", ");
+    let rows = group.rows.iter().map(|of| row(of, table, cells, filters)).collect::<Result<Vec<_>, _>>()?;
+    Ok(json!({ "heading": group.heading.as_deref().map(visible), "short": short, "rows": rows }))
+}
+
+fn row(row: &Row, table: &Table, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
+    let stray = || HtmlError::StrayRow { table: table.name.clone(), row: row.name.clone() };
+    let at = cells.groups.binary_search_by(|group| group.key.cmp(&row.key)).map_err(|_| stray())?;
+    let group = &cells.groups[at];
+    let key = |name: &str| cells.by.iter().position(|key| key == name).map(|at| row.key[at].to_string());
+    let experiment = key("experiment");
+    let views = row.cells.iter().zip(&table.columns).map(|(own, column)| {
+        let of = cells.of_metric(group, &column.metric)?;
+        let level = experiment.as_deref().and_then(|experiment| cells.catalog.chance(experiment, &column.metric));
+        Some(cell(own, of, &table.undefined, level))
+    });
+    Ok(json!({
+        "name": visible(&row.name),
+        // The position of its group of episodes, and the places of its keys among the values of the filters.
+        "group": at,
+        "places": filters.places(&row.key),
+        "episodes": group.episodes,
+        "model": key("model").as_deref().map(visible),
+        "experiment": experiment.as_deref().map(visible),
+        "cells": views.collect::<Option<Vec<_>>>().ok_or_else(stray)?,
+    }))
+}
+
+fn figure(figure: &Figure<'_>) -> Value {
+    let [name, title, caption] = [figure.name, figure.title, figure.caption].map(visible);
+    context! { name, title, caption, svg => markup(figure.svg) }
+}
+
+fn statistics(statistics: &Statistics) -> Json {
+    let all = |sentences: &[String]| sentences.iter().map(|sentence| visible(sentence)).collect::<Vec<_>>();
+    json!({
+        "conclusions": all(&statistics.conclusions),
+        "warnings": all(&statistics.warnings),
+        "text": text::render(statistics, &statistics.headline, Length::Full, None),
+    })
+}
+
+fn quality(table: &QualityTable) -> Json {
+    let all = |texts: &[String]| texts.iter().map(|text| visible(text)).collect::<Vec<_>>();
+    json!({
+        "notes": all(&table.notes),
+        "header": all(&table.header),
+        "rows": table.rows.iter().map(|row| all(row)).collect::<Vec<_>>(),
+    })
+}
+
+/// Where the numbers of the page come from.
+fn provenance(manifest: &Manifest) -> Json {
+    let names = |names: &[String]| names.iter().map(|name| visible(name)).collect::<Vec<_>>().join(", ");
+    let source = |name: &str, hash: &str| {
+        let short: String = hash.chars().take(12).collect();
+        json!({ "name": visible(name), "sha256": hash, "short": short })
+    };
+    let inputs = manifest
+        .inputs
+        .iter()
+        .map(|input| json!({ "path": visible(&input.path), "bytes": input.bytes, "sha256": input.sha256 }));
+    json!({
+        "version": manifest.version,
+        "schema_version": manifest.schema_version,
+        "definitions": source(&manifest.definitions.name, &manifest.definitions.hash),
+        "style": source(&manifest.style.name, &manifest.style.sha256),
+        "filter": manifest.filter.as_deref().map(visible),
+        "by": names(&manifest.by),
+        "metrics": names(&manifest.metrics),
+        "inputs": inputs.collect::<Vec<_>>(),
+        // Without its outputs: the hash of the page is among them.
+        "manifest": manifest.json().lines().map(visible).collect::<Vec<_>>().join("\n"),
+    })
+}
+
+/// All but the item at a place.
+fn others<T>(items: &[T], place: usize) -> impl Iterator<Item = &T> {
+    items.iter().enumerate().filter(move |(at, _)| *at != place).map(|(_, item)| item)
+}

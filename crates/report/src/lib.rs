@@ -1,0 +1,29 @@
+//! From cells to bytes: tables, their comparison with published ones, and the folder of a report.
+//!
+//! Rule: this crate sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
+//! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`figures`] draws, [`html`] makes the page of all
+//! of it, [`bundle`] writes the folder. [`audit`] asks of published tables whether any data gives them, [`plan`] how
+//! many episodes a comparison takes.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+pub mod audit;
+pub mod bundle;
+pub mod cells;
+pub mod changes;
+pub mod comparison;
+pub mod emphasis;
+pub mod errata;
+pub mod figures;
+pub mod html;
+pub mod layout;
+pub mod order;
+pub mod plan;
+pub mod published;
+pub mod quality;
+pub mod sensitivity;
+pub mod statistics;
+pub mod style;
+pub mod table;
+pub mod tables;
+pub mod value;

@@ -1,0 +1,74 @@
+//! The order of things in tables: keys, metrics.
+//!
+//! Rule: experiments stand as the definitions order them, models and metrics as the style does, everything else by
+//! value; so a list beside a table can be read along it.
+
+use crate::cells::KeyValue;
+use crate::cells::diff::Changes;
+use crate::style::{MAIN_TABLE, Style};
+use metric::catalog::Catalog;
+
+/// What decides the order.
+#[derive(Clone, Copy, Debug)]
+pub struct TableOrder<'a> {
+    /// The definitions.
+    pub catalog: &'a Catalog,
+    /// The style.
+    pub style: &'a Style,
+}
+
+impl TableOrder<'_> {
+    /// Where a key of these columns stands: heading keys count before the row's own.
+    pub fn of_key(self, by: &[String], key: &[KeyValue]) -> Vec<(usize, KeyValue)> {
+        let own = row_key(by);
+        let heading = (0..key.len()).filter(|at| *at != own);
+        let all = heading.chain((own < key.len()).then_some(own));
+        all.map(|at| (self.place(&by[at], &key[at]), key[at].clone())).collect()
+    }
+
+    /// Where a metric stands: by the first table that shows it, then as defined.
+    pub fn of_metric(self, metric: &str) -> (usize, usize) {
+        let sheet = &self.style.sheet;
+        let mut tables: Vec<_> = sheet.table.iter().collect();
+        tables.sort_by_key(|(name, _)| *name != MAIN_TABLE);
+        let columns: Vec<&String> = tables.into_iter().flat_map(|(_, table)| &table.columns).collect();
+        let shown = columns.iter().position(|column| *column == metric).unwrap_or(columns.len());
+        let defined = &self.catalog.metric;
+        (shown, defined.get_index_of(metric).unwrap_or(defined.len()))
+    }
+
+    /// Puts cells and flips in the order of the tables.
+    pub fn sort(self, changes: &mut Changes) {
+        let by = changes.by.clone();
+        changes.cells.sort_by_cached_key(|cell| {
+            let key: Vec<KeyValue> = cell.key.values().cloned().collect();
+            (self.of_key(&by, &key), self.of_metric(&cell.metric))
+        });
+        let by = ["experiment", "model", "seed", "run", "episode_id"].map(str::to_owned);
+        changes.flips.sort_by_cached_key(|flip| {
+            let text = |value: &String| KeyValue::Text(value.clone());
+            let name = &flip.episode;
+            let [seed, run] = [name.seed, name.run].map(|value| KeyValue::Int(value.into()));
+            let [experiment, model, id] = [&name.experiment, &name.model, &name.episode_id].map(text);
+            let key = [experiment, model, seed, run, id];
+            let places = by.iter().zip(key).map(|(name, value)| (self.place(name, &value), value));
+            (self.of_metric(&flip.metric), places.collect::<Vec<_>>())
+        });
+    }
+
+    fn place(self, column: &str, value: &KeyValue) -> usize {
+        match (column, value) {
+            ("experiment", KeyValue::Text(name)) => self.catalog.experiment_rank(name),
+            ("model", KeyValue::Text(name)) => {
+                let order = &self.style.sheet.row_order;
+                order.iter().position(|model| model == name).unwrap_or(order.len())
+            }
+            _ => 0,
+        }
+    }
+}
+
+/// Which key names the rows: the model where it is one, else the last.
+pub(super) fn row_key(by: &[String]) -> usize {
+    by.iter().position(|key| key == "model").unwrap_or(by.len().saturating_sub(1))
+}

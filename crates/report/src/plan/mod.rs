@@ -1,0 +1,225 @@
+//! A study planned: the episodes for a wanted difference, or the difference that given episodes can show.
+//!
+//! Rule: every test is planned twice, by itself and at the level that Holm's procedure holds its smallest p value to.
+//! What had to be assumed stands beside the answer, in sentences.
+
+pub mod register;
+pub mod text;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use exact::format::fixed;
+use exact::ratio::Ratio;
+use statistics::holm;
+use statistics::sample_size::{Clusters, Fisher, MOST_EPISODES, McNemar, OneRate, Power, Rates, settled, smallest};
+
+/// What a plan is asked.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlanRequest {
+    /// What is given; the other is answered.
+    pub given: Given,
+    /// The lower of the two rates; null puts both around 1/2, where a difference is hardest to show.
+    pub baseline: Option<f64>,
+    /// The power wanted.
+    pub power: f64,
+    /// The confidence of the tests; their level is one minus it.
+    pub confidence: f64,
+    /// How many models are compared, each with each.
+    pub models: u64,
+    /// Seeds, each with as many runs; and how far the episodes of one seed resemble each other.
+    pub clusters: Clusters,
+    /// The share of pairs of which one succeeds and the other does not; null takes success as independent in a pair.
+    pub discordance: Option<f64>,
+    /// A level of chance to hold each model against; null for none.
+    pub chance: Option<Ratio>,
+}
+
+/// What of a plan is given.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Given {
+    /// The difference wanted.
+    Difference(f64),
+    /// Runs per seed.
+    Runs(u64),
+}
+
+/// A plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Plan {
+    /// What was asked.
+    pub request: PlanRequest,
+    /// The answer in one line.
+    pub answer: String,
+    /// An answer per test and level; the first is the one that the line tells.
+    pub tests: Vec<PlannedTest>,
+    /// What was assumed, in sentences.
+    pub assumptions: Vec<String>,
+}
+
+/// A test at a level. Numbers have twelve significant digits, which any reader of JSON gives back as they are.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PlannedTest {
+    /// The test.
+    pub test: TestName,
+    /// How many tests share the level under Holm's procedure; 1 for a test by itself.
+    pub family: u64,
+    /// The level that p must not exceed.
+    pub level: f64,
+    /// The difference of rates; null where the episodes show none.
+    pub difference: Option<f64>,
+    /// Runs per seed; null where no number up to the limit has the power.
+    pub runs: Option<u64>,
+    /// Episodes per model and experiment.
+    pub episodes: Option<u64>,
+    /// The independent episodes that they are worth.
+    pub effective: Option<u64>,
+    /// The power there.
+    pub power: Option<f64>,
+}
+
+/// A test that a plan is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TestName {
+    /// Two models over the same scenes: the exact test of `McNemar`.
+    Paired,
+    /// Two models over scenes of their own: Fisher's exact test.
+    Unpaired,
+    /// One model against a level of chance: the exact binomial test.
+    Chance,
+}
+
+impl TestName {
+    /// What it compares, and how.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Paired => "two models, pairs (exact McNemar)",
+            Self::Unpaired => "two models, no pairs (Fisher)",
+            Self::Chance => "one model against chance (binomial)",
+        }
+    }
+}
+
+/// Why there is no such plan.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum PlanError {
+    #[error(
+        "--difference {difference} with --baseline {baseline}: expected rates from 0 to 1, found {}; lower one of the two",
+        fixed(Some(*higher), 3)
+    )]
+    BeyondOne { difference: f64, baseline: f64, higher: f64 },
+    #[error(
+        "--discordance {discordance}: expected a share from {} to {} with these rates",
+        fixed(Some(*least), 3),
+        fixed(Some(*most), 3)
+    )]
+    Discordance { discordance: f64, least: f64, most: f64 },
+    #[error("{episodes} episodes: expected at most {MOST_EPISODES} per model and experiment")]
+    TooMany { episodes: u64 },
+}
+
+pub fn plan(request: PlanRequest) -> Result<Plan, PlanError> {
+    request.check()?;
+    let level = holm::level(request.confidence).expect("a confidence within 0 and 1, as the command line has it");
+    let pairs = (request.models * request.models.saturating_sub(1) / 2).max(1);
+    let mut asked =
+        vec![(TestName::Paired, pairs), (TestName::Paired, 1), (TestName::Unpaired, pairs), (TestName::Unpaired, 1)];
+    if request.chance.is_some() {
+        asked.extend([(TestName::Chance, request.models), (TestName::Chance, 1)]);
+    }
+    // One test is its own family.
+    asked.dedup();
+    let tests: Vec<PlannedTest> =
+        asked.into_iter().map(|(test, family)| request.planned(test, family, level)).collect();
+    Ok(Plan { request, answer: text::answer(&request, &tests[0]), tests, assumptions: text::assumptions(&request) })
+}
+
+impl PlanRequest {
+    fn check(&self) -> Result<(), PlanError> {
+        if let Given::Runs(runs) = self.given {
+            let episodes = runs.saturating_mul(self.clusters.seeds);
+            return if episodes > MOST_EPISODES { Err(PlanError::TooMany { episodes }) } else { Ok(()) };
+        }
+        let Given::Difference(difference) = self.given else { return Ok(()) };
+        let Some(rates) = Rates::apart(difference, self.baseline) else {
+            let baseline = self.baseline.unwrap_or_default();
+            return Err(PlanError::BeyondOne { difference, baseline, higher: baseline + difference });
+        };
+        let (least, most) = rates.possible_discordance();
+        match self.discordance {
+            // A share typed with two digits meets sums of binary fractions.
+            Some(found) if found < least - 1e-9 || found > most + 1e-9 => {
+                Err(PlanError::Discordance { discordance: found, least, most })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn planned(&self, test: TestName, family: u64, level: f64) -> PlannedTest {
+        #[expect(clippy::cast_precision_loss, reason = "pairs of models are few")]
+        let level = level / family as f64;
+        let (difference, runs) = match self.given {
+            Given::Difference(difference) => (Some(difference), self.runs(test, level, difference)),
+            Given::Runs(runs) => (self.difference(test, level, runs), Some(runs)),
+        };
+        let effective = runs.map(|runs| self.clusters.effective(runs));
+        PlannedTest {
+            test,
+            family,
+            level: settled(level),
+            difference: difference.map(settled),
+            runs,
+            episodes: runs.map(|runs| runs * self.clusters.seeds),
+            effective,
+            power: difference.zip(effective).and_then(|(difference, n)| self.power_of(test, level, difference, n)),
+        }
+    }
+
+    fn power_of(&self, test: TestName, level: f64, difference: f64, n: u64) -> Option<f64> {
+        Some(settled(self.test(test, level, difference)?.power(n)))
+    }
+
+    fn runs(&self, test: TestName, level: f64, difference: f64) -> Option<u64> {
+        self.clusters.runs_for(self.power, self.test(test, level, difference)?.as_mut())
+    }
+
+    fn difference(&self, test: TestName, level: f64, runs: u64) -> Option<f64> {
+        let n = self.clusters.effective(runs);
+        let power = |difference| self.test(test, level, difference).map_or(0.0, |mut test| test.power(n));
+        smallest(self.power, self.largest_difference(test), power)
+    }
+
+    fn largest_difference(&self, test: TestName) -> f64 {
+        if test == TestName::Chance {
+            return self.chance.map_or(0.0, |chance| 1.0 - chance.value());
+        }
+        let of_rates = self.baseline.map_or(1.0, |baseline| 1.0 - baseline);
+        match self.discordance.filter(|_| test == TestName::Paired) {
+            None => of_rates,
+            Some(share) => of_rates.min(share).min(self.baseline.map_or(1.0, |baseline| 2.0 - 2.0 * baseline - share)),
+        }
+    }
+
+    /// The test of a true difference; `None` where the rates cannot be.
+    fn test(&self, test: TestName, level: f64, difference: f64) -> Option<Box<dyn Power>> {
+        let rates = || Rates::apart(difference, self.baseline);
+        Some(match test {
+            TestName::Paired => {
+                let discordance = self.discordance.unwrap_or(rates()?.independent_discordance());
+                Box::new(McNemar::new(level, difference, discordance))
+            }
+            TestName::Unpaired => Box::new(Fisher { level, rates: rates()? }),
+            TestName::Chance => {
+                let chance = self.chance?;
+                let rate = chance.value() + difference;
+                (rate <= 1.0 + 1e-9).then(|| Box::new(OneRate { level, chance, rate }))?
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,71 @@
+//! A plan written down before the first episode: inputs, results, and the hashes of what it is about.
+//!
+//! Rule: the same plan and the same definitions give the same bytes. `sha256` is over the document itself, as compact
+//! JSON in the order of its fields with an empty `sha256`, so that a later change is seen without the file's history.
+//! `experiments` and `prompts` are empty until a recorder fills them in; they are part of what is hashed.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Plan;
+use exact::hash;
+
+/// What the document calls itself.
+const FORMAT: &str = "mirrorstats-plan";
+
+/// The version of its shape.
+const VERSION: u32 = 1;
+
+/// A registered plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RegisteredPlan {
+    /// `mirrorstats-plan`.
+    pub format: String,
+    /// 1.
+    pub version: u32,
+    /// The plan.
+    pub plan: Plan,
+    /// The definitions that the study will be scored under.
+    pub definitions: NamedHash,
+    /// The experiments as they will be recorded, each with the hash of its configuration.
+    pub experiments: Vec<NamedHash>,
+    /// The prompts, each with the hash of its text.
+    pub prompts: Vec<NamedHash>,
+    /// SHA-256 over all of the above, 64 hexadecimal digits.
+    pub sha256: String,
+}
+
+/// A thing and the hash of its content.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NamedHash {
+    /// Its name; never a path.
+    pub name: String,
+    /// SHA-256, 64 hexadecimal digits.
+    pub sha256: String,
+}
+
+impl RegisteredPlan {
+    /// Registers a plan; experiments and prompts may be empty.
+    pub fn new(plan: Plan, definitions: NamedHash, experiments: Vec<NamedHash>, prompts: Vec<NamedHash>) -> Self {
+        let (format, version, sha256) = (FORMAT.to_owned(), VERSION, String::new());
+        let open = Self { format, version, plan, definitions, experiments, prompts, sha256 };
+        Self { sha256: open.content_hash(), ..open }
+    }
+
+    /// Whether it is as it was registered.
+    pub fn is_unchanged(&self) -> bool {
+        self.sha256 == self.content_hash()
+    }
+
+    /// The document as it is written.
+    pub fn to_json(&self) -> String {
+        serde_json::to_string_pretty(self).expect("texts and finite numbers") + "\n"
+    }
+
+    fn content_hash(&self) -> String {
+        let open = Self { sha256: String::new(), ..self.clone() };
+        hash::of_bytes(serde_json::to_string(&open).expect("texts and finite numbers").as_bytes())
+    }
+}

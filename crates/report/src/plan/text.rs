@@ -1,0 +1,115 @@
+//! A plan in words: the answer in one line, a row per test and level, what was assumed.
+
+use std::fmt::Write as _;
+
+use comfy_table::{CellAlignment, LineStyle, Table, presets};
+
+use super::{Given, Plan, PlanRequest, PlannedTest};
+use crate::tables::fit::{fitted, wrapped};
+use exact::format::{UNDEFINED, fixed};
+use statistics::sample_size::{MOST_EPISODES, Rates};
+
+/// The columns that name a row.
+const NAMES: usize = 2;
+
+/// The whole answer, in lines of at most `width` columns.
+pub fn render(plan: &Plan, width: Option<usize>) -> String {
+    let mut text = String::new();
+    push_wrapped(&mut text, &plan.answer, width);
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING.header_separator(LineStyle::none().fill('─').junction('─')));
+    table.set_header(["test", "level", "difference", "episodes", "runs per seed", "effective", "power"]);
+    for column in 2..7 {
+        if let Some(column) = table.column_mut(column) {
+            column.set_cell_alignment(CellAlignment::Right);
+        }
+    }
+    for test in &plan.tests {
+        table.add_row(record(test));
+    }
+    let _ = writeln!(text, "\n{}\n", fitted(&table, NAMES, width));
+    for assumption in &plan.assumptions {
+        push_wrapped(&mut text, assumption, width);
+    }
+    text
+}
+
+fn record(test: &PlannedTest) -> [String; 7] {
+    let count = |count: Option<u64>| count.map_or_else(|| UNDEFINED.to_owned(), |count| count.to_string());
+    let family = if test.family > 1 { format!(", Holm over {}", test.family) } else { String::new() };
+    [
+        test.test.title().to_owned(),
+        format!("{}{family}", fixed(Some(test.level), 5)),
+        fixed(test.difference, 3),
+        count(test.episodes),
+        count(test.runs),
+        count(test.effective),
+        fixed(test.power, 3),
+    ]
+}
+
+fn push_wrapped(text: &mut String, words: &str, width: Option<usize>) {
+    let _ = writeln!(text, "{}", wrapped(words, width.unwrap_or(usize::MAX), 2).join("\n"));
+}
+
+/// The answer that a test gives, in one line.
+pub(super) fn answer(request: &PlanRequest, test: &PlannedTest) -> String {
+    let power = request.power;
+    let family =
+        if test.family > 1 { format!(" and Holm's procedure over {} comparisons", test.family) } else { String::new() };
+    let seeds = request.clusters.seeds;
+    match (request.given, test.runs, test.difference) {
+        (Given::Difference(difference), Some(runs), _) => format!(
+            "{} episodes per model and experiment ({runs} for each of {seeds} seeds) show a difference of {difference} with power {power}, by pairs{family}",
+            seeds * runs
+        ),
+        (Given::Difference(difference), None, _) => format!(
+            "no number of runs up to {MOST_EPISODES} episodes shows a difference of {difference} with power {power}, by pairs{family}{}",
+            if request.clusters.icc > 0.0 { "; episodes of one seed resemble each other: take more seeds" } else { "" }
+        ),
+        (Given::Runs(runs), _, Some(difference)) => format!(
+            "{} episodes per model and experiment ({runs} for each of {seeds} seeds) show a difference of {} or more with power {power}, by pairs{family}",
+            seeds * runs,
+            fixed(Some(difference), 3)
+        ),
+        (Given::Runs(runs), _, None) => format!(
+            "{} episodes per model and experiment ({runs} for each of {seeds} seeds) show no difference with power {power}, by pairs{family}",
+            seeds * runs
+        ),
+    }
+}
+
+/// What a plan rests on.
+pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
+    let rates = match (request.given, request.baseline) {
+        (Given::Difference(difference), baseline) => Rates::apart(difference, baseline)
+            .map(|rates| format!("{} and {}", fixed(Some(rates.lower), 3), fixed(Some(rates.higher), 3))),
+        (Given::Runs(_), Some(baseline)) => Some(format!("{baseline} and more")),
+        (Given::Runs(_), None) => None,
+    };
+    let rates = rates.unwrap_or_else(|| "as far below 1/2 as above".to_owned());
+    let why = if request.baseline.is_none() { ": around 1/2 a difference is hardest to show" } else { "" };
+    let pairs = match request.discordance {
+        Some(share) => format!("pairs: in a share of {share} one model succeeds and the other does not"),
+        None => "pairs: the two models succeed independently in a scene; scenes that are hard for both leave fewer discordant pairs, and need fewer episodes".to_owned(),
+    };
+    let clusters = if request.clusters.icc > 0.0 {
+        format!(
+            "seeds: intraclass correlation {}, so that n episodes with r runs per seed are worth n / (1 + (r - 1) x {})",
+            request.clusters.icc, request.clusters.icc
+        )
+    } else {
+        "seeds: episodes of one seed are no more alike than others (--icc says how far they are)".to_owned()
+    };
+    let mut told = vec![
+        format!("rates: {rates}{why}"),
+        pairs,
+        clusters,
+        "power: exact, summed over every outcome of two-sided tests; it rises in steps, so that a few more episodes may have a little less".to_owned(),
+        "Holm: the level of the first step, which the smallest p value must meet; later steps ask for less".to_owned(),
+    ];
+    if let Some(chance) = request.chance {
+        told.push(format!("chance: the true rate is {chance} and the difference above it"));
+    }
+    told
+}

@@ -1,0 +1,266 @@
+//! The table of data quality: what became of the replies, by experiment, model and condition, in every format.
+//!
+//! Rule: what no trace records prints as `--`, never as zero.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::tables::{csv, latex, markdown};
+use crate::cells::KeyValue;
+use exact::escape::visible;
+use exact::format::fixed;
+use score::quality::{CellKey, Quality, QualityByCell, REPLY_STATUSES};
+
+/// The name of its files.
+pub const NAME: &str = "quality";
+/// What stands where nothing is recorded.
+const UNKNOWN: &str = "--";
+/// The shares of replies whose latency is told.
+const MEDIAN: f64 = 0.5;
+const SLOW: f64 = 0.95;
+const NANO: f64 = 1e9;
+
+/// The table, as text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct QualityTable {
+    /// The header.
+    pub header: Vec<String>,
+    /// The rows, by experiment, model and condition.
+    pub rows: Vec<Vec<String>>,
+    /// How to read it, and what it cannot say.
+    pub notes: Vec<String>,
+    /// The same in full, for programs.
+    csv: String,
+}
+
+impl QualityTable {
+    /// The table of these cells; `None` without any.
+    pub fn of(cells: &QualityByCell) -> Option<Self> {
+        if cells.0.is_empty() {
+            return None;
+        }
+        let keys = if cells.has_conditions() { 3 } else { 2 };
+        let header = ["experiment", "model", "condition"].into_iter().take(keys).chain([
+            "episodes",
+            "lost",
+            "steps",
+            "no decision",
+            "reasons",
+            "repaired",
+            "latency, ms",
+            "tokens",
+            "cost, USD",
+        ]);
+        Some(Self {
+            header: header.map(str::to_owned).collect(),
+            rows: cells.0.iter().map(|(key, quality)| row(key, quality, keys)).collect(),
+            notes: notes(cells),
+            csv: csv_text(cells),
+        })
+    }
+
+    /// As comma-separated values: one line per cell, counts in full.
+    pub fn csv(&self) -> &str {
+        &self.csv
+    }
+
+    pub fn markdown(&self) -> String {
+        let line = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|cell| markdown::escape(cell)).collect();
+            format!("| {} |\n", cells.join(" | "))
+        };
+        let mut text = format!("**Data quality.** {}\n\n", self.notes.join(" "));
+        text += &line(&self.header);
+        let _ = writeln!(text, "|{}", "---|".repeat(self.header.len()));
+        self.rows.iter().for_each(|row| text += &line(row));
+        text
+    }
+
+    /// As LaTeX; needs the packages booktabs and graphicx.
+    pub fn latex(&self) -> String {
+        let line = |cells: &[String]| {
+            let cells: Vec<String> = cells.iter().map(|cell| latex::escape(cell)).collect();
+            format!("{} \\\\\n", cells.join(" & "))
+        };
+        let columns = "l".repeat(self.header.len());
+        let mut text = format!(
+            "\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n"
+        );
+        text += &line(&self.header);
+        text.push_str("\\midrule\n");
+        self.rows.iter().for_each(|row| text += &line(row));
+        text.push_str("\\bottomrule\n\\end{tabular}%\n}\n");
+        let _ = writeln!(text, "\\caption{{\\textbf{{Data quality.}} {}}}", latex::escape(&self.notes.join(" ")));
+        text.push_str("\\label{tab:quality}\n\\end{table*}\n");
+        text
+    }
+}
+
+fn row(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
+    let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys).map(|name| visible(name));
+    let recorded = quality.replies() > 0;
+    let if_recorded = |text: String| if recorded { text } else { UNKNOWN.to_owned() };
+    names
+        .chain([
+            quality.episodes.to_string(),
+            quality.lost.map_or_else(|| UNKNOWN.to_owned(), |lost| lost.to_string()),
+            quality.steps.to_string(),
+            if_recorded(share(quality.unusable(), quality.replies())),
+            if_recorded(listed(quality.unread())),
+            if_recorded(repaired(quality)),
+            latency(quality),
+            tokens(quality),
+            cost(quality),
+        ])
+        .collect()
+}
+
+/// `12/340 (3.5 %)`.
+#[expect(clippy::cast_precision_loss, reason = "a share for people")]
+fn share(count: u64, all: u64) -> String {
+    let percent = 100.0 * count as f64 / all as f64;
+    format!("{count}/{all} ({} %)", fixed(Some(percent), 1))
+}
+
+/// `refusal 4, truncated 2`; empty without any.
+fn listed<'a>(counts: impl Iterator<Item = (&'a String, &'a u64)>) -> String {
+    counts.map(|(name, count)| format!("{} {count}", visible(name))).collect::<Vec<_>>().join(", ")
+}
+
+fn repaired(quality: &Quality) -> String {
+    let count = quality.of_status("repaired");
+    if quality.repairs.is_empty() { count.to_string() } else { format!("{count}: {}", listed(quality.repairs.iter())) }
+}
+
+fn latency(quality: &Quality) -> String {
+    match (quality.latency(MEDIAN), quality.latency(SLOW)) {
+        (Some(median), Some(slow)) => format!("{median}; 95 % within {slow}"),
+        _ => UNKNOWN.to_owned(),
+    }
+}
+
+/// Tokens per request and per reply.
+fn tokens(quality: &Quality) -> String {
+    match (quality.prompt_tokens.mean(), quality.completion_tokens.mean()) {
+        (None, None) => UNKNOWN.to_owned(),
+        (prompt, completion) => format!("{} + {}", fixed(prompt, 0), fixed(completion, 0)),
+    }
+}
+
+#[expect(clippy::cast_precision_loss, reason = "a cost for people")]
+fn cost(quality: &Quality) -> String {
+    let total = quality.cost_nano_usd;
+    if total.replies == 0 { UNKNOWN.to_owned() } else { fixed(Some(total.sum as f64 / NANO), 4) }
+}
+
+fn notes(cells: &QualityByCell) -> Vec<String> {
+    let mut notes =
+        vec!["Replies without a decision and their reasons; repairs that made a reply readable.".to_owned()];
+    if cells.0.values().any(|quality| quality.prompt_tokens.replies > 0) {
+        notes.push("Tokens per request and per reply.".to_owned());
+    }
+    if !cells.is_recorded() {
+        notes.push(format!("The traces do not record how replies came ({UNKNOWN})."));
+    }
+    notes
+}
+
+/// One line per cell; what is not recorded is empty.
+fn csv_text(cells: &QualityByCell) -> String {
+    let keys = if cells.has_conditions() { 3 } else { 2 };
+    let head =
+        ["experiment", "model", "condition"].into_iter().take(keys).chain(["episodes", "lost", "steps", "replies"]);
+    let tail = [
+        "unusable",
+        "other_status",
+        "repairs",
+        "latency_median_ms",
+        "latency_95_ms",
+        "prompt_tokens",
+        "completion_tokens",
+        "cost_usd",
+    ];
+    let mut writer = ::csv::Writer::from_writer(Vec::new());
+    csv::write(&mut writer, head.chain(REPLY_STATUSES).chain(tail).map(str::to_owned));
+    for (key, quality) in &cells.0 {
+        csv::write(&mut writer, csv_record(key, quality, keys));
+    }
+    csv::finish(writer)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "nine decimal places of a cost")]
+fn csv_record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
+    let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys);
+    let names = names.map(|name| csv::key_field(&KeyValue::Text(name.clone())));
+    let recorded = quality.replies() > 0;
+    let count = |count: u64| if recorded { count.to_string() } else { String::new() };
+    let optional = |number: Option<i64>| number.map_or_else(String::new, |number| number.to_string());
+    let total = |replies: u64, sum: String| if replies > 0 { sum } else { String::new() };
+    let known: u64 = REPLY_STATUSES.iter().map(|status| quality.of_status(status)).sum();
+    let repairs: BTreeMap<_, _> = quality.repairs.iter().collect();
+    let repairs = repairs.iter().map(|(name, count)| format!("{name} {count}")).collect::<Vec<_>>().join("; ");
+    let Quality { prompt_tokens, completion_tokens, cost_nano_usd, .. } = quality;
+    names
+        .chain([
+            quality.episodes.to_string(),
+            quality.lost.map_or_else(String::new, |lost| lost.to_string()),
+            quality.steps.to_string(),
+            count(quality.replies()),
+        ])
+        .chain(REPLY_STATUSES.map(|status| count(quality.of_status(status))))
+        .chain([
+            count(quality.unusable()),
+            count(quality.replies() - known),
+            repairs,
+            optional(quality.latency(MEDIAN)),
+            optional(quality.latency(SLOW)),
+            total(prompt_tokens.replies, prompt_tokens.sum.to_string()),
+            total(completion_tokens.replies, completion_tokens.sum.to_string()),
+            total(cost_nano_usd.replies, fixed(Some(cost_nano_usd.sum as f64 / NANO), 9)),
+        ])
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::QualityTable;
+    use score::quality::{CellKey, Quality, QualityByCell, Total};
+
+    fn cells(condition: &str) -> QualityByCell {
+        let key = |model: &str| CellKey { experiment: "E1".into(), model: model.into(), condition: condition.into() };
+        let told = Quality {
+            episodes: 2,
+            steps: 40,
+            lost: Some(1),
+            statuses: [("ok".to_owned(), 30), ("repaired".to_owned(), 6), ("refusal".to_owned(), 4)].into(),
+            repairs: [("fence".to_owned(), 5), ("case".to_owned(), 2)].into(),
+            latencies: [(100, 30), (900, 10)].into(),
+            prompt_tokens: Total { replies: 40, sum: 48_000 },
+            completion_tokens: Total { replies: 40, sum: 3_240 },
+            cost_nano_usd: Total { replies: 40, sum: 12_345_678 },
+        };
+        let untold = Quality { episodes: 1, steps: 7, ..Quality::default() };
+        QualityByCell([(key("=m"), told), (key("n_1"), untold)].into())
+    }
+
+    #[test]
+    fn what_is_not_recorded_is_not_zero() {
+        let table = QualityTable::of(&cells("default")).unwrap();
+        assert_eq!(table.rows[1][2..], ["1", "--", "7", "--", "--", "--", "--", "--", "--"].map(str::to_owned));
+        assert_eq!(table.rows[0][5..8], ["4/40 (10.0 %)", "refusal 4", "6: case 2, fence 5"].map(str::to_owned));
+        assert_eq!(table.rows[0][8..], ["100; 95 % within 900", "1200 + 81", "0.0123"].map(str::to_owned));
+        assert!(QualityTable::of(&QualityByCell::default()).is_none());
+    }
+
+    #[test]
+    fn every_format_escapes_its_names() {
+        let table = QualityTable::of(&cells("near")).unwrap();
+        insta::assert_snapshot!(table.csv(), @r"
+        experiment,model,condition,episodes,lost,steps,replies,ok,repaired,parse_failed,schema_invalid,refusal,truncated,empty,rate_limited,server_error,timeout,unusable,other_status,repairs,latency_median_ms,latency_95_ms,prompt_tokens,completion_tokens,cost_usd
+        E1,'=m,near,2,1,40,40,30,6,0,0,4,0,0,0,0,0,4,0,case 2; fence 5,100,900,48000,3240,0.012345678
+        E1,n_1,near,1,,7,,,,,,,,,,,,,,,,,,,
+        ");
+        assert!(table.latex().contains(r"n\_1 & near & 1 & "), "{}", table.latex());
+        assert!(table.markdown().contains("| E1 | n\\_1 | near |"), "{}", table.markdown());
+    }
+}

@@ -1,0 +1,202 @@
+//! How cells move with the threshold of mirror evidence, and where a conclusion changes.
+//!
+//! Rule: no episode is scored and nothing is tested here. What each threshold gave comes as cells and statistics
+//! ([`Level`]); this module lines them up, for people and for programs.
+
+mod changes;
+mod table;
+mod text;
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::statistics::Statistics;
+use super::style::Style;
+use super::table::Table;
+use super::tables::latex;
+use super::tables::terminal::Terminal;
+use crate::cells::{Cells, Group, KeyValue};
+use exact::moments::Moments;
+use metric::catalog::Kind;
+
+pub use changes::{Change, Question, Says};
+
+/// What one threshold gives, or the definitions as they are.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// The least number of pixels that counts as evidence; `None` for the definitions as they are.
+    pub px: Option<u32>,
+    /// The cells.
+    pub cells: Cells,
+    /// What can be concluded from the same episodes.
+    pub statistics: Statistics,
+}
+
+/// What the row of the definitions as they are stands for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reference {
+    /// Whether the evidence is what was recorded as such; definitions may say otherwise.
+    pub is_recorded: bool,
+    /// The thresholds in pixels that the footers declare, ascending; none where they declare none.
+    pub px: Vec<u64>,
+}
+
+impl Reference {
+    /// `recorded`, or `defined` where the definitions name other evidence than the recording.
+    pub const fn word(&self) -> &'static str {
+        if self.is_recorded { "recorded" } else { "defined" }
+    }
+
+    /// The word and the thresholds: `recorded (60 px)`.
+    pub fn words(&self) -> String {
+        let px: Vec<String> = self.px.iter().map(u64::to_string).collect();
+        match px.split_last().filter(|_| self.is_recorded) {
+            None => self.word().to_owned(),
+            Some((last, [])) => format!("{} ({last} px)", self.word()),
+            Some((last, rest)) => format!("{} ({} and {last} px)", self.word(), rest.join(", ")),
+        }
+    }
+}
+
+/// How cells move with the threshold.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Sensitivity {
+    /// The definition file's own name.
+    pub definitions: String,
+    /// SHA-256 of the definitions as they are.
+    pub definitions_hash: String,
+    /// What a threshold of null stands for: `recorded (60 px)`.
+    pub reference: String,
+    /// The thresholds that the recordings' footers declare, ascending, px.
+    pub recorded_px: Vec<u64>,
+    /// The thresholds that were tried, ascending, px.
+    pub thresholds: Vec<u32>,
+    /// The columns that cells are grouped by.
+    pub by: Vec<String>,
+    /// The metrics that depend on the threshold, in the order of the definitions.
+    pub metrics: Vec<String>,
+    /// The metrics that do not.
+    pub independent: Vec<String>,
+    /// Every cell under every threshold.
+    pub cells: Vec<ThresholdCell>,
+    /// Where a conclusion is another one than under the definitions as they are.
+    pub changes: Vec<Change>,
+    /// The cells as one table.
+    #[serde(skip)]
+    pub table: Table,
+}
+
+/// One cell under one threshold.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct ThresholdCell {
+    /// The group, by the columns grouped by.
+    pub key: IndexMap<String, KeyValue>,
+    /// The threshold, px; null for the definitions as they are.
+    pub threshold: Option<u32>,
+    /// The metric.
+    pub metric: String,
+    /// A rate or a quantity.
+    pub kind: Kind,
+    /// The episodes of the group.
+    pub episodes: u64,
+    /// Those in which the metric is defined.
+    pub n: u64,
+    /// The sum of the values; for a rate, the successes.
+    pub sum: i128,
+    /// The arithmetic mean; null where nothing is defined.
+    pub mean: Option<f64>,
+    /// The standard error that the definition asks for; null where there is none.
+    pub se: Option<f64>,
+}
+
+impl Sensitivity {
+    /// Lines up what thresholds gave: the definitions as they are first, then the thresholds ascending. `metrics` depend on
+    /// the threshold, `independent` do not.
+    ///
+    /// # Panics
+    /// Without any level.
+    pub fn of(
+        levels: &[Level],
+        reference: &Reference,
+        metrics: &[String],
+        independent: &[String],
+        style: &Style,
+    ) -> Self {
+        let first = &levels.first().expect("the definitions as they are come first").cells;
+        Self {
+            definitions: first.catalog.name.clone(),
+            definitions_hash: first.catalog.hash.clone(),
+            reference: reference.words(),
+            recorded_px: reference.px.clone(),
+            thresholds: levels.iter().filter_map(|level| level.px).collect(),
+            by: first.by.clone(),
+            metrics: metrics.to_vec(),
+            independent: independent.to_vec(),
+            cells: cells(levels, metrics, style),
+            changes: changes::changes(levels, reference, metrics),
+            table: table::table(levels, reference, (metrics, independent), style),
+        }
+    }
+
+    /// As comma-separated values in full precision: the key columns, then `threshold,metric,n,sum,mean,se`. The threshold of
+    /// the definitions as they are is `recorded`, or `defined`; what is undefined is empty.
+    pub fn csv(&self) -> String {
+        text::csv(self)
+    }
+
+    /// As Markdown, the changes of conclusions below the table.
+    pub fn markdown(&self) -> String {
+        text::markdown(self)
+    }
+
+    /// As LaTeX, the table alone.
+    pub fn latex(&self) -> String {
+        latex::render(&self.table)
+    }
+
+    /// For a terminal: the table, then where a conclusion changes.
+    pub fn render(&self, terminal: Terminal) -> String {
+        text::render(self, terminal)
+    }
+}
+
+/// Every cell, by group, then threshold, then metric.
+fn cells(levels: &[Level], metrics: &[String], style: &Style) -> Vec<ThresholdCell> {
+    let mut found = Vec::new();
+    for key in table::keys(levels, style) {
+        for level in levels {
+            let Some(group) = level.group(&key) else { continue };
+            found.extend(metrics.iter().filter_map(|metric| ThresholdCell::of(level, group, metric)));
+        }
+    }
+    found
+}
+
+impl ThresholdCell {
+    fn of(level: &Level, group: &Group, name: &str) -> Option<Self> {
+        let metric = level.cells.catalog.metric.get(name)?;
+        let moments = level.moments(group, name)?;
+        Some(Self {
+            key: level.cells.by.iter().cloned().zip(group.key.iter().cloned()).collect(),
+            threshold: level.px,
+            metric: name.to_owned(),
+            kind: metric.kind,
+            episodes: group.episodes,
+            n: moments.n,
+            sum: moments.sum,
+            mean: moments.mean(),
+            se: moments.se(metric.se),
+        })
+    }
+}
+
+impl Level {
+    fn group(&self, key: &[KeyValue]) -> Option<&Group> {
+        self.cells.groups.iter().find(|group| group.key == key)
+    }
+
+    fn moments<'g>(&self, group: &'g Group, metric: &str) -> Option<&'g Moments> {
+        group.moments.get(self.cells.metrics.iter().position(|known| known == metric)?)
+    }
+}

@@ -1,0 +1,96 @@
+//! The table: a group of rows per experiment and model, one row per threshold, one column per metric.
+
+use super::{Level, Reference};
+use crate::cells::{Group, KeyValue};
+use crate::order::TableOrder;
+use crate::style::{CellForm, Style, TableSheet};
+use crate::table::{Cell, Column, Row, RowGroup, Spread, Table, Value};
+use exact::moments::Moments;
+use exact::number::Decimal;
+use metric::catalog::{Better, Kind, Metric};
+
+const NOTE: &str = "Mirror evidence is in view where at least so many pixels show the own body by way of the mirror. Rates are \
+                    counts of the episodes where the metric is defined; other values are means, n given where it is not \
+                    all episodes.";
+
+/// The table of all levels; of the two lists of metrics, the first are its columns and the others do not move.
+pub(super) fn table(
+    levels: &[Level],
+    reference: &Reference,
+    (metrics, independent): (&[String], &[String]),
+    style: &Style,
+) -> Table {
+    let unmoved = format!("The threshold does not move {}.", independent.join(", "));
+    Table {
+        name: "sensitivity".to_owned(),
+        title: "Sensitivity to the threshold of mirror evidence".to_owned(),
+        note: NOTE.to_owned(),
+        footnotes: if independent.is_empty() { Vec::new() } else { vec![unmoved] },
+        label: Some("tab:sensitivity".to_owned()),
+        undefined: style.sheet.undefined.clone(),
+        form: CellForm::CountInterval,
+        keys: by(levels).iter().cloned().chain(["threshold".to_owned()]).collect(),
+        row_heading: "Threshold".to_owned(),
+        columns: metrics.iter().map(|metric| column(metric, levels, style)).collect(),
+        groups: keys(levels, style).iter().map(|key| group(key, levels, reference, (metrics, style))).collect(),
+    }
+}
+
+/// The groups of all levels, in the order of tables.
+pub(super) fn keys(levels: &[Level], style: &Style) -> Vec<Vec<KeyValue>> {
+    let Some(first) = levels.first() else { return Vec::new() };
+    let order = TableOrder { catalog: &first.cells.catalog, style };
+    let groups = levels.iter().flat_map(|level| &level.cells.groups);
+    let mut keys: Vec<Vec<KeyValue>> = groups.map(|group| group.key.clone()).collect();
+    keys.sort_by_cached_key(|key| order.of_key(&first.cells.by, key));
+    keys.dedup();
+    keys
+}
+
+fn by(levels: &[Level]) -> &[String] {
+    levels.first().map_or(&[], |level| &level.cells.by)
+}
+
+fn column(metric: &str, levels: &[Level], style: &Style) -> Column {
+    let better = levels.first().map(|level| style.sheet.better(metric, &level.cells.catalog));
+    Column {
+        metric: metric.to_owned(),
+        latex: style.sheet.column.get(metric).and_then(|column| column.latex.clone()),
+        better: better.unwrap_or(Better::Neither),
+    }
+}
+
+fn group(key: &[KeyValue], levels: &[Level], reference: &Reference, shown: (&[String], &Style)) -> RowGroup {
+    let parts = by(levels).iter().zip(key).map(|(name, value)| match name.as_str() {
+        "experiment" | "model" => value.to_string(),
+        _ => format!("{name} {value}"),
+    });
+    let rows = levels.iter().filter_map(|level| row(level, level.group(key)?, reference, shown));
+    RowGroup { heading: Some(parts.collect::<Vec<_>>().join(", ")), rows: rows.collect() }
+}
+
+fn row(level: &Level, group: &Group, reference: &Reference, (metrics, style): (&[String], &Style)) -> Option<Row> {
+    let (name, threshold) = match level.px {
+        Some(px) => (format!("{px} px"), KeyValue::Int(px.into())),
+        None => (reference.words(), KeyValue::Text(reference.word().to_owned())),
+    };
+    let cell = |metric: &String| {
+        let moments = level.moments(group, metric)?;
+        let value = value(moments, level.cells.catalog.metric.get(metric)?, group.episodes, style);
+        Some(Cell::plain(value, moments, group.episodes))
+    };
+    let cells = metrics.iter().map(cell).collect::<Option<Vec<_>>>()?;
+    Some(Row { key: group.key.iter().cloned().chain([threshold]).collect(), name, cells })
+}
+
+/// A count or a mean without an interval: rows are the same episodes, and differ by definition, not by chance.
+fn value(moments: &Moments, metric: &Metric, episodes: u64, style: &Style) -> Value {
+    let places = style.sheet.print_of(&TableSheet::default()).decimals.of(metric.kind);
+    let Some(mean) = Decimal::of_ratio(moments.sum, i128::from(moments.n), places) else { return Value::Undefined };
+    match metric.kind {
+        Kind::Rate => Value::Count { count: moments.sum, n: moments.n, mean, spread: Spread::Unknown },
+        Kind::Quantity => {
+            Value::Mean { mean, spread: Spread::Unknown, n: (moments.n != episodes).then_some(moments.n) }
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! Rates against the levels of blind guessing, by the exact binomial test.
+//!
+//! Rule: a rate that counts unfinished episodes as failures stands beside the same rate among finished episodes
+//! ([`COMPLETED`]): who does not finish is below chance under the first and need not guess.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::study::{Block, Experiment, Study, named};
+use exact::ratio::Ratio;
+use score::table::MetricColumn;
+use statistics::chance::{exact_test, least_p};
+use statistics::holm::{holm, level};
+use statistics::outcomes::ExactTest;
+use statistics::tarone::{Attained, tarone_holm};
+
+/// One rate against one level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ChanceRow {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The metric.
+    pub metric: String,
+    /// What the level is.
+    pub role: Role,
+    /// The level.
+    pub level: Ratio,
+    /// The successes.
+    pub successes: u64,
+    /// The episodes in which the metric is defined.
+    pub n: u64,
+    /// The exact p value, two-sided by minimum likelihood.
+    pub p: f64,
+    /// The mid-p value, which is not guaranteed to keep the level.
+    pub mid_p: f64,
+    /// `p` adjusted by Holm's method over the models of the experiment, against this level.
+    pub p_adjusted: f64,
+    /// `p` adjusted by Tarone and Holm: tests of too few episodes to reach it do not count.
+    pub p_tarone: f64,
+    /// What the value adjusted by Holm says at the level of significance.
+    pub verdict: Verdict,
+}
+
+/// What a level stands for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Role {
+    /// The rate of blind guessing.
+    Chance,
+    /// What some blind strategy would reach, where no chance level applies.
+    Reference,
+}
+
+/// Where a rate stands against a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Shown to be above.
+    Above,
+    /// Shown to be below.
+    Below,
+    /// Not shown to differ.
+    NotSeparated,
+}
+
+/// Rates that count an unfinished episode as a failure, and the same among finished episodes, which has the same levels
+/// of chance where the definitions give it none of its own.
+pub const COMPLETED: [(&str, &str); 1] = [("TSA", "TSA-C")];
+
+impl ChanceRow {
+    /// Every rate against every level that its experiment has.
+    pub(super) fn all(study: &Study, confidence: f64) -> Vec<Self> {
+        let mut rows = Vec::new();
+        for experiment in &study.experiments {
+            for column in study.rates() {
+                for (role, level) in levels(study, experiment.name, &column.name) {
+                    rows.extend(Self::family(study, experiment, &column.name, (role, level), confidence));
+                }
+            }
+        }
+        rows
+    }
+
+    fn family(
+        study: &Study,
+        experiment: &Experiment,
+        metric: &str,
+        (role, chance): (Role, Ratio),
+        confidence: f64,
+    ) -> Vec<Self> {
+        let Some(column) = study.column(metric) else { return Vec::new() };
+        let tested: Vec<_> = experiment.blocks.iter().filter_map(|block| Tested::of(block, column, chance)).collect();
+        let adjusted = holm(&tested.iter().map(|tested| tested.test.p).collect::<Vec<_>>());
+        let attained = |tested: &Tested| Attained { p: tested.test.p, least: tested.least };
+        let by_tarone = tarone_holm(&tested.iter().map(attained).collect::<Vec<_>>());
+        let row = |(Tested { block, successes, n, test, .. }, (p_adjusted, p_tarone)): (Tested, (f64, f64))| Self {
+            experiment: experiment.name.to_owned(),
+            model: block.model.to_owned(),
+            condition: block.condition(),
+            metric: metric.to_owned(),
+            role,
+            level: chance,
+            successes,
+            n,
+            p: test.p,
+            mid_p: test.mid_p,
+            p_adjusted,
+            p_tarone,
+            verdict: Verdict::of(successes, n, chance, level(confidence).is_some_and(|level| p_adjusted <= level)),
+        };
+        tested.into_iter().zip(adjusted.into_iter().zip(by_tarone)).map(row).collect()
+    }
+
+    /// The model as it is compared.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+}
+
+/// One rate of one block against one level.
+struct Tested<'s, 'a> {
+    block: &'s Block<'a>,
+    successes: u64,
+    n: u64,
+    test: ExactTest,
+    least: f64,
+}
+
+impl<'s, 'a> Tested<'s, 'a> {
+    fn of(block: &'s Block<'a>, column: &MetricColumn, chance: Ratio) -> Option<Self> {
+        let (successes, n) = block.moments(column).counts()?;
+        Some(Self { block, successes, n, test: exact_test(successes, n, chance)?, least: least_p(n, chance)? })
+    }
+}
+
+impl Verdict {
+    pub(super) fn of(successes: u64, n: u64, level: Ratio, is_shown: bool) -> Self {
+        let seen = i128::from(successes) * i128::from(level.denominator());
+        let expected = i128::from(level.numerator()) * i128::from(n);
+        match is_shown {
+            true if seen > expected => Self::Above,
+            true if seen < expected => Self::Below,
+            _ => Self::NotSeparated,
+        }
+    }
+}
+
+/// The levels of a metric in an experiment: chance, then references; those of the rate that it completes where it has none.
+pub(super) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+    let own = own_levels(study, experiment, metric);
+    let whole = COMPLETED.iter().find(|(_, completed)| *completed == metric);
+    match whole {
+        Some((whole, _)) if own.is_empty() => own_levels(study, experiment, whole),
+        _ => own,
+    }
+}
+
+/// The levels that the definitions give a metric in an experiment.
+pub(super) fn own_levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
+    let catalog = &study.table.catalog;
+    let chance = catalog.chance(experiment, metric).map(|level| (Role::Chance, level));
+    let references = catalog.experiment.get(experiment).and_then(|known| known.reference.get(metric));
+    let references = references.into_iter().flatten().map(|&level| (Role::Reference, level));
+    chance.into_iter().chain(references).collect()
+}

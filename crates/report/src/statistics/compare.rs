@@ -1,0 +1,240 @@
+//! One block minus another under one metric: by their pairs where they have pairs, else as independent samples.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::durations::{decided, is_duration};
+use super::matching::Matched;
+use super::study::{Block, Study};
+use exact::moments::Moments;
+use metric::catalog::{Kind, StandardError};
+use score::table::MetricColumn;
+use statistics::contrast::{newcombe, welch};
+use statistics::coverage::{self, Withheld};
+use statistics::holm::{holm, level};
+use statistics::interval::{Interval, student_t};
+use statistics::outcomes::ExactTest;
+use statistics::paired::Pairs;
+use statistics::restricted::{Difference, independent, paired, shared_horizon};
+use statistics::tarone::{Attained, tarone_holm};
+use statistics::unpaired::{fisher, fisher_least_p};
+
+/// How a difference was tested, and what its interval is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Pairs of a rate: the exact test of `McNemar`, Newcombe's interval for pairs.
+    Mcnemar,
+    /// Independent rates: Fisher's exact test, Newcombe's hybrid score interval.
+    Fisher,
+    /// Pairs of a duration: restricted means, Student's t interval and test of their difference.
+    RestrictedMeanPaired,
+    /// Independent durations: the same with Satterthwaite's degrees of freedom.
+    RestrictedMean,
+    /// Pairs of another quantity: Student's t interval of the differences; no test.
+    StudentPaired,
+    /// Independent samples of another quantity: Welch's t interval; no test.
+    Welch,
+}
+
+/// The first minus the second.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Comparison {
+    /// The test and the interval.
+    pub method: Method,
+    /// The episodes compared: of each side those in which the metric is defined; of pairs, those defined in both.
+    pub n: [u64; 2],
+    /// The successes among them; none for quantities.
+    pub successes: Option<[u64; 2]>,
+    /// The 2x2 table; none where the samples are independent.
+    pub pairs: Option<Pairs>,
+    /// Pairs left out because the metric is undefined in one episode or both.
+    pub undefined: u64,
+    /// The horizon of restricted means, in steps.
+    pub horizon: Option<i64>,
+    /// The first mean minus the second, over the episodes compared.
+    pub difference: Option<f64>,
+    /// Its interval, not adjusted for the number of comparisons.
+    pub interval: Option<Interval>,
+    /// Why there is no interval.
+    pub withheld: Option<Withheld>,
+    /// The p value, two-sided: exact and by minimum likelihood for rates, by Student's t for durations.
+    pub p: Option<f64>,
+    /// The mid-p value of a rate, which is not guaranteed to keep the level.
+    pub mid_p: Option<f64>,
+    /// The least p value that the test could have reached, given its discordant pairs or margins.
+    pub p_least: Option<f64>,
+    /// `p` adjusted by Holm's method over the family.
+    pub p_adjusted: Option<f64>,
+    /// `p` adjusted by Tarone and Holm: tests that could not have reached it do not count.
+    pub p_tarone: Option<f64>,
+    /// Whether the value adjusted by Holm reaches the level of significance.
+    pub separated: bool,
+}
+
+/// What two blocks are compared by.
+pub(super) struct Compared<'s, 'a> {
+    pub study: &'s Study<'a>,
+    pub first: &'s Block<'a>,
+    pub second: &'s Block<'a>,
+    pub matched: &'s Matched,
+    pub horizon: Option<i64>,
+    pub confidence: f64,
+}
+
+impl Compared<'_, '_> {
+    /// The comparison under one metric, not adjusted yet.
+    pub fn under(&self, column: &MetricColumn) -> Comparison {
+        if is_duration(self.study, &column.name) {
+            return self.durations(column);
+        }
+        let rates = self.study.kind(&column.name) == Kind::Rate;
+        match &self.matched.pairs {
+            Some(pairs) if rates => self.paired_rate(column, pairs),
+            Some(pairs) => self.paired_quantity(column, pairs),
+            None => self.independent(column, rates),
+        }
+    }
+
+    fn paired_rate(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
+        let pairs = Pairs::of(rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))));
+        let test = pairs.mcnemar().zip(pairs.mcnemar_mid_p()).map(|(p, mid_p)| ExactTest { p, mid_p });
+        Comparison {
+            successes: Some([pairs.both + pairs.first_only, pairs.both + pairs.second_only]),
+            pairs: Some(pairs),
+            undefined: rows.len() as u64 - pairs.n(),
+            difference: pairs.difference(),
+            interval: pairs.interval(self.confidence),
+            ..Comparison::of(Method::Mcnemar, [pairs.n(); 2]).tested(test, pairs.mcnemar_least_p())
+        }
+    }
+
+    fn paired_quantity(&self, column: &MetricColumn, rows: &[(usize, usize)]) -> Comparison {
+        let mut differences = rows.iter().filter_map(|&(a, b)| column.get(a)?.checked_sub(column.get(b)?));
+        // No sum of squares that 128 bits cannot hold: then there is no interval.
+        let moments = differences.try_fold(Moments::default(), Moments::with).unwrap_or_default();
+        let interval = student_t(&moments, StandardError::Sample, self.confidence);
+        let spread = moments.se(StandardError::Sample).is_some_and(|se| se > 0.0);
+        let (interval, withheld) = coverage::given(interval, moments.n, coverage::STUDENT, spread);
+        Comparison {
+            undefined: rows.len() as u64 - moments.n,
+            difference: moments.mean(),
+            interval,
+            withheld,
+            ..Comparison::of(Method::StudentPaired, [moments.n; 2])
+        }
+    }
+
+    fn independent(&self, column: &MetricColumn, rates: bool) -> Comparison {
+        let (a, b) = (self.first.moments(column), self.second.moments(column));
+        let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
+        let counted = rates.then(|| a.counts().zip(b.counts())).flatten();
+        if let Some((first, second)) = counted {
+            return Comparison {
+                successes: Some([first.0, second.0]),
+                difference,
+                interval: newcombe(first, second, self.confidence),
+                ..Comparison::of(Method::Fisher, [a.n, b.n])
+                    .tested(fisher(first, second), fisher_least_p(first, second))
+            };
+        }
+        let spread = [a, b].iter().any(|side| side.se(StandardError::Sample).is_some_and(|se| se > 0.0));
+        let (interval, withheld) =
+            coverage::given(welch(&a, &b, self.confidence), a.n.min(b.n), coverage::WELCH, spread);
+        Comparison { difference, interval, withheld, ..Comparison::of(Method::Welch, [a.n, b.n]) }
+    }
+
+    fn durations(&self, column: &MetricColumn) -> Comparison {
+        let ending = |row: usize| decided(self.study, column, row);
+        let (first, second, found);
+        let method = if let Some(pairs) = &self.matched.pairs {
+            let pairs: Vec<_> = pairs.iter().filter_map(|&(a, b)| ending(a).zip(ending(b))).collect();
+            (first, second) = pairs.iter().copied().unzip::<_, _, Vec<_>, Vec<_>>();
+            let horizon = self.horizon.or_else(|| shared_horizon(&first, &second));
+            found = horizon.and_then(|horizon| paired(&pairs, horizon, self.confidence));
+            Method::RestrictedMeanPaired
+        } else {
+            first = self.first.rows().filter_map(ending).collect();
+            second = self.second.rows().filter_map(ending).collect();
+            let horizon = self.horizon.or_else(|| shared_horizon(&first, &second));
+            found = horizon.and_then(|horizon| independent(&first, &second, horizon, self.confidence));
+            Method::RestrictedMean
+        };
+        let n = [first.len() as u64, second.len() as u64];
+        let undefined = self.matched.pairs.as_ref().map_or(0, |pairs| pairs.len() as u64 - n[0]);
+        Comparison { undefined, ..Comparison::of_durations(method, n, found) }
+    }
+}
+
+impl Comparison {
+    fn of(method: Method, n: [u64; 2]) -> Self {
+        Self {
+            method,
+            n,
+            successes: None,
+            pairs: None,
+            undefined: 0,
+            horizon: None,
+            difference: None,
+            interval: None,
+            withheld: None,
+            p: None,
+            mid_p: None,
+            p_least: None,
+            p_adjusted: None,
+            p_tarone: None,
+            separated: false,
+        }
+    }
+
+    fn of_durations(method: Method, n: [u64; 2], found: Option<Difference>) -> Self {
+        let (interval, withheld) = coverage::given(
+            found.and_then(|found| found.interval),
+            n[0].min(n[1]),
+            coverage::DIFFERENCE,
+            found.is_none_or(|found| found.p.is_some()),
+        );
+        Self {
+            horizon: found.map(|found| found.horizon),
+            difference: found.map(|found| found.difference),
+            interval,
+            withheld,
+            // The test rests on the same distribution as the interval.
+            p: found.and_then(|found| found.p).filter(|_| interval.is_some()),
+            ..Self::of(method, n)
+        }
+    }
+
+    fn tested(self, test: Option<ExactTest>, least: Option<f64>) -> Self {
+        Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), p_least: least, ..self }
+    }
+
+    /// Whether the first is shown to be above or below the second; none where neither is.
+    pub fn sign(&self) -> Option<Sign> {
+        let difference = self.difference.filter(|_| self.separated)?;
+        Some(if difference > 0.0 { Sign::Higher } else { Sign::Lower })
+    }
+}
+
+/// Where the first of two stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sign {
+    /// Above the second.
+    Higher,
+    /// Below it.
+    Lower,
+}
+
+/// Fills in the adjusted values of a family and what follows from them; a comparison without a test is not in it.
+pub(super) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
+    let mut tested: Vec<&mut Comparison> = family.filter(|comparison| comparison.p.is_some()).collect();
+    let p_values: Vec<f64> = tested.iter().filter_map(|comparison| comparison.p).collect();
+    let attained: Option<Vec<Attained>> =
+        tested.iter().map(|it| Some(Attained { p: it.p?, least: it.p_least? })).collect();
+    let by_tarone = attained.map(|attained| tarone_holm(&attained));
+    for (at, (comparison, adjusted)) in tested.iter_mut().zip(holm(&p_values)).enumerate() {
+        comparison.p_adjusted = Some(adjusted);
+        comparison.p_tarone = by_tarone.as_ref().map(|adjusted| adjusted[at]);
+        comparison.separated = level(confidence).is_some_and(|level| adjusted <= level);
+    }
+}

@@ -1,0 +1,129 @@
+//! What a reader may conclude, in sentences made from the numbers.
+
+use indexmap::IndexMap;
+
+use super::chance::own_levels;
+use super::study::Study;
+use super::{CENSORED, ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Statistics, Verdict};
+use exact::format::fixed;
+use statistics::power::Detectable;
+
+/// The metrics that conclusions are about: rates with a level to compare with, and durations.
+/// The first metric where there is neither.
+pub(super) fn headline(study: &Study) -> Vec<String> {
+    let has_level =
+        |metric: &str| study.experiments.iter().any(|known| !own_levels(study, known.name, metric).is_empty());
+    let rates = study.rates().map(|column| column.name.as_str()).filter(|metric| has_level(metric));
+    let durations = CENSORED.iter().map(|(duration, _)| *duration).filter(|metric| study.column(metric).is_some());
+    let chosen: Vec<String> = rates.chain(durations).map(str::to_owned).collect();
+    if chosen.is_empty() {
+        return study.table.metrics.first().map(|column| column.name.clone()).into_iter().collect();
+    }
+    chosen
+}
+
+/// What the numbers allow to say about the headline metrics.
+pub(super) fn conclusions(statistics: &Statistics) -> Vec<String> {
+    let is_headline = |metric: &String| statistics.headline.contains(metric);
+    let families: Vec<&Family> = statistics.models.iter().filter(|family| is_headline(&family.metric)).collect();
+    let mut sentences: Vec<String> = statistics.selection.iter().map(Selection::sentence).collect();
+    sentences.extend(reaches(&families));
+    sentences.extend(against_levels(&statistics.chance));
+    sentences.extend(families.iter().map(|family| ties(family)));
+    sentences.extend(unfinished(&statistics.durations));
+    sentences
+}
+
+/// What the numbers of episodes could have shown, once for all experiments that share them.
+fn reaches(families: &[&Family]) -> Vec<String> {
+    let mut shared: IndexMap<(Method, u64, usize), (Reach, Vec<String>)> = IndexMap::new();
+    for family in families {
+        let Some(reach) = family.detectable else { continue };
+        let of_reach = shared.entry((reach.method, reach.n, reach.tests));
+        of_reach.or_insert_with(|| (reach, Vec::new())).1.push(format!("{} {}", family.experiment, family.metric));
+    }
+    shared.into_values().map(|(reach, names)| reach_sentence(reach, &names)).collect()
+}
+
+fn reach_sentence(reach: Reach, names: &[String]) -> String {
+    let is_paired = reach.method == Method::Mcnemar;
+    let (about, n) = (names.join(", "), reach.n);
+    let with = match (is_paired, n) {
+        (true, 1) => "1 pair".to_owned(),
+        (true, _) => format!("{n} pairs"),
+        (false, 1) => "1 episode per model".to_owned(),
+        (false, _) => format!("{n} episodes per model"),
+    };
+    let when = if is_paired { "if every disagreement points the same way" } else { "against a model without success" };
+    let least = |found: Detectable| format!("{}/{} ({})", found.pairs, found.n, fixed(Some(found.smallest), 2));
+    match (reach.single, reach.family) {
+        (None, _) => format!("{about}: {with} cannot show any difference between two models, whatever the outcomes."),
+        (Some(single), None) => format!(
+            "{about}: with {with}, the smallest difference between two models that could have been shown is {} in one \
+             comparison, {when}; as the first of {} under Holm none could have been.",
+            least(single),
+            reach.tests
+        ),
+        (Some(single), Some(family)) => format!(
+            "{about}: with {with}, the smallest difference between two models that could have been shown is {} in one \
+             comparison and {} as the first of {} under Holm, {when}.",
+            least(single),
+            least(family),
+            reach.tests
+        ),
+    }
+}
+
+fn against_levels(rows: &[ChanceRow]) -> Vec<String> {
+    let mut groups: IndexMap<(&str, &str, String), Vec<&ChanceRow>> = IndexMap::new();
+    for row in rows {
+        let role = match row.role {
+            Role::Chance => "chance",
+            Role::Reference => "the reference",
+        };
+        let level = format!("{role} ({})", row.level);
+        groups.entry((&row.experiment, &row.metric, level)).or_default().push(row);
+    }
+    groups.iter().map(|((experiment, metric, level), rows)| level_sentence(experiment, metric, level, rows)).collect()
+}
+
+fn level_sentence(experiment: &str, metric: &str, level: &str, rows: &[&ChanceRow]) -> String {
+    let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect();
+    let phrase = |what: &str, models: Vec<String>| match models.len() {
+        0 => None,
+        count if count == rows.len() && count > 1 => Some(format!("{what}: all {count} models")),
+        _ => Some(format!("{what}: {}", models.join(", "))),
+    };
+    let parts = [
+        phrase("above it", those(Verdict::Above)),
+        phrase("below it", those(Verdict::Below)),
+        phrase("not told apart from it", those(Verdict::NotSeparated)),
+    ];
+    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    format!("{experiment} {metric} against {level}: {}.", parts.join("; "))
+}
+
+fn ties(family: &Family) -> String {
+    let about = format!("{} {}", family.experiment, family.metric);
+    if let [all] = family.tied.as_slice() {
+        return format!("{about}: no model is shown to be better than another (one tied set of {}).", all.len());
+    }
+    let sets: Vec<String> = family.tied.iter().map(|set| format!("{{{}}}", set.join(", "))).collect();
+    format!("{about}: tied sets, best first: {}.", sets.join(" "))
+}
+
+fn unfinished(rows: &[DurationRow]) -> Vec<String> {
+    let mut totals: IndexMap<&str, (u64, u64)> = IndexMap::new();
+    for row in rows {
+        let (unfinished, all) = totals.entry(&row.metric).or_default();
+        *unfinished += row.n - row.finished;
+        *all += row.n;
+    }
+    let sentence = |(metric, (unfinished, all)): (&str, (u64, u64))| {
+        format!(
+            "{metric}: {unfinished} of {all} episodes never finished and are censored; every comparison is of restricted means, \
+             since the plain mean takes them as finished."
+        )
+    };
+    totals.into_iter().filter(|(_, (unfinished, _))| *unfinished > 0).map(sentence).collect()
+}

@@ -1,0 +1,190 @@
+//! What `stats` shows: everything that can be said about cells at this n, and what cannot.
+//!
+//! Rule: no statistic is computed here. This module asks `cells` about each cell, pair and block, keeps the
+//! answers as plain data for programs ([`Statistics`] as JSON) and states them for people ([`text`]).
+//! Cells follow the grouping asked for; every comparison is by experiment, model and condition, and follows the declared
+//! design: paired where scenes are equal, by clusters where they are declared, of independent episodes elsewhere.
+
+mod answers;
+mod cells;
+mod chance;
+mod clusters;
+mod compare;
+mod conclusions;
+mod conditions;
+mod durations;
+mod losses;
+mod matching;
+mod models;
+mod overall;
+mod replies;
+mod retest;
+mod selection;
+mod sequential;
+mod study;
+pub mod text;
+mod warnings;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use answers::Answer;
+pub use cells::{CellRow, FEW, Intervals};
+pub use chance::{COMPLETED, ChanceRow, Role, Verdict};
+pub use clusters::ClusterRow;
+pub use compare::{Comparison, Method, Sign};
+pub use conditions::Contrast;
+pub use durations::{CorrectRow, DurationRow};
+pub use losses::{LossRow, Losses};
+pub use matching::Matching;
+pub use models::{Family, Gap, PairTest, Reach};
+pub use overall::{ImprovementRow, OverallMethod, OverallRow};
+pub use replies::{Replies, UnusableReplies};
+pub use retest::RetestRow;
+pub use selection::Selection;
+pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRate};
+
+pub use warnings::TEXT_SCORES;
+
+use crate::cells::Cells;
+pub use crate::cells::interval::CENSORED;
+use crate::cells::interval::CONFIDENCE;
+use exact::moments::MomentOverflow;
+use score::lost_counts::LostCounts;
+use score::table::EpisodeTable;
+use statistics::design::Design;
+use study::Study;
+
+/// What may be chosen about statistics.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Options {
+    /// The confidence of every interval, and one minus the level of every test; between 0 and 1.
+    pub confidence: f64,
+    /// The horizon of restricted means in steps, instead of the last step known for every model.
+    pub horizon: Option<i64>,
+    /// How many episodes were lost beside those given; `None` where the traces do not say.
+    pub lost: Option<LostCounts>,
+    /// What the traces declare about their design; nothing by default.
+    pub design: Design,
+    /// Which episodes were chosen; all by default.
+    pub selection: Option<Selection>,
+    /// How many replies gave no decision; `None` where that is not recorded.
+    pub replies: Option<Replies>,
+    /// Whether probabilities of improvement are computed, each of which resamples all episodes of two models.
+    pub improvements: bool,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            confidence: CONFIDENCE,
+            horizon: None,
+            lost: None,
+            design: Design::default(),
+            selection: None,
+            replies: None,
+            improvements: false,
+        }
+    }
+}
+
+/// All statistics of a set of episodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Statistics {
+    /// The definition file's own name.
+    pub definitions: String,
+    /// SHA-256 of the resolved definitions.
+    pub definitions_hash: String,
+    /// The confidence of every interval.
+    pub confidence: f64,
+    /// The columns that cells are grouped by.
+    pub by: Vec<String>,
+    /// The number of episodes.
+    pub episodes: usize,
+    /// The filter that chose the episodes; null without one.
+    #[serde(default, rename = "where")]
+    pub selection: Option<Selection>,
+    /// What the traces declare about their design.
+    pub design: Design,
+    /// What follows from the design, in a sentence.
+    pub design_note: String,
+    /// The answers to the questions of the study, a line each.
+    pub answers: Vec<Answer>,
+    /// What a reader may conclude, a sentence each.
+    pub conclusions: Vec<String>,
+    /// What a reader must not conclude, and why, a sentence each.
+    pub warnings: Vec<String>,
+    /// The metrics that the conclusions are about.
+    pub headline: Vec<String>,
+    /// Every cell with its intervals.
+    pub cells: Vec<CellRow>,
+    /// Rates against chance and reference levels.
+    pub chance: Vec<ChanceRow>,
+    /// Models against each other.
+    pub models: Vec<Family>,
+    /// Models against each other over all experiments, under the headline rates.
+    pub overall: Vec<OverallRow>,
+    /// How often one model decides earlier than another; none unless asked for.
+    pub improvements: Vec<ImprovementRow>,
+    /// Scenes that keep episodes out of pairs, where models are compared by pairs.
+    pub gaps: Vec<Gap>,
+    /// The first experiment minus each other one.
+    pub conditions: Vec<Contrast>,
+    /// Cells by seed; none unless the design declares that seeds are clusters.
+    pub clusters: Vec<ClusterRow>,
+    /// Durations with censoring.
+    pub durations: Vec<DurationRow>,
+    /// Verdicts on scenes that a model played more than once.
+    #[serde(default)]
+    pub retests: Vec<RetestRow>,
+    /// Episodes lost to infrastructure.
+    pub losses: Losses,
+    /// Replies that gave no decision; null where no status of a reply is recorded.
+    #[serde(default)]
+    pub replies: Option<Replies>,
+}
+
+impl Statistics {
+    /// The statistics of `table`; `cells` are the cells of the same table, grouped as its reader wants them.
+    ///
+    /// With a confidence outside (0, 1) no interval and no verdict is defined.
+    pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
+        let study = Study::of(table, options.design)?;
+        let (confidence, horizon) = (options.confidence, options.horizon);
+        let headline = conclusions::headline(&study);
+        let asked: &[String] = if options.improvements { &headline } else { &[] };
+        let (models, gaps) = models::compared(&study, horizon, confidence);
+        let mut statistics = Self {
+            definitions: table.catalog.name.clone(),
+            definitions_hash: table.catalog.hash.clone(),
+            confidence,
+            by: cells.by.clone(),
+            episodes: table.len(),
+            selection: options.selection.clone(),
+            design: options.design,
+            design_note: String::new(),
+            answers: Vec::new(),
+            conclusions: Vec::new(),
+            warnings: Vec::new(),
+            cells: CellRow::all(&study, cells, confidence),
+            chance: ChanceRow::all(&study, confidence),
+            models,
+            overall: overall::rates(&study, &headline, confidence),
+            improvements: overall::improvements(&study, asked, confidence),
+            gaps,
+            conditions: Contrast::all(&study, horizon, confidence),
+            clusters: ClusterRow::all(&study, confidence),
+            durations: DurationRow::all(&study, horizon, confidence),
+            retests: RetestRow::all(&study),
+            losses: Losses::of(&study, options.lost.as_ref(), confidence),
+            replies: options.replies.clone(),
+            headline,
+        };
+        let from_text = table.declared.from_text;
+        statistics.design_note = warnings::design_note(&statistics, from_text);
+        statistics.answers = answers::answers(&statistics);
+        statistics.conclusions = conclusions::conclusions(&statistics);
+        statistics.warnings = warnings::warnings(&statistics, from_text);
+        Ok(statistics)
+    }
+}

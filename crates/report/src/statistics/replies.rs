@@ -1,0 +1,78 @@
+//! Replies that gave no decision, whose steps are in every number all the same.
+
+use std::cmp::Reverse;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::study::named;
+use exact::escape::visible;
+use score::quality::QualityByCell;
+
+/// How many cells a sentence names before it counts the rest.
+const NAMED_CELLS: usize = 3;
+
+/// The replies of all episodes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Replies {
+    /// The replies whose status is recorded.
+    pub replies: u64,
+    /// Those that gave no decision.
+    pub unusable: u64,
+    /// The cells that have such replies, by experiment, model and condition.
+    pub cells: Vec<UnusableReplies>,
+}
+
+/// The replies of one cell.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct UnusableReplies {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The replies whose status is recorded.
+    pub replies: u64,
+    /// Those that gave no decision.
+    pub unusable: u64,
+}
+
+impl Replies {
+    /// `None` where no reply has a status.
+    pub fn of(quality: &QualityByCell) -> Option<Self> {
+        let whole = quality.whole();
+        let unusable = quality.0.iter().filter(|(_, quality)| quality.unusable() > 0);
+        let cells = unusable.map(|(key, found)| UnusableReplies {
+            experiment: key.experiment.clone(),
+            model: key.model.clone(),
+            condition: quality.has_conditions().then(|| key.condition.clone()),
+            replies: found.replies(),
+            unusable: found.unusable(),
+        });
+        let (replies, unusable) = (whole.replies(), whole.unusable());
+        (replies > 0).then(|| Self { replies, unusable, cells: cells.collect() })
+    }
+
+    /// How many gave no decision, and in which cells most; `None` where each gave one.
+    pub fn sentence(&self) -> Option<String> {
+        let mut cells: Vec<&UnusableReplies> = self.cells.iter().collect();
+        // Compared as fractions: the larger share first.
+        cells.sort_by_key(|cell| Reverse(u128::from(cell.unusable) * 1_000_000 / u128::from(cell.replies.max(1))));
+        let shown = cells.iter().take(NAMED_CELLS).map(|cell| {
+            let model = named(&cell.model, cell.condition.as_deref());
+            format!("{} {} {} of {}", visible(&cell.experiment), visible(&model), cell.unusable, cell.replies)
+        });
+        let rest = cells.len().saturating_sub(NAMED_CELLS);
+        let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
+        let shown = shown.collect::<Vec<_>>().join("; ");
+        (self.unusable > 0).then(|| {
+            let (unusable, replies) = (self.unusable, self.replies);
+            format!(
+                "{unusable} of {replies} replies gave no decision ({shown}{rest}): a model that cannot be read is not told \
+                 from one that fails."
+            )
+        })
+    }
+}

@@ -1,0 +1,74 @@
+//! The same scene played again by the same model: how often a verdict comes out otherwise.
+//!
+//! Rule: what one scene gives from one time to the next is noise, and a difference has to exceed it. Every two times of a
+//! scene count once, each scene with the same weight.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::matching::Scenes;
+use super::study::{Block, Study};
+use score::table::MetricColumn;
+
+/// The verdicts of one model on scenes that it played more than once.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RetestRow {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are more than the default one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The metric, a rate.
+    pub metric: String,
+    /// Scenes that were played at least twice with a defined value.
+    pub scenes: u64,
+    /// The episodes of these scenes.
+    pub episodes: u64,
+    /// The scenes whose verdicts are not all the same.
+    pub unstable: u64,
+    /// The chance that two times of a scene, both taken at random, give different verdicts: the mean over scenes of
+    /// 2 k (m - k) / (m (m - 1)) for k successes in m times (Fleiss 1971, one minus the agreement of a subject).
+    pub flipped: f64,
+}
+
+impl RetestRow {
+    /// Every rate of every model that played a scene twice; none of a reconstruction, whose scenes are made up.
+    pub(super) fn all(study: &Study) -> Vec<Self> {
+        if !study.design.has_pairs() {
+            return Vec::new();
+        }
+        let of_block = |block| {
+            let scenes = Scenes::of(study, block);
+            study.rates().filter_map(|column| Self::of(block, &scenes, column)).collect::<Vec<_>>()
+        };
+        study.blocks().flat_map(of_block).collect()
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+    fn of(block: &Block, scenes: &Scenes, column: &MetricColumn) -> Option<Self> {
+        let (mut count, mut episodes, mut unstable, mut flipped) = (0, 0, 0, 0.0);
+        for rows in scenes.rows.values() {
+            let values: Vec<i64> = rows.iter().filter_map(|row| column.get(*row)).collect();
+            let (times, successes) = (values.len() as u64, values.iter().filter(|value| **value == 1).count() as u64);
+            if times < 2 {
+                continue;
+            }
+            count += 1;
+            episodes += times;
+            unstable += u64::from(successes > 0 && successes < times);
+            flipped += (2 * successes * (times - successes)) as f64 / (times * (times - 1)) as f64;
+        }
+        (count > 0).then(|| Self {
+            experiment: block.experiment.to_owned(),
+            model: block.model.to_owned(),
+            condition: block.condition.map(str::to_owned),
+            metric: column.name.clone(),
+            scenes: count,
+            episodes,
+            unstable,
+            flipped: flipped / count as f64,
+        })
+    }
+}

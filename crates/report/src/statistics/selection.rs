@@ -1,0 +1,28 @@
+//! Which episodes the numbers are of, where a filter chose some.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use exact::escape::visible;
+
+/// A filter over episodes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Selection {
+    /// The condition, as typed.
+    pub condition: String,
+    /// Whether it depends on what the agents did, and not on what was recorded alone.
+    pub by_results: bool,
+}
+
+impl Selection {
+    /// The sentence that stands beside tables and conclusions.
+    pub fn sentence(&self) -> String {
+        let chosen = if self.by_results {
+            "; the filter chose them by their results, so no number here is about a model as such: a guesser's correct \
+             episodes are all correct"
+        } else {
+            ""
+        };
+        format!("Only episodes where `{}`{chosen}.", visible(&self.condition))
+    }
+}

@@ -1,0 +1,264 @@
+//! What may be said while a study still runs: confidence sequences and e-values.
+//!
+//! Rule: nothing here is a fixed-n statistic, so that a reader may look after every episode and stop at any look.
+//! Families are those of the fixed-n page: models of an experiment against a level, pairs of models of an experiment.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::chance::levels;
+use super::conclusions::headline;
+use super::models::compared;
+use super::study::{Experiment, Study, named};
+use super::{Family, Options, PairTest, Role, Selection, Verdict};
+use exact::moments::MomentOverflow;
+use exact::ratio::Ratio;
+use metric::catalog::Kind;
+use score::table::EpisodeTable;
+use statistics::holm::{holm, level};
+use statistics::interval::Interval;
+use statistics::paired::Pairs;
+use statistics::sequential::{against_level, confidence_sequence, discordant};
+
+/// Statistics that hold at every look and at any stop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Sequential {
+    /// The definition file's own name.
+    pub definitions: String,
+    /// SHA-256 of the resolved definitions.
+    pub definitions_hash: String,
+    /// The confidence of every sequence, and one minus the level of every verdict.
+    pub confidence: f64,
+    /// The number of episodes so far.
+    pub episodes: usize,
+    /// The filter that chose the episodes; null without one.
+    #[serde(default, rename = "where")]
+    pub selection: Option<Selection>,
+    /// The rates that have a level to be compared with.
+    pub headline: Vec<String>,
+    /// Every rate of every model.
+    pub rates: Vec<SequentialRate>,
+    /// Rates against chance and reference levels.
+    pub chance: Vec<SequentialChance>,
+    /// Models against each other.
+    pub models: Vec<SequentialPair>,
+}
+
+/// One rate of one model in one experiment.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SequentialRate {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The metric.
+    pub metric: String,
+    /// The successes.
+    pub successes: u64,
+    /// The episodes in which the metric is defined.
+    pub n: u64,
+    /// The rate; none without an episode.
+    pub rate: Option<f64>,
+    /// Its confidence sequence at this n.
+    pub interval: Option<Interval>,
+}
+
+/// One rate against one level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SequentialChance {
+    /// The experiment.
+    pub experiment: String,
+    /// The model.
+    pub model: String,
+    /// The condition, where there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The metric.
+    pub metric: String,
+    /// What the level is.
+    pub role: Role,
+    /// The level.
+    pub level: Ratio,
+    /// The successes.
+    pub successes: u64,
+    /// The episodes in which the metric is defined.
+    pub n: u64,
+    /// The e-value.
+    pub e: f64,
+    /// The anytime-valid p value, 1 / e.
+    pub p: f64,
+    /// The same adjusted by Holm's method over the models of the experiment, against this level.
+    pub p_adjusted: f64,
+    /// What the adjusted value says at the level of significance.
+    pub verdict: Verdict,
+}
+
+/// One model against another, over their pairs.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct SequentialPair {
+    /// The experiment.
+    pub experiment: String,
+    /// The metric.
+    pub metric: String,
+    /// The model with the better mean.
+    pub first: String,
+    /// The other one.
+    pub second: String,
+    /// The 2x2 table of the pairs.
+    pub pairs: Pairs,
+    /// The e-value of the discordant pairs.
+    pub e: f64,
+    /// The anytime-valid p value, 1 / e.
+    pub p: f64,
+    /// The same adjusted by Holm's method over all pairs of models in the experiment.
+    pub p_adjusted: f64,
+    /// Where the first one's rate stands against the second one's.
+    pub verdict: Verdict,
+}
+
+impl Sequential {
+    /// The statistics of `table`, the episodes so far.
+    ///
+    /// With a confidence outside (0, 1) no sequence and no verdict is defined.
+    pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
+        let study = Study::of(table, options.design)?;
+        Ok(Self {
+            definitions: table.catalog.name.clone(),
+            definitions_hash: table.catalog.hash.clone(),
+            confidence: options.confidence,
+            episodes: table.len(),
+            selection: options.selection.clone(),
+            headline: headline_rates(&study),
+            rates: SequentialRate::all(&study, options.confidence),
+            chance: SequentialChance::all(&study, options.confidence),
+            models: SequentialPair::all(&study, options),
+        })
+    }
+}
+
+/// The rates among the headline metrics; the first rate where none has a level.
+fn headline_rates(study: &Study) -> Vec<String> {
+    let chosen: Vec<String> = headline(study).into_iter().filter(|metric| study.kind(metric) == Kind::Rate).collect();
+    if chosen.is_empty() { study.rates().take(1).map(|column| column.name.clone()).collect() } else { chosen }
+}
+
+impl SequentialRate {
+    /// The model as it is compared.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+
+    fn all(study: &Study, confidence: f64) -> Vec<Self> {
+        study.experiments.iter().flat_map(|experiment| of_experiment(study, experiment, confidence)).collect()
+    }
+}
+
+/// The rates of an experiment that are 0 or 1 in every episode, by metric, then by model.
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec<SequentialRate> {
+    let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
+    each.filter_map(|(column, block)| {
+        let (successes, n) = block.moments(column).counts()?;
+        Some(SequentialRate {
+            experiment: experiment.name.to_owned(),
+            model: block.model.to_owned(),
+            condition: block.condition(),
+            metric: column.name.clone(),
+            successes,
+            n,
+            rate: (n > 0).then(|| successes as f64 / n as f64),
+            interval: confidence_sequence(successes, n, confidence),
+        })
+    })
+    .collect()
+}
+
+impl SequentialChance {
+    /// The model as it is compared.
+    pub fn name(&self) -> String {
+        named(&self.model, self.condition.as_deref())
+    }
+
+    /// Every rate against every level that its experiment has.
+    fn all(study: &Study, confidence: f64) -> Vec<Self> {
+        let mut rows = Vec::new();
+        for experiment in &study.experiments {
+            let rates = of_experiment(study, experiment, confidence);
+            for column in study.rates() {
+                let rates: Vec<&SequentialRate> = rates.iter().filter(|rate| rate.metric == column.name).collect();
+                for level in levels(study, experiment.name, &column.name) {
+                    rows.extend(Self::family(&rates, level, confidence));
+                }
+            }
+        }
+        rows
+    }
+
+    fn family(rates: &[&SequentialRate], (role, chance): (Role, Ratio), confidence: f64) -> Vec<Self> {
+        let evidence = |rate: &&SequentialRate| Some(((*rate).clone(), against_level(rate.successes, rate.n, chance)?));
+        let tested: Vec<_> = rates.iter().filter_map(evidence).collect();
+        let adjusted = holm(&tested.iter().map(|(_, found)| found.p).collect::<Vec<_>>());
+        let rows = tested.into_iter().zip(adjusted).map(|((rate, found), p_adjusted)| {
+            let is_shown = level(confidence).is_some_and(|level| p_adjusted <= level);
+            Self {
+                verdict: Verdict::of(rate.successes, rate.n, chance, is_shown),
+                experiment: rate.experiment,
+                model: rate.model,
+                condition: rate.condition,
+                metric: rate.metric,
+                role,
+                level: chance,
+                successes: rate.successes,
+                n: rate.n,
+                e: found.e,
+                p: found.p,
+                p_adjusted,
+            }
+        });
+        rows.collect()
+    }
+}
+
+impl SequentialPair {
+    fn all(study: &Study, options: &Options) -> Vec<Self> {
+        let families = paired(study, options);
+        families.iter().flat_map(|family| Self::family(family, options.confidence)).collect()
+    }
+
+    fn family(family: &Family, confidence: f64) -> Vec<Self> {
+        let evidence = |test: &PairTest| {
+            let pairs = test.comparison.pairs?;
+            Some((test.clone(), pairs, discordant(pairs)?))
+        };
+        let tested: Vec<_> = family.tests.iter().filter_map(evidence).collect();
+        let adjusted = holm(&tested.iter().map(|(.., found)| found.p).collect::<Vec<_>>());
+        let rows = tested.into_iter().zip(adjusted).map(|((test, pairs, found), p_adjusted)| Self {
+            experiment: family.experiment.clone(),
+            metric: family.metric.clone(),
+            first: test.first,
+            second: test.second,
+            pairs,
+            e: found.e,
+            p: found.p,
+            p_adjusted,
+            verdict: direction(pairs, level(confidence).is_some_and(|level| p_adjusted <= level)),
+        });
+        rows.collect()
+    }
+}
+
+/// The pairs of models: all that this page knows of how episodes are paired.
+fn paired(study: &Study, options: &Options) -> Vec<Family> {
+    compared(study, options.horizon, options.confidence).0
+}
+
+fn direction(pairs: Pairs, is_shown: bool) -> Verdict {
+    match is_shown {
+        true if pairs.first_only > pairs.second_only => Verdict::Above,
+        true if pairs.first_only < pairs.second_only => Verdict::Below,
+        _ => Verdict::NotSeparated,
+    }
+}

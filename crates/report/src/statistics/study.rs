@@ -1,0 +1,176 @@
+//! The episode table seen by experiment, model and condition: the blocks that every statistic compares.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use crate::cells::interval;
+use exact::moments::{MomentOverflow, Moments};
+use metric::catalog::{Better, Kind, Metric};
+use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
+use statistics::design::Design;
+use statistics::interval::Interval;
+
+/// What stands for no condition.
+const DEFAULT_CONDITION: &str = "default";
+
+/// The label of the scene: room, body, cubes, start.
+const SCENE: &str = "scene";
+
+/// An episode table and its blocks, ordered by the catalog's experiments, then by model and condition.
+pub(super) struct Study<'a> {
+    pub table: &'a EpisodeTable,
+    pub design: Design,
+    pub experiments: Vec<Experiment<'a>>,
+    ranges: BTreeMap<&'a str, Interval>,
+}
+
+/// The blocks of one experiment.
+pub(super) struct Experiment<'a> {
+    pub name: &'a str,
+    pub blocks: Vec<Block<'a>>,
+}
+
+/// The episodes of one model in one experiment under one condition, and the moments of their metrics.
+pub(super) struct Block<'a> {
+    pub experiment: &'a str,
+    pub model: &'a str,
+    /// The condition; none where no episode of the table has any but the default one.
+    pub condition: Option<&'a str>,
+    /// The rows of the table, in runs.
+    rows: Vec<Range<usize>>,
+    moments: BTreeMap<&'a str, Moments>,
+}
+
+impl<'a> Study<'a> {
+    pub fn of(table: &'a EpisodeTable, design: Design) -> Result<Self, MomentOverflow> {
+        let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
+        let mut blocks: BTreeMap<(usize, &str), Vec<Block>> = BTreeMap::new();
+        // A table is ordered by experiment, then by model.
+        for rows in runs(0..table.len(), |row| (table.keys.experiments().code(row), table.keys.models().code(row))) {
+            let key = table.keys.get(rows.start);
+            let of_experiment =
+                blocks.entry((table.catalog.experiment_rank(key.experiment), key.experiment)).or_default();
+            for (condition, rows) in by_condition(conditions, rows) {
+                of_experiment.push(Block::of(table, (key.experiment, key.model, condition), rows)?);
+            }
+        }
+        let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
+        let names = table.metrics.iter().map(|column| column.name.as_str());
+        let ranges = names.zip(interval::ranges(table)).collect();
+        Ok(Self { table, design, experiments, ranges })
+    }
+
+    pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {
+        self.experiments.iter().flat_map(|experiment| &experiment.blocks)
+    }
+
+    /// The scene of each row, where equal scenes make pairs.
+    pub fn scenes(&self) -> Option<&'a TextColumn> {
+        self.table.label(SCENE).filter(|_| self.design.has_pairs())
+    }
+
+    pub fn column(&self, metric: &str) -> Option<&'a MetricColumn> {
+        self.table.metric(metric)
+    }
+
+    /// The metrics of 0 and 1.
+    pub fn rates(&self) -> impl Iterator<Item = &'a MetricColumn> {
+        self.table.metrics.iter().filter(|column| self.kind(&column.name) == Kind::Rate)
+    }
+
+    /// What a metric's integers mean; a metric that the catalog does not describe is no rate.
+    pub fn kind(&self, metric: &str) -> Kind {
+        self.metric(metric).map_or(Kind::Quantity, |metric| metric.kind)
+    }
+
+    pub fn metric(&self, name: &str) -> Option<&'a Metric> {
+        self.table.catalog.metric.get(name)
+    }
+
+    /// Whether a larger mean comes first.
+    pub fn better(&self, metric: &str) -> Better {
+        self.metric(metric).map_or(Better::Neither, |metric| metric.better)
+    }
+
+    /// The least and the largest mean that a metric can have.
+    pub fn range(&self, metric: &str) -> Interval {
+        self.ranges.get(metric).copied().unwrap_or(Interval::UNBOUNDED)
+    }
+}
+
+impl<'a> Block<'a> {
+    fn of(
+        table: &'a EpisodeTable,
+        (experiment, model, condition): (&'a str, &'a str, Option<&'a str>),
+        rows: Vec<Range<usize>>,
+    ) -> Result<Self, MomentOverflow> {
+        let of_column = |column: &'a MetricColumn| {
+            let moments =
+                rows.iter().try_fold(Moments::default(), |sum, rows| column.add_moments(sum, rows.clone()))?;
+            Ok((column.name.as_str(), moments))
+        };
+        let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
+        Ok(Self { experiment, model, condition, rows, moments })
+    }
+
+    /// The model as it is compared: `model`, or `model [condition]` where there are several.
+    pub fn name(&self) -> String {
+        named(self.model, self.condition)
+    }
+
+    /// Whether another block is of the same model under the same condition.
+    pub fn is_same_subject(&self, other: &Self) -> bool {
+        (self.model, self.condition) == (other.model, other.condition)
+    }
+
+    /// The condition as rows have it.
+    pub fn condition(&self) -> Option<String> {
+        self.condition.map(str::to_owned)
+    }
+
+    /// The rows of the table.
+    pub fn rows(&self) -> impl Iterator<Item = usize> + Clone + '_ {
+        self.rows.iter().cloned().flatten()
+    }
+
+    /// The exact moments of a metric of the table.
+    pub fn moments(&self, column: &MetricColumn) -> Moments {
+        self.moments[column.name.as_str()]
+    }
+
+    /// The rows of each seed.
+    pub fn seeds(&self, table: &EpisodeTable) -> Vec<Vec<usize>> {
+        let mut seeds: BTreeMap<i32, Vec<usize>> = BTreeMap::new();
+        for row in self.rows() {
+            seeds.entry(table.keys.seed(row)).or_default().push(row);
+        }
+        seeds.into_values().collect()
+    }
+}
+
+/// A model under a condition.
+pub(super) fn named(model: &str, condition: Option<&str>) -> String {
+    condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
+}
+
+/// The rows of one model by condition, which is not part of a table's order.
+fn by_condition(conditions: Option<&TextColumn>, rows: Range<usize>) -> Vec<(Option<&str>, Vec<Range<usize>>)> {
+    let Some(conditions) = conditions else { return vec![(None, vec![rows])] };
+    let mut parts: BTreeMap<&str, Vec<Range<usize>>> = BTreeMap::new();
+    for run in runs(rows, |row| conditions.get(row).unwrap_or(DEFAULT_CONDITION)) {
+        parts.entry(conditions.get(run.start).unwrap_or(DEFAULT_CONDITION)).or_default().push(run);
+    }
+    parts.into_iter().map(|(condition, rows)| (Some(condition), rows)).collect()
+}
+
+/// The runs of rows that have the same key.
+fn runs<K: PartialEq>(rows: Range<usize>, key: impl Fn(usize) -> K) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for row in rows {
+        match runs.last_mut() {
+            Some(run) if key(run.start) == key(row) => run.end = row + 1,
+            _ => runs.push(row..row + 1),
+        }
+    }
+    runs
+}

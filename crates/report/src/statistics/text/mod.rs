@@ -1,0 +1,185 @@
+//! Statistics for people: the answers first, then the numbers that they rest on, each under the name of its method.
+//!
+//! Rule: text from traces is shown, never obeyed ([`visible`]).
+
+mod grid;
+pub mod pairs;
+pub mod sequential;
+mod tables;
+
+use std::fmt::Write as _;
+
+use super::{Answer, FEW, Statistics};
+use crate::tables::fit::wrapped;
+use exact::escape::visible;
+use exact::format::fixed;
+use grid::Grid;
+
+/// How much is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Length {
+    /// The answers, and the numbers that they rest on.
+    Short,
+    /// Everything: further intervals, plain means, clusters, what could have been shown.
+    Full,
+}
+
+/// The text, its tables about these metrics alone, in lines of at most `width` columns.
+///
+/// A table that has nothing to show is left out. [`Statistics::headline`] is what a reader wants who did not choose.
+pub fn render(statistics: &Statistics, metrics: &[String], length: Length, width: Option<usize>) -> String {
+    let shown = |metric: &str| metrics.iter().any(|name| name == metric);
+    let percent = percent(statistics.confidence);
+    let mut text = format!(
+        "{} episodes, definitions {}, {percent} confidence\n",
+        statistics.episodes,
+        visible(&statistics.definitions)
+    );
+    if let Some(selection) = &statistics.selection {
+        push_wrapped(&mut text, &selection.sentence(), width, 0);
+    }
+    push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
+    let is_chosen = statistics.selection.as_ref().is_some_and(|selection| selection.by_results);
+    let of = if is_chosen { ", of episodes that the filter chose by their results" } else { "" };
+    list(&mut text, &format!("Answers, after Holm's adjustment{of}"), &answers(&statistics.answers), width);
+    if length == Length::Full {
+        list(&mut text, "What can be concluded", &statistics.conclusions, width);
+    }
+    let design = format!("{}.", statistics.design_note);
+    let warnings: Vec<String> = statistics.warnings.iter().filter(|warning| **warning != design).cloned().collect();
+    list(&mut text, "What can not", &warnings, width);
+    for (title, grid) in sections(statistics, &shown, length, &percent) {
+        section(&mut text, &title, &grid, width);
+    }
+    if length == Length::Short {
+        text.push('\n');
+        push_wrapped(
+            &mut text,
+            "--full prints every interval, plain means, clusters, and what could have been shown.",
+            width,
+            0,
+        );
+    }
+    text
+}
+
+fn answers(answers: &[Answer]) -> Vec<String> {
+    answers.iter().map(|answer| format!("{} {}: {}.", answer.question, answer.metric, answer.answer)).collect()
+}
+
+fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, percent: &str) -> Vec<(String, Grid)> {
+    let is_full = length == Length::Full;
+    let always = [
+        (
+            if is_full { format!("Rates, {percent} intervals") } else { format!("Rates, {percent} score intervals (Wilson)") },
+            tables::rates(statistics, shown, is_full),
+        ),
+        (
+            "Against chance: exact binomial test, two-sided by minimum likelihood; mid-p need not keep the level; Holm and \
+             Tarone-Holm over the models; verdict by Holm"
+                .to_owned(),
+            tables::chance(statistics, shown),
+        ),
+        (
+            format!(
+                "Models told apart: exact tests two-sided by minimum likelihood (McNemar of pairs, Fisher of independent \
+                 episodes), t tests of restricted means; Holm over all pairs; {percent} intervals (Newcombe) not adjusted"
+            ),
+            tables::separated(statistics, shown),
+        ),
+        (
+            format!(
+                "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
+                 {percent} interval, or McNemar's over the pairs of all; two-sided by minimum likelihood; Holm over all pairs"
+            ),
+            tables::overall(statistics, shown, is_full),
+        ),
+        (
+            format!(
+                "Between conditions: first experiment minus the other, by the same methods; Holm over the models; {percent} \
+                 intervals not adjusted"
+            ),
+            tables::conditions(statistics, shown),
+        ),
+        (
+            format!(
+                "Durations: unfinished episodes censored (Kaplan-Meier); medians by Brookmeyer and Crowley, restricted means on \
+                 the log-odds scale, {percent} intervals"
+            ),
+            tables::durations(statistics, shown),
+        ),
+        (
+            "The same scene played again: verdicts that differ by chance alone, which a difference has to exceed".to_owned(),
+            tables::retests(statistics, shown),
+        ),
+        ("Lost to infrastructure".to_owned(), tables::losses(statistics, shown)),
+    ];
+    let further = || {
+        [
+            (
+                format!(
+                    "How often one model decides earlier than another, averaged over experiments; who never decides is the \
+                     latest; stratified bootstrap, {percent} percentile intervals"
+                ),
+                tables::improvements(statistics, shown),
+            ),
+            (
+                format!("Time to a correct decision: a wrong one competes (Aalen-Johansen); {percent} intervals"),
+                tables::correct(statistics, shown),
+            ),
+            (
+                format!("Quantities, {percent} intervals of the plain mean: Student's t, seeded BCa bootstrap"),
+                tables::quantities(statistics, shown),
+            ),
+            (
+                "By seed: cluster-robust standard errors, t(seeds - 1), of rates on the log-odds scale".to_owned(),
+                tables::clusters(statistics, shown),
+            ),
+        ]
+    };
+    always.into_iter().chain(is_full.then(further).into_iter().flatten()).collect()
+}
+
+fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
+    for line in wrapped(words, width.unwrap_or(usize::MAX), indent) {
+        let _ = writeln!(text, "{line}");
+    }
+}
+
+fn list(text: &mut String, title: &str, sentences: &[String], width: Option<usize>) {
+    if sentences.is_empty() {
+        return;
+    }
+    let _ = writeln!(text, "\n{title}");
+    for sentence in sentences {
+        push_wrapped(text, &format!("  - {}", visible(sentence)), width, 4);
+    }
+}
+
+fn section(text: &mut String, title: &str, rows: &Grid, width: Option<usize>) {
+    if rows.is_empty() {
+        return;
+    }
+    text.push('\n');
+    push_wrapped(text, title, width, 0);
+    text.push_str(&rows.render(width));
+    if rows.has(tables::FEW_MARK) {
+        let legend = format!("{} fewer than {FEW} defined episodes: not to be compared.", tables::FEW_MARK);
+        push_wrapped(text, &legend, width, 0);
+    }
+}
+
+pub(crate) fn percent(confidence: f64) -> String {
+    let text = fixed(Some(confidence * 100.0), 3);
+    format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::percent;
+
+    #[test]
+    fn a_confidence_is_a_percentage() {
+        assert_eq!([percent(0.95), percent(0.995), percent(0.9)], ["95 %", "99.5 %", "90 %"]);
+    }
+}

@@ -1,0 +1,144 @@
+//! Every test of two models as texts, for a page that shows those of the two that a reader chooses.
+//!
+//! Rule: what depends on which of the two comes first is there both ways, so that nobody computes again.
+
+use super::super::{Comparison, OverallMethod, OverallRow, PairTest, Statistics};
+use super::tables::{held, method};
+use exact::format::{UNDEFINED, fixed, p_value};
+use statistics::coverage::Withheld;
+use statistics::interval::Interval;
+
+/// Decimals of a difference of rates.
+const RATE_PLACES: usize = 3;
+
+/// What a test says, in the order of a page's columns.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// The first is better, after adjustment.
+    FirstIsBetter,
+    /// The two are not told apart.
+    NotToldApart,
+    /// There is no test.
+    NoTest,
+}
+
+/// One model against another, as texts; two texts are seen from the first and from the second.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PairText<'a> {
+    /// The model with the better mean.
+    pub first: &'a str,
+    /// The other one.
+    pub second: &'a str,
+    /// The name of the test.
+    pub test: &'static str,
+    /// What each side has: `11/21`, or `n = 21` of a duration.
+    pub counts: [String; 2],
+    /// The pairs that differ, `2 : 6 of 21`: in favour of this side, of the other one, all of them.
+    pub differing: [String; 2],
+    /// One side minus the other.
+    pub difference: [String; 2],
+    /// Its interval, or why there is none.
+    pub interval: [String; 2],
+    /// The p value.
+    pub p: String,
+    /// The same, adjusted by Holm's method.
+    pub p_adjusted: String,
+    /// What follows.
+    pub verdict: Verdict,
+}
+
+/// All tests under one metric in one experiment; without an experiment over all of them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FamilyText<'a> {
+    /// The experiment.
+    pub experiment: Option<&'a str>,
+    /// The metric.
+    pub metric: &'a str,
+    /// Every two models.
+    pub tests: Vec<PairText<'a>>,
+}
+
+/// Every family, experiment by experiment, then those over all experiments.
+pub fn families(statistics: &Statistics) -> Vec<FamilyText<'_>> {
+    let single = statistics.models.iter().map(|family| FamilyText {
+        experiment: Some(&family.experiment),
+        metric: &family.metric,
+        tests: family.tests.iter().map(PairText::of).collect(),
+    });
+    let mut families: Vec<FamilyText<'_>> = single.collect();
+    for rows in statistics.overall.chunk_by(|a, b| a.metric == b.metric) {
+        let tests = rows.iter().map(PairText::overall).collect();
+        families.push(FamilyText { experiment: None, metric: &rows[0].metric, tests });
+    }
+    families
+}
+
+impl<'a> PairText<'a> {
+    fn of(PairTest { first, second, comparison, .. }: &'a PairTest) -> Self {
+        let (test, places) = method(comparison.method);
+        Self {
+            test,
+            counts: counts(comparison),
+            differing: differing(comparison),
+            difference: difference(comparison.difference, places),
+            interval: interval(comparison.interval, comparison.withheld, places),
+            p: p_value(comparison.p),
+            p_adjusted: p_value(comparison.p_adjusted),
+            verdict: Verdict::of(comparison.separated, comparison.p),
+            first,
+            second,
+        }
+    }
+
+    fn overall(row: &'a OverallRow) -> Self {
+        let OverallRow { first, second, .. } = row;
+        Self {
+            test: match row.method {
+                OverallMethod::MantelHaenszel => "exact conditional",
+                OverallMethod::PooledMcnemar => "McNemar, pooled",
+            },
+            counts: [UNDEFINED, UNDEFINED].map(str::to_owned),
+            differing: [UNDEFINED, UNDEFINED].map(str::to_owned),
+            difference: difference(row.difference, RATE_PLACES),
+            interval: interval(row.interval, None, RATE_PLACES),
+            p: p_value(row.p),
+            p_adjusted: p_value(row.p_adjusted),
+            verdict: Verdict::of(row.separated, row.p),
+            first,
+            second,
+        }
+    }
+}
+
+impl Verdict {
+    fn of(separated: bool, p: Option<f64>) -> Self {
+        match p {
+            None => Self::NoTest,
+            Some(_) if separated => Self::FirstIsBetter,
+            Some(_) => Self::NotToldApart,
+        }
+    }
+}
+
+fn counts(found: &Comparison) -> [String; 2] {
+    let [m, n] = found.n;
+    match found.successes {
+        Some([k, l]) => [format!("{k}/{m}"), format!("{l}/{n}")],
+        None => [format!("n = {m}"), format!("n = {n}")],
+    }
+}
+
+fn differing(found: &Comparison) -> [String; 2] {
+    let Some(pairs) = found.pairs else { return [UNDEFINED, UNDEFINED].map(str::to_owned) };
+    let (first, second, all) = (pairs.first_only, pairs.second_only, pairs.n());
+    [format!("{first} : {second} of {all}"), format!("{second} : {first} of {all}")]
+}
+
+fn difference(difference: Option<f64>, places: usize) -> [String; 2] {
+    [difference, difference.map(|difference| -difference)].map(|difference| fixed(difference, places))
+}
+
+fn interval(interval: Option<Interval>, withheld: Option<Withheld>, places: usize) -> [String; 2] {
+    let turned = interval.map(|interval| Interval { low: -interval.high, high: -interval.low });
+    [interval, turned].map(|interval| held(interval, withheld, places))
+}

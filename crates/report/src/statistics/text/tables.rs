@@ -1,0 +1,277 @@
+//! The tables of `stats`, one function each: a line per row of the statistics whose metric is shown.
+
+use super::super::study::named;
+use super::super::{COMPLETED, CellRow, Comparison, Intervals, Method, OverallMethod, Role, Sign, Statistics, Verdict};
+use super::grid::Grid;
+use exact::format::{UNDEFINED, bounds, fixed, p_value};
+use metric::catalog::Kind;
+use statistics::coverage::Withheld;
+use statistics::interval::Interval;
+
+pub(super) type Shown<'a> = &'a dyn Fn(&str) -> bool;
+
+/// The mark of a conditional metric with few defined episodes.
+pub(super) const FEW_MARK: char = '†';
+
+/// Rates with Wilson's interval; with the other two where `is_full`.
+pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Grid {
+    let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
+        let Intervals::Rate { wilson, clopper_pearson, jeffreys } = cell.intervals else { return None };
+        let mut line = group(cell);
+        line.extend([format!("{}/{}{}", cell.sum, cell.n, mark(cell)), fixed(cell.mean, 3), plain(wilson, 3)]);
+        if is_full {
+            line.extend([plain(clopper_pearson, 3), plain(jeffreys, 3)]);
+        }
+        Some(line)
+    });
+    let numbers = ["count", "rate", "Wilson", "Clopper-Pearson", "Jeffreys"];
+    Grid::new(&keys(statistics), if is_full { &numbers } else { &numbers[..3] }).with(lines)
+}
+
+pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
+        let Intervals::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld } = cell.intervals
+        else {
+            return None;
+        };
+        let mut line = group(cell);
+        line.extend([format!("{}{}", cell.n, mark(cell)), fixed(cell.mean, 2), error(cell.se, 2)]);
+        line.extend([held(student_t, student_t_withheld, 2), held(bootstrap, bootstrap_withheld, 2)]);
+        Some(line)
+    });
+    Grid::new(&keys(statistics), &["n", "mean", "SE", "Student's t", "bootstrap"]).with(lines)
+}
+
+fn keys(statistics: &Statistics) -> Vec<String> {
+    statistics.by.iter().map(String::as_str).chain(["metric"]).map(str::to_owned).collect()
+}
+
+fn group(cell: &CellRow) -> Vec<String> {
+    cell.key.values().map(ToString::to_string).chain([cell.metric.clone()]).collect()
+}
+
+fn mark(cell: &CellRow) -> String {
+    if cell.few { FEW_MARK.to_string() } else { String::new() }
+}
+
+/// Rates against their levels; where a rate is shown, so is the same among finished episodes.
+pub(super) fn chance(statistics: &Statistics, shown: Shown) -> Grid {
+    let is_shown =
+        |metric: &str| shown(metric) || COMPLETED.iter().any(|(whole, completed)| *completed == metric && shown(whole));
+    let line = |row: &super::super::ChanceRow| {
+        let role = match row.role {
+            Role::Chance => "chance",
+            Role::Reference => "reference",
+        };
+        let verdict = match row.verdict {
+            Verdict::Above => "above",
+            Verdict::Below => "below",
+            Verdict::NotSeparated => "not told apart",
+        };
+        let mut line = vec![row.experiment.clone(), row.name(), row.metric.clone(), format!("{role} {}", row.level)];
+        line.push(format!("{}/{}", row.successes, row.n));
+        line.extend([row.p, row.mid_p, row.p_adjusted, row.p_tarone].map(|p| p_value(Some(p))));
+        line.push(verdict.to_owned());
+        line
+    };
+    let rows = statistics.chance.iter().filter(|row| is_shown(&row.metric)).map(line);
+    let numbers = ["count", "p", "mid-p", "p (Holm)", "p (T-H)", "verdict"];
+    Grid::new(&["experiment", "model", "metric", "level"], &numbers).with(rows)
+}
+
+pub(super) fn separated(statistics: &Statistics, shown: Shown) -> Grid {
+    let families = statistics.models.iter().filter(|family| shown(&family.metric));
+    let lines = families.flat_map(|family| {
+        family.tests.iter().filter(|test| test.comparison.separated).map(|test| {
+            let names = [&family.experiment, &family.metric, &test.first, &test.second].map(Clone::clone);
+            names.into_iter().chain(compared(&test.comparison)).collect()
+        })
+    });
+    let texts = ["experiment", "metric", "better", "than", "test"];
+    Grid::new(&texts, &["counts", "difference", "interval", "p", "mid-p", "p (Holm)", "p (T-H)"]).with(lines)
+}
+
+pub(super) fn conditions(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)).map(|contrast| {
+        let pair = format!("{} - {}", contrast.baseline, contrast.against);
+        let names = [named(&contrast.model, contrast.condition.as_deref()), contrast.metric.clone(), pair];
+        let verdict = match contrast.comparison.sign() {
+            Some(Sign::Higher) => "higher",
+            Some(Sign::Lower) => "lower",
+            None if contrast.comparison.p.is_some() => "not told apart",
+            None => UNDEFINED,
+        };
+        names.into_iter().chain(compared(&contrast.comparison)).chain([verdict.to_owned()]).collect()
+    });
+    let numbers = ["counts", "difference", "interval", "p", "mid-p", "p (Holm)", "p (T-H)", "verdict"];
+    Grid::new(&["model", "metric", "conditions", "test"], &numbers).with(lines)
+}
+
+/// The test, the counts, the difference with its interval, and the p values of a comparison.
+fn compared(found: &Comparison) -> Vec<String> {
+    let (test, places) = method(found.method);
+    let [m, n] = found.n;
+    let counts = match (found.pairs, found.successes) {
+        (Some(pairs), _) => format!("{}:{} of {m} pairs", pairs.first_only, pairs.second_only),
+        (None, Some([k, l])) => format!("{k}/{m}, {l}/{n}"),
+        _ if matches!(found.method, Method::RestrictedMeanPaired | Method::StudentPaired) => format!("{m} pairs"),
+        _ => format!("{m}, {n}"),
+    };
+    let mut line = vec![test.to_owned(), counts, fixed(found.difference, places)];
+    line.push(held(found.interval, found.withheld, places));
+    line.extend([found.p, found.mid_p, found.p_adjusted, found.p_tarone].map(p_value));
+    line
+}
+
+/// What a test is called, and how many decimals its difference has.
+pub(super) const fn method(method: Method) -> (&'static str, usize) {
+    match method {
+        Method::Mcnemar => ("McNemar", 3),
+        Method::Fisher => ("Fisher", 3),
+        Method::RestrictedMeanPaired => ("restricted means, pairs", 2),
+        Method::RestrictedMean => ("restricted means", 2),
+        Method::StudentPaired => ("Student's t, pairs", 2),
+        Method::Welch => ("Welch's t", 2),
+    }
+}
+
+/// Two models over all experiments: all of them where `is_full`, else those that are told apart.
+pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Grid {
+    let rows = statistics.overall.iter().filter(|row| shown(&row.metric) && (is_full || row.separated));
+    let lines = rows.map(|row| {
+        let test = match row.method {
+            OverallMethod::MantelHaenszel => "exact conditional",
+            OverallMethod::PooledMcnemar => "McNemar, pooled",
+        };
+        let verdict = if row.separated { "better" } else { "not told apart" };
+        let mut line: Vec<String> = [&*row.metric, &row.first, &row.second, test].map(str::to_owned).to_vec();
+        line.extend([row.experiments.len().to_string(), fixed(row.difference, 3), plain(row.interval, 3)]);
+        line.extend([row.p, row.mid_p, row.p_adjusted].map(p_value));
+        line.push(verdict.to_owned());
+        line
+    });
+    let numbers = ["experiments", "difference", "interval", "p", "mid-p", "p (Holm)", "verdict"];
+    Grid::new(&["metric", "first", "second", "test"], &numbers).with(lines)
+}
+
+pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.improvements.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let names = [&row.metric, &row.first, &row.second].map(Clone::clone);
+        let found = row.improvement;
+        let numbers = [row.experiments.len().to_string(), fixed(Some(found.probability), 3), plain(found.interval, 3)];
+        names.into_iter().chain(numbers).collect()
+    });
+    Grid::new(&["metric", "earlier", "than"], &["experiments", "probability", "interval"]).with(lines)
+}
+
+pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Grid {
+    let kind = |metric: &str| statistics.cells.iter().find(|cell| cell.metric == metric).map(|cell| cell.kind);
+    let lines = statistics.clusters.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let places = if kind(&row.metric) == Some(Kind::Rate) { 3 } else { 2 };
+        let by_seed = row.by_seed;
+        let numbers = [
+            row.seeds.to_string(),
+            row.n.to_string(),
+            fixed(row.mean, places),
+            error(row.se, places),
+            error(by_seed.map(|by_seed| by_seed.se), places),
+            held(by_seed.and_then(|by_seed| by_seed.interval), row.withheld, places),
+            fixed(by_seed.and_then(|by_seed| by_seed.icc), 2),
+            fixed(by_seed.and_then(|by_seed| by_seed.design_effect), 2),
+        ];
+        let model = named(&row.model, row.condition.as_deref());
+        [row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers).collect()
+    });
+    let numbers = ["seeds", "n", "mean", "SE", "SE by seed", "interval by seed", "ICC", "design effect"];
+    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+}
+
+pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.durations.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let restricted = row.restricted;
+        let median_interval = row.median_interval.map(|found| match found.high {
+            Some(high) => format!("[{}, {high}]", found.low),
+            None => format!("[{}, open)", found.low),
+        });
+        let numbers = [
+            format!("{}/{}", row.finished, row.n),
+            reached(row.median),
+            median_interval.unwrap_or_else(|| UNDEFINED.to_owned()),
+            fixed(restricted.map(|restricted| restricted.mean), 2),
+            held(restricted.and_then(|restricted| restricted.interval), row.withheld, 2),
+            restricted.map_or_else(|| UNDEFINED.to_owned(), |restricted| restricted.horizon.to_string()),
+        ];
+        let model = named(&row.model, row.condition.as_deref());
+        [row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers).collect()
+    });
+    let numbers = ["finished", "median", "interval", "restricted mean", "interval", "up to"];
+    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+}
+
+pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Grid {
+    let rows = statistics.durations.iter().filter(|row| shown(&row.metric));
+    let lines = rows.filter_map(|row| {
+        let correct = row.correct.as_ref()?;
+        let numbers = [
+            fixed(Some(correct.correct), 3),
+            fixed(Some(correct.wrong), 3),
+            reached(correct.median),
+            fixed(Some(correct.restricted.mean), 2),
+            held(correct.restricted.interval, correct.withheld, 2),
+            correct.restricted.horizon.to_string(),
+        ];
+        let model = named(&row.model, row.condition.as_deref());
+        Some([row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers).collect())
+    });
+    let numbers = ["correct", "wrong", "half correct", "restricted mean", "interval", "up to"];
+    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+}
+
+pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.retests.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let numbers = [
+            row.scenes.to_string(),
+            row.episodes.to_string(),
+            format!("{}/{}", row.unstable, row.scenes),
+            fixed(Some(row.flipped), 3),
+        ];
+        let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
+        names.into_iter().chain(numbers).collect()
+    });
+    let numbers = ["scenes", "episodes", "not always the same", "flipped from one time to the next"];
+    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+}
+
+pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Grid {
+    let lines = statistics.losses.rows.iter().filter(|row| shown(&row.metric)).map(|row| {
+        let lossy = row.lossy;
+        let (count, lost) = (format!("{}/{}", lossy.successes, lossy.n), lossy.lost.to_string());
+        let bounds = [lossy.bounds, lossy.interval].map(|interval| plain(Some(interval), 3));
+        let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
+        names.into_iter().chain([count, lost]).chain(bounds).collect()
+    });
+    let numbers = ["without them", "lost", "bounds", "interval around the bounds"];
+    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+}
+
+fn reached(median: Option<i64>) -> String {
+    median.map_or_else(|| "not reached".to_owned(), |median| median.to_string())
+}
+
+fn plain(interval: Option<Interval>, places: usize) -> String {
+    bounds(interval.map(|interval| (interval.low, interval.high)), places)
+}
+
+/// An interval, or why there is none.
+pub(super) fn held(interval: Option<Interval>, withheld: Option<Withheld>, places: usize) -> String {
+    match (interval, withheld) {
+        (None, Some(Withheld::TooFew { fewest })) => format!("{UNDEFINED} (n < {fewest})"),
+        (None, Some(Withheld::NoSpread)) => format!("{UNDEFINED} (no spread)"),
+        _ => plain(interval, places),
+    }
+}
+
+/// A standard error; zero is no certainty.
+fn error(se: Option<f64>, places: usize) -> String {
+    fixed(se.filter(|&se| se > 0.0), places)
+}

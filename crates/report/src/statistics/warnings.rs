@@ -1,0 +1,185 @@
+//! What a reader must not conclude, and what the design allows, in sentences made from the numbers.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::matching::Matching;
+use super::{CellRow, FEW, Replies, Selection, Statistics};
+use exact::format::p_value;
+use statistics::clustered::fewest_clusters;
+use statistics::design::{Cluster, DesignKind};
+use statistics::holm::level;
+
+/// What a file of scores in text leaves unknown.
+pub const TEXT_SCORES: &str = "scores in CSV and JSON Lines do not carry the kind of episodes, their clusters, losses and reply \
+                           quality, which are unknown here";
+
+/// How many gaps a warning names before it counts the rest.
+const NAMED_GAPS: usize = 5;
+
+/// How much of a scene's name is shown: a fingerprint is long.
+const SCENE_SHOWN: usize = 16;
+
+/// What the design declares, what follows from it, and what to do where it declares nothing.
+pub(super) fn design_note(statistics: &Statistics, from_text: bool) -> String {
+    let (paired, all) = pairings(statistics);
+    if statistics.design.kind == Some(DesignKind::Reconstruction) {
+        return "reconstructed episodes: their seeds, runs and scenes are made up, so nothing is paired or clustered and every \
+                test takes episodes as independent; no number here says more about a model than the aggregates that the \
+                episodes were made from"
+            .to_owned();
+    }
+    let has_scenes = matchings(statistics).any(|matching| matching.pairs + matching.alone + matching.repeated > 0);
+    if from_text {
+        return format!(
+            "{TEXT_SCORES}: no test knows clusters, and {}; give the traces, or score them into Parquet",
+            if paired == 0 { "nothing is paired" } else { "pairs are by the column `scene` alone" }
+        );
+    }
+    if statistics.design.kind.is_none() && statistics.design.cluster.is_none() && !has_scenes {
+        return "the traces declare no design: episodes are taken as independent, nothing is paired or clustered; record or import \
+                them with a column `scene` and the design in the footer to have pairs"
+            .to_owned();
+    }
+    let kind = match statistics.design.kind {
+        Some(DesignKind::Import) => "imported episodes",
+        Some(DesignKind::Recording) => "recorded episodes",
+        _ => "episodes of an undeclared kind",
+    };
+    let pairs = match (has_scenes, paired) {
+        (false, _) => "no scenes are declared, so nothing is paired".to_owned(),
+        (true, 0) => format!("none of {all} comparisons has pairs of equal scenes"),
+        (true, _) => format!("{paired} of {all} comparisons are by pairs of equal scenes"),
+    };
+    let clusters = match statistics.design.clusters() {
+        Some(Cluster::Seed) => "seeds are clusters",
+        None => "no clusters are declared",
+    };
+    format!("{kind}; {pairs}; {clusters}")
+}
+
+fn matchings(statistics: &Statistics) -> impl Iterator<Item = &Matching> {
+    let models = statistics.models.iter().flat_map(|family| &family.tests).map(|test| &test.matching);
+    models.chain(statistics.conditions.iter().map(|contrast| &contrast.matching))
+}
+
+/// The comparisons by pairs, and all: each two blocks once, under one metric.
+fn pairings(statistics: &Statistics) -> (usize, usize) {
+    let metric = statistics.models.first().map(|family| &family.metric);
+    let models =
+        statistics.models.iter().filter(|family| Some(&family.metric) == metric).flat_map(|family| &family.tests);
+    let metric = statistics.conditions.first().map(|contrast| &contrast.metric);
+    let conditions = statistics.conditions.iter().filter(|contrast| Some(&contrast.metric) == metric);
+    let all: Vec<bool> =
+        models.map(|test| test.matching.paired).chain(conditions.map(|contrast| contrast.matching.paired)).collect();
+    (all.iter().filter(|paired| **paired).count(), all.len())
+}
+
+/// What the numbers do not allow to say.
+pub(super) fn warnings(statistics: &Statistics, from_text: bool) -> Vec<String> {
+    let chosen = statistics.selection.as_ref().filter(|selection| selection.by_results);
+    let found = [
+        chosen.map(Selection::sentence),
+        is_undeclared(statistics).then(|| format!("{}.", statistics.design_note)),
+        repeated(statistics),
+        few_seeds(statistics),
+        few_episodes(statistics),
+        gaps(statistics),
+        losses(statistics, from_text),
+        statistics.replies.as_ref().and_then(Replies::sentence),
+    ];
+    found.into_iter().flatten().collect()
+}
+
+fn is_undeclared(statistics: &Statistics) -> bool {
+    matches!(statistics.design.kind, None | Some(DesignKind::Reconstruction))
+}
+
+/// Repeats of a scene are no pairs, and depend on each other.
+fn repeated(statistics: &Statistics) -> Option<String> {
+    let most = matchings(statistics).map(|matching| matching.repeated).max().filter(|&most| most > 0)?;
+    let unpaired = matchings(statistics).any(|matching| matching.repeated > 0 && !matching.paired);
+    let follows = if unpaired {
+        "; where a comparison is not by pairs they are taken as independent, which repeats of a scene are not"
+    } else {
+        ""
+    };
+    Some(format!(
+        "up to {most} episodes of a comparison share a scene that one side has more than once: they are not pairs{follows}."
+    ))
+}
+
+fn few_seeds(statistics: &Statistics) -> Option<String> {
+    let level = level(statistics.confidence)?;
+    let mut blocks: BTreeMap<(&str, &str, Option<&str>), usize> = BTreeMap::new();
+    for row in &statistics.clusters {
+        let seeds = blocks.entry((&row.experiment, &row.model, row.condition.as_deref())).or_default();
+        *seeds = row.seeds.max(*seeds);
+    }
+    let needed = fewest_clusters(level);
+    let fewest = blocks.into_values().min().filter(|&fewest| fewest < needed)?;
+    let seeds = if fewest == 1 { "1 seed is".to_owned() } else { format!("{fewest} seeds are") };
+    Some(format!(
+        "{seeds} too few for a claim about new seeds: no test over fewer than {needed} can reach p = {}. \
+         Tests and intervals speak of new runs of these seeds; see the clustered intervals for how little is known beyond them.",
+        p_value(Some(level)).trim_end_matches('0')
+    ))
+}
+
+fn few_episodes(statistics: &Statistics) -> Option<String> {
+    let few: Vec<&CellRow> = statistics.cells.iter().filter(|cell| cell.few).collect();
+    let metrics: BTreeSet<&str> = few.iter().map(|cell| cell.metric.as_str()).collect();
+    (!few.is_empty()).then(|| {
+        format!(
+            "{} of {} cells are of conditional metrics with fewer than {FEW} defined episodes ({}): do not compare them.",
+            few.len(),
+            statistics.cells.len(),
+            metrics.into_iter().collect::<Vec<_>>().join(", ")
+        )
+    })
+}
+
+fn gaps(statistics: &Statistics) -> Option<String> {
+    let named: Vec<String> = statistics
+        .gaps
+        .iter()
+        .take(NAMED_GAPS)
+        .map(|gap| {
+            let found = if gap.episodes == 0 { "missing".to_owned() } else { format!("{} episodes", gap.episodes) };
+            let scene: String = gap.scene.chars().take(SCENE_SHOWN).collect();
+            let model = super::study::named(&gap.model, gap.condition.as_deref());
+            format!("{} {model} scene {scene} ({found})", gap.experiment)
+        })
+        .collect();
+    let rest = statistics.gaps.len().saturating_sub(named.len());
+    let rest = if rest > 0 { format!("; and {rest} more") } else { String::new() };
+    let places = if statistics.gaps.len() == 1 { "1 scene of a model is" } else { "scenes of models are" };
+    let count = if statistics.gaps.len() == 1 { String::new() } else { format!("{} ", statistics.gaps.len()) };
+    (!named.is_empty())
+        .then(|| format!("{count}{places} not paired, for want of exactly one episode: {}{rest}.", named.join("; ")))
+}
+
+fn losses(statistics: &Statistics, from_text: bool) -> Option<String> {
+    if !statistics.losses.recorded {
+        let why = if from_text {
+            "these scores do not carry"
+        } else {
+            "neither reply_status nor a list of lost episodes records"
+        };
+        return Some(format!(
+            "{why} how replies came: episodes lost to infrastructure, if any, are counted as the model's own."
+        ));
+    }
+    let lost: BTreeSet<(&str, &str, Option<&str>, u64)> = statistics
+        .losses
+        .rows
+        .iter()
+        .map(|row| (row.experiment.as_str(), row.model.as_str(), row.condition.as_deref(), row.lossy.lost))
+        .collect();
+    let total: u64 = lost.iter().map(|(.., lost)| lost).sum();
+    (total > 0).then(|| {
+        format!(
+            "{total} episodes were lost for want of an answer (a crash, a rate limit, a server error, a timeout): they are \
+             in no denominator; the bounds under losses say what they could have changed."
+        )
+    })
+}

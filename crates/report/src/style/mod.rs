@@ -1,0 +1,262 @@
+//! Presentation as data: which tables there are, their columns and order, how a cell prints, what is emphasised.
+//!
+//! Rule: a style changes how a number looks, never the number. Styles are TOML, checked against the catalog
+//! before anything prints. `default` and `paper` are built in; any other name is a file. `read.rs` reads them.
+
+mod read;
+pub mod shape;
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use exact::suggest::nearest;
+use metric::catalog::{Better, Catalog, Kind};
+use metric::fault::{Fault, Faults, Place};
+
+/// The table that every report has.
+pub const MAIN_TABLE: &str = "main";
+
+/// The table of the metrics that a style names nowhere.
+pub const OTHER_TABLE: &str = "other";
+
+const BUILT_IN: [(&str, &str); 2] = [
+    ("default", include_str!("../../../../assets/styles/default.toml")),
+    ("paper", include_str!("../../../../assets/styles/paper.toml")),
+];
+
+/// A style ready for use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Style {
+    /// The built-in name, or the file's name without its ending; never a path.
+    pub name: String,
+    /// SHA-256 of the file, 64 hexadecimal digits.
+    pub hash: String,
+    /// What the file says.
+    pub sheet: Sheet,
+    /// Every metric that a file of the user's names, and where. A built-in style may name metrics that a catalog has not.
+    named: Vec<(String, Place)>,
+    is_built_in: bool,
+}
+
+/// What a style file says, with all that it includes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sheet {
+    /// The models in the order of their rows; others come after them, by name.
+    pub row_order: Vec<String>,
+    /// What stands where a value is undefined.
+    pub undefined: String,
+    /// The sentence that explains emphasis, under tables where something is emphasised.
+    pub emphasis_note: String,
+    /// How cells print in every table, unless the table says otherwise.
+    pub print: PrintSheet,
+    /// Headers and arrows, by metric.
+    pub column: IndexMap<String, ColumnSheet>,
+    /// The tables by name; a name becomes a file name. `main` must be one of them.
+    pub table: IndexMap<String, TableSheet>,
+}
+
+/// One table of a style file.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TableSheet {
+    /// The first words of the caption, without a full stop.
+    pub title: String,
+    /// The sentences after them.
+    pub note: String,
+    /// The LaTeX label; none if absent.
+    pub label: Option<String>,
+    /// The metrics, in the order of the columns. Those that the scores have not are left out.
+    pub columns: Vec<String>,
+    /// What prints otherwise than in the other tables.
+    pub print: PrintSheet,
+    /// The metrics whose undefined cells print as zero and compete as zero (a quirk of the published main table).
+    pub undefined_as_zero: Vec<String>,
+}
+
+/// How a metric's column is headed.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnSheet {
+    /// The header as LaTeX; the escaped name if absent.
+    pub latex: Option<String>,
+    /// The direction to print and emphasise by; the definition's own if absent.
+    pub better: Option<Better>,
+}
+
+/// How cells print; what is absent is as one level up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PrintSheet {
+    /// What a cell shows.
+    pub cell: Option<CellForm>,
+    /// How its numbers are rounded.
+    pub rounding: Option<Rounding>,
+    /// Digits behind the point.
+    pub decimals: Option<Decimals>,
+    /// Which cells stand out.
+    pub emphasis: Option<EmphasisRule>,
+    /// The standard error of a single value, where the sample form has none.
+    pub single_se: Option<SingleSe>,
+    /// Cells with fewer defined episodes than this are marked with a dagger.
+    pub mark_n_below: Option<u64>,
+}
+
+/// How cells print, every question answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each field is that of `PrintSheet`")]
+pub struct Print {
+    pub cell: CellForm,
+    pub rounding: Rounding,
+    pub decimals: Decimals,
+    pub emphasis: EmphasisRule,
+    pub single_se: SingleSe,
+    pub mark_n_below: u64,
+}
+
+/// What a cell shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CellForm {
+    /// `0.57 ± 0.11`.
+    MeanSe,
+    /// `12/21 [.37, .76]` for a rate, `47.7 [30.7, 64.7]` for a quantity.
+    CountInterval,
+}
+
+/// How numbers are rounded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Rounding {
+    /// The exact value once, ties to even.
+    Once,
+    /// The binary float once, ties to even, as C and Python print it.
+    OnceBinary,
+    /// The binary float to one digit more, then that text with halves away from zero.
+    Twice,
+}
+
+/// Digits behind the point, at most nine.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Decimals {
+    /// Of a rate.
+    #[schemars(range(max = 9))]
+    pub rate: u32,
+    /// Of anything else.
+    #[schemars(range(max = 9))]
+    pub quantity: u32,
+}
+
+/// Which cells of a column stand out within their group. Only models compete: where rows are anything else,
+/// nothing is emphasised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum EmphasisRule {
+    /// Nothing.
+    None,
+    /// The best exact mean is bold, the next underlined, with all that tie; nothing where all tie.
+    ExactMean,
+    /// The same by the means as printed; where all tie, all are bold.
+    PrintedMean,
+}
+
+/// The standard error of a single value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SingleSe {
+    /// Not printed.
+    Undefined,
+    /// Printed as zero.
+    Zero,
+}
+
+/// Why a style cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum StyleError {
+    #[error("no style `{name}`: expected `default`, `paper` or the path of a style file{hint}")]
+    Unknown { name: String, hint: String },
+    #[error("style {}: cannot read the file: {source}", path.display())]
+    Unreadable { path: PathBuf, source: io::Error },
+    #[error(transparent)]
+    Faults(#[from] Faults),
+}
+
+/// The names of the built-in styles.
+pub fn built_in_names() -> [&'static str; 2] {
+    BUILT_IN.map(|(name, _)| name)
+}
+
+/// The text of a built-in style.
+pub fn built_in(name: &str) -> Option<&'static str> {
+    BUILT_IN.into_iter().find(|(known, _)| *known == name).map(|(_, text)| text)
+}
+
+fn default_undefined() -> String {
+    "--".to_owned()
+}
+
+impl Style {
+    /// The built-in style of that name, or else the style in that file.
+    pub fn load(name_or_path: impl AsRef<Path>) -> Result<Self, StyleError> {
+        let path = name_or_path.as_ref();
+        let is_built_in = BUILT_IN.into_iter().any(|(name, _)| path == Path::new(name));
+        let name = path.file_stem().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let read::Read { sheet, named, hash } = read::read(path)?;
+        Ok(Self { name, hash, sheet, named, is_built_in })
+    }
+
+    /// That the style names only metrics that the definitions have. A built-in style may name others.
+    pub fn check_against(&self, catalog: &Catalog) -> Result<(), StyleError> {
+        let strange = self.named.iter().filter(|(metric, _)| !catalog.metric.contains_key(metric));
+        let fault = |(metric, place): &(String, Place)| {
+            let near = nearest(metric, catalog.metric.keys().map(String::as_str));
+            let known = || catalog.metric.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+            let help =
+                near.map_or_else(|| format!("metrics are {}", known()), |near| format!("did you mean `{near}`?"));
+            let message = format!("the definitions `{}` have no metric `{metric}`", catalog.name);
+            Fault::new(place.clone(), message).help(help)
+        };
+        let faults: Vec<Fault> = strange.map(fault).collect();
+        if faults.is_empty() { Ok(()) } else { Err(Faults(faults).in_order().into()) }
+    }
+
+    /// Whether the style came with the program.
+    pub fn is_built_in(&self) -> bool {
+        self.is_built_in
+    }
+}
+
+impl Sheet {
+    /// How the cells of `table` print.
+    pub fn print_of(&self, table: &TableSheet) -> Print {
+        let (own, all) = (&table.print, &self.print);
+        Print {
+            cell: own.cell.or(all.cell).unwrap_or(CellForm::CountInterval),
+            rounding: own.rounding.or(all.rounding).unwrap_or(Rounding::Once),
+            decimals: own.decimals.or(all.decimals).unwrap_or(Decimals { rate: 2, quantity: 1 }),
+            emphasis: own.emphasis.or(all.emphasis).unwrap_or(EmphasisRule::ExactMean),
+            single_se: own.single_se.or(all.single_se).unwrap_or(SingleSe::Undefined),
+            mark_n_below: own.mark_n_below.or(all.mark_n_below).unwrap_or(0),
+        }
+    }
+
+    /// The direction of a metric's column.
+    pub fn better(&self, metric: &str, catalog: &Catalog) -> Better {
+        let own = self.column.get(metric).and_then(|column| column.better);
+        own.or_else(|| catalog.metric.get(metric).map(|m| m.better)).unwrap_or(Better::Neither)
+    }
+}
+
+impl Decimals {
+    /// Digits behind the point of a metric of that kind.
+    pub fn of(self, kind: Kind) -> u32 {
+        match kind {
+            Kind::Rate => self.rate,
+            Kind::Quantity => self.quantity,
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! Moments to what a cell shows, under a style's rules.
+
+use crate::cells::Cell;
+use crate::style::{CellForm, Print, Rounding, SingleSe};
+use crate::table::{Spread, Value};
+use exact::moments::Moments;
+use exact::number::Decimal;
+use metric::catalog::{Kind, Metric, PPM, StandardError};
+use statistics::interval::Interval;
+
+const MILLION: i128 = 1_000_000;
+
+/// What a cell shows in a row of `episodes` episodes.
+pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {
+    let Cell { moments, metric, interval, .. } = *cell;
+    let (whole, places) = scale(metric, print);
+    let Some(mean) = mean(moments, print.rounding, whole, places) else { return Value::Undefined };
+    let spread = || spread(interval, print.rounding, (whole, places));
+    match (print.cell, metric.kind) {
+        (CellForm::MeanSe, _) => Value::MeanSe { mean, se: standard_error(moments, metric.se, print, (whole, places)) },
+        (CellForm::CountInterval, Kind::Rate) => {
+            Value::Count { count: moments.sum, n: moments.n, mean, spread: spread() }
+        }
+        (CellForm::CountInterval, Kind::Quantity) => {
+            let spread = if moments.n > 1 && !moments.has_spread() { Spread::AllEqual } else { spread() };
+            Value::Mean { mean, spread, n: (moments.n != episodes || spread == Spread::Unknown).then_some(moments.n) }
+        }
+    }
+}
+
+/// What an undefined cell shows where a style has it print as zero.
+pub fn zero(metric: &Metric, print: &Print) -> Value {
+    let zero = Decimal::zero(scale(metric, print).1);
+    Value::MeanSe { mean: zero, se: Some(zero) }
+}
+
+/// What a value of one is, and the decimals: shares in parts per million are shown as rates are.
+fn scale(metric: &Metric, print: &Print) -> (i128, u32) {
+    if metric.unit == PPM { (MILLION, print.decimals.of(Kind::Rate)) } else { (1, print.decimals.of(metric.kind)) }
+}
+
+/// One of the two scales, which are small.
+#[expect(clippy::cast_precision_loss, reason = "a million is exact")]
+const fn float_of(whole: i128) -> f64 {
+    whole as f64
+}
+
+fn mean(moments: &Moments, rounding: Rounding, whole: i128, places: u32) -> Option<Decimal> {
+    match rounding {
+        Rounding::Once => Decimal::of_ratio(moments.sum, i128::from(moments.n).checked_mul(whole)?, places),
+        Rounding::OnceBinary | Rounding::Twice => float(moments.mean()? / float_of(whole), rounding, places),
+    }
+}
+
+fn standard_error(moments: &Moments, form: StandardError, print: &Print, scale: (i128, u32)) -> Option<Decimal> {
+    let (whole, places) = scale;
+    if moments.n == 1 {
+        return match (print.single_se, form) {
+            (SingleSe::Zero, _) | (_, StandardError::Population) => Some(Decimal::zero(places)),
+            (SingleSe::Undefined, StandardError::Sample) => None,
+        };
+    }
+    match print.rounding {
+        Rounding::Once => {
+            let (above, below) = moments.se_squared(form)?;
+            Decimal::of_root(above, below.checked_mul(whole * whole)?, places)
+        }
+        Rounding::OnceBinary | Rounding::Twice => float(moments.se(form)? / float_of(whole), print.rounding, places),
+    }
+}
+
+fn float(value: f64, rounding: Rounding, places: u32) -> Option<Decimal> {
+    match rounding {
+        Rounding::Once | Rounding::OnceBinary => Decimal::of_float(value, places),
+        Rounding::Twice => Decimal::of_float_twice(value, places),
+    }
+}
+
+fn spread(interval: Option<Interval>, rounding: Rounding, (whole, places): (i128, u32)) -> Spread {
+    let bound = |value: f64| float(value / float_of(whole), rounding, places);
+    let bounds = interval.and_then(|interval| Some((bound(interval.low)?, bound(interval.high)?)));
+    bounds.map_or(Spread::Unknown, |(low, high)| Spread::Interval { low, high })
+}

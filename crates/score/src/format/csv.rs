@@ -1,0 +1,143 @@
+//! The episode table as comma-separated values.
+
+use std::io::{Read, Write};
+
+use super::FormatError;
+use crate::builder::TableBuilder;
+use crate::table::{EpisodeTable, Header, KeyRef};
+use exact::budget::Limit;
+use metric::catalog::Catalog;
+
+pub(super) use crate::columns::KEYS;
+
+/// Writes a table as comma-separated values.
+pub(super) fn write(table: &EpisodeTable, out: impl Write) -> Result<(), FormatError> {
+    let mut writer = csv::Writer::from_writer(out);
+    let header = table.header();
+    let columns = header.labels.iter().chain(&header.metrics).map(String::as_str);
+    writer.write_record(KEYS.into_iter().chain(columns)).map_err(io)?;
+    for (row, key) in table.keys.iter().enumerate() {
+        for text in [key.episode_id, key.model, key.experiment] {
+            writer.write_field(text).map_err(io)?;
+        }
+        for number in [key.seed, key.run] {
+            writer.write_field(number.to_string()).map_err(io)?;
+        }
+        for label in &table.labels {
+            writer.write_field(label.values.get(row).unwrap_or_default()).map_err(io)?;
+        }
+        for metric in &table.metrics {
+            writer.write_field(metric.get(row).map_or_else(String::new, |value| value.to_string())).map_err(io)?;
+        }
+        writer.write_record(None::<&[u8]>).map_err(io)?;
+    }
+    Ok(writer.flush()?)
+}
+
+/// The system's own error: `csv` wraps it in another of a kind that says nothing, such as whether a pipe is closed.
+fn io(error: csv::Error) -> FormatError {
+    FormatError::Io(match error.into_kind() {
+        csv::ErrorKind::Io(error) => error,
+        other => std::io::Error::other(format!("{other:?}")),
+    })
+}
+
+pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
+    let mut reader = csv::Reader::from_reader(input);
+    let header: Vec<String> = reader.headers().map_err(|error| line_fault(&error))?.iter().map(str::to_owned).collect();
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|error| line_fault(&error))?;
+        rows.push(record.iter().map(|cell| Some(cell.to_owned())).collect());
+    }
+    // The header is line 1; quoted line breaks aside, row i is line i + 2.
+    assemble(catalog, &header, rows, 2)
+}
+
+fn line_fault(error: &csv::Error) -> FormatError {
+    let line = error.position().map_or(1, |position| usize::try_from(position.line()).unwrap_or(usize::MAX));
+    FormatError::Line { line, reason: error.to_string() }
+}
+
+const MOST_COLUMNS: Limit = Limit::new("columns in a file of scores", 2000);
+
+/// A table out of rows of cells; `None` and empty cells are nulls.
+pub(super) fn assemble(
+    catalog: &Catalog,
+    header: &[String],
+    rows: Vec<Vec<Option<String>>>,
+    first_line: usize,
+) -> Result<EpisodeTable, FormatError> {
+    MOST_COLUMNS.check(header.len() as u64).map_err(std::io::Error::from)?;
+    let names: Vec<&str> = header.iter().map(String::as_str).collect();
+    check_unique(&names)?;
+    let mut positions = [0; 5];
+    for (position, name) in positions.iter_mut().zip(KEYS) {
+        *position = header.iter().position(|column| column == name).ok_or_else(|| FormatError::Column {
+            column: name.to_owned(),
+            expected: "a key column of scores",
+            found: if header.is_empty() {
+                "no column".to_owned()
+            } else {
+                format!("the columns {}", header.join(", "))
+            },
+        })?;
+    }
+    let is_metric = |name: &&String| catalog.metric.contains_key(*name);
+    let metric_names: Vec<&String> = header.iter().filter(is_metric).collect();
+    let label_names: Vec<&String> =
+        header.iter().filter(|name| !is_metric(name) && !KEYS.contains(&name.as_str())).collect();
+    let column = |name: &String| header.iter().position(|column| column == name).unwrap_or_default();
+    let header = Header {
+        catalog: catalog.clone(),
+        labels: label_names.iter().map(|name| (*name).clone()).collect(),
+        metrics: metric_names.iter().map(|name| (*name).clone()).collect(),
+    };
+    let mut builder = TableBuilder::new(header);
+    for (at, row) in rows.into_iter().enumerate() {
+        let line = first_line + at;
+        let cell = |position: usize| row.get(position)?.as_deref().filter(|cell| !cell.is_empty());
+        let [episode_id, model, experiment, seed, run] = positions;
+        let key = KeyRef {
+            experiment: required(cell(experiment), line, "experiment")?,
+            model: required(cell(model), line, "model")?,
+            seed: integer(required(cell(seed), line, "seed")?, line, "seed")?,
+            run: integer(required(cell(run), line, "run")?, line, "run")?,
+            episode_id: required(cell(episode_id), line, "episode_id")?,
+        };
+        let value = |name: &&String| cell(column(name)).map(|text| integer(text, line, name)).transpose();
+        let metrics: Vec<Option<i64>> = metric_names.iter().map(value).collect::<Result<_, _>>()?;
+        builder.push(key, label_names.iter().map(|name| cell(column(name))), metrics);
+    }
+    Ok(builder.finish())
+}
+
+/// Each column has a name of its own.
+pub(super) fn check_unique(names: &[&str]) -> Result<(), FormatError> {
+    match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
+        None => Ok(()),
+        Some((_, name)) => Err(FormatError::Column {
+            column: (*name).to_owned(),
+            expected: "one column of that name",
+            found: "more than one".to_owned(),
+        }),
+    }
+}
+
+fn required<'a>(cell: Option<&'a str>, line: usize, column: &str) -> Result<&'a str, FormatError> {
+    cell.ok_or_else(|| FormatError::Value {
+        line,
+        column: column.to_owned(),
+        expected: "a value",
+        found: String::new(),
+    })
+}
+
+fn integer<T: std::str::FromStr>(text: &str, line: usize, column: &str) -> Result<T, FormatError> {
+    text.parse().map_err(|_| FormatError::Value {
+        line,
+        column: column.to_owned(),
+        expected: "an integer",
+        found: text.to_owned(),
+    })
+}

@@ -1,0 +1,188 @@
+//! The episode table as bytes and back: Parquet, CSV, JSON lines.
+//!
+//! Columns are `episode_id, model, experiment, seed, run`, then the labels, then the metrics by name;
+//! rates are 0 and 1; undefined is null or empty. Parquet carries the definitions in its footer; the
+//! two text formats cannot, nor can the SQL lowering run by hand on another engine, so whoever reads those back names
+//! the definitions.
+
+mod csv;
+mod footer;
+mod jsonl;
+pub mod parquet;
+mod partition;
+
+use std::collections::HashSet;
+use std::io::{self, Read, Write};
+
+use ::parquet::errors::ParquetError;
+
+use super::table::EpisodeTable;
+use metric::catalog::{Catalog, Kind};
+use trace::TableFile;
+
+pub use self::parquet::{
+    DECLARED_KEY, DEFINITIONS_KEY, HASH_KEY, KIND_KEY, SCORES_KIND, holds_definitions, holds_scores,
+};
+pub use self::partition::Partition;
+
+/// A format of episode tables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Columnar, with the definitions in its footer.
+    Parquet,
+    /// Comma-separated, with a header.
+    Csv,
+    /// A JSON object a line.
+    JsonLines,
+}
+
+impl Format {
+    /// The format that a file name's ending asks for.
+    pub fn of_name(name: &str) -> Result<Self, FormatError> {
+        match name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase()).as_deref() {
+            Some("parquet") => Ok(Self::Parquet),
+            Some("csv") => Ok(Self::Csv),
+            Some("jsonl" | "ndjson") => Ok(Self::JsonLines),
+            _ => Err(FormatError::Ending(name.to_owned())),
+        }
+    }
+}
+
+/// What keeps an episode table from being written or read.
+#[derive(Debug, thiserror::Error)]
+pub enum FormatError {
+    /// A file name that asks for no known format.
+    #[error("`{0}`: expected a name that ends in .parquet, .csv or .jsonl")]
+    Ending(String),
+    /// Bytes could not be written or read.
+    #[error("cannot write or read the scores")]
+    Io(#[from] std::io::Error),
+    /// The Parquet library's own words.
+    #[error("not a readable Parquet file of scores: {0}")]
+    Parquet(#[from] ::parquet::errors::ParquetError),
+    /// Bytes that contradict the file's own checksums.
+    #[error("the file is damaged: {0}; restore it from its source, or score the traces again")]
+    Damaged(String),
+    /// A column that is missing or has another type.
+    #[error("column `{column}`: expected {expected}, found {found}; scores are written by `mirrorstats score`")]
+    Column {
+        /// Its name.
+        column: String,
+        /// What it must be.
+        expected: &'static str,
+        /// What it is.
+        found: String,
+    },
+    /// A value that is not what its column holds.
+    #[error("line {line}, column `{column}`: expected {expected}, found `{found}`")]
+    Value {
+        /// 1-based.
+        line: usize,
+        /// Its name.
+        column: String,
+        /// What it must be.
+        expected: &'static str,
+        /// What it is.
+        found: String,
+    },
+    /// An episode that no scoring can have given.
+    #[error("episode `{episode}`, column `{column}`: expected {expected}, found {found}; score the traces again")]
+    Episode {
+        /// Its id.
+        episode: String,
+        /// The column.
+        column: String,
+        /// What it must hold.
+        expected: String,
+        /// What it holds.
+        found: String,
+    },
+    /// A line that is no CSV or JSON.
+    #[error("line {line}: {reason}")]
+    Line {
+        /// 1-based.
+        line: usize,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// What the footer says of the recording.
+    #[error("`{DECLARED_KEY}` in the footer is not readable: {0}; score the traces again")]
+    Declared(String),
+    /// The definitions in the footer.
+    #[error("the definitions in the footer are not readable: {0}")]
+    Definitions(String),
+}
+
+impl FormatError {
+    /// What the system said, if it is what failed: mostly for want of space or of a reader.
+    pub fn into_io(self) -> Result<io::Error, Self> {
+        match self {
+            Self::Io(error) => Ok(error),
+            Self::Parquet(ParquetError::External(error)) => match error.downcast::<io::Error>() {
+                Ok(error) => Ok(*error),
+                Err(error) => Err(Self::Parquet(ParquetError::External(error))),
+            },
+            other => Err(other),
+        }
+    }
+}
+
+/// Writes a table.
+///
+/// Parquet can be encoded by several threads: see [`parquet::Encoder`].
+pub fn write(table: &EpisodeTable, format: Format, out: impl Write + Send) -> Result<(), FormatError> {
+    match format {
+        Format::Parquet => {
+            let (encoder, mut writer) = parquet::encoder(table, out)?;
+            encoder.jobs().try_for_each(|job| writer.append(encoder.encode(job)?))?;
+            writer.finish()
+        }
+        Format::Csv => csv::write(table, out),
+        Format::JsonLines => jsonl::write(table, out),
+    }
+}
+
+/// Reads a table of one of the text formats; `catalog` tells which columns are metrics.
+pub fn read_text(format: Format, catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, FormatError> {
+    let mut table = match format {
+        Format::JsonLines => jsonl::read(catalog, input)?,
+        Format::Csv | Format::Parquet => csv::read(catalog, input)?,
+    };
+    table.declared.from_text = true;
+    checked(table)
+}
+
+/// Reads a table and the definitions that it carries, or those of its partition.
+pub fn read_parquet(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
+    checked(parquet::read(input, partition)?)
+}
+
+/// A table as scoring gives it: each episode once, of a known experiment, rates 0 and 1.
+fn checked(table: EpisodeTable) -> Result<EpisodeTable, FormatError> {
+    let fault = |row: usize, column: &str, expected: &str, found: &str| FormatError::Episode {
+        episode: table.keys.get(row).episode_id.to_owned(),
+        column: column.to_owned(),
+        expected: expected.to_owned(),
+        found: found.to_owned(),
+    };
+    let experiments = &table.catalog.experiment;
+    let mut seen = HashSet::new();
+    for (row, key) in table.keys.iter().enumerate() {
+        if !seen.insert(key.episode_id) {
+            return Err(fault(row, "episode_id", "each episode once", "a second row of it"));
+        }
+        if !table.catalog.open && !experiments.contains_key(key.experiment) {
+            let known = experiments.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
+            return Err(fault(row, "experiment", &format!("one of {known}"), &format!("`{}`", key.experiment)));
+        }
+    }
+    for metric in &table.metrics {
+        let is_rate = table.catalog.metric.get(&metric.name).is_some_and(|known| known.kind == Kind::Rate);
+        let strange = |value: Option<i64>| is_rate && !matches!(value, None | Some(0 | 1));
+        if let Some(row) = metric.iter().position(strange) {
+            let found = metric.get(row).map_or_else(String::new, |value| value.to_string());
+            return Err(fault(row, &metric.name, "0 or 1, or nothing where it is undefined", &found));
+        }
+    }
+    Ok(table)
+}

@@ -1,0 +1,358 @@
+//! The physical plan: which kernel computes what, in which order.
+//!
+//! The logical plan ([`metric::plan::Plan`]) says what the definitions mean. This one fixes every choice before
+//! the first batch: which conditions are windows of timesteps, which lookups compute from the values that they look up,
+//! where a constant is written out, and which texts are compared as keys. Equal steps are one step, also across several
+//! logical plans. Evaluation ([`super::evaluate`]) runs the steps from the first to the last and decides nothing.
+
+mod lower;
+mod print;
+mod window;
+
+use std::collections::HashMap;
+
+use regex::Regex;
+
+use metric::catalog::Kind;
+use metric::columns::Type;
+use metric::plan::{Aggregate, Arithmetic, Comparison, Constant, NodeId, Plan};
+
+/// The position of a step in its physical plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct StepId(pub(super) usize);
+
+impl StepId {
+    pub(super) const fn index(self) -> usize {
+        self.0
+    }
+}
+
+/// How many values a step gives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Shape {
+    /// One value that stands for all.
+    One,
+    /// One value per episode.
+    Episodes,
+    /// One value per timestep.
+    Timesteps,
+}
+
+/// One kernel and its operands, which are earlier steps.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Step {
+    /// What computes the values.
+    pub kernel: Kernel,
+    /// Their type.
+    pub ty: Type,
+    /// How many there are.
+    pub shape: Shape,
+}
+
+/// The kernels. Unless said otherwise a null operand gives null, and operands have the shape of the result or
+/// [`Shape::One`]. Texts are symbols (integers that stand for texts), except where a kernel takes keys.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum Kernel {
+    /// A column of the batch; a column of text gives keys into its dictionary.
+    Column(String),
+    /// A constant.
+    Constant(Constant),
+    /// The timestep of each row.
+    Times,
+    /// The length of each episode.
+    Lengths,
+    /// A constant, written out.
+    Repeat(StepId),
+    /// A value per episode, repeated for each of its timesteps.
+    Spread(StepId),
+    /// The symbols of keys.
+    Symbols(StepId),
+    /// Negation.
+    Not(StepId),
+    /// Kleene's conjunction; no operand is a constant.
+    And(StepId, StepId),
+    /// Kleene's disjunction; no operand is a constant.
+    Or(StepId, StepId),
+    /// A comparison by value, of symbols for equality alone.
+    Compare(Comparison, StepId, StepId),
+    /// A comparison of symbols by the order of their texts.
+    CompareTexts(Comparison, StepId, StepId),
+    /// Whether keys stand for a constant text, or whether they do not.
+    KeysEqualText {
+        /// The keys.
+        keys: StepId,
+        /// The constant.
+        text: StepId,
+        /// False for "do not".
+        equal: bool,
+    },
+    /// Whether the keys of each timestep stand for the text of their episode, or whether they do not.
+    KeysEqualEpisode {
+        /// The keys, per timestep.
+        keys: StepId,
+        /// The symbols, per episode.
+        texts: StepId,
+        /// False for "do not".
+        equal: bool,
+    },
+    /// Whether the timestep compares with a moment of its episode; timesteps are not written out.
+    Window(Comparison, StepId),
+    /// Whether two values differ, null being a value like others; never null.
+    Distinct(StepId, StepId),
+    /// Whether there is no value; never null. Takes keys.
+    IsNull(StepId),
+    /// Whether a truth value is true; never null.
+    IsTrue(StepId),
+    /// Whether a truth value is false; never null.
+    IsFalse(StepId),
+    /// Sum, difference or product; an error beyond 64 bits.
+    Arithmetic(Arithmetic, StepId, StepId),
+    /// Quotient or remainder of two integers, null where the divisor is 0; no operand is a constant.
+    Divide(Arithmetic, StepId, StepId),
+    /// The value with the other sign.
+    Negate(StepId),
+    /// The value after the first condition that is true, else the last one. Values of branches may be constants.
+    Case {
+        /// Conditions and values, in order.
+        branches: Vec<(StepId, StepId)>,
+        /// The value where no condition is true.
+        otherwise: StepId,
+    },
+    /// The first value that is not null; no operand is a constant.
+    Coalesce(Vec<StepId>),
+    /// Whether the text of a key contains a match of a pattern.
+    KeysMatch(StepId, String),
+    /// Whether the text of a symbol contains a match of a pattern.
+    SymbolsMatch(StepId, String),
+    /// 1 for true, 0 for false.
+    IntFromBool(StepId),
+    /// The same number as a float.
+    FloatFromInt(StepId),
+    /// The rows of each episode that lie in all these windows, comparisons of the timestep with moments; none where a
+    /// moment is null. Gives ranges of rows, no values.
+    Within(Vec<(Comparison, StepId)>),
+    /// `first`, `last`, `any` or `count` of a condition, over all rows or over those of a `Within`.
+    Search {
+        /// One of the four.
+        aggregate: Aggregate,
+        /// The condition, per timestep.
+        condition: StepId,
+        /// A [`Kernel::Within`].
+        within: Option<StepId>,
+    },
+    /// `all`, `min`, `max` or `sum` of a value per timestep.
+    Fold(Aggregate, StepId),
+    /// The value at a timestep of each episode; null where there is no such timestep. Takes values or keys.
+    At {
+        /// The values, per timestep.
+        values: StepId,
+        /// The timesteps, per episode.
+        moments: StepId,
+    },
+    /// The value at the timestep before, null at the first one; not a constant. Takes values.
+    Lag(StepId),
+    /// Values per episode, null where the episode has no such timestep.
+    NullWhereAbsent {
+        /// The values, per episode.
+        values: StepId,
+        /// The timesteps, per episode.
+        moments: StepId,
+    },
+}
+
+impl Kernel {
+    /// The steps that this one reads.
+    pub fn operands(&self) -> Vec<StepId> {
+        match self {
+            Self::Column(_) | Self::Constant(_) | Self::Times | Self::Lengths => vec![],
+            Self::Repeat(x)
+            | Self::Spread(x)
+            | Self::Symbols(x)
+            | Self::Not(x)
+            | Self::Window(_, x)
+            | Self::IsNull(x)
+            | Self::IsTrue(x)
+            | Self::IsFalse(x)
+            | Self::Negate(x)
+            | Self::KeysMatch(x, _)
+            | Self::SymbolsMatch(x, _)
+            | Self::IntFromBool(x)
+            | Self::FloatFromInt(x)
+            | Self::Fold(_, x)
+            | Self::Lag(x) => vec![*x],
+            Self::And(x, y)
+            | Self::Or(x, y)
+            | Self::Compare(_, x, y)
+            | Self::CompareTexts(_, x, y)
+            | Self::KeysEqualText { keys: x, text: y, .. }
+            | Self::KeysEqualEpisode { keys: x, texts: y, .. }
+            | Self::Distinct(x, y)
+            | Self::Arithmetic(_, x, y)
+            | Self::Divide(_, x, y)
+            | Self::At { values: x, moments: y }
+            | Self::NullWhereAbsent { values: x, moments: y } => vec![*x, *y],
+            Self::Case { branches, otherwise } => {
+                branches.iter().flat_map(|(when, then)| [*when, *then]).chain([*otherwise]).collect()
+            }
+            Self::Coalesce(values) => values.clone(),
+            Self::Within(windows) => windows.iter().map(|(_, moments)| *moments).collect(),
+            Self::Search { condition, within, .. } => std::iter::once(*condition).chain(*within).collect(),
+        }
+    }
+}
+
+/// A metric and the step that computes it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Metric {
+    /// Its name.
+    pub name: String,
+    /// A rate or a quantity.
+    pub kind: Kind,
+    /// Its values: truth values or integers, per episode.
+    pub step: StepId,
+}
+
+/// What one set of definitions asks of the plan.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Scores {
+    /// The metrics, in the order of the definitions.
+    pub metrics: Vec<Metric>,
+    /// Which episodes count, a truth value per episode; all if absent.
+    pub filter: Option<StepId>,
+}
+
+/// The steps that compute everything that was asked for, operands before their users.
+#[derive(Clone, Debug, Default)]
+pub struct PhysicalPlan {
+    steps: Vec<Step>,
+    known: HashMap<Step, StepId>,
+    /// The compiled pattern of each step that matches one.
+    patterns: HashMap<StepId, Regex>,
+    /// The first metric that needs each step, for messages.
+    metrics: HashMap<StepId, String>,
+    scores: Vec<Scores>,
+}
+
+impl PhysicalPlan {
+    /// The metrics and filters of some definitions, in their order, in one plan.
+    pub fn of(plans: &[&Plan]) -> Self {
+        let mut physical = Self::default();
+        for plan in plans {
+            physical.add_scores(plan);
+        }
+        physical
+    }
+
+    /// Adds the metrics and the filter of some definitions.
+    pub fn add_scores(&mut self, plan: &Plan) {
+        let mut lowering = lower::Lowering::new(self, plan);
+        let metrics = plan.outputs.iter().map(|output| Metric {
+            name: output.name.clone(),
+            kind: output.kind,
+            step: lowering.values(output.node),
+        });
+        let metrics = metrics.collect();
+        let filter = plan.filter.map(|node| lowering.values(node));
+        self.scores.push(Scores { metrics, filter });
+    }
+
+    /// Adds nodes of some definitions, each in its own shape; the step of each.
+    pub fn add_nodes(&mut self, plan: &Plan, nodes: impl IntoIterator<Item = NodeId>) -> Vec<StepId> {
+        let mut lowering = lower::Lowering::new(self, plan);
+        nodes.into_iter().map(|node| lowering.values(node)).collect()
+    }
+
+    /// What the definitions asked for, in the order in which they were added.
+    pub fn scores(&self) -> &[Scores] {
+        &self.scores
+    }
+
+    /// The steps, operands before their users.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    pub fn step(&self, id: StepId) -> &Step {
+        &self.steps[id.0]
+    }
+
+    /// The columns per timestep and the columns per episode that a batch must have.
+    pub fn columns(&self) -> (Vec<String>, Vec<String>) {
+        let (mut timesteps, mut episodes) = (Vec::new(), Vec::new());
+        for step in &self.steps {
+            if let Kernel::Column(name) = &step.kernel {
+                let columns = if step.shape == Shape::Timesteps { &mut timesteps } else { &mut episodes };
+                columns.push(name.clone());
+            }
+        }
+        (timesteps, episodes)
+    }
+
+    /// The compiled pattern of a step.
+    pub(super) fn pattern(&self, id: StepId) -> &Regex {
+        &self.patterns[&id]
+    }
+
+    /// The first metric that needs a step.
+    pub(super) fn metric_of(&self, step: StepId) -> Option<&str> {
+        self.metrics.get(&step).map(String::as_str)
+    }
+
+    /// The step that does this, new or known.
+    fn push(&mut self, kernel: Kernel, ty: Type, shape: Shape) -> StepId {
+        let step = Step { kernel, ty, shape };
+        if let Some(known) = self.known.get(&step) {
+            return *known;
+        }
+        let id = StepId(self.steps.len());
+        if let Kernel::KeysMatch(_, pattern) | Kernel::SymbolsMatch(_, pattern) = &step.kernel {
+            let pattern = Regex::new(pattern).expect("the binder has compiled this pattern");
+            self.patterns.insert(id, pattern);
+        }
+        self.known.insert(step.clone(), id);
+        self.steps.push(step);
+        id
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PhysicalPlan;
+    use crate::score_traces::schema_columns;
+    use metric::definitions::Definitions;
+
+    fn paper() -> Definitions {
+        Definitions::load("paper", &schema_columns()).unwrap()
+    }
+
+    #[test]
+    fn the_plan_of_the_papers_definitions() {
+        insta::assert_snapshot!(PhysicalPlan::of(&[&paper().plan]));
+    }
+
+    #[test]
+    fn definitions_share_the_steps_that_they_have_in_common() {
+        let paper = paper();
+        let filtered = paper.clone().filtered("--where", "seed = 1", &schema_columns()).unwrap();
+        let alone = PhysicalPlan::of(&[&paper.plan]);
+        let both = PhysicalPlan::of(&[&paper.plan, &filtered.plan]);
+        // The column and the comparison; the paper's definitions have the constant 1 already.
+        assert_eq!(both.steps().len(), alone.steps().len() + 2);
+        assert_eq!(both.scores()[0], alone.scores()[0]);
+        assert_eq!(both.scores()[1].metrics, alone.scores()[0].metrics);
+        assert!(both.scores()[1].filter.is_some());
+    }
+
+    #[test]
+    fn every_choice_is_in_the_plan() {
+        let text = r#"
+        [metric.M]
+        value = "count(mirror_visible and t < 3 and action <> 'done')"
+        [metric.N]
+        value = "coalesce(at(regexp_like(self_color, '^b') or selected_cube < body_color, M), false)"
+        "#;
+        let definitions = Definitions::from_toml("test", text, &schema_columns()).unwrap();
+        insta::assert_snapshot!(PhysicalPlan::of(&[&definitions.plan]));
+        insta::assert_snapshot!("logical", definitions.plan);
+    }
+}

@@ -1,0 +1,157 @@
+//! When an agent looked, claimed and decided: an episode as a line of time, for rasters of gaze.
+//!
+//! The moments are those of the definitions: the `let`s `visible` (a truth value per step), `sight`,
+//! `claim` and `done` (timesteps), and `answered` (whether the decision committed to a colour).
+
+use std::ops::RangeInclusive;
+
+use arrow::array::Array;
+
+use super::evaluate::Evaluated;
+use super::physical::{PhysicalPlan, StepId};
+use super::segments::{Segments, truths};
+use super::table::{EpisodeKey, EpisodeKeys};
+use metric::columns::{Level, Type};
+use metric::definitions::Definitions;
+use metric::plan::{NodeId, Plan};
+use trace::scan::EpisodeBatch;
+
+/// One episode along its time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Timeline {
+    /// The episode.
+    pub key: EpisodeKey,
+    /// The number of steps, T.
+    pub length: u32,
+    /// The runs of timesteps with mirror evidence in view, ascending, apart from each other.
+    pub visible: Vec<RangeInclusive<u32>>,
+    /// The first of them.
+    pub first_sight: Option<u32>,
+    /// The first commitment to a colour before the end.
+    pub claim: Option<u32>,
+    /// The first `done`.
+    pub decision: Option<u32>,
+    /// Whether the decision came with a commitment to a colour.
+    pub answered: bool,
+}
+
+/// What timelines are read from.
+struct Moments<T> {
+    visible: T,
+    sight: T,
+    claim: T,
+    done: T,
+    answered: T,
+}
+
+impl Moments<NodeId> {
+    /// `None` where the definitions do not name them all, with the types and levels they have in the paper's.
+    fn of(definitions: &Definitions) -> Option<Self> {
+        Some(Self {
+            visible: named(definitions, "visible", Type::Bool, Level::Step)?,
+            sight: named(definitions, "sight", Type::Int, Level::Episode)?,
+            claim: named(definitions, "claim", Type::Int, Level::Episode)?,
+            done: named(definitions, "done", Type::Int, Level::Episode)?,
+            answered: answered_node(definitions)?,
+        })
+    }
+
+    fn steps(&self, plan: &mut PhysicalPlan, logical: &Plan) -> Moments<StepId> {
+        let mut step = |node: NodeId| plan.add_nodes(logical, [node])[0];
+        Moments {
+            visible: step(self.visible),
+            sight: step(self.sight),
+            claim: step(self.claim),
+            done: step(self.done),
+            answered: step(self.answered),
+        }
+    }
+}
+
+/// The node of a `let` that has this type and level; `None` where the definitions have no such one.
+fn named(definitions: &Definitions, name: &str, ty: Type, level: Level) -> Option<NodeId> {
+    let plan = &definitions.plan;
+    let (_, node) = plan.lets.iter().find(|(known, _)| known == name)?;
+    (plan.node(*node).ty == ty && plan.node(*node).level == level).then_some(*node)
+}
+
+fn answered_node(definitions: &Definitions) -> Option<NodeId> {
+    named(definitions, "answered", Type::Bool, Level::Episode)
+}
+
+/// Reads timelines from the vectors of a plan.
+pub(super) struct TimelineReader {
+    moments: Moments<StepId>,
+    filter: Option<StepId>,
+}
+
+impl TimelineReader {
+    /// Adds what timelines are read from to a plan; `None` where the definitions do not name it.
+    pub(super) fn of(plan: &mut PhysicalPlan, definitions: &Definitions) -> Option<Self> {
+        let logical = &definitions.plan;
+        let moments = Moments::of(definitions)?.steps(plan, logical);
+        Some(Self { moments, filter: plan.add_nodes(logical, logical.filter).pop() })
+    }
+
+    /// The timelines of the episodes of a batch that the filter keeps.
+    pub(super) fn timelines(&self, values: &Evaluated, batch: &EpisodeBatch) -> Vec<Timeline> {
+        let keys = EpisodeKeys::of_batch(&batch.episodes);
+        let kept = self.filter.map(|step| truths(values.of(step).bools()));
+        let episodes = (0..keys.len()).filter(|episode| kept.as_ref().is_none_or(|kept| kept.value(*episode)));
+        let segments = Segments::new(&batch.offsets);
+        let timeline = |episode| self.moments.timeline(values, segments, episode, keys.get(episode).to_owned());
+        episodes.map(timeline).collect()
+    }
+}
+
+/// Timelines in the order of their keys.
+pub(super) fn in_key_order(mut timelines: Vec<Timeline>) -> Vec<Timeline> {
+    timelines.sort_by(|a, b| a.key.cmp(&b.key));
+    timelines
+}
+
+impl Moments<StepId> {
+    fn timeline(&self, values: &Evaluated, segments: Segments<'_>, episode: usize, key: EpisodeKey) -> Timeline {
+        let moment = |step: StepId| {
+            let ints = values.of(step).ints();
+            ints.is_valid(episode).then(|| as_step(ints.value(episode)))
+        };
+        Timeline {
+            key,
+            length: as_step(segments.length(episode)),
+            visible: runs(&segments.timesteps(episode, values.of(self.visible).bools())),
+            first_sight: moment(self.sight),
+            claim: moment(self.claim),
+            decision: moment(self.done),
+            answered: truths(values.of(self.answered).bools()).value(episode),
+        }
+    }
+}
+
+/// Timesteps as runs of neighbours.
+fn runs(timesteps: &[i64]) -> Vec<RangeInclusive<u32>> {
+    let mut runs: Vec<RangeInclusive<u32>> = Vec::new();
+    for t in timesteps.iter().map(|&t| as_step(t)) {
+        match runs.last_mut() {
+            Some(run) if run.end() + 1 == t => *run = *run.start()..=t,
+            _ => runs.push(t..=t),
+        }
+    }
+    runs
+}
+
+/// A timestep as the schema has it: 32 bits.
+fn as_step(t: i64) -> u32 {
+    u32::try_from(t).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::runs;
+
+    #[test]
+    fn neighbours_are_one_run() {
+        assert_eq!(runs(&[]), []);
+        assert_eq!(runs(&[1, 2, 3, 5, 9, 10]), [1..=3, 5..=5, 9..=10]);
+    }
+}

@@ -1,0 +1,93 @@
+//! Episodes lost to infrastructure: what they could have changed.
+//!
+//! Rule: a lost episode is neither a success nor a failure. It is counted apart, and the rate is given
+//! with the bounds between "all lost ones fail" and "all succeed" (Manski 1989).
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::interval::{Interval, wilson};
+
+/// The outcomes of a step's reply, as recorded, that are the infrastructure's doing and not the model's.
+pub const INFRASTRUCTURE: [&str; 3] = ["rate_limited", "server_error", "timeout"];
+
+/// A rate with some of its episodes lost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Lossy {
+    /// The episodes that count: not lost, and the metric defined.
+    pub n: u64,
+    /// The successes among them.
+    pub successes: u64,
+    /// The lost episodes.
+    pub lost: u64,
+    /// The rate if every lost episode were a 0, and if every one were a 1.
+    pub bounds: Interval,
+    /// The lower end of the score interval at the lower bound, the upper end at the upper bound.
+    pub interval: Interval,
+}
+
+/// The bounds of a rate from its values and which of them belong to lost episodes.
+///
+/// The value of a lost episode is not used, defined or not. `None` where there is nothing to count.
+#[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
+pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidence: f64) -> Option<Lossy> {
+    let (mut n, mut successes, mut lost) = (0, 0, 0);
+    for (value, fate) in episodes {
+        match (fate, value) {
+            (Fate::Lost, _) => lost += 1,
+            (Fate::Kept, Some(value)) => {
+                n += 1;
+                successes += u64::from(value == 1);
+            }
+            (Fate::Kept, None) => {}
+        }
+    }
+    let (worst, best) = (wilson(successes, n + lost, confidence)?, wilson(successes + lost, n + lost, confidence)?);
+    let all = (n + lost) as f64;
+    Some(Lossy {
+        n,
+        successes,
+        lost,
+        bounds: Interval { low: successes as f64 / all, high: (successes + lost) as f64 / all },
+        interval: Interval { low: worst.low, high: best.high },
+    })
+}
+
+/// Whether an episode counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// It ran as it should.
+    Kept,
+    /// The infrastructure ended it.
+    Lost,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Fate, bounds};
+    use crate::interval::{Interval, wilson};
+
+    #[test]
+    fn lost_episodes_widen_the_bounds_and_their_values_do_not_count() {
+        let kept = [Some(1), Some(1), Some(0), None].map(|value| (value, Fate::Kept));
+        let lost = [Some(1), None].map(|value| (value, Fate::Lost));
+        let found = bounds(kept.into_iter().chain(lost), 0.95).unwrap();
+        assert_eq!((found.n, found.successes, found.lost), (3, 2, 2));
+        assert_eq!((found.bounds.low, found.bounds.high), (2.0 / 5.0, 4.0 / 5.0));
+        let (worst, best) = (wilson(2, 5, 0.95).unwrap(), wilson(4, 5, 0.95).unwrap());
+        assert_eq!(found.interval, Interval { low: worst.low, high: best.high });
+    }
+
+    #[test]
+    fn without_losses_the_bounds_are_the_rate() {
+        let found = bounds([Some(1), Some(0)].map(|value| (value, Fate::Kept)), 0.95).unwrap();
+        assert_eq!((found.lost, found.bounds.low, found.bounds.high), (0, 0.5, 0.5));
+        assert_eq!(bounds([(None, Fate::Kept)], 0.95), None);
+    }
+
+    #[test]
+    fn everything_lost_says_nothing() {
+        let found = bounds([(Some(1), Fate::Lost)], 0.95).unwrap();
+        assert_eq!((found.bounds.low, found.bounds.high), (0.0, 1.0));
+    }
+}

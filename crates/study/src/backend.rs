@@ -1,0 +1,122 @@
+//! What computes the scores: the native kernels, or the SQL lowering on another engine. The results are the same.
+
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use super::error::StudyError;
+use super::{Question, Study};
+use engines::spark::source::{Sources, is_uri};
+use engines::spark::{self, Cluster, Job, SparkError, Written};
+use exact::replace::check_target;
+use metric::definitions::Definitions;
+use score::score_traces::check_label;
+use score::table::EpisodeTable;
+use trace::open::TraceSet;
+
+/// An engine.
+#[derive(Clone, Debug, Default)]
+pub enum Backend {
+    /// The program's own kernels.
+    #[default]
+    Native,
+    /// The SQL lowering on Polars, in this process; an error in a build without it.
+    Polars,
+    /// The SQL lowering on the user's own Spark.
+    Spark(Cluster),
+}
+
+/// What Spark is to compute, checked as far as it can be without Spark.
+#[derive(Debug)]
+pub struct SparkJob {
+    sources: Sources,
+    definitions: Definitions,
+    labels: Vec<String>,
+    cluster: Cluster,
+    /// The files of this machine that are read.
+    read: Vec<PathBuf>,
+}
+
+impl SparkJob {
+    /// Traces of this machine.
+    ///
+    /// # Errors
+    /// Files of scores; whatever is wrong with the definitions or the columns to group by.
+    pub fn of_study(study: &Study, cluster: Cluster) -> Result<Self, StudyError> {
+        let traces = study.source.traces()?;
+        let labels = study.question.labels_over(traces);
+        labels.iter().try_for_each(|label| check_label(traces, label))?;
+        let definitions = study.question.bind(traces)?;
+        let sources = Sources::files(&study.inputs, traces)
+            .map_err(|source| SparkError::System { what: "name the traces for Spark".to_owned(), source })?;
+        let read = study.files_read(None);
+        if let Some(log) = &cluster.log {
+            check_target(log, &read, "one that is read")?;
+        }
+        Ok(Self { sources, definitions, labels, cluster, read })
+    }
+
+    /// URIs that Spark alone can read.
+    ///
+    /// # Errors
+    /// Every fault of the definitions.
+    pub fn of_uris(uris: Vec<String>, question: &Question, cluster: Cluster) -> Result<Self, StudyError> {
+        let definitions = question.bind_to(&score::score_traces::unknown_columns())?;
+        let (sources, labels, read) = (Sources::Uris(uris), question.labels(), Vec::new());
+        Ok(Self { sources, definitions, labels, cluster, read })
+    }
+
+    /// The files of this machine that are read.
+    pub fn read(&self) -> &[PathBuf] {
+        &self.read
+    }
+
+    /// The scores, brought here.
+    ///
+    /// # Errors
+    /// Whatever Spark, its absence, or the traces give.
+    pub fn score(&self) -> Result<EpisodeTable, StudyError> {
+        Ok(spark::score(self.job(), &self.cluster)?)
+    }
+
+    /// The scores in a folder of Parquet that Spark writes.
+    ///
+    /// # Errors
+    /// Whatever Spark, its absence, or the traces give; a folder that exists.
+    pub fn write(&self, folder: &str) -> Result<Written, StudyError> {
+        Ok(spark::write(self.job(), &self.cluster, folder)?)
+    }
+
+    fn job(&self) -> Job<'_> {
+        Job { definitions: &self.definitions, labels: &self.labels, sources: &self.sources }
+    }
+}
+
+/// Whether arguments are URIs: all of them, or none.
+///
+/// # Errors
+/// Files of this machine and URIs at once.
+pub fn are_uris(arguments: &[OsString]) -> Result<bool, StudyError> {
+    match arguments.iter().filter(|argument| argument.to_str().is_some_and(is_uri)).count() {
+        0 => Ok(false),
+        all if all == arguments.len() => Ok(true),
+        _ => Err(StudyError::FilesAndUris),
+    }
+}
+
+/// The table out of the SQL lowering on Polars.
+#[cfg(feature = "polars")]
+pub(super) fn polars(
+    traces: &TraceSet,
+    question: &Question,
+    threads: NonZeroUsize,
+) -> Result<EpisodeTable, StudyError> {
+    let definitions = question.bind(traces)?;
+    Ok(engines::polars::score::score(traces, &definitions, &question.labels_over(traces), threads)?)
+}
+
+/// The refusal of a build without Polars.
+#[cfg(not(feature = "polars"))]
+pub(super) fn polars(_: &TraceSet, _: &Question, _: NonZeroUsize) -> Result<EpisodeTable, StudyError> {
+    Err(StudyError::WithoutPolars { what: "--engine polars" })
+}

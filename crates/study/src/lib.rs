@@ -1,0 +1,498 @@
+//! A study: inputs, definitions and a filter, opened once and scanned once; every answer is a function of it.
+//!
+//! ```text
+//! Study::open ──► definitions, filter, metrics, by ──► scan ──► episodes, timelines, losses, input hashes
+//!                                                              │
+//!                            score, cells, report, figures, statistics, diff, rescore, compare
+//! ```
+//!
+//! Rule: each input is opened once, and its content must stay the same until the answer is complete; a file that changes
+//! in between is an error. Nothing here knows a command line: text for people comes from errors and from `report`.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod backend;
+mod between;
+mod design;
+mod diff;
+mod empty_filter;
+mod error;
+mod experiment_findings;
+mod figure_inputs;
+mod input_hashes;
+mod inputs;
+mod losses;
+mod overview;
+mod own_definitions;
+mod pooled;
+mod provenance;
+mod report;
+mod rescore;
+mod results;
+mod scan;
+mod scores;
+mod sensitivity;
+mod size;
+pub mod verify;
+
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use ::report::bundle::BundleError;
+use ::report::cells::Cells;
+use ::report::cells::group::{CONDITION, DEFAULT_BY, KEY_COLUMNS, group};
+use ::report::comparison::{Comparison, choose, compare};
+use ::report::errata::Errata;
+use ::report::figures::{Figure, FigureName};
+pub use ::report::layout;
+use ::report::published;
+use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics};
+use ::report::style::Style;
+use ::report::table::Table;
+use exact::replace;
+use metric::columns::Columns;
+use metric::definitions::Definitions;
+use metric::file;
+use metric::names::is_about;
+use score::declared_experiments::declare;
+use score::evidence::{self, Evidence};
+use score::lost_counts::LostCounts;
+use score::score_traces;
+use score::table::EpisodeTable;
+use trace::checksums::stale_note;
+use trace::inputs::Input;
+use trace::open::TraceSet;
+use trace::steps::Steps;
+
+pub use backend::Backend;
+pub use backend::{SparkJob, are_uris};
+pub use diff::{Diff, DiffRequest, Side, diff};
+pub use error::StudyError;
+pub use experiment_findings::experiment_findings;
+pub use figure_inputs::{Drawings, FigureInputs};
+pub use inputs::{ScoreFile, Source, resolve};
+pub use losses::LostAs;
+pub use overview::{Overview, Part};
+pub use own_definitions::ScoredAlike;
+pub use provenance::ProvenanceError;
+pub use report::{Report, ReportOptions, WrittenReport};
+pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
+pub use results::{Outputs, Results};
+pub use scores::write as write_scores;
+pub use sensitivity::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds, ThresholdsError};
+
+use design::design_of;
+use inputs::Stamp;
+use losses::Counted;
+
+/// What scores say of each episode's recording, where the traces do.
+const STANDING_LABELS: [&str; 3] = [CONDITION, "scene", "fingerprint"];
+
+/// The definitions that are used where none are named.
+pub const DEFAULT_DEFINITIONS: &str = "paper";
+
+/// Inputs that are open, and the question that is put to them.
+#[derive(Debug)]
+pub struct Study {
+    inputs: Vec<Input>,
+    /// The state of each input before it was opened.
+    stamps: Vec<Stamp>,
+    source: Source,
+    question: Question,
+    backend: Backend,
+    threads: NonZeroUsize,
+}
+
+/// What is asked of the inputs.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Question {
+    /// Definitions by name or path; those that scores carry, or that the experiments of the traces name, if absent.
+    pub definitions: Option<PathBuf>,
+    /// Whether experiments that need different definitions are each scored by their own, beside each other; else refused.
+    pub each: bool,
+    /// These definitions, found in the traces.
+    pub parts: Vec<ScoredAlike>,
+    /// A condition on episodes in the language of definitions; all episodes if absent.
+    pub filter: Option<String>,
+    /// The metrics wanted, by name; all if absent.
+    pub metrics: Option<Vec<String>>,
+    /// The columns that cells are grouped by; experiment and model if absent, and the condition where there is more than the
+    /// default one.
+    pub by: Option<Vec<String>>,
+    /// Whether a cell may hold episodes that were recorded differently.
+    pub pool: bool,
+    /// What lost episodes count as.
+    pub lost: LostAs,
+}
+
+impl Question {
+    /// The definition file asked for, or the default one.
+    pub(crate) fn definitions_name(&self) -> &Path {
+        self.definitions.as_deref().unwrap_or(Path::new(DEFAULT_DEFINITIONS))
+    }
+
+    /// The columns among those to group by that a score does not have by itself.
+    pub(crate) fn labels(&self) -> Vec<String> {
+        self.by.iter().flatten().filter(|name| !KEY_COLUMNS.contains(&name.as_str())).cloned().collect()
+    }
+
+    /// The labels of scores of these traces: the columns to group by, and what the traces say of each episode's recording.
+    pub(crate) fn labels_over(&self, traces: &TraceSet) -> Vec<String> {
+        let mut labels = self.labels();
+        let standing = STANDING_LABELS.into_iter().filter(|name| traces.declares(name));
+        for name in standing {
+            if !labels.iter().any(|label| label == name) {
+                labels.push(name.to_owned());
+            }
+        }
+        labels
+    }
+
+    /// The columns that cells of these episodes are grouped by.
+    pub(crate) fn by_over(&self, episodes: &EpisodeTable) -> Vec<String> {
+        let default = || {
+            let condition = episodes.has_conditions().then_some(CONDITION);
+            DEFAULT_BY.into_iter().chain(condition).map(str::to_owned).collect()
+        };
+        self.by.clone().unwrap_or_else(default)
+    }
+
+    /// The definitions asked for, with every column that they read in every trace, and the experiments that these declare.
+    pub(crate) fn bind(&self, traces: &TraceSet) -> Result<Definitions, StudyError> {
+        let asked = self.clone().resolved(traces)?;
+        let mut definitions = asked.bind_to(&score_traces::trace_columns(traces))?;
+        score_traces::check_columns(traces, &definitions)?;
+        declare(&mut definitions.catalog, traces)?;
+        Ok(definitions)
+    }
+
+    /// The definitions asked for over some columns.
+    pub fn bind_to(&self, columns: &Columns) -> Result<Definitions, StudyError> {
+        let mut definitions = self.load(columns)?;
+        if let Some(filter) = &self.filter {
+            definitions = definitions.filtered("--where", filter, columns)?;
+        }
+        if let Some(metrics) = &self.metrics {
+            definitions.select(metrics)?;
+        }
+        Ok(definitions)
+    }
+}
+
+/// The experiments that some definitions know; any if `None`.
+///
+/// # Errors
+/// Every fault of the definitions.
+pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
+    let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
+    Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
+}
+
+impl Study {
+    /// Opens traces, files of scores or folders of either: paths, folders, globs.
+    ///
+    /// # Errors
+    /// An argument that names no file, the first fault of a footer, traces and scores mixed.
+    pub fn open<T: Into<OsString>>(arguments: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
+        let arguments: Vec<OsString> = arguments.into_iter().map(Into::into).collect();
+        Self::of(resolve(&arguments, std::io::empty())?)
+    }
+
+    /// Opens these files.
+    ///
+    /// # Errors
+    /// The first fault of a footer, traces and scores mixed, no file at all.
+    pub fn of(inputs: Vec<Input>) -> Result<Self, StudyError> {
+        let stamps = inputs.iter().map(Stamp::of).collect::<Result<_, _>>()?;
+        let source = Source::open(&inputs)?;
+        let threads = std::thread::available_parallelism().unwrap_or(NonZeroUsize::MIN);
+        let mut question = Question::default();
+        if let Source::Traces(traces) = &source {
+            // What keeps an answer from having definitions is told with the answer: others may be asked for first.
+            question = question.clone().resolved(traces).unwrap_or(question);
+        }
+        Ok(Self { inputs, stamps, source, question, backend: Backend::Native, threads })
+    }
+
+    /// Asks for these definitions: `paper`, `extended`, or the path of a TOML file.
+    ///
+    /// # Errors
+    /// A file that cannot be read; every fault in it.
+    pub fn definitions(mut self, name: impl Into<PathBuf>) -> Result<Self, StudyError> {
+        self.question.definitions = Some(name.into());
+        self.checked()
+    }
+
+    /// Keeps the episodes where a condition in the language of definitions holds, such as `seed = 1 and TSA = 1`.
+    ///
+    /// # Errors
+    /// Every fault of the condition.
+    pub fn filter(mut self, condition: &str) -> Result<Self, StudyError> {
+        self.question.filter = Some(condition.to_owned());
+        self.checked()
+    }
+
+    /// Computes these metrics alone.
+    ///
+    /// # Errors
+    /// A metric that the definitions do not have.
+    pub fn metrics<T: Into<String>>(mut self, names: impl IntoIterator<Item = T>) -> Result<Self, StudyError> {
+        self.question.metrics = Some(names.into_iter().map(Into::into).collect());
+        self.checked()
+    }
+
+    /// Groups cells by these columns; experiment and model where this is not called, and the condition where there are some. A column that no episode has is an
+    /// error of the scan.
+    #[must_use]
+    pub fn by<T: Into<String>>(mut self, columns: impl IntoIterator<Item = T>) -> Self {
+        self.question.by = Some(columns.into_iter().map(Into::into).collect());
+        self
+    }
+
+    /// Lets a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent.
+    #[must_use]
+    pub const fn pool(mut self) -> Self {
+        self.question.pool = true;
+        self
+    }
+
+    /// Uses so many threads; all cores where this is not called. Results do not depend on it.
+    #[must_use]
+    pub const fn threads(mut self, threads: NonZeroUsize) -> Self {
+        self.threads = threads;
+        self
+    }
+
+    /// Lets another engine compute the scores; the results are the same.
+    #[must_use]
+    pub fn backend(mut self, backend: Backend) -> Self {
+        self.backend = backend;
+        self
+    }
+
+    /// Puts a whole question at once.
+    ///
+    /// # Errors
+    /// Every fault of the definitions and the condition; a metric that the definitions do not have.
+    pub fn asked(mut self, question: Question) -> Result<Self, StudyError> {
+        self.question = question;
+        self.checked()
+    }
+
+    /// Faults of a definition file or of a filter are found before any row is read. Whether the traces have the columns is
+    /// checked with the scan, when it is known which metrics are wanted.
+    fn checked(mut self) -> Result<Self, StudyError> {
+        if let Source::Traces(traces) = &self.source {
+            self.question = self.question.resolved(traces)?;
+            self.question.bind_to(&score_traces::trace_columns(traces))?;
+        }
+        Ok(self)
+    }
+
+    /// The traces, for an answer that only steps can give.
+    ///
+    /// # Errors
+    /// Scores, which have no steps.
+    pub fn traces(&self) -> Result<&TraceSet, StudyError> {
+        self.source.traces()
+    }
+
+    /// The steps of the episodes that the filter keeps, with these columns in this order, all if absent.
+    ///
+    /// # Errors
+    /// Scores, which have no steps; a column that no trace has, or that two have with different types; with a filter, as
+    /// [`Study::score`].
+    pub fn steps(&self, columns: Option<&[String]>) -> Result<Steps, StudyError> {
+        let traces = self.source.traces()?;
+        if self.question.filter.is_none() {
+            return Ok(Steps::new(traces, columns, None)?);
+        }
+        let kept = self.score()?.episodes.keys.iter().map(|key| key.episode_id.to_owned()).collect();
+        Ok(Steps::new(traces, columns, Some(kept))?)
+    }
+
+    /// The episode table.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the traces or the scores; numbers beyond 64 bits.
+    pub fn score(&self) -> Result<Results, StudyError> {
+        self.scan(Outputs { losses: true, ..Outputs::default() })
+    }
+
+    /// The cells: exact moments of every metric in every group.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; a column to group by that the episodes do not have.
+    pub fn cells(&self) -> Result<Cells, StudyError> {
+        let counted = self.counted(self.score()?);
+        self.cells_of(&counted.results.episodes)
+    }
+
+    /// The cells of these episodes, as [`Study::cells`].
+    ///
+    /// # Errors
+    /// A column to group by that the episodes do not have; a cell that mixes episodes which were recorded differently.
+    pub fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
+        let by = self.question.by_over(episodes);
+        if !self.question.pool {
+            pooled::check(episodes, &by, self.source.traces().ok())?;
+        }
+        size::check_comparisons(episodes)?;
+        let cells = group(episodes, &by)?;
+        size::check_cells(&cells)?;
+        Ok(cells)
+    }
+
+    /// The tables of these episodes, each with the filter that chose them.
+    fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<Table>, StudyError> {
+        let mut tables = layout::tables(cells, style)?;
+        if let Some(selection) = self.selection(episodes) {
+            for table in &mut tables {
+                table.footnotes.push(selection.sentence());
+            }
+        }
+        Ok(tables)
+    }
+
+    /// The filter; it is by results where it asks for more than what is recorded of an episode before it begins.
+    fn selection(&self, episodes: &EpisodeTable) -> Option<Selection> {
+        let condition = self.question.filter.clone()?;
+        let is_key = |name: &str| episodes.label(name).is_some() || score_traces::is_constant(name);
+        let by_results = !is_about(&condition, &is_key);
+        Some(Selection { condition, by_results })
+    }
+
+    /// The statistics of the cells: intervals, tests, comparisons.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; sums of squares beyond 128 bits.
+    pub fn statistics(&self, options: &Options) -> Result<Statistics, StudyError> {
+        let results = self.scan(Outputs { losses: true, quality: true, ..Outputs::default() })?;
+        self.check_filter(results.episodes.len())?;
+        let counted = self.counted(results);
+        let cells = self.cells_of(&counted.results.episodes)?;
+        self.statistics_of(&counted, &cells, options)
+    }
+
+    /// A sentence about traces whose checksums are another file's.
+    pub fn stale_checksums(&self) -> Option<String> {
+        self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
+    }
+
+    /// The statistics of the episodes that count.
+    fn statistics_of(&self, counted: &Counted, cells: &Cells, options: &Options) -> Result<Statistics, StudyError> {
+        let Counted { results, lost, .. } = counted;
+        let declared = &results.episodes.declared;
+        let (is_known, total) = (results.lost.is_some() || declared.losses_recorded || !lost.is_empty(), lost.total());
+        let beside = if self.question.lost == LostAs::Nothing { lost.clone() } else { LostCounts::default() };
+        let (design, selection) = (design_of(declared), self.selection(&results.episodes));
+        let replies = results.quality.as_ref().and_then(Replies::of);
+        let lost = is_known.then_some(beside);
+        let options = Options { lost, design, selection, replies, ..options.clone() };
+        let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
+        if self.question.lost == LostAs::Failure && total > 0 {
+            let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
+            statistics.warnings.push(words);
+        }
+        statistics.warnings.extend(self.stale_checksums());
+        Ok(statistics)
+    }
+
+    /// What may be said while the study still runs: confidence sequences and e-values.
+    ///
+    /// # Errors
+    /// As [`Study::statistics`].
+    pub fn sequential(&self, options: &Options) -> Result<Sequential, StudyError> {
+        let results = self.scan(Outputs { losses: true, ..Outputs::default() })?;
+        self.check_filter(results.episodes.len())?;
+        let episodes = self.counted(results).results.episodes;
+        size::check_comparisons(&episodes)?;
+        let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
+        let options = Options { design, selection, ..options.clone() };
+        Ok(Sequential::of(&episodes, &options)?)
+    }
+
+    /// One figure, with the models in the order of a style.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; inputs that lack what the figure needs.
+    pub fn figure(&self, name: FigureName, style: impl AsRef<Path>) -> Result<Figure, StudyError> {
+        let style = Style::load(style)?;
+        let results = self.scan(Outputs { losses: true, ..Outputs::of_figures(&[name]) })?;
+        self.check_filter(results.episodes.len())?;
+        let results = self.counted(results).results;
+        self.cells_of(&results.episodes)?;
+        Ok(FigureInputs::of(&results, &style)?.draw(name)?)
+    }
+
+    /// The scores of one episode, and the timesteps that decided them.
+    ///
+    /// # Errors
+    /// As [`Study::score`]; scores in the place of traces; no such episode.
+    pub fn explain(&self, episode_id: &str) -> Result<Evidence, StudyError> {
+        let traces = self.source.traces()?;
+        let definitions = self.question.bind(traces)?;
+        if own_definitions::unscored(&definitions, traces, |_| true).is_some() {
+            let filter = Some(format!("episode_id = '{}'", episode_id.replace('\'', "''")));
+            let one = Question { filter, ..self.question.clone() }.bind(traces)?;
+            own_definitions::check(&one, traces, &score_traces::score(traces, &one, &[], self.threads)?)?;
+        }
+        let found = evidence::explain(traces, &definitions, episode_id, self.threads);
+        self.check_unchanged()?;
+        Ok(found?)
+    }
+
+    /// As [`Study::explain`], of an episode that is known to be in one of the inputs: no other is read.
+    ///
+    /// # Errors
+    /// As [`Study::explain`].
+    pub fn explain_in(&self, input: &Input, episode_id: &str) -> Result<Evidence, StudyError> {
+        // Bound to its own columns: beside other tasks a trace may lack those that are theirs.
+        let one = TraceSet::open(std::slice::from_ref(input))?;
+        let definitions = Question { filter: None, ..self.question.clone() }.bind(&one)?;
+        Ok(evidence::explain(&one, &definitions, episode_id, self.threads)?)
+    }
+
+    /// A table of the study beside a published one, cell by cell. `table` names it; otherwise it is the first that has
+    /// all the published metrics.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the published table, the style or the inputs; no such table.
+    pub fn compare(
+        &self,
+        published: &Path,
+        style: impl AsRef<Path>,
+        table: Option<&str>,
+        errata: &Errata,
+    ) -> Result<Comparison, StudyError> {
+        // Small files first: a slip in them should not cost a pass over the traces.
+        let published = published::read(published)?;
+        let style = Style::load(style)?;
+        let counted = self.counted(self.score()?);
+        let tables = self.tables(&counted.results.episodes, &self.cells_of(&counted.results.episodes)?, &style)?;
+        Ok(compare(choose(&tables, &published, table, &style)?, &published, errata))
+    }
+
+    /// The files that an answer is made from: inputs, definitions and, where there is one, a style. An output that is one of
+    /// them would replace what it is made from. Names of built-in styles are in it too.
+    pub fn files_read(&self, style: Option<&Path>) -> Vec<PathBuf> {
+        let is_file = |name: &&Path| name.to_str().is_none_or(|name| file::built_in(name).is_none());
+        let named = self.question.definitions.as_deref().filter(is_file).into_iter().chain(style).map(PathBuf::from);
+        self.inputs.iter().map(|input| input.path.clone()).chain(named).collect()
+    }
+
+    /// Refuses a folder for outputs that holds an input: both would be read together from then on.
+    ///
+    /// # Errors
+    /// When it holds one.
+    pub fn check_out(&self, out: &Path) -> Result<(), StudyError> {
+        let inputs = self.inputs.iter().map(|input| &input.path);
+        Ok(replace::check_folder(out, inputs).map_err(BundleError::from)?)
+    }
+
+    /// Refuses inputs that are not what they were when they were opened.
+    fn check_unchanged(&self) -> Result<(), StudyError> {
+        self.stamps.iter().try_for_each(Stamp::check)
+    }
+}

@@ -1,0 +1,168 @@
+//! Episodes that were lost for want of an answer: ended by the infrastructure, or never recorded.
+//!
+//! Rule: a lost episode is neither a success nor a failure. It is in no denominator, or in all of them as a failure where
+//! that is asked for; either is said. A file of scores keeps its row, marked by the label `lost`.
+
+use std::collections::{BTreeSet, HashSet};
+
+use super::Study;
+use super::error::StudyError;
+use super::results::Results;
+use metric::catalog::{Better, Catalog, Kind};
+use report::cells::group::CONDITION;
+use score::builder::TableBuilder;
+use score::lost_counts::LostCounts;
+use score::quality::{CellKey, QualityByCell};
+use score::table::{EpisodeTable, KeyRef, LOST, LabelColumn};
+use trace::inputs::Input;
+use trace::lost::{self, LostEpisode};
+use trace::schema::{self, Column};
+
+/// What the label of lost episodes says.
+const YES: &str = "true";
+
+/// What lost episodes count as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LostAs {
+    /// Nothing: they are in no denominator.
+    #[default]
+    Nothing,
+    /// Failures: they are in the denominator of every rate that is defined for all episodes.
+    Failure,
+}
+
+/// The episodes that a cell counts, and those that it leaves out.
+#[derive(Debug)]
+pub(super) struct Counted {
+    /// The results of the episodes that count.
+    pub results: Results,
+    /// All episodes, where some are left out or added.
+    pub all: Option<EpisodeTable>,
+    /// How many are lost, counted or not.
+    pub lost: LostCounts,
+}
+
+/// The episodes in the lists beside the traces that are in no trace, of models that the traces have.
+pub(super) fn unrecorded(inputs: &[Input], table: &EpisodeTable) -> Result<Vec<LostEpisode>, StudyError> {
+    let mut listed = lost::beside(inputs)?;
+    if listed.is_empty() {
+        return Ok(listed);
+    }
+    let ids: HashSet<&str> = table.keys.iter().map(|key| key.episode_id).collect();
+    let models: BTreeSet<&str> = table.keys.models().iter().flatten().collect();
+    listed.retain(|episode| !ids.contains(episode.episode_id.as_str()) && models.contains(episode.model.as_str()));
+    Ok(listed)
+}
+
+/// Marks the lost episodes of a table, and counts them among the replies.
+pub(super) fn label(results: &mut Results) {
+    let Results { episodes, lost, quality, .. } = results;
+    if let Some(ids) = lost.as_ref().filter(|ids| !ids.is_empty()) {
+        let is_lost = |row| ids.contains(episodes.keys.get(row).episode_id).then_some(YES);
+        let values = (0..episodes.len()).map(is_lost).collect();
+        episodes.labels.push(LabelColumn { name: LOST.to_owned(), values });
+    }
+    if let Some(quality) = quality {
+        count(quality, &counts(episodes), lost.is_some() || !episodes.declared.unrecorded.is_empty());
+    }
+}
+
+/// Puts the lost episodes beside what became of the replies.
+fn count(quality: &mut QualityByCell, lost: &LostCounts, is_known: bool) {
+    for (key, lost) in lost.iter() {
+        quality.0.entry(key.clone()).or_default().lost = Some(*lost);
+    }
+    if is_known {
+        quality.0.values_mut().for_each(|quality| quality.lost = quality.lost.or(Some(0)));
+    }
+}
+
+/// How many episodes of each cell were lost.
+fn counts(table: &EpisodeTable) -> LostCounts {
+    let mut counts = LostCounts::default();
+    for row in (0..table.len()).filter(|row| is_lost(table, *row)) {
+        let key = table.keys.get(row);
+        counts.add(cell(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(row))));
+    }
+    for episode in &table.declared.unrecorded {
+        counts.add(cell(&episode.experiment, &episode.model, episode.condition.as_deref()));
+    }
+    counts
+}
+
+fn cell(experiment: &str, model: &str, condition: Option<&str>) -> CellKey {
+    let condition = condition.or_else(|| schema::column(CONDITION).and_then(Column::default_text)).unwrap_or_default();
+    CellKey { experiment: experiment.to_owned(), model: model.to_owned(), condition: condition.to_owned() }
+}
+
+fn is_lost(table: &EpisodeTable, row: usize) -> bool {
+    table.label(LOST).is_some_and(|label| label.get(row) == Some(YES))
+}
+
+impl Study {
+    /// The episodes that cells, statistics and figures count.
+    pub(super) fn counted(&self, results: Results) -> Counted {
+        let lost = counts(&results.episodes);
+        if lost.is_empty() {
+            return Counted { results, all: None, lost };
+        }
+        match self.question.lost {
+            LostAs::Nothing => without(results, lost),
+            LostAs::Failure => {
+                let episodes = with_failures(&results.episodes);
+                // Who never looked, claimed or decided has no timeline.
+                let timelines = results.timelines.filter(|timelines| timelines.len() == episodes.len());
+                let all = Some(episodes.clone());
+                Counted { results: Results { episodes, timelines, ..results }, all, lost }
+            }
+        }
+    }
+}
+
+/// The results without the lost episodes.
+fn without(results: Results, lost: LostCounts) -> Counted {
+    let all = results.episodes;
+    let kept: Vec<usize> = (0..all.len()).filter(|row| !is_lost(&all, *row)).collect();
+    let mut episodes = all.taken(&kept);
+    episodes.labels.retain(|label| label.name != LOST);
+    let timelines = results.timelines;
+    let timelines = timelines.map(|timelines| kept.iter().map(|row| timelines[*row].clone()).collect());
+    Counted { results: Results { episodes, timelines, ..results }, all: Some(all), lost }
+}
+
+/// The table with a row for each episode that was never recorded: a failure in each rate that every episode has, undefined
+/// in everything else.
+fn with_failures(table: &EpisodeTable) -> EpisodeTable {
+    let mut builder = TableBuilder::new(table.header());
+    for row in 0..table.len() {
+        let labels = table.labels.iter().map(|label| label.values.get(row));
+        builder.push(table.keys.get(row), labels, table.metrics.iter().map(|metric| metric.get(row)));
+    }
+    for episode in &table.declared.unrecorded {
+        let key = KeyRef {
+            experiment: &episode.experiment,
+            model: &episode.model,
+            seed: episode.seed,
+            run: episode.run,
+            episode_id: &episode.episode_id,
+        };
+        let label = |label: &LabelColumn| match label.name.as_str() {
+            LOST => Some(YES),
+            CONDITION => episode.condition.as_deref().or_else(|| schema::column(CONDITION)?.default_text()),
+            _ => None,
+        };
+        let failure = |metric: &score::table::MetricColumn| failure(&table.catalog, &metric.name);
+        builder.push(key, table.labels.iter().map(label), table.metrics.iter().map(failure));
+    }
+    EpisodeTable { declared: table.declared.clone(), ..builder.finish() }
+}
+
+/// What a metric says of an episode that failed; `None` where that is not known.
+fn failure(catalog: &Catalog, metric: &str) -> Option<i64> {
+    let metric = catalog.metric.get(metric)?;
+    match (metric.kind, metric.better) {
+        (Kind::Rate, Better::Higher) if metric.when.is_none() => Some(0),
+        (Kind::Rate, Better::Lower) if metric.when.is_none() => Some(1),
+        _ => None,
+    }
+}

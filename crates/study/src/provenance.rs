@@ -1,0 +1,231 @@
+//! The traces that a report was made of, found again by its manifest.
+//!
+//! Rule: a file is the trace that the manifest names if it has its hash, whatever the folder it lies in; every trace
+//! that changed or is missing is told at once, and no report is made without them.
+
+use std::ffi::OsStr;
+use std::fmt;
+use std::fs::{self};
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+use exact::budget::Limit;
+use exact::hash;
+use exact::input;
+use report::bundle::{self, Manifest};
+use trace::inputs::Input;
+use trace::schema::SCHEMA_VERSION;
+
+/// Why a report cannot be made again.
+#[derive(Debug, thiserror::Error)]
+pub enum ProvenanceError {
+    /// No manifest in the folder.
+    #[error("{}: expected a report's folder with its manifest.json; name the folder that `mirrorstats report` wrote", path.display())]
+    NoManifest {
+        /// Where it was looked for.
+        path: PathBuf,
+        /// Why it is not readable.
+        source: io::Error,
+    },
+    /// A manifest that does not say what a report was made of.
+    #[error("{}: expected the manifest of a report, found {found}; make the report again with `mirrorstats report`", path.display())]
+    Malformed {
+        /// Where.
+        path: PathBuf,
+        /// What is the matter.
+        found: String,
+    },
+    /// Traces that are not what they were.
+    #[error("{} of {all} traces of the report are not what they were:\n{}\n{REMEDY}", faults.len(), lines(faults))]
+    Traces {
+        /// How many there are.
+        all: usize,
+        /// What is the matter with which.
+        faults: Vec<TraceFault>,
+    },
+}
+
+/// What to do about traces that are not found.
+const REMEDY: &str = "  help: restore them, say where they are with --traces, or make a new report of what there is with `mirrorstats report`";
+
+/// A trace of the manifest that is not there as it was.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TraceFault {
+    /// Its path in the manifest.
+    pub path: String,
+    /// Its hash in the manifest.
+    pub expected: String,
+    /// What is in its place, and where that is; `None` where there is no such file.
+    pub found: Option<(Found, PathBuf)>,
+}
+
+/// What is in the place of a trace.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// A file of this hash.
+    Other(String),
+    /// A file that cannot be read, for this reason.
+    Unreadable(String),
+}
+
+impl fmt::Display for TraceFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { path, expected, found } = self;
+        match found {
+            None => write!(f, "  {path}: missing; expected sha256 {expected}"),
+            Some((Found::Other(hash), at)) => {
+                write!(f, "  {path}: changed; expected sha256 {expected}, found {hash} in {}", at.display())
+            }
+            Some((Found::Unreadable(why), at)) => {
+                write!(f, "  {path}: cannot read `{}`: {why}; expected sha256 {expected}", at.display())
+            }
+        }
+    }
+}
+
+/// The most traces that a message tells one by one: what to do about them must stay in view.
+const TOLD: usize = 5;
+
+fn lines(faults: &[TraceFault]) -> String {
+    let mut lines: Vec<String> = faults.iter().take(TOLD).map(ToString::to_string).collect();
+    if let Some(more) = faults.len().checked_sub(TOLD).filter(|more| *more > 0) {
+        lines.push(format!("  and {more} more"));
+    }
+    lines.join("\n")
+}
+
+/// A trace takes some 200 bytes of it.
+const LARGEST: Limit = Limit::new("bytes of a manifest", 64 << 20);
+
+/// The manifest of a report's folder.
+///
+/// # Errors
+/// A folder without one, one that is not readable, one of a later program.
+pub fn manifest(report: &Path) -> Result<Manifest, ProvenanceError> {
+    let path = report.join("manifest.json");
+    let text = match input::text(&path, LARGEST) {
+        Ok(text) => text,
+        Err(source) => return Err(ProvenanceError::NoManifest { path, source }),
+    };
+    let malformed = |found: String| ProvenanceError::Malformed { path: path.clone(), found };
+    let manifest: Manifest = serde_json::from_str(&text).map_err(|error| malformed(error.to_string()))?;
+    if manifest.schema_version > SCHEMA_VERSION {
+        let found = format!("one over trace schema {}, newer than {SCHEMA_VERSION}", manifest.schema_version);
+        return Err(malformed(found));
+    }
+    if manifest.inputs.is_empty() {
+        return Err(malformed("one that names no trace".to_owned()));
+    }
+    match manifest.inputs.iter().find(|input| !is_plain(&input.path)) {
+        None => Ok(manifest),
+        Some(input) => Err(malformed(format!("the path `{}`, which leads out of its folder", input.path))),
+    }
+}
+
+/// Whether a path is one that a manifest may name.
+fn is_plain(path: &str) -> bool {
+    !path.is_empty() && Path::new(path).components().all(|part| matches!(part, Component::Normal(_)))
+}
+
+/// The traces of a manifest under their names in it: below one of `places`, in this order.
+///
+/// # Errors
+/// Every trace that changed or is missing.
+pub fn traces(manifest: &Manifest, places: &[PathBuf]) -> Result<Vec<Input>, ProvenanceError> {
+    let (mut found, mut faults) = (Vec::new(), Vec::new());
+    for wanted in &manifest.inputs {
+        match find(wanted, places) {
+            Ok(path) => found.push(Input { name: wanted.path.clone(), path }),
+            Err(fault) => faults.push(fault),
+        }
+    }
+    let all = manifest.inputs.len();
+    if faults.is_empty() { Ok(found) } else { Err(ProvenanceError::Traces { all, faults }) }
+}
+
+fn find(wanted: &bundle::Input, places: &[PathBuf]) -> Result<PathBuf, TraceFault> {
+    let mut other = None;
+    for path in places.iter().flat_map(|place| candidates(wanted, place)) {
+        match input::open(&path).and_then(hash::of_reader) {
+            Ok(hash) if hash == wanted.sha256 => return Ok(path),
+            Ok(hash) => other = other.or(Some((Found::Other(hash), path))),
+            Err(error) => other = other.or(Some((Found::Unreadable(error.to_string()), path))),
+        }
+    }
+    Err(TraceFault { path: wanted.path.clone(), expected: wanted.sha256.clone(), found: other })
+}
+
+/// Where a trace may lie in a place: under its path, under its bare name, or as the place itself.
+fn candidates(wanted: &bundle::Input, place: &Path) -> Vec<PathBuf> {
+    let path = Path::new(&wanted.path);
+    if place.is_file() {
+        let names = [place, path].map(|path| path.file_name().map(OsStr::to_string_lossy));
+        return if names[0] == names[1] { vec![place.to_owned()] } else { Vec::new() };
+    }
+    let mut candidates = shown_as(place, path);
+    for bare in path.file_name().map(|name| shown_as(place, Path::new(name))).unwrap_or_default() {
+        if !candidates.contains(&bare) {
+            candidates.push(bare);
+        }
+    }
+    candidates.retain(|path| path.is_file());
+    candidates
+}
+
+/// The paths below a folder that a manifest writes so: what is no text in a name stands there as U+FFFD.
+fn shown_as(folder: &Path, path: &Path) -> Vec<PathBuf> {
+    path.components().fold(vec![folder.to_owned()], |folders, part| {
+        let part = part.as_os_str().to_string_lossy();
+        if !part.contains(char::REPLACEMENT_CHARACTER) {
+            return folders.iter().map(|folder| folder.join(&*part)).collect();
+        }
+        let is_shown = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy() == part);
+        let entries = folders.iter().filter_map(|folder| fs::read_dir(folder).ok()).flatten();
+        entries.filter_map(|entry| Some(entry.ok()?.path())).filter(is_shown).collect()
+    })
+}
+
+/// Where the traces of a report are looked for: where one is told, else the current folder, the report's folder and
+/// the folders above it.
+pub fn places(report: &Path, told: &[PathBuf]) -> Vec<PathBuf> {
+    if !told.is_empty() {
+        return told.to_vec();
+    }
+    let here = PathBuf::from(".");
+    let report = fs::canonicalize(report).unwrap_or_else(|_| report.to_owned());
+    std::iter::once(here).chain(report.ancestors().map(Path::to_owned)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{candidates, is_plain, places};
+    use report::bundle;
+    use std::path::{Path, PathBuf};
+
+    #[test]
+    fn a_manifest_names_nothing_outside() {
+        for (path, plain) in
+            [("a.parquet", true), ("runs/a.parquet", true), ("/a.parquet", false), ("../a.parquet", false), ("", false)]
+        {
+            assert_eq!(is_plain(path), plain, "{path}");
+        }
+    }
+
+    #[test]
+    fn a_place_that_was_told_is_the_only_one() {
+        assert_eq!(places(Path::new("r"), &[PathBuf::from("there")]), [PathBuf::from("there")]);
+    }
+
+    #[test]
+    fn a_trace_may_lie_under_its_path_or_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::create_dir(folder.path().join("runs")).unwrap();
+        let wanted = bundle::Input { path: "runs/a.parquet".into(), sha256: String::new(), bytes: 0 };
+        let [deep, bare] = ["runs/a.parquet", "a.parquet"].map(|name| folder.path().join(name));
+        std::fs::write(&bare, "").unwrap();
+        assert_eq!(candidates(&wanted, folder.path()), std::slice::from_ref(&bare));
+        assert_eq!(candidates(&wanted, &bare), std::slice::from_ref(&bare));
+        std::fs::write(&deep, "").unwrap();
+        assert_eq!(candidates(&wanted, folder.path()), [deep, bare]);
+    }
+}

@@ -1,0 +1,41 @@
+//! How large a report may become: every model is compared with every other one, so that what a report holds grows with the
+//! square of the models while the traces grow with their number.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::error::StudyError;
+use exact::budget::Limit;
+use report::cells::Cells;
+use score::table::{CONDITION, EpisodeTable};
+
+/// A hundred models in five experiments under ten metrics are 247,500; a comparison takes half a kilobyte.
+const MOST_COMPARISONS: Limit =
+    Limit::new("comparisons of two models under a metric; leave models or metrics out", 400_000);
+
+/// The cells of all tables.
+const MOST_CELLS: Limit =
+    Limit::new("cells, groups times metrics; group by fewer columns or leave metrics out", 200_000);
+
+/// Whether the comparisons that a report of these episodes makes are within the budget.
+///
+/// # Errors
+/// [`StudyError::Exceeded`] if not.
+pub(super) fn check_comparisons(episodes: &EpisodeTable) -> Result<(), StudyError> {
+    let conditions = episodes.label(CONDITION);
+    let mut subjects = BTreeMap::<_, BTreeSet<_>>::new();
+    for row in 0..episodes.len() {
+        let subject = (episodes.keys.models().code(row), conditions.and_then(|conditions| conditions.get(row)));
+        subjects.entry(episodes.keys.experiments().code(row)).or_default().insert(subject);
+    }
+    let pairs = |count: usize| (count as u64).saturating_mul(count.saturating_sub(1) as u64) / 2;
+    let pairs = subjects.values().fold(0_u64, |sum, subjects| sum.saturating_add(pairs(subjects.len())));
+    Ok(MOST_COMPARISONS.check(pairs.saturating_mul(episodes.metrics.len() as u64))?)
+}
+
+/// Whether the cells are within the budget.
+///
+/// # Errors
+/// [`StudyError::Exceeded`] if not.
+pub(super) fn check_cells(cells: &Cells) -> Result<(), StudyError> {
+    Ok(MOST_CELLS.check((cells.groups.len() as u64).saturating_mul(cells.metrics.len() as u64))?)
+}

@@ -1,0 +1,60 @@
+//! A panic in somebody else's decoder, turned into an error of the file that caused it.
+
+use std::cell::Cell;
+use std::panic::{self, AssertUnwindSafe};
+use std::sync::Once;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+thread_local! {
+    static CONTAINING: Cell<bool> = const { Cell::new(false) };
+}
+
+/// How many calls are under way that contain the panics of all threads.
+static EVERYWHERE: AtomicUsize = AtomicUsize::new(0);
+
+/// What `decode` gives, or the message of the panic it ended in; nothing is printed for that panic.
+///
+/// Only for calls into a decoder whose state is thrown away afterwards.
+pub fn contained<R>(decode: impl FnOnce() -> R) -> Result<R, String> {
+    silence_contained_panics();
+    let before = CONTAINING.replace(true);
+    let result = panic::catch_unwind(AssertUnwindSafe(decode));
+    CONTAINING.set(before);
+    result.map_err(|payload| {
+        let text = payload.downcast_ref::<&str>().map(ToString::to_string);
+        text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_else(|| "the decoder gave up".into())
+    })
+}
+
+/// As [`contained`], for a library that has threads of its own: nothing is printed for a panic on any thread.
+#[cfg(feature = "polars")]
+pub fn contained_on_all_threads<R>(run: impl FnOnce() -> R) -> Result<R, String> {
+    EVERYWHERE.fetch_add(1, Ordering::SeqCst);
+    let result = contained(run);
+    EVERYWHERE.fetch_sub(1, Ordering::SeqCst);
+    result
+}
+
+fn silence_contained_panics() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let report = panic::take_hook();
+        panic::set_hook(Box::new(move |info| {
+            if !CONTAINING.get() && EVERYWHERE.load(Ordering::SeqCst) == 0 {
+                report(info);
+            }
+        }));
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::contained;
+
+    #[test]
+    fn a_panic_becomes_its_message() {
+        assert_eq!(contained(|| 7), Ok(7));
+        let empty: Vec<i32> = Vec::new();
+        assert!(contained(|| empty[3]).unwrap_err().contains("out of bounds"));
+    }
+}

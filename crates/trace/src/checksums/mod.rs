@@ -1,0 +1,107 @@
+//! The checksums in the footer of a file: one per column chunk, and one of all that lies behind the chunks.
+//!
+//! The footer's own covers the bytes from the end of the last chunk to the end of the footer, page indexes included, with
+//! its own eight digits taken as zeros: schema, offsets, statistics and every key.
+//!
+//! Rule: where the key is, the checksums hold, or the file is refused. But other programs carry the key along when they write
+//! a file again. Such a file is read without checksums, and every verb says so. It differs from the one that was summed as a
+//! whole: another program is named in `created_by`, and most chunks are others. Damage leaves most of either as it was.
+
+mod read;
+mod write;
+
+use parquet::file::metadata::ColumnChunkMetaData;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+pub use read::Checksums;
+pub use read::verify_file;
+pub(crate) use read::{ChunkChecksums, Fault, of_file, sum};
+pub use write::{Held, finish, pass_on};
+
+use crate::open::TraceFile;
+use crate::schema::CHECKSUMS_KEY as KEY;
+
+/// What footers name as the program that wrote the file.
+pub const CREATED_BY: &str = concat!("mirrorstats version ", env!("CARGO_PKG_VERSION"));
+
+/// The only algorithm so far.
+const ALGORITHM: &str = "CRC-32";
+
+/// Where the first chunk of a file may start: behind the magic number.
+const FIRST: u64 = 4;
+
+/// What stands under the key, as JSON.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stated {
+    algorithm: String,
+    /// Of the footer that the checksums belong to.
+    created_by: String,
+    /// A list per row group, a checksum per leaf column of the schema.
+    chunks: Vec<Vec<Checksum>>,
+    /// The last of all, so that its digits lie at a known place.
+    footer: Checksum,
+}
+
+/// A CRC-32, eight lower-case hexadecimal digits as JSON.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Checksum(u32);
+
+impl Serialize for Checksum {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(&format_args!("{:08x}", self.0))
+    }
+}
+
+impl<'de> Deserialize<'de> for Checksum {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let is_hexadecimal = text.len() == 8 && text.bytes().all(|digit| matches!(digit, b'0'..=b'9' | b'a'..=b'f'));
+        let number = is_hexadecimal.then(|| u32::from_str_radix(&text, 16).ok()).flatten();
+        number.map(Self).ok_or_else(|| de::Error::custom("a checksum is eight lower-case hexadecimal digits"))
+    }
+}
+
+/// A sentence about the files whose checksums are another file's; `None` if there are none.
+pub fn stale_note(files: &[TraceFile]) -> Option<String> {
+    let stale = named(files, Checksums::Stale)?;
+    Some(format!(
+        "{stale}: another program wrote the rows again and copied the checksums of the file that it read; they are not \
+         checked, and damage is not found; use that file where you have it"
+    ))
+}
+
+/// A sentence about the files without checksums; `None` if there are none.
+pub fn missing_note(files: &[TraceFile]) -> Option<String> {
+    let missing = named(files, Checksums::None)?;
+    Some(format!("{missing}: no checksums; damage to the data may not be found"))
+}
+
+/// The first of the files in this state, without its folder, and how many others there are.
+fn named(files: &[TraceFile], state: Checksums) -> Option<String> {
+    let mut of_state = files.iter().filter(|file| file.checksums() == state);
+    let first = of_state.next()?.path().file_name()?.to_string_lossy();
+    Some(match of_state.count() {
+        0 => first.into_owned(),
+        1 => format!("{first} and one other file"),
+        more => format!("{first} and {more} other files"),
+    })
+}
+
+impl Stated {
+    fn json(&self) -> String {
+        serde_json::to_string(self).expect("texts and lists of them are JSON")
+    }
+}
+
+/// Where the digits of the footer's own checksum lie in the JSON of this length: before a quote and a brace.
+fn digits(length: usize) -> std::ops::Range<usize> {
+    length - 10..length - 2
+}
+
+/// The bytes of a column chunk: from the first to before the last.
+pub(crate) fn range(chunk: &ColumnChunkMetaData) -> Option<(u64, u64)> {
+    let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
+    let (start, length) = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok())?;
+    start.checked_add(length).map(|end| (start, end))
+}

@@ -1,0 +1,132 @@
+//! One column of pages out of memory, for the fuzz targets of the member `fuzz` (feature `fuzz`): the decoders that a scan
+//! uses, and neither a file nor a footer of bytes around them.
+//!
+//! A scan takes rows from the short cut until that gives up, and the rest from the library. A target asks for both parts
+//! one by one, because each of them must agree with another reader of the same bytes.
+
+use std::sync::Arc;
+
+use arrow::array::ArrayRef;
+use bytes::Bytes;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, RowSelection, RowSelector};
+use parquet::file::metadata::ParquetMetaData;
+
+use super::catch_panic::contained;
+use super::checksums::ChunkChecksums;
+use super::read::column::Column;
+use super::read::decode::{Refused, normal_column};
+use super::read::footer::{plain, rows_of};
+use super::read::open::{columns_of, readable};
+use super::read::pages::{self, Cursor, FaultSlot, Form, Library, Place, Store};
+use super::schema::Kind;
+
+/// Row group 0 of a file with one column.
+pub struct OneColumn {
+    footer: ArrowReaderMetadata,
+    kind: Kind,
+    /// Where the bytes start in the file.
+    start: u64,
+    bytes: Bytes,
+}
+
+/// Why a column is not decoded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    /// What was expected of the page in which the fault is; `None` where the Parquet library found it.
+    pub expected: Option<String>,
+    /// What was found, or the library's words.
+    pub found: String,
+}
+
+impl Refusal {
+    fn library(found: String) -> Self {
+        Self { expected: None, found }
+    }
+}
+
+impl OneColumn {
+    /// The column of a file with this footer whose bytes from `start` on are these.
+    pub fn new(metadata: ParquetMetaData, start: u64, bytes: Bytes) -> Result<Self, Refusal> {
+        let columns = columns_of("column", metadata.file_metadata().schema_descr())
+            .map_err(|findings| Refusal::library(format!("{findings:?}")))?;
+        let kind = columns.first().and_then(|column| column.kind).unwrap_or(Kind::Unsupported);
+        let footer = readable(metadata, &columns).map_err(Refusal::library)?;
+        Ok(Self { footer, kind, start, bytes })
+    }
+
+    fn store(&self) -> Store {
+        Store::of_memory(self.start, self.bytes.clone())
+    }
+
+    /// What the short cut gives, `at_once` rows at a time: the rows until it gives up, and whether it did not.
+    pub fn short_cut(&self, runs: bool, at_once: usize) -> Result<(Vec<ArrayRef>, bool), String> {
+        let form = if runs { Form::Runs } else { Form::Rows };
+        contained(|| {
+            let metadata = self.footer.metadata();
+            let checksums = &ChunkChecksums::default();
+            let place = Place { metadata, checksums, row_group: 0, column: 0 };
+            let stored = self.footer.schema().field(0).data_type();
+            let mut rows = Vec::new();
+            let Ok(mut cursor) = Cursor::open(&self.store(), place, stored, form) else { return (rows, false) };
+            let mut left = rows_of(metadata.row_group(0));
+            while left > 0 {
+                let count = left.min(at_once.max(1));
+                let Some(read) = cursor.read(count).ok().and_then(|column: Column| column.flat().ok()) else {
+                    return (rows, false);
+                };
+                rows.push(read);
+                left -= count;
+            }
+            let is_whole = cursor.read(0).is_ok();
+            (rows, is_whole)
+        })
+    }
+
+    /// What the library gives of pages that are checked, from row `first` on and `at_once` rows at a time.
+    pub fn checked(&self, first: usize, at_once: usize) -> Result<Vec<ArrayRef>, Refusal> {
+        let slot = FaultSlot::default();
+        let refused = |found: String| match slot.get() {
+            Some(fault) => Refusal { expected: Some(fault.expected.clone()), found: fault.found.clone() },
+            None => Refusal::library(found),
+        };
+        let metadata = Arc::clone(self.footer.metadata());
+        let rows = rows_of(metadata.row_group(0));
+        let (store, checksums, kept) = (self.store(), ChunkChecksums::default(), Arc::clone(&slot));
+        let library = Library { store, metadata, checksums, row_groups: vec![0], slot: kept, writes_out: false };
+        let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
+        let selection = (first > 0).then(|| RowSelection::from(rest));
+        let fields = Some(self.footer.schema().fields());
+        let reader = contained(|| library.reader(ProjectionMask::all(), fields, at_once.max(1), selection))
+            .map_err(refused)?
+            .map_err(|error| refused(plain(&error)))?;
+        let mut reader = reader;
+        let mut columns = Vec::new();
+        while let Some(batch) = contained(|| reader.next()).map_err(refused)? {
+            let batch = batch.map_err(|error| refused(error.to_string()))?;
+            let column = contained(|| normal_column(batch.column(0), self.kind)).map_err(refused)?;
+            columns.push(column.map_err(|refused| match refused {
+                Refused::Unreadable(why) => Refusal::library(why),
+                Refused::TooLarge { value, .. } => {
+                    Refusal { expected: Some(format!("a number up to {}", i64::MAX)), found: value.to_string() }
+                }
+            })?);
+        }
+        let found: usize = columns.iter().map(|column| column.len()).sum();
+        if found != rows - first.min(rows) {
+            return Err(Refusal::library(format!("{found} rows, not {}", rows - first.min(rows))));
+        }
+        Ok(columns)
+    }
+
+    /// Checks headers and checksums, as `validate` does of columns that it does not decode.
+    pub fn verified(&self) -> Result<(), Refusal> {
+        let (slot, metadata) = (FaultSlot::default(), self.footer.metadata());
+        let checksums = &ChunkChecksums::default();
+        let place = Place { metadata, checksums, row_group: 0, column: 0 };
+        pages::verify(&self.store(), place, &slot).map_err(|error| match slot.get() {
+            Some(fault) => Refusal { expected: Some(fault.expected.clone()), found: fault.found.clone() },
+            None => Refusal::library(plain(&error)),
+        })
+    }
+}

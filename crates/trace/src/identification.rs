@@ -1,0 +1,220 @@
+//! From the free text of `identification` to an attribution: a colour of the palette, `unknown`, or nothing.
+//!
+//! Rule, in this order, over the text in lower case and cut into words:
+//!
+//! 1. Nothing but blanks is no attribution.
+//! 2. A clause that speaks in the first person ("I am red", "my body is red", "self: red") and names one colour that it
+//!    does not deny, nor has from hearsay, decides; clauses end at `. ; ! ? ,` and at "but", "while", "whereas", "although", "though".
+//! 3. Words of not knowing ("unknown", "not sure", "cannot tell", ...) are `unknown`, whatever colours stand beside.
+//! 4. One colour that is not denied is that colour, "probably" or not; two or more are `unknown`: nothing is chosen.
+//! 5. Colours that are all denied ("not red") are `unknown`.
+//! 6. No word about a colour, or about one outside of the palette alone, is no attribution.
+//!
+//! Other languages than English are not read. [`VERSION`] changes with every change of meaning; it goes into
+//! recordings, and the column can be made anew from the texts at any time.
+
+use crate::palette::Color;
+
+/// The version of the rule.
+pub const VERSION: &str = "1";
+
+/// The attribution where the agent says that it does not know.
+pub const UNKNOWN: &str = "unknown";
+
+/// The normal form of an identification; `None` where it holds no attribution.
+///
+/// ```
+/// use mirrorstats_trace::identification::normal_form;
+///
+/// assert_eq!(normal_form("I am the crimson robot."), Some("red"));
+/// assert_eq!(normal_form("not red"), Some("unknown"));
+/// assert_eq!(normal_form("a humanoid"), None);
+/// ```
+pub fn normal_form(identification: &str) -> Option<&'static str> {
+    let clauses = clauses(identification);
+    let all = clauses.iter().flatten().map(String::as_str).collect::<Vec<_>>();
+    let own = clauses.iter().filter(|clause| is_about_oneself(clause) && !is_ignorance(clause)).collect::<Vec<_>>();
+    if let [color] = affirmed(own.into_iter())[..] {
+        return Some(color.name());
+    }
+    if is_ignorance(&all) {
+        return Some(UNKNOWN);
+    }
+    match affirmed(clauses.iter())[..] {
+        [color] => Some(color.name()),
+        [] if !all.iter().any(|word| color(word).is_some()) => None,
+        _ => Some(UNKNOWN),
+    }
+}
+
+/// The words of each clause, in lower case, apostrophes dropped.
+fn clauses(text: &str) -> Vec<Vec<String>> {
+    let mut clauses = vec![Vec::new()];
+    for piece in text.to_lowercase().split_inclusive(|c: char| !c.is_alphanumeric() && !matches!(c, '\'' | '’')) {
+        let word = piece.trim_end_matches(|c: char| !c.is_alphanumeric()).replace(['\'', '’'], "");
+        let ends = piece.ends_with(['.', ';', '!', '?', ',', '\n']);
+        if TURNS.contains(&word.as_str()) {
+            clauses.push(Vec::new());
+        } else if !word.is_empty() {
+            clauses.last_mut().expect("there is a clause from the start").push(word);
+        }
+        if ends {
+            clauses.push(Vec::new());
+        }
+    }
+    clauses.retain(|clause| !clause.is_empty());
+    clauses
+}
+
+/// Words after which another thought begins.
+const TURNS: [&str; 6] = ["but", "while", "whereas", "although", "though", "however"];
+
+/// The colours that clauses name and do not deny, each once.
+fn affirmed<'a>(clauses: impl Iterator<Item = &'a Vec<String>>) -> Vec<Color> {
+    let mut found = Vec::new();
+    for clause in clauses {
+        let mut is_denied = false;
+        for (at, word) in clause.iter().enumerate() {
+            is_denied |= denies(clause, at);
+            match color(word) {
+                Some(color) if !is_denied && !found.contains(&color) => found.push(color),
+                _ => {}
+            }
+        }
+    }
+    found
+}
+
+/// From the word here on, the clause denies what it names.
+fn denies(clause: &[String], at: usize) -> bool {
+    let after = clause.get(at + 1).map(String::as_str);
+    match clause[at].as_str() {
+        "not" | "no" | "never" | "neither" | "nor" | "without" | "isnt" | "arent" | "wasnt" | "non" | "excluding"
+        | "except" | "unlike" => after != Some("only"),
+        "rather" | "other" | "different" => matches!(after, Some("than" | "from")),
+        "instead" => after == Some("of"),
+        _ => false,
+    }
+}
+
+/// The clause speaks of the speaker, and in the speaker's own name.
+fn is_about_oneself(clause: &[String]) -> bool {
+    if clause.iter().any(|word| HEARSAY.contains(&word.as_str())) {
+        return false;
+    }
+    clause.iter().any(|word| matches!(word.as_str(), "i" | "im" | "my" | "me" | "self" | "myself" | "ego" | "own"))
+}
+
+/// Words of what somebody else says.
+const HEARSAY: [&str; 9] = ["told", "say", "says", "said", "stated", "states", "claimed", "claims", "prompt"];
+
+/// The words say that the speaker does not know.
+fn is_ignorance(words: &[impl AsRef<str>]) -> bool {
+    let has = |phrase: &[&str]| {
+        words.windows(phrase.len()).any(|window| window.iter().zip(phrase).all(|(a, b)| a.as_ref() == *b))
+    };
+    IGNORANCE.iter().any(|phrase| has(phrase))
+        || matches!(words, [one] if matches!(one.as_ref(), "none" | "na" | "null" | "nothing"))
+}
+
+const IGNORANCE: &[&[&str]] = &[
+    &["unknown"],
+    &["unsure"],
+    &["uncertain"],
+    &["unclear"],
+    &["undetermined"],
+    &["indeterminate"],
+    &["unidentified"],
+    &["unverified"],
+    &["unconfirmed"],
+    &["undecided"],
+    &["not", "sure"],
+    &["not", "certain"],
+    &["not", "clear"],
+    &["not", "known"],
+    &["not", "yet"],
+    &["not", "determined"],
+    &["not", "identified"],
+    &["not", "confirmed"],
+    &["not", "visible"],
+    &["not", "been"],
+    &["no", "idea"],
+    &["no", "evidence"],
+    &["no", "information"],
+    &["no", "identification"],
+    &["dont", "know"],
+    &["do", "not", "know"],
+    &["cannot"],
+    &["cant"],
+    &["can", "not"],
+    &["could", "not"],
+    &["couldnt"],
+    &["unable"],
+    &["have", "not"],
+    &["havent"],
+    &["has", "not"],
+    &["hasnt"],
+    &["to", "be", "determined"],
+    &["tbd"],
+    &["n", "a"],
+    &["pending"],
+];
+
+/// The colour that a word names.
+fn color(word: &str) -> Option<Color> {
+    let stem = word.strip_suffix("ish").filter(|stem| stem.len() > 2).unwrap_or(word);
+    let stem = if stem == "redd" { "red" } else { stem };
+    let in_full = |stem: &str| {
+        Color::named(stem).or_else(|| SYNONYMS.iter().find(|(name, _)| *name == stem).map(|found| found.1))
+    };
+    in_full(stem).or_else(|| in_full(word.strip_suffix("colored").or_else(|| word.strip_suffix("coloured"))?))
+}
+
+/// Names of shades, by the colour of the palette that a person would file them under.
+const SYNONYMS: &[(&str, Color)] = &[
+    ("amber", Color::Orange),
+    ("amethyst", Color::Purple),
+    ("aqua", Color::Cyan),
+    ("aquamarine", Color::Cyan),
+    ("auburn", Color::Brown),
+    ("azure", Color::Blue),
+    ("blu", Color::Blue),
+    ("bronze", Color::Brown),
+    ("burgundy", Color::Red),
+    ("cherry", Color::Red),
+    ("chocolate", Color::Brown),
+    ("cobalt", Color::Blue),
+    ("crimson", Color::Red),
+    ("emerald", Color::Green),
+    ("fuchsia", Color::Pink),
+    ("gold", Color::Yellow),
+    ("golden", Color::Yellow),
+    ("indigo", Color::Purple),
+    ("ivory", Color::White),
+    ("lavender", Color::Purple),
+    ("lemon", Color::Yellow),
+    ("lilac", Color::Purple),
+    ("lime", Color::Green),
+    ("magenta", Color::Pink),
+    ("maroon", Color::Red),
+    ("mauve", Color::Purple),
+    ("navy", Color::Blue),
+    ("olive", Color::Green),
+    ("plum", Color::Purple),
+    ("purpl", Color::Purple),
+    ("rose", Color::Pink),
+    ("rosy", Color::Pink),
+    ("ruby", Color::Red),
+    ("rust", Color::Brown),
+    ("salmon", Color::Pink),
+    ("sapphire", Color::Blue),
+    ("scarlet", Color::Red),
+    ("sienna", Color::Brown),
+    ("tan", Color::Brown),
+    ("tangerine", Color::Orange),
+    ("teal", Color::Cyan),
+    ("turquoise", Color::Cyan),
+    ("vermilion", Color::Red),
+    ("violet", Color::Purple),
+    ("whit", Color::White),
+];

@@ -1,0 +1,263 @@
+//! What the keys of steps become: columns of the schema, checked against it, and columns of their own, whose types come
+//! from the values of all lines.
+//!
+//! Rule: a value is taken as it is or refused; no text becomes a number, no number becomes another.
+
+use indexmap::IndexMap;
+
+use super::fault::{Fault, Place};
+use super::limits::Limits;
+use super::line::{Members, Value};
+use crate::schema::rules::{Known, Requirement, Rule, rules_of};
+use crate::schema::{self, COLUMNS, Column, Kind, Stored};
+use exact::suggest::nearest;
+
+/// A column that the schema does not know.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Own {
+    /// Its name, the key of the lines.
+    pub name: String,
+    /// What it holds; `None` where every line says null.
+    pub kind: Option<Kind>,
+}
+
+/// The columns that the lines so far have.
+#[derive(Debug, Default)]
+pub(super) struct Columns {
+    known: Vec<&'static str>,
+    own: IndexMap<String, Inferred>,
+}
+
+/// What is known of an own column's type.
+#[derive(Debug, Default)]
+struct Inferred {
+    kind: Option<Kind>,
+    /// Where the first value was that is not null.
+    first: Option<Place>,
+    /// An integer that no floating-point number can be relied on to hold.
+    wide: Option<(Place, i64)>,
+}
+
+/// More own columns than any harness has, far fewer than keys that are data.
+const MOST_OWN: usize = 1000;
+/// Floating-point numbers of 64 bits hold every integer up to here.
+const EXACT: u64 = 1 << 53;
+const SEE: &str = "`mirrorstats schema step` prints what a step may hold";
+
+impl Columns {
+    /// Checks a line against the schema and against the lines before it.
+    pub(super) fn check(&mut self, members: &Members, place: &Place, limits: Limits<'_>) -> Vec<Fault> {
+        let mut faults = Vec::new();
+        for (key, value) in members {
+            let fault = match schema::column(key) {
+                Some(column) => {
+                    self.note_known(column);
+                    misfit(column, value, limits)
+                }
+                None => self.check_own(key, value, place),
+            };
+            faults.extend(fault.map(|fault| fault.of_key(key).at(place)));
+        }
+        let has = |name: &str| members.iter().any(|(key, _)| key == name);
+        for column in COLUMNS.iter().filter(|column| column.required && !has(column.name)) {
+            faults.push(missing(column, members).at(place));
+        }
+        faults
+    }
+
+    /// Faults that show when all lines are known.
+    pub(super) fn faults(&self) -> Vec<Fault> {
+        let lossy = |(name, inferred): (&String, &Inferred)| {
+            let (place, value) = inferred.wide.as_ref().filter(|_| inferred.kind == Some(Kind::Float))?;
+            let expected = format!("a number that is exact beside those with fractions, at most {EXACT}");
+            let help = "write the large numbers as text in every line, or the fractions under another key";
+            Some(Fault::new(expected, value.to_string(), help).of_key(name).at(place))
+        };
+        self.own.iter().filter_map(lossy).collect()
+    }
+
+    /// The schema's columns that the trace has, in its order.
+    pub(super) fn known(&self) -> impl Iterator<Item = &'static Column> + '_ {
+        COLUMNS.iter().filter(|column| self.known.contains(&column.name))
+    }
+
+    /// The columns that the schema does not know, in the order of their first lines.
+    pub(super) fn own(&self) -> Vec<Own> {
+        self.own.iter().map(|(name, inferred)| Own { name: name.clone(), kind: inferred.kind }).collect()
+    }
+
+    fn note_known(&mut self, column: &'static Column) {
+        if !self.known.contains(&column.name) {
+            self.known.push(column.name);
+        }
+    }
+
+    fn check_own(&mut self, key: &str, value: &Value, place: &Place) -> Option<Fault> {
+        if key.is_empty() {
+            return Some(Fault::new("a key with a name", "an empty one", "give the key a name, or leave it out"));
+        }
+        let kind = match kind_of(value) {
+            Ok(kind) => kind,
+            Err(fault) => return Some(*fault),
+        };
+        if !self.own.contains_key(key) && self.own.len() == MOST_OWN {
+            let found = "one more";
+            let help = "keys are the same in all lines; write what changes from line to line as a value";
+            return Some(Fault::new(format!("at most {MOST_OWN} keys that the schema does not know"), found, help));
+        }
+        self.own.entry(key.to_owned()).or_default().take(kind, value, place)
+    }
+}
+
+impl Inferred {
+    /// Adds a value; a fault if it does not go with those before it.
+    fn take(&mut self, kind: Option<Kind>, value: &Value, place: &Place) -> Option<Fault> {
+        let now = kind?;
+        if let Value::Int(value) = value
+            && value.unsigned_abs() > EXACT
+            && self.wide.is_none()
+        {
+            self.wide = Some((place.clone(), *value));
+        }
+        let Some((before, first)) = self.kind.zip(self.first.as_ref()) else {
+            (self.kind, self.first) = (Some(now), Some(place.clone()));
+            return None;
+        };
+        match (before, now) {
+            (before, now) if before == now => None,
+            (Kind::Int, Kind::Float) | (Kind::Float, Kind::Int) => {
+                self.kind = Some(Kind::Float);
+                None
+            }
+            _ => {
+                let expected = format!("{}, as in {first}", named(before));
+                Some(Fault::new(expected, value.shown(), "write the key with values of one type in all lines"))
+            }
+        }
+    }
+}
+
+fn named(kind: Kind) -> &'static str {
+    match kind {
+        Kind::Bool => "true or false",
+        Kind::Int | Kind::Float => "a number",
+        Kind::String | Kind::Unsupported => "a text",
+    }
+}
+
+fn kind_of(value: &Value) -> Result<Option<Kind>, Box<Fault>> {
+    match value {
+        Value::Null => Ok(None),
+        Value::Bool(_) => Ok(Some(Kind::Bool)),
+        Value::Int(_) => Ok(Some(Kind::Int)),
+        Value::Float(_) => Ok(Some(Kind::Float)),
+        Value::Text(_) => Ok(Some(Kind::String)),
+        Value::LargeInt(_) => {
+            let expected = format!("an integer of at most {}", i64::MAX);
+            Err(Box::new(Fault::new(expected, value.shown(), "write it as text in every line")))
+        }
+        Value::List | Value::Object(_) => {
+            let help = "give its parts keys of their own, write it as text, or leave it out";
+            Err(Box::new(Fault::new("null, true or false, a number or a text", value.shown(), help)))
+        }
+    }
+}
+
+/// What is wrong with the value of a column of the schema, if anything is.
+fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
+    let refused = |help: &str| Some(Fault::new(expected(column), value.shown(), help));
+    match (column.stored.kind(), value) {
+        (_, Value::Null) if column.nullable => None,
+        (_, Value::Null) => refused("give the step its value; nothing is filled in"),
+        (Kind::Bool, Value::Bool(_)) => None,
+        (Kind::Int, Value::Int(value)) if *value < lowest(column) => {
+            refused(if column.name == "t" { "number the steps from 1" } else { "correct the number" })
+        }
+        (Kind::Int, Value::Int(value)) => {
+            let (_, highest) = column.stored.range()?;
+            if *value > highest { refused("correct the number, or use smaller ones") } else { None }
+        }
+        (Kind::Int, Value::LargeInt(_)) => refused("correct the number, or use smaller ones"),
+        (Kind::Int, Value::Float(_)) => refused("write it without a point and without an exponent"),
+        (Kind::Float, Value::Int(_) | Value::LargeInt(_) | Value::Float(_)) => {
+            if is_held(column, value) {
+                None
+            } else {
+                refused("correct the number")
+            }
+        }
+        (Kind::String, Value::Text(text)) => {
+            let Limits { experiments, palette, .. } = limits;
+            let rules = rules_of(column, Known { palette, experiments });
+            rules.iter().find(|rule| !rule.allows(text)).map(|rule| odd_text(column, rule, text, value.shown()))
+        }
+        _ => refused(SEE),
+    }
+}
+
+/// The smallest integer of a column.
+pub(super) fn lowest(column: &Column) -> i64 {
+    match column.stored.range() {
+        _ if column.name == "t" => 1,
+        _ if column.counts() => 0,
+        Some((lowest, _)) => lowest,
+        None => i64::MIN,
+    }
+}
+
+/// Whether the column's floating-point type holds a number of this size, and the column one of this sign.
+#[expect(clippy::cast_precision_loss, reason = "a column of floating-point numbers rounds")]
+#[expect(clippy::cast_possible_truncation, reason = "that is the question")]
+fn is_held(column: &Column, value: &Value) -> bool {
+    let number = match value {
+        Value::Int(value) => *value as f64,
+        Value::LargeInt(value) => *value as f64,
+        Value::Float(value) => *value,
+        _ => return false,
+    };
+    let fits = column.stored != Stored::Float32 || (number as f32).is_finite();
+    fits && !(column.counts() && number < 0.0)
+}
+
+/// What a column of the schema takes, in words.
+pub(super) fn expected(column: &Column) -> String {
+    let what = match column.stored.kind() {
+        Kind::Bool => "true or false".to_owned(),
+        Kind::Int => {
+            let highest = column.stored.range().map_or(i64::MAX, |(_, highest)| highest);
+            format!("an integer from {} to {highest}", lowest(column))
+        }
+        Kind::Float if column.counts() => "a number from 0".to_owned(),
+        Kind::Float => "a number".to_owned(),
+        _ if !column.values.is_empty() => format!("one of {}", column.values.join(", ")),
+        _ if column.names() => "a text that is not empty".to_owned(),
+        _ => "a text".to_owned(),
+    };
+    if column.nullable { format!("{what}, or null") } else { what }
+}
+
+/// A text that breaks a rule of its column.
+fn odd_text(column: &Column, rule: &Rule<'_>, text: &str, found: String) -> Fault {
+    match rule.asks {
+        Requirement::Color(color, palette) => Fault::new(color.expected(palette), found, color.help(text, palette)),
+        Requirement::Experiment(known) => {
+            let like = nearest(text, known.iter().map(String::as_str));
+            let like = like.map(|like| format!("did you mean `{like}`? Otherwise ")).unwrap_or_default();
+            let help = format!("{like}name the definition file that knows it with --definitions");
+            Fault::new(rule.expected(), found, help)
+        }
+        Requirement::OneOf(names) => {
+            let like = nearest(text, names.iter().copied()).map(|like| format!("did you mean `{like}`?"));
+            Fault::new(expected(column), found, like.unwrap_or_else(|| SEE.to_owned()))
+        }
+        _ => Fault::new(expected(column), found, "give the name, or null where allowed"),
+    }
+}
+
+fn missing(column: &Column, members: &Members) -> Fault {
+    let strangers = members.iter().map(|(key, _)| key.as_str()).filter(|key| schema::column(key).is_none());
+    let found =
+        nearest(column.name, strangers).map_or("none".to_owned(), |key| format!("none, though there is `{key}`"));
+    let help = if column.nullable { "write null where the reply gave none" } else { SEE };
+    Fault::new(expected(column), found, help).of_key(column.name)
+}

@@ -1,0 +1,87 @@
+//! Why lines of steps did not become a trace: the faults in them, gathered until a pass is over, or what else failed.
+
+use std::io;
+
+use super::fault::Fault;
+use crate::error::TraceError;
+
+/// The most faults that a message tells one by one.
+const TOLD: usize = 10;
+
+/// The faults so far: the first of them, and how many there are.
+#[derive(Debug, Default)]
+pub(super) struct Faults {
+    told: Vec<Fault>,
+    more: usize,
+}
+
+impl Faults {
+    pub(super) fn add(&mut self, fault: Fault) {
+        if let Some(same) = self.told.iter_mut().find(|told| told.is_alike(&fault)) {
+            same.further_lines += 1;
+        } else if self.told.len() < TOLD {
+            self.told.push(fault);
+        } else {
+            self.more += 1;
+        }
+    }
+
+    pub(super) fn extend(&mut self, faults: impl IntoIterator<Item = Fault>) {
+        faults.into_iter().for_each(|fault| self.add(fault));
+    }
+
+    /// The error of these faults, if there are any.
+    pub(super) fn none(&mut self) -> Result<(), ImportError> {
+        let Self { told, more } = std::mem::take(self);
+        if told.is_empty() { Ok(()) } else { Err(ImportError::Faults { told, more }) }
+    }
+}
+
+/// Why lines of steps did not become a trace.
+#[derive(Debug, thiserror::Error)]
+pub enum ImportError {
+    /// Lines that are no steps, or steps that are no episodes.
+    #[error("{}", listed(told, *more))]
+    Faults {
+        /// The first of them; never empty.
+        told: Vec<Fault>,
+        /// How many more there are.
+        more: usize,
+    },
+    /// A text cannot be read.
+    #[error("cannot read {file}; check the path and its permissions")]
+    Read {
+        /// As it was named.
+        file: String,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A text is not what it was a moment before.
+    #[error("{file}: expected the lines of the first pass, found others\n  help: import it when nothing writes to it")]
+    Changed {
+        /// As it was named.
+        file: String,
+    },
+    /// The trace cannot be written, or breaks a rule of the schema.
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+}
+
+impl ImportError {
+    pub(super) fn changed(file: &str) -> Self {
+        Self::Changed { file: file.to_owned() }
+    }
+
+    pub(super) fn read(file: &str) -> impl FnOnce(io::Error) -> Self {
+        let file = file.to_owned();
+        move |source| Self::Read { file, source }
+    }
+}
+
+fn listed(told: &[Fault], more: usize) -> String {
+    let told = told.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+    match more {
+        0 => told,
+        more => format!("{told}\nand {more} more; nothing was written"),
+    }
+}

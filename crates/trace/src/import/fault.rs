@@ -1,0 +1,86 @@
+//! What can be wrong with lines of steps: which line, which key, expected, found, what to do.
+
+use std::fmt;
+use std::sync::Arc;
+
+use exact::escape::visible;
+
+/// A line of a text.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Place {
+    pub(super) file: Arc<str>,
+    /// From 1; blank lines count.
+    pub(super) line: u64,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, line {}", visible(&self.file), self.line)
+    }
+}
+
+/// One thing that is wrong with a line, or with a file if it has no line.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Fault {
+    /// The file, as it was named.
+    pub file: String,
+    /// The line, from 1.
+    pub line: Option<u64>,
+    /// The key of the object.
+    pub key: Option<String>,
+    /// What would do.
+    pub expected: String,
+    /// What is there.
+    pub found: String,
+    /// What to do about it.
+    pub help: String,
+    /// How many lines after it have the same fault.
+    pub further_lines: u64,
+}
+
+impl Fault {
+    /// Whether another one is the same fault in another line of the file.
+    pub(super) fn is_alike(&self, other: &Self) -> bool {
+        let of_line = |fault: &Self| Self { line: None, further_lines: 0, ..fault.clone() };
+        self.line.is_some() && other.line.is_some() && of_line(self) == of_line(other)
+    }
+
+    /// A fault of a whole file, its words still to be said.
+    pub(super) fn of_file(file: &str) -> Self {
+        Self { file: file.to_owned(), ..Self::default() }
+    }
+
+    /// The same fault, in this line.
+    pub(super) fn at(self, place: &Place) -> Self {
+        Self { file: place.file.to_string(), line: Some(place.line), ..self }
+    }
+
+    /// The same fault, of this key.
+    pub(super) fn of_key(self, key: &str) -> Self {
+        Self { key: Some(key.to_owned()), ..self }
+    }
+
+    /// A fault without its place.
+    pub(super) fn new(expected: impl Into<String>, found: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { expected: expected.into(), found: found.into(), help: help.into(), ..Self::default() }
+    }
+}
+
+/// `steps.jsonl, line 3, key t: expected .., found ..; help`, on four lines.
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", visible(&self.file))?;
+        if let Some(line) = self.line {
+            write!(f, ", line {line}")?;
+        }
+        if let Some(key) = &self.key {
+            write!(f, ", key `{}`", visible(key))?;
+        }
+        match self.further_lines {
+            0 => {}
+            1 => f.write_str(", and in one more line")?,
+            more => write!(f, ", and in {more} more lines")?,
+        }
+        write!(f, "\n  expected {}\n  found {}\n  help: {}", self.expected, self.found, self.help)
+    }
+}

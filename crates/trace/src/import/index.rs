@@ -1,0 +1,121 @@
+//! Where each step lies, and whether the steps of an episode are whole: t = 1, 2, ... each once, the same names in all.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::fault::{Fault, Place};
+use super::line::{Members, Value};
+use super::text::Line;
+use crate::schema::{COLUMNS, Column};
+use exact::escape::visible;
+
+/// Where a step lies.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Step {
+    /// Which episode, in the order of their first lines.
+    pub(super) episode: usize,
+    t: i64,
+    /// Which text.
+    pub(super) text: usize,
+    /// Where its line begins.
+    pub(super) offset: u64,
+    line: u64,
+}
+
+/// What the first line of an episode says of it.
+#[derive(Debug)]
+struct Head {
+    id: String,
+    place: Place,
+    constants: Vec<Value>,
+}
+
+/// The steps so far.
+#[derive(Debug, Default)]
+pub(super) struct Index {
+    heads: Vec<Head>,
+    by_id: HashMap<String, usize>,
+    steps: Vec<Step>,
+}
+
+/// Columns that are the same in all steps of an episode, besides its id.
+fn constants() -> impl Iterator<Item = &'static Column> {
+    COLUMNS.iter().filter(|column| column.constant && column.name != "episode_id")
+}
+
+fn value<'a>(members: &'a Members, name: &str) -> &'a Value {
+    members.iter().find(|(key, _)| key == name).map_or(&Value::Null, |(_, value)| value)
+}
+
+impl Index {
+    /// Adds the step of a line whose values are those of the schema; a fault if the line contradicts its episode's first.
+    pub(super) fn add(&mut self, text: usize, line: &Line, members: &Members) -> Option<Fault> {
+        let (Value::Text(id), Value::Int(t)) = (value(members, "episode_id"), value(members, "t")) else { return None };
+        let known = self.by_id.get(id).copied();
+        let episode = known.unwrap_or_else(|| self.begin(id, line, members));
+        self.steps.push(Step { episode, t: *t, text, offset: line.offset, line: line.place.line });
+        let head = &self.heads[episode];
+        let mut pairs = constants().zip(&head.constants);
+        pairs.find_map(|(column, first)| {
+            let now = value(members, column.name);
+            if now == first {
+                return None;
+            }
+            let expected = format!("{}, as in the episode's first line ({})", first.shown(), head.place);
+            let help = "correct the lines, or give the episodes ids of their own";
+            Some(Fault::new(expected, now.shown(), help).of_key(column.name).at(&line.place))
+        })
+    }
+
+    fn begin(&mut self, id: &str, line: &Line, members: &Members) -> usize {
+        let constants = constants().map(|column| value(members, column.name).clone()).collect();
+        self.heads.push(Head { id: id.to_owned(), place: line.place.clone(), constants });
+        self.by_id.insert(id.to_owned(), self.heads.len() - 1);
+        self.heads.len() - 1
+    }
+
+    /// The steps of all episodes, one after the other, each in the order of its t; faults where one is not whole.
+    pub(super) fn into_steps(self, names: &[Arc<str>], faults: &mut super::error::Faults) -> Vec<Step> {
+        let Self { heads, mut steps, .. } = self;
+        steps.sort_by_key(|step| (step.episode, step.t));
+        for episode in steps.chunk_by(|a, b| a.episode == b.episode) {
+            let id = &heads[episode[0].episode].id;
+            faults.extend(sequence_fault(id, episode, names));
+        }
+        steps
+    }
+}
+
+/// The first place where t is not one more than before.
+fn sequence_fault(id: &str, episode: &[Step], names: &[Arc<str>]) -> Option<Fault> {
+    let place = |step: &Step| Place { file: Arc::clone(&names[step.text]), line: step.line };
+    let of = format!("of episode `{}`", visible(id));
+    let mut before: Option<&Step> = None;
+    for step in episode {
+        let wanted = before.map_or(1, |before| before.t.saturating_add(1));
+        let found = |words: String| format!("t = {}{words}", step.t);
+        let fault = match before {
+            Some(before) if step.t == before.t => Fault::new(
+                format!("one line for each t {of}"),
+                found(format!(" again, as in {}", place(before))),
+                "keep one line for each t",
+            ),
+            _ if step.t == wanted => {
+                before = Some(step);
+                continue;
+            }
+            None => Fault::new(
+                format!("t = 1 as the first {of}"),
+                found(String::new()),
+                "add the first steps, or number the steps from 1",
+            ),
+            Some(before) => Fault::new(
+                format!("t = {wanted} {of}, one more than in {}", place(before)),
+                found(String::new()),
+                "add the missing steps, or leave the episode out",
+            ),
+        };
+        return Some(fault.of_key("t").at(&place(step)));
+    }
+    None
+}

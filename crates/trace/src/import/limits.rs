@@ -1,0 +1,34 @@
+//! What the values of steps are held against besides the schema, and what the trace declares of them.
+
+use serde_json::{Value, json};
+
+use crate::declared::{Cluster, Origin};
+use crate::schema::colors::palette::Palette;
+
+/// What there is of experiments and colours.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Limits<'a> {
+    /// The experiments that there are; any if `None`.
+    pub experiments: Option<&'a [String]>,
+    /// The colours that there are, which the trace then declares; any if `None`.
+    pub palette: Option<&'a Palette>,
+    /// What episodes share that are more alike than chance; nothing if `None`.
+    pub cluster: Option<Cluster>,
+    /// Whether the steps were rebuilt from published numbers, which leave the rest of them open.
+    pub is_reconstruction: bool,
+}
+
+impl Limits<'_> {
+    /// What the footer says of the steps in these texts, given their hashes.
+    pub(super) fn recording(&self, sources: &[String]) -> Value {
+        let origin = if self.is_reconstruction { Origin::Reconstruction } else { Origin::Import };
+        let mut recording = json!({ "kind": origin.name(), "sources": sources });
+        if let Some(palette) = self.palette {
+            recording["palette"] = json!(palette.names());
+        }
+        if let Some(cluster) = self.cluster {
+            recording["design"] = json!({ "cluster": cluster });
+        }
+        recording
+    }
+}

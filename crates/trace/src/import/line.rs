@@ -1,0 +1,211 @@
+//! One line as a flat JSON object: its keys and plain values, in the order of the line.
+//!
+//! Rule: strict JSON, each key once, no value inside of a value. What a number is stays as written: `1` is an integer,
+//! `1.0` is none.
+
+use std::collections::HashSet;
+use std::fmt;
+
+use serde::de::{Deserialize, DeserializeSeed, Deserializer, IgnoredAny, MapAccess, SeqAccess, Visitor};
+
+use super::fault::Fault;
+use exact::escape::{exact, visible};
+
+/// A value of a step.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    Null,
+    Bool(bool),
+    Int(i64),
+    /// An integer that no column of integers holds.
+    LargeInt(u64),
+    Float(f64),
+    Text(String),
+    /// A list, of whatever.
+    List,
+    /// An object.
+    Object(Members),
+}
+
+/// Keys and values in the order of the line; for an object inside of a value they are not kept.
+pub(super) type Members = Vec<(String, Value)>;
+
+impl Value {
+    /// The value for a message, long texts cut.
+    pub(super) fn shown(&self) -> String {
+        const LONGEST: usize = 60;
+        match self {
+            Self::Null => "null".into(),
+            Self::Bool(value) => value.to_string(),
+            Self::Int(value) => value.to_string(),
+            Self::LargeInt(value) => value.to_string(),
+            Self::Float(value) => format!("{value:?}"),
+            Self::Text(text) if text.chars().count() > LONGEST => {
+                format!("the text `{}...`", visible(&text.chars().take(LONGEST).collect::<String>()))
+            }
+            Self::Text(text) => format!("the text `{}`", exact(text)),
+            Self::List => "a list".into(),
+            Self::Object(_) => "an object".into(),
+        }
+    }
+}
+
+/// The keys and values of a line; `ended` says whether a line feed was at its end.
+pub(super) fn members(bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
+    let text = std::str::from_utf8(bytes).map_err(|error| {
+        let found = format!("other bytes after the first {}", error.valid_up_to());
+        Box::new(Fault::new("text in UTF-8", found, "write the file as UTF-8"))
+    })?;
+    match serde_json::from_str(text.trim_end()) {
+        Ok(Value::Object(members)) => unique(members),
+        Ok(other) => Err(Box::new(Fault::new("a JSON object, one step", other.shown(), "write one object a line"))),
+        Err(error) => Err(Box::new(no_json(text.trim_end(), ended, &error))),
+    }
+}
+
+fn unique(members: Members) -> Result<Members, Box<Fault>> {
+    let mut seen = HashSet::with_capacity(members.len());
+    match members.iter().find(|(key, _)| !seen.insert(key.as_str())) {
+        None => Ok(members),
+        Some((key, _)) => Err(Box::new(Fault::new("each key once", "the key twice", "keep one of them").of_key(key))),
+    }
+}
+
+fn no_json(text: &str, ended: bool, error: &serde_json::Error) -> Fault {
+    let words = error.to_string();
+    let what = words.split(" at line ").next().unwrap_or(&words);
+    let found = format!("{what} at character {}", character(text, error.column()));
+    let help = if is_no_number(text, error.column()) {
+        "JSON has no NaN and no infinity: write null where there is no number"
+    } else if error.is_eof() && !ended {
+        "the file was cut off while it was written: complete the line, or remove it and what belongs to it"
+    } else if error.is_eof() {
+        "write each object in one line, without line breaks inside"
+    } else {
+        "correct the line; nothing is skipped"
+    };
+    Fault::new("strict JSON", found, help)
+}
+
+/// Whether a word that is no JSON, and stands for a number elsewhere, is around this byte.
+fn is_no_number(text: &str, byte: usize) -> bool {
+    let start = text.floor_char_boundary(byte.saturating_sub(2));
+    let around: String = text[start..].chars().take(4).collect();
+    ["NaN", "Inf"].iter().any(|word| around.contains(word))
+}
+
+/// The number of the character at this byte, both from 1.
+fn character(text: &str, byte: usize) -> usize {
+    text.get(..text.floor_char_boundary(byte)).map_or(byte, |before| before.chars().count())
+}
+
+impl<'de> Deserialize<'de> for Value {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Plain { is_line: true }.deserialize(deserializer)
+    }
+}
+
+/// The line itself, or a value inside of it: what is in lists and objects there is read and not kept.
+struct Plain {
+    is_line: bool,
+}
+
+impl<'de> DeserializeSeed<'de> for Plain {
+    type Value = Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Value, D::Error> {
+        deserializer.deserialize_any(self)
+    }
+}
+
+impl<'de> Visitor<'de> for Plain {
+    type Value = Value;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a JSON value")
+    }
+
+    fn visit_unit<E>(self) -> Result<Value, E> {
+        Ok(Value::Null)
+    }
+
+    fn visit_bool<E>(self, value: bool) -> Result<Value, E> {
+        Ok(Value::Bool(value))
+    }
+
+    fn visit_i64<E>(self, value: i64) -> Result<Value, E> {
+        Ok(Value::Int(value))
+    }
+
+    fn visit_u64<E>(self, value: u64) -> Result<Value, E> {
+        Ok(i64::try_from(value).map_or(Value::LargeInt(value), Value::Int))
+    }
+
+    fn visit_f64<E>(self, value: f64) -> Result<Value, E> {
+        Ok(Value::Float(value))
+    }
+
+    fn visit_str<E>(self, text: &str) -> Result<Value, E> {
+        Ok(Value::Text(text.to_owned()))
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Value, A::Error> {
+        while list.next_element::<IgnoredAny>()?.is_some() {}
+        Ok(Value::List)
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Value, A::Error> {
+        let mut members = Members::new();
+        while let Some(key) = map.next_key()? {
+            if self.is_line {
+                members.push((key, map.next_value_seed(Self { is_line: false })?));
+            } else {
+                map.next_value::<IgnoredAny>()?;
+            }
+        }
+        Ok(Value::Object(members))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Value, members};
+
+    #[test]
+    fn numbers_stay_what_they_are_written_as() {
+        let line = r#"{"a":1,"b":1.0,"c":-9223372036854775808,"d":18446744073709551615,"e":1e3,"f":null}"#;
+        let values: Vec<_> = members(line.as_bytes(), true).unwrap().into_iter().map(|(_, value)| value).collect();
+        let (int, float) = (Value::Int, Value::Float);
+        let expected = [int(1), float(1.0), int(i64::MIN), Value::LargeInt(u64::MAX), float(1000.0), Value::Null];
+        assert_eq!(values, expected);
+    }
+
+    #[test]
+    fn what_is_no_flat_object_is_told() {
+        let deep = format!("{}{}", "[".repeat(100_000), "]".repeat(100_000));
+        for (line, expected, found) in [
+            ("[1]", "a JSON object, one step", "a list"),
+            ("null", "a JSON object, one step", "null"),
+            (r#"{"a":1,"a":1}"#, "each key once", "the key twice"),
+            (r#"{"a":1} {"#, "strict JSON", "trailing characters at character 9"),
+            (r#"{"a":"\ud800"}"#, "strict JSON", "unexpected end of hex escape at character 13"),
+            (&deep, "a JSON object, one step", "a list"),
+        ] {
+            let fault = members(line.as_bytes(), true).unwrap_err();
+            let short = &line[..line.len().min(20)];
+            assert_eq!((fault.expected.as_str(), fault.found.as_str()), (expected, found), "{short}");
+        }
+        assert!(members(b"{\"a\":\"\xff\"}", true).unwrap_err().found.ends_with("the first 6"));
+    }
+
+    #[test]
+    fn help_knows_what_python_writes_and_what_a_crash_leaves() {
+        let help = |line: &str, ended| members(line.as_bytes(), ended).unwrap_err().help;
+        for line in [r#"{"a": NaN}"#, r#"{"a": Infinity}"#, r#"{"a": -Infinity}"#] {
+            assert!(help(line, true).contains("no NaN"), "{line}: {}", help(line, true));
+        }
+        assert!(help(r#"{"a": "NaN"#, false).contains("cut off"));
+        assert!(help("{", true).contains("in one line"));
+        assert!(help("{'a': 1}", true).contains("correct the line"));
+    }
+}

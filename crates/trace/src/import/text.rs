@@ -1,0 +1,140 @@
+//! A text of lines that is read twice: from its start to its end, then line by line at places that are known.
+//!
+//! What cannot be read twice (standard input, a pipe) goes through a temporary file. A byte order mark at the start and
+//! blank lines hold no step and are passed over; blank lines count. A line may end with `\n` or `\r\n`.
+
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek as _, SeekFrom};
+use std::path::Path;
+use std::sync::Arc;
+
+use super::error::ImportError;
+use super::fault::Place;
+use crate::inputs::Input;
+use exact::budget::Limit;
+use exact::hash;
+use exact::input;
+
+/// Lines of steps, and what they are called in messages.
+#[derive(Debug)]
+pub struct Text {
+    name: Arc<str>,
+    reader: BufReader<File>,
+    /// Where the reader is, in bytes from the start.
+    offset: u64,
+    /// Lines that were read since the start.
+    lines: u64,
+}
+
+/// One line that is not blank.
+#[derive(Debug)]
+pub(super) struct Line {
+    pub(super) place: Place,
+    /// Where it begins.
+    pub(super) offset: u64,
+    /// What it holds, without the byte order mark.
+    pub(super) bytes: Vec<u8>,
+    /// Whether it ends with a line feed; the last one of a file that was cut off does not.
+    pub(super) ended: bool,
+}
+
+/// A step with all that was replied; the longest reply of a model has some hundred thousand bytes.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of steps", 16 << 20);
+
+/// What is piped in is kept on the disk meanwhile.
+const LARGEST_STREAM: Limit = Limit::new("bytes of steps that are piped in", 64 << 30);
+
+const BYTE_ORDER_MARK: &[u8] = "\u{feff}".as_bytes();
+
+impl Text {
+    /// The text in this file.
+    pub fn open(path: &Path) -> Result<Self, ImportError> {
+        let name = Input::new(path).name;
+        let failed = || ImportError::read(&name);
+        if path.is_dir() {
+            return Err(failed()(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder; name the files in it")));
+        }
+        let file = input::open_text(path).map_err(failed())?;
+        let about = file.metadata().map_err(failed())?;
+        if about.is_file() { Ok(Self::of_file(&name, file)) } else { Self::spool(&name, file) }
+    }
+
+    /// The text that a stream still gives, kept in a temporary file.
+    pub fn spool(name: &str, stream: impl Read) -> Result<Self, ImportError> {
+        let mut file = tempfile::tempfile().map_err(ImportError::read(name))?;
+        let copied = io::copy(&mut stream.take(LARGEST_STREAM.most().saturating_add(1)), &mut file);
+        let checked = copied.and_then(|bytes| LARGEST_STREAM.check(bytes).map_err(Into::into));
+        checked.map_err(ImportError::read(name))?;
+        Ok(Self::of_file(name, file))
+    }
+
+    fn of_file(name: &str, file: File) -> Self {
+        Self { name: name.into(), reader: BufReader::new(file), offset: 0, lines: 0 }
+    }
+
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
+    pub(super) fn shared_name(&self) -> Arc<str> {
+        Arc::clone(&self.name)
+    }
+
+    pub(super) fn rewind(&mut self) -> Result<(), ImportError> {
+        self.reader.rewind().map_err(ImportError::read(&self.name))?;
+        (self.offset, self.lines) = (0, 0);
+        Ok(())
+    }
+
+    /// The hash of the whole text.
+    pub(super) fn hash(&mut self) -> Result<String, ImportError> {
+        self.rewind()?;
+        let hash = hash::of_reader(&mut self.reader).map_err(ImportError::read(&self.name))?;
+        self.rewind()?;
+        Ok(hash)
+    }
+
+    /// The next line that is not blank; `None` at the end.
+    pub(super) fn next_line(&mut self) -> Result<Option<Line>, ImportError> {
+        loop {
+            let offset = self.offset;
+            let mut bytes = self.read_line()?;
+            if bytes.is_empty() {
+                return Ok(None);
+            }
+            self.lines += 1;
+            let ended = bytes.ends_with(b"\n");
+            if offset == 0 && bytes.starts_with(BYTE_ORDER_MARK) {
+                bytes.drain(..BYTE_ORDER_MARK.len());
+            }
+            if !bytes.trim_ascii().is_empty() {
+                let place = Place { file: Arc::clone(&self.name), line: self.lines };
+                return Ok(Some(Line { place, offset, bytes, ended }));
+            }
+        }
+    }
+
+    /// The line that begins at this offset.
+    pub(super) fn line_at(&mut self, offset: u64) -> Result<Vec<u8>, ImportError> {
+        let failed = || ImportError::read(&self.name);
+        if offset != self.offset {
+            // Within what is buffered this costs nothing.
+            match i64::try_from(i128::from(offset) - i128::from(self.offset)) {
+                Ok(distance) => self.reader.seek_relative(distance).map_err(failed())?,
+                Err(_) => drop(self.reader.seek(SeekFrom::Start(offset)).map_err(failed())?),
+            }
+            self.offset = offset;
+        }
+        let mut bytes = self.read_line()?;
+        if offset == 0 && bytes.starts_with(BYTE_ORDER_MARK) {
+            bytes.drain(..BYTE_ORDER_MARK.len());
+        }
+        Ok(bytes)
+    }
+
+    fn read_line(&mut self) -> Result<Vec<u8>, ImportError> {
+        let bytes = input::line(&mut self.reader, LONGEST_LINE).map_err(ImportError::read(&self.name))?;
+        self.offset += bytes.len() as u64;
+        Ok(bytes)
+    }
+}

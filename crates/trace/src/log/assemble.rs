@@ -1,0 +1,197 @@
+//! One log out of several: episodes in the order of the trace, each in chunks of its own.
+
+use std::collections::BTreeMap;
+#[cfg(feature = "view")]
+use std::collections::BTreeSet;
+use std::fs::File;
+use std::io::{BufReader, BufWriter, Seek, Write};
+use std::path::{Path, PathBuf};
+
+use mcap::records::Metadata;
+use mcap::{Compression, Message, WriteOptions, Writer};
+use serde_json::Value;
+
+use super::error::LogError;
+use super::message::EpisodeMessage;
+use super::messages::Messages;
+use super::{METADATA, METADATA_KEY, topic};
+use crate::episode::Episode;
+use exact::replace::NewFile;
+
+/// What orders the episodes of a log: seed, run and repetition.
+pub type Place = (i32, i32, i32);
+
+/// Where an episode is in its log.
+pub fn place(head: &Episode) -> Place {
+    (head.seed, head.run, head.repetition.unwrap_or(1))
+}
+
+/// A writer whose bytes depend on nothing but what is written.
+pub(super) fn writer<W: Write + Seek>(out: W) -> mcap::McapResult<Writer<W>> {
+    WriteOptions::new()
+        .profile("")
+        .library(concat!("mirrorstats ", env!("CARGO_PKG_VERSION")))
+        .compression(Some(Compression::Zstd))
+        .compression_threads(0)
+        // Chunks end where an episode does, never at a number of bytes.
+        .chunk_size(None)
+        .create(out)
+}
+
+pub(super) fn write_recording<W: Write + Seek>(out: &mut Writer<W>, recording: &Value) -> mcap::McapResult<()> {
+    let metadata = BTreeMap::from([(METADATA_KEY.to_owned(), recording.to_string())]);
+    out.write_metadata(&Metadata { name: METADATA.to_owned(), metadata })
+}
+
+/// Writes one log of these logs of one episode each, which replaces the one at `out` in one step.
+pub fn write(out: &Path, parts: &[(Place, PathBuf)], recording: &Value) -> Result<(), LogError> {
+    let file = NewFile::create(out).map_err(LogError::io("write", out))?;
+    join(file, None, out, parts, recording)
+}
+
+/// Puts the episodes of the log `before`, if there is one, and of these logs of one episode each into one log, which
+/// replaces whatever is at `out` in one step; it is written in `scratch`, a folder of the same disk. Of an episode that is
+/// there twice the one in the log `before` counts. That `before` was recorded as `recording` says is for the caller to know.
+pub fn assemble(
+    out: &Path,
+    before: Option<&Path>,
+    parts: &[(Place, PathBuf)],
+    recording: &Value,
+    scratch: &Path,
+) -> Result<(), LogError> {
+    let file = NewFile::create_in(scratch, out).map_err(LogError::io("write", out))?;
+    join(file, before.map(Source::open).transpose()?, out, parts, recording)
+}
+
+/// Writes the log at `path` anew without the episodes of these ids.
+#[cfg(feature = "view")]
+pub fn without(path: &Path, ids: &BTreeSet<String>, recording: &Value) -> Result<(), LogError> {
+    let mut source = Source::open(path)?;
+    let file = NewFile::create(path).map_err(LogError::io("write", path))?;
+    let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
+    write_recording(&mut log, recording).map_err(LogError::writing(path))?;
+    while let Some((head, _)) = &source.begin {
+        if ids.contains(&head.episode_id) {
+            // Up to the next begin.
+            source.begin = None;
+            source.advance()?;
+        } else {
+            source.copy_episode(&mut log, path)?;
+        }
+    }
+    log.finish().map_err(LogError::writing(path))?;
+    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", path)(error.into_error()))?;
+    file.commit().map_err(LogError::io("write", path))
+}
+
+/// Writes a log and gives it its name.
+fn join(
+    file: NewFile,
+    before: Option<Source>,
+    out: &Path,
+    parts: &[(Place, PathBuf)],
+    recording: &Value,
+) -> Result<(), LogError> {
+    let mut log = writer(BufWriter::new(file)).map_err(LogError::writing(out))?;
+    write_recording(&mut log, recording).map_err(LogError::writing(out))?;
+    copy_all(&mut log, before, out, parts)?;
+    log.finish().map_err(LogError::writing(out))?;
+    let file = log.into_inner().into_inner().map_err(|error| LogError::io("write", out)(error.into_error()))?;
+    file.commit().map_err(LogError::io("write", out))
+}
+
+/// Copies the episodes of both, by seed and run.
+fn copy_all<W: Write + Seek>(
+    log: &mut Writer<W>,
+    mut before: Option<Source>,
+    out: &Path,
+    parts: &[(Place, PathBuf)],
+) -> Result<(), LogError> {
+    let mut parts = parts.to_vec();
+    parts.sort();
+    for (place, part) in &parts {
+        while let Some(earlier) = before.as_ref().and_then(Source::place).filter(|earlier| earlier <= place) {
+            if let Some(source) = &mut before {
+                source.copy_episode(log, out)?;
+            }
+            if earlier == *place {
+                break;
+            }
+        }
+        if !is_written(before.as_ref(), *place) {
+            let mut source = Source::open(part)?;
+            source.copy_episode(log, out)?;
+        }
+    }
+    while let Some(source) = before.as_mut().filter(|source| source.place().is_some()) {
+        source.copy_episode(log, out)?;
+    }
+    Ok(())
+}
+
+fn is_written(before: Option<&Source>, place: Place) -> bool {
+    before.is_some_and(|source| source.last == Some(place))
+}
+
+/// A log that is copied episode by episode.
+struct Source {
+    path: PathBuf,
+    messages: Messages<BufReader<File>>,
+    /// The message with which the next episode begins.
+    begin: Option<(Episode, Message<'static>)>,
+    /// The episode that was copied last.
+    last: Option<Place>,
+}
+
+impl Source {
+    fn open(path: &Path) -> Result<Self, LogError> {
+        let messages = Messages::open(path)?;
+        let mut source = Self { path: path.to_owned(), messages, begin: None, last: None };
+        source.advance()?;
+        Ok(source)
+    }
+
+    fn place(&self) -> Option<Place> {
+        self.begin.as_ref().map(|(head, _)| place(head))
+    }
+
+    /// Goes on to the next episode's first message.
+    fn advance(&mut self) -> Result<(), LogError> {
+        while let Some(message) = self.messages.next().transpose()? {
+            if let Some(EpisodeMessage::Begin(head)) = self.episode_message(&message)? {
+                self.begin = Some((*head, message));
+                return Ok(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Copies the next episode, from its `begin` to its `end`, and ends the chunk behind it.
+    fn copy_episode<W: Write + Seek>(&mut self, log: &mut Writer<W>, out: &Path) -> Result<(), LogError> {
+        let Some((head, begin)) = self.begin.take() else { return Ok(()) };
+        log.write(&begin).map_err(LogError::writing(out))?;
+        let mut has_ended = false;
+        while let Some(message) = self.messages.next().transpose()? {
+            log.write(&message).map_err(LogError::writing(out))?;
+            if let Some(EpisodeMessage::End { .. }) = self.episode_message(&message)? {
+                has_ended = true;
+                break;
+            }
+        }
+        if !has_ended {
+            let fault = format!("the episode `{}` has no end", head.episode_id);
+            return Err(LogError::Damaged { file: self.path.display().to_string(), fault });
+        }
+        log.flush().map_err(LogError::writing(out))?;
+        self.last = Some(place(&head));
+        self.advance()
+    }
+
+    fn episode_message(&self, message: &Message<'_>) -> Result<Option<EpisodeMessage>, LogError> {
+        if message.channel.topic != topic::EPISODE {
+            return Ok(None);
+        }
+        let found = serde_json::from_slice(&message.data);
+        found.map(Some).map_err(|fault| self.messages.damaged(&format!("a message of {}: {fault}", topic::EPISODE)))
+    }
+}

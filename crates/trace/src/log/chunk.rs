@@ -1,0 +1,194 @@
+//! What is in a chunk, unpacked within a budget.
+//!
+//! Rule: a chunk says how large it is when unpacked, and is never unpacked beyond that; what it says is held against its
+//! own bytes and counted for the whole log before anything is unpacked.
+
+use std::sync::Arc;
+
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use super::parse::{FRAME, LONGEST, parsed};
+use exact::budget::{Budget, Exceeded, Limit};
+
+/// What is unpacked of a log, and how much of it is looked at for chunks behind damage.
+///
+/// Frames are compressed already, and rows as text take some twenty times less in a chunk: a log is far below the limit,
+/// which a chunk of zeros is not.
+#[derive(Clone, Debug)]
+pub(super) struct Budgets {
+    unpacked: Arc<Budget>,
+    searched: Arc<Budget>,
+}
+
+impl Budgets {
+    /// Of a log of so many bytes.
+    pub(super) fn new(bytes: u64) -> Self {
+        let unpacked = Limit::in_proportion("bytes unpacked from a log of its size", 128 << 20, 64, bytes);
+        let searched = Limit::in_proportion("bytes looked at for chunks behind damage", 128 << 20, 64, bytes);
+        Self { unpacked: Arc::new(Budget::new(unpacked)), searched: Arc::new(Budget::new(searched)) }
+    }
+
+    /// A chunk that is to be unpacked.
+    fn unpack(&self, chunk: &[u8]) -> Result<(), Exceeded> {
+        let size = size_unpacked(chunk) as u64;
+        // A length that is damaged must not use up what the chunks behind it need.
+        Limit::in_proportion("bytes unpacked from a chunk of its size", 32 << 20, 64, chunk.len() as u64)
+            .check(size)?;
+        self.unpacked.spend(size)
+    }
+
+    /// Bytes that are read to see whether a chunk begins somewhere.
+    pub(super) fn search(&self, bytes: usize) -> Result<(), Exceeded> {
+        self.searched.spend(bytes as u64)
+    }
+}
+
+/// The records of a chunk, unpacked; each is parsed when it is asked for.
+#[derive(Debug, Default)]
+pub(super) struct Unpacked {
+    /// Opcode, length and bytes of each record, one behind the other.
+    bytes: Vec<u8>,
+    at: usize,
+}
+
+impl Unpacked {
+    fn push(&mut self, opcode: u8, data: &[u8]) {
+        self.bytes.push(opcode);
+        self.bytes.extend((data.len() as u64).to_le_bytes());
+        self.bytes.extend(data);
+    }
+}
+
+impl Iterator for Unpacked {
+    type Item = Record<'static>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (opcode, data, _) = first_record(self.bytes.get(self.at..)?)?;
+        self.at += FRAME + data.len();
+        parsed(opcode, data).ok().map(Record::into_owned)
+    }
+}
+
+/// The records in a chunk, all of them or none: none is given before the chunk's checksum holds.
+pub(super) fn inside(chunk: &[u8], budgets: &Budgets) -> Result<Unpacked, String> {
+    let mut found = Unpacked::default();
+    let options = LinearReaderOptions::default().with_validate_chunk_crcs(true);
+    unpacked(chunk, options, budgets, |opcode, data| found.push(opcode, data))?;
+    Ok(found)
+}
+
+/// The records in front of a chunk that is cut off or damaged, as far as they can be read: enough to name what is lost,
+/// never enough to be saved.
+pub(super) fn glimpse(chunk: &[u8], budgets: &Budgets) -> Unpacked {
+    let mut found = Unpacked::default();
+    // That it ends in a fault is known.
+    let _ = unpacked(chunk, LinearReaderOptions::default(), budgets, |opcode, data| found.push(opcode, data));
+    found
+}
+
+/// Gives the schemas, channels and messages of a chunk one after the other.
+///
+/// The library makes room for what a length says, and only then finds that the data ends before it. So a record may be as
+/// long as the chunk says it is when unpacked, and the size of the chunk itself is not asked for at once: of lengths that
+/// contradict each other the smaller one counts.
+fn unpacked(
+    chunk: &[u8],
+    options: LinearReaderOptions,
+    budgets: &Budgets,
+    mut give: impl FnMut(u8, &[u8]),
+) -> Result<(), String> {
+    budgets.unpack(chunk).map_err(|exceeded| exceeded.to_string())?;
+    let mut check_and_give = |opcode, data: &[u8]| {
+        if matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+            parsed(opcode, data)?;
+            give(opcode, data);
+        }
+        Ok::<_, String>(())
+    };
+    if let Some(mut whole) = before_overrun(chunk) {
+        while let Some((opcode, data, rest)) = first_record(whole) {
+            check_and_give(opcode, data)?;
+            whole = rest;
+        }
+        return Err("a record is longer than what is left of its chunk".to_owned());
+    }
+    let options = options.with_skip_start_magic(true).with_skip_end_magic(true);
+    let mut reader = LinearReader::new_with_options(options.with_record_length_limit(size_unpacked(chunk)));
+    let mut rest = chunk;
+    while let Some(event) = reader.next_event() {
+        match event.map_err(|fault| fault.to_string())? {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let (now, later) = rest.split_at(wanted.min(rest.len()));
+                reader.insert(now.len()).copy_from_slice(now);
+                reader.notify_read(now.len());
+                rest = later;
+            }
+            LinearReadEvent::Record { data, opcode } => check_and_give(opcode, data)?,
+        }
+    }
+    Ok(())
+}
+
+/// The whole records of a chunk that is not compressed, if the one behind them says that it is longer than what is left.
+///
+/// The library subtracts such a length from what is left and does not compare them before, which panics in builds that
+/// check for overflow. A chunk that is cut off is left to the library.
+fn before_overrun(chunk: &[u8]) -> Option<&[u8]> {
+    // Behind the frame stand two times, a size and a checksum; then the name of the compression, empty where there is none.
+    let (length, records) = chunk.get(FRAME + 28..)?.strip_prefix(&[0; 4])?.split_first_chunk::<8>()?;
+    let (mut left, mut at) = (u64::from_le_bytes(*length), 0_usize);
+    while left > 0 {
+        let [_, size @ ..] = *records.get(at..)?.first_chunk::<FRAME>()?;
+        let size = u64::from_le_bytes(size).saturating_add(FRAME as u64);
+        let Some(fewer) = left.checked_sub(size) else { return records.get(..at) };
+        (left, at) = (fewer, at.checked_add(usize::try_from(size).ok()?)?);
+    }
+    None
+}
+
+/// The opcode and the bytes of the first of some records, and the records behind it.
+fn first_record(records: &[u8]) -> Option<(u8, &[u8], &[u8])> {
+    let ([opcode, length @ ..], behind) = records.split_first_chunk::<FRAME>()?;
+    let (data, rest) = behind.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+    Some((*opcode, data, rest))
+}
+
+/// The size that the header of a chunk gives for what is in it, as far as any chunk may be that large.
+fn size_unpacked(chunk: &[u8]) -> usize {
+    // Behind the frame stand two times of 8 bytes each.
+    let size = chunk.get(FRAME + 16..FRAME + 24).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes);
+    // The library holds the header of the chunk against the same limit.
+    size.and_then(|size| usize::try_from(size).ok()).map_or(LONGEST, |size| size.clamp(1 << 16, LONGEST))
+}
+
+#[cfg(test)]
+mod tests {
+    use mcap::records::op;
+
+    use super::{Budgets, FRAME, before_overrun, inside};
+
+    fn record(opcode: u8, length: u64, data: &[u8]) -> Vec<u8> {
+        [&[opcode][..], &length.to_le_bytes(), data].concat()
+    }
+
+    fn chunk(records: &[u8]) -> Vec<u8> {
+        let size = (records.len() as u64).to_le_bytes();
+        let data = [&[0; 16][..], &size, &[0; 4], &[0; 4], &size, records].concat();
+        record(op::CHUNK, data.len() as u64, &data)
+    }
+
+    #[test]
+    fn a_record_that_is_longer_than_its_chunk_is_refused() {
+        let first = record(0x7f, 2, &[1, 2]);
+        for length in [4, 5, u64::MAX] {
+            let chunk = chunk(&[first.clone(), record(0x7f, length, &[1, 2, 3])].concat());
+            assert_eq!(before_overrun(&chunk), Some(&first[..]), "{length}");
+            let refused = inside(&chunk, &Budgets::new(chunk.len() as u64)).unwrap_err();
+            assert_eq!(refused, "a record is longer than what is left of its chunk");
+        }
+        let whole = chunk(&[first.clone(), record(0x7f, 3, &[1, 2, 3])].concat());
+        assert!((0..=whole.len()).all(|cut| before_overrun(&whole[..cut]).is_none()));
+        assert_eq!(whole.len(), FRAME + 40 + first.len() + FRAME + 3);
+    }
+}

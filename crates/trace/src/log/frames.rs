@@ -1,0 +1,469 @@
+//! One step out of a log: its frame and its shapes, found by the log's index.
+//!
+//! Rule: of a log that has ended no more is read than its index and the chunk that holds the step. One that is still being
+//! written has no index: it is read as far as it is there, and what is behind that is no fault.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+use mcap::records::Record;
+use serde::Serialize;
+
+use super::chunk::{Budgets, inside};
+use super::error::LogError;
+use super::message::EpisodeMessage;
+use super::read::{Event, event, png};
+use super::records::{Piece, Records};
+use super::topic;
+use crate::episode::{Episode, Step};
+use exact::input;
+
+/// Where the steps of a log are.
+#[derive(Debug)]
+pub struct LogIndex {
+    path: PathBuf,
+    topics: BTreeMap<u16, String>,
+    chunks: Vec<Chunk>,
+}
+
+/// Where a chunk begins, and the times of its first and its last message, ns.
+#[derive(Clone, Copy, Debug)]
+struct Chunk {
+    at: u64,
+    first: u64,
+    last: u64,
+}
+
+/// What a log has of a step.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Moment {
+    /// The frame, PNG; `None` where none was drawn.
+    pub frame: Option<Vec<u8>>,
+    /// Everything in the room, as shapes.
+    pub shapes: Vec<Shape>,
+}
+
+/// A shape seen from above.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Shape {
+    /// Its name, such as `pane0`, `cube0` or `agent0_head`.
+    pub name: String,
+    /// Its outline on the floor: corners one after the other, m.
+    pub outline: Vec<[f64; 2]>,
+    /// The radius of a round one, m; its place is the only corner then.
+    pub radius: Option<f64>,
+    /// Red, green, blue and opacity, from 0 to 1.
+    pub rgba: [f64; 4],
+    /// How high its centre is, m.
+    pub height: f64,
+}
+
+/// A log that is still being written, as far as it is there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unfinished {
+    /// The episode with the rows that are there.
+    pub episode: Episode,
+}
+
+impl LogIndex {
+    /// Reads the index of a log; `None` where the log has not ended, and has none.
+    pub fn open(path: &Path) -> Result<Option<Self>, LogError> {
+        let mut records = records(path)?;
+        let (mut topics, mut chunks) = (BTreeMap::new(), Vec::new());
+        for record in records.summary().map_err(LogError::io("read", path))? {
+            match record {
+                Record::Channel(channel) => {
+                    topics.insert(channel.id, channel.topic);
+                }
+                Record::ChunkIndex(index) => chunks.push(Chunk {
+                    at: index.chunk_start_offset,
+                    first: index.message_start_time,
+                    last: index.message_end_time,
+                }),
+                _ => {}
+            }
+        }
+        Ok((!chunks.is_empty()).then(|| Self { path: path.to_owned(), topics, chunks }))
+    }
+
+    /// What the log has of the step of an episode at this time, ns; `None` where it has nothing of it.
+    pub fn step(&self, episode_id: &str, time: u64) -> Result<Option<Moment>, LogError> {
+        let mut records = records(&self.path)?;
+        for chunk in self.chunks.iter().filter(|chunk| (chunk.first..=chunk.last).contains(&time)) {
+            let messages = self.messages(&mut records, chunk, episode_id)?;
+            if let Some(moment) = moment(messages, &self.topics, time) {
+                return Ok(Some(moment));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The shapes of the steps of an episode at these times, ns; a step that the log does not have is left out.
+    pub fn shapes(&self, episode_id: &str, times: &BTreeSet<u64>) -> Result<BTreeMap<u64, Vec<Shape>>, LogError> {
+        let mut found = BTreeMap::new();
+        let (Some(first), Some(last)) = (times.first(), times.last()) else { return Ok(found) };
+        let mut records = records(&self.path)?;
+        for chunk in self.chunks.iter().filter(|chunk| chunk.first <= *last && chunk.last >= *first) {
+            for record in self.messages(&mut records, chunk, episode_id)? {
+                if let Record::Message { header, data } = record
+                    && times.contains(&header.log_time)
+                    && self.is_of(header.channel_id, topic::SCENE)
+                {
+                    found.insert(header.log_time, shapes(&data));
+                }
+            }
+        }
+        Ok(found)
+    }
+
+    /// The records of a chunk; none where it is of other episodes.
+    fn messages(
+        &self,
+        records: &mut Records<BufReader<File>>,
+        chunk: &Chunk,
+        episode_id: &str,
+    ) -> Result<Vec<Record<'static>>, LogError> {
+        let bytes = records.chunk_at(chunk.at).map_err(LogError::io("read", &self.path))?;
+        let bytes = bytes.ok_or_else(|| self.damaged("its index names a chunk that is not there"))?;
+        let unpacked = inside(&bytes, &Budgets::new(records.bytes())).map_err(|fault| self.damaged(&fault))?;
+        let messages: Vec<Record<'static>> = unpacked.collect();
+        Ok(if self.is_of_another(&messages, episode_id) { Vec::new() } else { messages })
+    }
+
+    /// Whether the episodes that begin in a chunk are all others. In a chunk where none begins it is not known, and the time
+    /// tells.
+    fn is_of_another(&self, messages: &[Record<'static>], episode_id: &str) -> bool {
+        let begun: Vec<bool> = messages
+            .iter()
+            .filter_map(|record| match record {
+                Record::Message { header, data } if self.is_of(header.channel_id, topic::EPISODE) => {
+                    match event(topic::EPISODE, data.as_ref()) {
+                        Ok(Event::Episode(EpisodeMessage::Begin(head))) => Some(head.episode_id == episode_id),
+                        _ => None,
+                    }
+                }
+                _ => None,
+            })
+            .collect();
+        !begun.is_empty() && !begun.contains(&true)
+    }
+
+    fn is_of(&self, channel: u16, topic: &str) -> bool {
+        self.topics.get(&channel).is_some_and(|found| found == topic)
+    }
+
+    fn damaged(&self, fault: &str) -> LogError {
+        LogError::Damaged { file: self.path.display().to_string(), fault: fault.to_owned() }
+    }
+}
+
+/// The episode of a log that is still being written; `None` where not even its begin is there.
+pub fn unfinished(path: &Path) -> Result<Option<Unfinished>, LogError> {
+    let (mut head, mut steps): (Option<Episode>, Vec<Step>) = (None, Vec::new());
+    each_message(path, |topic, _, data| match event(topic, data) {
+        Ok(Event::Episode(EpisodeMessage::Begin(found))) if head.is_none() => head = Some(*found),
+        Ok(Event::Decision(row)) => steps.extend(row.into_step().ok()),
+        _ => {}
+    })?;
+    Ok(head.map(|head| Unfinished { episode: Episode { steps, ..head } }))
+}
+
+/// What a log that is still being written has of the step at this time, ns.
+pub fn unfinished_step(path: &Path, time: u64) -> Result<Option<Moment>, LogError> {
+    let mut found: Option<Moment> = None;
+    each_message(path, |topic, at, data| {
+        if at == time {
+            add(found.get_or_insert_default(), topic, data);
+        }
+    })?;
+    Ok(found)
+}
+
+/// The shapes of the steps of a log that is still being written, by their times, ns.
+pub fn unfinished_shapes(path: &Path) -> Result<BTreeMap<u64, Vec<Shape>>, LogError> {
+    let mut found = BTreeMap::new();
+    each_message(path, |topic, at, data| {
+        if topic == topic::SCENE {
+            found.insert(at, shapes(data));
+        }
+    })?;
+    Ok(found)
+}
+
+/// Whether a file begins as a log does.
+pub fn is_log(path: &Path) -> bool {
+    records(path).is_ok()
+}
+
+fn records(path: &Path) -> Result<Records<BufReader<File>>, LogError> {
+    let file = input::open(path).map_err(LogError::io("open", path))?;
+    let records = Records::new(BufReader::new(file)).map_err(LogError::io("read", path))?;
+    records.ok_or_else(|| LogError::no_log(path))
+}
+
+/// Gives every message of the whole chunks of a log: its topic, its time and its bytes.
+fn each_message(path: &Path, mut give: impl FnMut(&str, u64, &[u8])) -> Result<(), LogError> {
+    let mut records = records(path)?;
+    let mut topics = BTreeMap::new();
+    while let Some(piece) = records.next().map_err(LogError::io("read", path))? {
+        let messages = match piece {
+            Piece::Chunk(_, bytes) => inside(&bytes, records.budgets()).unwrap_or_default(),
+            Piece::Cut(..) => break,
+            Piece::Record(_) | Piece::Damage(_) => continue,
+        };
+        for record in messages {
+            match record {
+                Record::Channel(channel) => {
+                    topics.insert(channel.id, channel.topic);
+                }
+                Record::Message { header, data } => {
+                    if let Some(topic) = topics.get(&header.channel_id) {
+                        give(topic, header.log_time, &data);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    Ok(())
+}
+
+fn moment(
+    messages: impl IntoIterator<Item = Record<'static>>,
+    topics: &BTreeMap<u16, String>,
+    time: u64,
+) -> Option<Moment> {
+    let mut found: Option<Moment> = None;
+    for record in messages {
+        if let Record::Message { header, data } = record
+            && header.log_time == time
+            && let Some(topic) = topics.get(&header.channel_id)
+            && topic != topic::EPISODE
+        {
+            add(found.get_or_insert_default(), topic, &data);
+        }
+    }
+    found
+}
+
+fn add(moment: &mut Moment, topic: &str, data: &[u8]) {
+    match topic {
+        topic::CAMERA => moment.frame = png(data),
+        topic::SCENE => moment.shapes = shapes(data),
+        _ => {}
+    }
+}
+
+/// As much of `foxglove.SceneUpdate` as a map needs.
+#[derive(Clone, PartialEq, prost::Message)]
+struct SceneUpdate {
+    #[prost(message, repeated, tag = "2")]
+    entities: Vec<Entity>,
+}
+
+#[derive(Clone, PartialEq, prost::Message)]
+struct Entity {
+    #[prost(string, tag = "3")]
+    id: String,
+    #[prost(message, repeated, tag = "8")]
+    cubes: Vec<Solid>,
+    #[prost(message, repeated, tag = "9")]
+    spheres: Vec<Solid>,
+    #[prost(message, repeated, tag = "10")]
+    cylinders: Vec<Cylinder>,
+}
+
+/// A cube or a sphere.
+#[derive(Clone, PartialEq, prost::Message)]
+struct Solid {
+    #[prost(message, optional, tag = "1")]
+    pose: Option<Pose>,
+    #[prost(message, optional, tag = "2")]
+    size: Option<Vector>,
+    #[prost(message, optional, tag = "3")]
+    color: Option<Rgba>,
+}
+
+#[derive(Clone, PartialEq, prost::Message)]
+struct Cylinder {
+    #[prost(message, optional, tag = "1")]
+    pose: Option<Pose>,
+    #[prost(message, optional, tag = "2")]
+    size: Option<Vector>,
+    #[prost(message, optional, tag = "5")]
+    color: Option<Rgba>,
+}
+
+#[derive(Clone, PartialEq, prost::Message)]
+struct Pose {
+    #[prost(message, optional, tag = "1")]
+    position: Option<Vector>,
+    #[prost(message, optional, tag = "2")]
+    orientation: Option<Quaternion>,
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message)]
+struct Vector {
+    #[prost(double, tag = "1")]
+    x: f64,
+    #[prost(double, tag = "2")]
+    y: f64,
+    #[prost(double, tag = "3")]
+    z: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message)]
+struct Quaternion {
+    #[prost(double, tag = "1")]
+    x: f64,
+    #[prost(double, tag = "2")]
+    y: f64,
+    #[prost(double, tag = "3")]
+    z: f64,
+    #[prost(double, tag = "4")]
+    w: f64,
+}
+
+#[derive(Clone, Copy, PartialEq, prost::Message)]
+struct Rgba {
+    #[prost(double, tag = "1")]
+    r: f64,
+    #[prost(double, tag = "2")]
+    g: f64,
+    #[prost(double, tag = "3")]
+    b: f64,
+    #[prost(double, tag = "4")]
+    a: f64,
+}
+
+/// The shapes of an update, the lowest first.
+fn shapes(data: &[u8]) -> Vec<Shape> {
+    let Ok(update) = <SceneUpdate as prost::Message>::decode(data) else { return Vec::new() };
+    let mut shapes: Vec<Shape> = update.entities.iter().flat_map(of_entity).collect();
+    shapes.sort_by(|a, b| a.height.total_cmp(&b.height));
+    shapes
+}
+
+fn of_entity(entity: &Entity) -> Vec<Shape> {
+    let name = &entity.id;
+    let cubes = entity.cubes.iter().filter_map(|cube| boxed(name, cube.pose.as_ref()?, cube.size?, cube.color?));
+    let spheres = entity.spheres.iter().filter_map(|ball| round(name, ball.pose.as_ref()?, ball.size?, ball.color?));
+    let posts = entity.cylinders.iter().filter_map(|post| round(name, post.pose.as_ref()?, post.size?, post.color?));
+    cubes.chain(spheres).chain(posts).collect()
+}
+
+/// A box from above: the hull of its corners.
+fn boxed(name: &str, pose: &Pose, size: Vector, color: Rgba) -> Option<Shape> {
+    let (at, turn) = (pose.position?, pose.orientation?);
+    let corner = |x: f64, y: f64, z: f64| {
+        let [dx, dy, _] = turned(turn, [x * size.x / 2.0, y * size.y / 2.0, z * size.z / 2.0]);
+        [at.x + dx, at.y + dy]
+    };
+    let sign = |corner: u8, axis: u8| if corner >> axis & 1 == 0 { -1.0 } else { 1.0 };
+    let outline = hull((0..8).map(|of| corner(sign(of, 0), sign(of, 1), sign(of, 2))).collect());
+    Some(Shape { name: name.to_owned(), outline, radius: None, rgba: rgba(color), height: at.z })
+}
+
+fn round(name: &str, pose: &Pose, size: Vector, color: Rgba) -> Option<Shape> {
+    let at = pose.position?;
+    let radius = Some(size.x / 2.0);
+    Some(Shape { name: name.to_owned(), outline: vec![[at.x, at.y]], radius, rgba: rgba(color), height: at.z })
+}
+
+fn rgba(color: Rgba) -> [f64; 4] {
+    [color.r, color.g, color.b, color.a]
+}
+
+/// A vector turned by a unit quaternion.
+fn turned(turn: Quaternion, vector: [f64; 3]) -> [f64; 3] {
+    let cross =
+        |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    let axis = [turn.x, turn.y, turn.z];
+    let once = cross(axis, vector).map(|part| 2.0 * part);
+    let twice = cross(axis, once);
+    std::array::from_fn(|at| vector[at] + turn.w * once[at] + twice[at])
+}
+
+/// The convex hull of some points, counter-clockwise (Andrew's monotone chain).
+fn hull(mut points: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    points.sort_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    points.dedup();
+    let half = |points: &mut dyn Iterator<Item = [f64; 2]>| {
+        let mut kept: Vec<[f64; 2]> = Vec::new();
+        for point in points {
+            while let [.., a, b] = kept[..]
+                && (b[0] - a[0]) * (point[1] - a[1]) - (b[1] - a[1]) * (point[0] - a[0]) <= 1e-12
+            {
+                kept.pop();
+            }
+            kept.push(point);
+        }
+        kept.pop();
+        kept
+    };
+    let mut outline = half(&mut points.iter().copied());
+    outline.extend(half(&mut points.iter().rev().copied()));
+    if outline.is_empty() {
+        points.truncate(1);
+    } else {
+        points = outline;
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{LogIndex, Quaternion, hull, turned, unfinished};
+    use crate::log::read::{Event, LogReader, png};
+
+    #[test]
+    fn the_index_finds_the_frame_that_a_reading_of_all_finds() {
+        let log = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/recorded/E1-guesser.mcap"));
+        let index = LogIndex::open(log).unwrap().unwrap();
+        let mut id = String::new();
+        let mut frames = 0;
+        for message in LogReader::open(log).unwrap().map(Result::unwrap) {
+            match message.event {
+                Event::Episode(crate::log::message::EpisodeMessage::Begin(head)) => id = head.episode_id,
+                Event::Frame(image) => {
+                    let found = index.step(&id, message.time).unwrap().unwrap();
+                    assert_eq!(found.frame, png(&image));
+                    assert!(found.shapes.iter().any(|shape| shape.name.starts_with("cube")));
+                    frames += 1;
+                }
+                _ => {}
+            }
+        }
+        assert!(frames > 0);
+        assert_eq!(index.step("E1/nobody/s1/r1", 0).unwrap(), None);
+    }
+
+    #[test]
+    fn a_log_that_ends_anywhere_is_read_as_far_as_it_is_there() {
+        let log =
+            std::fs::read(concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/recorded/E1-guesser.mcap")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let cut = folder.path().join("cut");
+        for length in [8, log.len() / 3, log.len() - 1] {
+            std::fs::write(&cut, &log[..length]).unwrap();
+            assert!(LogIndex::open(&cut).unwrap().is_none(), "{length}");
+            unfinished(&cut).unwrap();
+        }
+        std::fs::write(&cut, &log[..4]).unwrap();
+        assert!(unfinished(&cut).is_err());
+    }
+
+    #[test]
+    fn a_quarter_turn_and_a_hull() {
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let [x, y, _] = turned(Quaternion { x: 0.0, y: 0.0, z: half, w: half }, [1.0, 0.0, 0.0]);
+        assert!(x.abs() < 1e-9 && (y - 1.0).abs() < 1e-9);
+        let square = vec![[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [1.0, 0.0], [0.5, 0.5]];
+        assert_eq!(hull(square), [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+        assert_eq!(hull(vec![[2.0, 3.0]; 3]), [[2.0, 3.0]]);
+    }
+}

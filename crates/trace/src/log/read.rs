@@ -1,0 +1,107 @@
+//! A log as its messages, one after the other, in memory that does not grow with it.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::error::LogError;
+use super::message::{Decision, EpisodeMessage};
+use super::messages::Messages;
+use super::topic;
+
+/// What a message says.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Event {
+    /// An episode begins or has ended.
+    Episode(EpisodeMessage),
+    /// The frame of a step: the bytes of a `foxglove.CompressedImage`.
+    Frame(Vec<u8>),
+    /// What the eye could see.
+    Census(Value),
+    /// The row of a step.
+    Decision(Box<Decision>),
+    /// Any other message.
+    Other,
+}
+
+/// A message and its time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Timed {
+    /// ns; the step's `frame_time`.
+    pub time: u64,
+    /// What it says.
+    pub event: Event,
+}
+
+/// What a log says, message by message.
+pub struct LogReader(Messages<BufReader<File>>);
+
+impl LogReader {
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        Messages::open(path).map(Self)
+    }
+}
+
+/// An episode of a log that is not the one of this id; `None` if there is none.
+pub fn other_episode(path: &Path, id: &str) -> Result<Option<String>, LogError> {
+    for message in LogReader::open(path)? {
+        if let Event::Episode(EpisodeMessage::Begin(head)) = message?.event
+            && head.episode_id != id
+        {
+            return Ok(Some(head.episode_id));
+        }
+    }
+    Ok(None)
+}
+
+/// The hashes of a log's episodes by their ids, as their ends tell them; logs of earlier versions tell none.
+pub fn episode_hashes(path: &Path) -> Result<BTreeMap<String, String>, LogError> {
+    let mut hashes = BTreeMap::new();
+    for message in LogReader::open(path)? {
+        if let Event::Episode(EpisodeMessage::End { episode_id, episode_hash: Some(hash), .. }) = message?.event {
+            hashes.insert(episode_id, hash);
+        }
+    }
+    Ok(hashes)
+}
+
+impl Iterator for LogReader {
+    type Item = Result<Timed, LogError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let message = match self.0.next()? {
+            Ok(message) => message,
+            Err(error) => return Some(Err(error)),
+        };
+        let topic = &message.channel.topic;
+        let event = event(topic, &message.data)
+            .map_err(|fault| self.0.damaged(&format!("a message of {topic} cannot be read: {fault}")));
+        Some(event.map(|event| Timed { time: message.log_time, event }))
+    }
+}
+
+/// What a message of a topic says.
+pub(super) fn event(name: &str, data: &[u8]) -> serde_json::Result<Event> {
+    Ok(match name {
+        topic::EPISODE => Event::Episode(serde_json::from_slice(data)?),
+        topic::CENSUS => Event::Census(serde_json::from_slice(data)?),
+        topic::DECISION => Event::Decision(Decision::parse(data)?.into()),
+        topic::CAMERA => Event::Frame(data.to_vec()),
+        _ => Event::Other,
+    })
+}
+
+/// The PNG in a `foxglove.CompressedImage`; `None` if there is none.
+pub fn png(image: &[u8]) -> Option<Vec<u8>> {
+    /// As much of the message as is needed.
+    #[derive(Clone, PartialEq, prost::Message)]
+    struct Image {
+        #[prost(bytes = "vec", tag = "2")]
+        data: Vec<u8>,
+    }
+    let image = <Image as prost::Message>::decode(image).ok()?;
+    (!image.data.is_empty()).then_some(image.data)
+}

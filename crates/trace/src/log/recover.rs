@@ -1,0 +1,334 @@
+//! What can be saved of a log that was cut off or damaged.
+//!
+//! Rule: an episode is saved if its `begin`, its `end` and every row between are there, and their hash is that of the `end`;
+//! anything else that was begun is lost, and named. What is behind damage is still looked at. What is saved is what was written: of a chunk whose
+//! checksum does not hold nothing is.
+
+use std::collections::BTreeMap;
+use std::io::{self, BufReader, Read, Seek};
+use std::path::Path;
+
+use mcap::records::{Metadata, Record};
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::Value;
+
+use super::chunk::{Budgets, glimpse, inside};
+use super::error::LogError;
+use super::message::EpisodeMessage;
+use super::read::{Event, event};
+use super::records::{Piece, Records};
+use super::{METADATA, METADATA_KEY, topic};
+use crate::episode::{Episode, Step};
+use crate::episode_hash;
+use exact::budget::{Budget, Limit, SETTING};
+use exact::input;
+
+/// What was saved of a log, and what was not.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recovered {
+    /// The episodes that are whole, in the order of the log.
+    pub episodes: Vec<Episode>,
+    /// How the recording was made, if the log still says so.
+    pub recording: Option<Value>,
+    /// What is lost.
+    pub losses: Losses,
+}
+
+/// What is lost of a log.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Losses {
+    /// Episodes that were begun and are not whole.
+    pub episodes: Vec<LostEpisode>,
+    /// Rows that belong to no episode whose begin is there.
+    pub stray_rows: usize,
+    /// Chunks that cannot be read.
+    pub damaged_chunks: usize,
+    /// What is damaged beside chunks: records that cannot be read, checksums that do not hold.
+    pub damage: Vec<String>,
+    /// Why the log does not say any more how it was recorded, if it does not.
+    pub recording: Option<String>,
+    /// Why reading ended before the end of the log, if it did.
+    pub cut: Option<String>,
+}
+
+/// An episode that is not whole.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct LostEpisode {
+    /// Its id.
+    pub episode_id: String,
+    /// The rows that are there.
+    pub rows: usize,
+    /// What is missing.
+    pub reason: String,
+}
+
+impl Losses {
+    pub fn is_any(&self) -> bool {
+        *self != Self::default()
+    }
+
+    /// One of them in words; `None` if there is none.
+    pub fn first(&self) -> Option<String> {
+        let episode = self.episodes.first().map(|lost| format!("the episode `{}`: {}", lost.episode_id, lost.reason));
+        let told = self.damage.first().or(self.cut.as_ref()).or(self.recording.as_ref()).cloned();
+        let counted = || format!("{} damaged chunks, {} rows of no episode", self.damaged_chunks, self.stray_rows);
+        episode.or(told).or_else(|| self.is_any().then(counted))
+    }
+}
+
+/// Saves what can be saved of the log at `path`.
+pub fn recover(path: &Path) -> Result<Recovered, LogError> {
+    let file = input::open(path).map_err(LogError::io("open", path))?;
+    recover_from(path, BufReader::new(file))
+}
+
+/// Saves what can be saved of the log in these bytes; `path` is for messages of errors.
+pub fn recover_from(path: &Path, bytes: impl Read + Seek) -> Result<Recovered, LogError> {
+    let records = Records::new(bytes).map_err(LogError::io("read", path))?;
+    let mut records = records.ok_or_else(|| LogError::no_log(path))?;
+    let salvage = Salvage::of(&mut records).map_err(LogError::io("read", path))?;
+    let is_ours = salvage.channels.values().any(|found| found == topic::EPISODE);
+    if !is_ours && !salvage.result.losses.is_any() {
+        let fault = "it has no topic /episode; `mirrorstats record` writes logs that do".to_owned();
+        return Err(LogError::Foreign { file: path.display().to_string(), fault });
+    }
+    Ok(salvage.finished())
+}
+
+/// How many rows may be held: what is saved is held whole, and a row in memory is far larger than one of few words in a
+/// chunk. A log in use has some hundred bytes for a row without its frame.
+#[derive(Debug)]
+struct Rows(Budget, Limit);
+
+impl Default for Rows {
+    fn default() -> Self {
+        Self::of(0)
+    }
+}
+
+impl Rows {
+    /// Of a log of so many bytes.
+    fn of(bytes: u64) -> Self {
+        let limit = Limit::new("rows in a log of its size", 200_000 + bytes / 8);
+        Self(Budget::new(limit), limit)
+    }
+
+    fn take(&self) -> bool {
+        self.0.spend(1).is_ok()
+    }
+
+    fn words(&self) -> String {
+        self.1.check(u64::MAX).map_or_else(|exceeded| exceeded.to_string(), |()| String::new())
+    }
+}
+
+/// The episode that is being put together.
+#[derive(Default)]
+struct Salvage {
+    channels: BTreeMap<u16, String>,
+    open: Option<(Episode, Vec<Step>, Option<String>)>,
+    /// Rows that may still be held.
+    rows: Rows,
+    result: Recovered,
+}
+
+impl Salvage {
+    fn of(records: &mut Records<impl Read + Seek>) -> io::Result<Self> {
+        let mut salvage = Self { rows: Rows::of(records.bytes()), ..Self::default() };
+        // A chunk does not repeat the channels of earlier ones, which may be damaged; the summary does.
+        let channels = records.of_summary()?;
+        salvage.channels.extend(channels.into_iter().map(|channel| (channel.id, channel.topic)));
+        let mut is_open = true;
+        while let Some(piece) = records.next()? {
+            match piece {
+                Piece::Record(Record::DataEnd(end)) => {
+                    is_open = false;
+                    salvage.compare("the data", end.data_section_crc, records.checksum());
+                    salvage.index(records)?;
+                    break;
+                }
+                Piece::Record(record) => salvage.record(record),
+                Piece::Chunk(at, chunk) => salvage.chunk(at, &chunk, records.budgets()),
+                Piece::Damage(fault) => salvage.result.losses.damage.push(fault),
+                Piece::Cut(fault, tail) => {
+                    salvage.close("the log ends before the episode does");
+                    salvage.lose_all(&tail, records.budgets(), "the log ends before the episode does");
+                    salvage.result.losses.cut = Some(fault);
+                }
+            }
+        }
+        if is_open && salvage.result.losses.cut.is_none() {
+            salvage.result.losses.cut = Some("the log ends before its end record".to_owned());
+        }
+        Ok(salvage)
+    }
+
+    /// Looks at the index behind the data: nothing of a recording is in it, but a log without it is damaged all the same.
+    fn index(&mut self, records: &mut Records<impl Read + Seek>) -> io::Result<()> {
+        while let Some(piece) = records.next()? {
+            match piece {
+                Piece::Record(Record::Footer(footer)) => {
+                    self.compare("the index", footer.summary_crc, records.checksum());
+                    if !records.is_closed()? {
+                        self.result.losses.damage.push("the log does not end as an MCAP file does".to_owned());
+                    }
+                    return Ok(());
+                }
+                Piece::Record(_) | Piece::Chunk(..) => {}
+                Piece::Damage(fault) => self.result.losses.damage.push(fault),
+                Piece::Cut(..) => break,
+            }
+        }
+        self.result.losses.cut = Some("the log ends within its index, behind all that was recorded".to_owned());
+        Ok(())
+    }
+
+    /// Holds a checksum against the one that was written; 0 stands for none.
+    fn compare(&mut self, what: &str, written: u32, found: u32) {
+        let losses = &mut self.result.losses;
+        if written != 0 && written != found && losses.damaged_chunks == 0 && losses.damage.is_empty() {
+            losses.damage.push(format!("the checksum of {what}: expected {written:08x}, found {found:08x}"));
+        }
+    }
+
+    fn record(&mut self, record: Record<'static>) {
+        match record {
+            Record::Message { header, data } => self.message(header.channel_id, &data),
+            Record::Channel(channel) => drop(self.channels.insert(channel.id, channel.topic)),
+            Record::Metadata(metadata) if metadata.name == METADATA => self.recording(&metadata),
+            _ => {}
+        }
+    }
+
+    fn recording(&mut self, metadata: &Metadata) {
+        let text = metadata.metadata.get(METADATA_KEY);
+        self.result.recording = text.and_then(|text| serde_json::from_str(text).ok());
+    }
+
+    fn chunk(&mut self, at: u64, chunk: &[u8], budgets: &Budgets) {
+        match inside(chunk, budgets) {
+            Err(fault) => {
+                self.result.losses.damaged_chunks += 1;
+                if fault.contains(SETTING) {
+                    self.result.losses.damage.push(format!("the chunk at byte {at} is not unpacked: {fault}"));
+                }
+                self.close(&format!("a chunk with its rows is damaged, at byte {at}: {fault}"));
+                self.lose_all(chunk, budgets, &format!("its chunk is damaged, at byte {at}: {fault}"));
+            }
+            Ok(records) => records.for_each(|record| self.record(record)),
+        }
+    }
+
+    /// Names the episodes that begin in a chunk which cannot be read to its end, as far as it can.
+    fn lose_all(&mut self, chunk: &[u8], budgets: &Budgets, reason: &str) {
+        for record in glimpse(chunk, budgets) {
+            match record {
+                Record::Channel(channel) => drop(self.channels.entry(channel.id).or_insert(channel.topic)),
+                Record::Message { header, data } => {
+                    let topic = self.channels.get(&header.channel_id).map_or("", String::as_str);
+                    match (event(topic, &data), &mut self.open) {
+                        (Ok(Event::Episode(EpisodeMessage::Begin(head))), open) => {
+                            *open = Some((*head, Vec::new(), None));
+                        }
+                        (Ok(Event::Decision(row)), Some((_, rows, _))) if self.rows.take() => {
+                            rows.extend(row.into_step());
+                        }
+                        _ => {}
+                    }
+                }
+                _ => {}
+            }
+        }
+        self.close(reason);
+    }
+
+    fn finished(mut self) -> Recovered {
+        self.close("the log ends before the episode does");
+        if self.result.recording.is_none() {
+            let words = format!("no metadata `{METADATA}` can be read: the trace cannot be replayed");
+            self.result.losses.recording = Some(words);
+        }
+        self.result
+    }
+
+    fn message(&mut self, channel: u16, data: &[u8]) {
+        let Some(topic) = self.channels.get(&channel) else { return };
+        match event(topic, data) {
+            Ok(Event::Episode(EpisodeMessage::Begin(head))) => {
+                self.close("the next episode begins before its end");
+                self.open = Some((*head, Vec::new(), None));
+            }
+            Ok(Event::Episode(EpisodeMessage::End { episode_id, steps, fingerprint, episode_hash })) => {
+                self.end(&episode_id, steps, (fingerprint, episode_hash));
+            }
+            Ok(Event::Decision(row)) => {
+                let Some((_, rows, fault)) = &mut self.open else {
+                    self.result.losses.stray_rows += 1;
+                    return;
+                };
+                let expected = rows.len() + 1;
+                if usize::try_from(row.t) != Ok(expected) {
+                    fault.get_or_insert(format!("expected the row of step {expected}, found that of step {}", row.t));
+                }
+                match row.into_step() {
+                    Ok(step) if self.rows.take() => rows.push(step),
+                    Ok(_) => drop(fault.get_or_insert_with(|| self.rows.words())),
+                    Err(error) => drop(fault.get_or_insert(error.to_string())),
+                }
+            }
+            Ok(_) => {}
+            Err(error) => {
+                if let Some((_, _, fault)) = &mut self.open {
+                    fault.get_or_insert(format!("a message of {topic} cannot be read: {error}"));
+                }
+            }
+        }
+    }
+
+    fn end(&mut self, episode_id: &str, steps: usize, (fingerprint, hash): (Option<String>, Option<String>)) {
+        match self.open.take() {
+            Some((head, rows, None)) if head.episode_id == episode_id && rows.len() == steps && steps > 0 => {
+                match ended(head, rows, fingerprint, hash) {
+                    Ok(episode) => self.result.episodes.push(episode),
+                    Err((episode, reason)) => self.lose(episode.episode_id, episode.steps.len(), reason),
+                }
+            }
+            Some((head, rows, fault)) => {
+                let reason = fault.unwrap_or_else(|| format!("its end says {steps} rows of `{episode_id}`"));
+                self.lose(head.episode_id, rows.len(), reason);
+            }
+            // Its begin was in a damaged chunk.
+            None => self.lose(episode_id.to_owned(), 0, "its begin is not there".to_owned()),
+        }
+    }
+
+    /// What is open now will not be whole.
+    fn close(&mut self, reason: &str) {
+        if let Some((head, rows, fault)) = self.open.take() {
+            self.lose(head.episode_id, rows.len(), fault.unwrap_or_else(|| reason.to_owned()));
+        }
+    }
+
+    fn lose(&mut self, episode_id: String, rows: usize, reason: String) {
+        self.result.losses.episodes.push(LostEpisode { episode_id, rows, reason });
+    }
+}
+
+/// The episode of a begin, its rows, and what its end tells of them.
+pub fn ended(
+    head: Episode,
+    steps: Vec<Step>,
+    fingerprint: Option<String>,
+    hash: Option<String>,
+) -> Result<Episode, (Box<Episode>, String)> {
+    let fingerprint = fingerprint.or_else(|| head.fingerprint.clone());
+    let episode = Episode { steps, fingerprint, episode_hash: None, ..head };
+    let Some(stated) = hash else { return Ok(episode) };
+    let found = episode_hash::of(&episode);
+    if found == stated {
+        return Ok(Episode { episode_hash: Some(stated), ..episode });
+    }
+    let reason = format!("its rows are not those that its end tells of: expected the hash {stated}, found {found}");
+    Err((Box::new(episode), reason))
+}

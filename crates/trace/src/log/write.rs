@@ -1,0 +1,265 @@
+//! The log of one episode, written while it is played.
+
+use std::collections::BTreeMap;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use foxglove::messages::{
+    Color, CompressedImage, CubePrimitive, CylinderPrimitive, FrameTransform, FrameTransforms, Pose, Quaternion,
+    SceneEntity, SceneUpdate, SpherePrimitive, Timestamp, Vector3,
+};
+use foxglove::{Encode, Schema};
+use mcap::Writer;
+use mcap::records::MessageHeader;
+use schemars::schema_for;
+use serde::Serialize;
+
+use super::assemble::writer;
+use super::error::LogError;
+use super::message::{Decision, EpisodeMessage};
+use super::topic;
+use crate::episode::Episode;
+use crate::episode_hash;
+use exact::replace::NewFile;
+
+/// Something that moves, in the frame of the room.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// The name of its frame.
+    pub name: String,
+    /// m.
+    pub position: [f64; 3],
+    /// A unit quaternion: w, x, y, z.
+    pub rotation: [f64; 4],
+}
+
+/// A shape in the frame of the room.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Solid {
+    /// Its id.
+    pub name: String,
+    /// Its form and sizes.
+    pub form: Form,
+    /// Of its centre, m.
+    pub position: [f64; 3],
+    /// A unit quaternion: w, x, y, z.
+    pub rotation: [f64; 4],
+    /// Red, green, blue and opacity, from 0 to 1.
+    pub rgba: [f32; 4],
+}
+
+/// A form and its sizes, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// Of these edges; an edge of 0 makes it a plane.
+    Box([f64; 3]),
+    /// Of this radius.
+    Sphere(f64),
+    /// Along z: the radius, and the length of the cylinder between its round ends.
+    Capsule {
+        /// Of the cylinder and of both ends.
+        radius: f64,
+        /// Between the centres of the ends.
+        length: f64,
+    },
+}
+
+/// What is seen before a step.
+#[derive(Clone, Debug)]
+pub struct View<'a, C> {
+    /// The frame, PNG; `None` where none was drawn.
+    pub png: Option<&'a [u8]>,
+    /// What moves.
+    pub placed: &'a [Placed],
+    /// Everything, as shapes.
+    pub solids: &'a [Solid],
+    /// What the eye could see.
+    pub census: &'a C,
+}
+
+/// The frame of reference that everything is in.
+const ROOM: &str = "room";
+
+/// The log of an episode under way. It is a temporary file until the episode has ended, and is removed if it does not.
+pub struct EpisodeLog {
+    path: PathBuf,
+    out: Writer<Out>,
+    channels: Channels,
+    sequence: u32,
+    /// Whether each step ends a chunk.
+    is_read_meanwhile: bool,
+}
+
+type Out = BufWriter<NewFile>;
+
+struct Channels {
+    episode: u16,
+    camera: u16,
+    transforms: u16,
+    scene: u16,
+    census: u16,
+    decision: u16,
+}
+
+impl EpisodeLog {
+    /// Begins the log that will be at `path`; `census` is the JSON Schema of censuses.
+    pub fn create(path: &Path, head: &Episode, census: &serde_json::Value, time: u64) -> Result<Self, LogError> {
+        let file = NewFile::create(path).map_err(LogError::io("write", path))?;
+        let mut out = writer(BufWriter::new(file)).map_err(LogError::writing(path))?;
+        let channels = channels(&mut out, census).map_err(LogError::writing(path))?;
+        let mut log = Self { path: path.to_owned(), out, channels, sequence: 0, is_read_meanwhile: true };
+        let channel = log.channels.episode;
+        // What its rows hash to is not known before its end, and stands there.
+        let head = Episode { episode_hash: None, ..head.clone() };
+        log.json(channel, time, &EpisodeMessage::Begin(Box::new(head)))?;
+        log.flush()?;
+        Ok(log)
+    }
+
+    /// Adds what is seen before a step.
+    pub fn seen<C: Serialize>(&mut self, time: u64, view: &View<'_, C>) -> Result<(), LogError> {
+        let stamp = Timestamp::new_checked(u32::try_from(time / 1_000_000_000).unwrap_or(u32::MAX), 0);
+        if let Some(png) = view.png {
+            let image = CompressedImage {
+                timestamp: stamp,
+                frame_id: "eye".to_owned(),
+                data: png.to_vec().into(),
+                format: "png".to_owned(),
+            };
+            self.protobuf(self.channels.camera, time, &image)?;
+        }
+        let transforms = view.placed.iter().map(|placed| transform(placed, stamp)).collect();
+        self.protobuf(self.channels.transforms, time, &FrameTransforms { transforms })?;
+        let entities = view.solids.iter().map(|solid| entity(solid, stamp)).collect();
+        self.protobuf(self.channels.scene, time, &SceneUpdate { deletions: Vec::new(), entities })?;
+        self.json(self.channels.census, time, view.census)
+    }
+
+    /// Adds the row of a step.
+    pub fn decided(&mut self, time: u64, row: &Decision) -> Result<(), LogError> {
+        let channel = self.channels.decision;
+        self.json(channel, time, row)?;
+        if self.is_read_meanwhile { self.flush() } else { Ok(()) }
+    }
+
+    /// The same in chunks of many steps, which take less room, for a log that nobody reads before it has ended.
+    #[must_use]
+    pub fn in_large_chunks(self) -> Self {
+        Self { is_read_meanwhile: false, ..self }
+    }
+
+    /// Ends the chunk of a step, so that others can read it while the episode goes on.
+    fn flush(&mut self) -> Result<(), LogError> {
+        self.out.flush().map_err(LogError::writing(&self.path))
+    }
+
+    /// Ends the log of an episode of these rows, tells their hash, and gives the log its name.
+    pub fn end(mut self, time: u64, episode: &Episode) -> Result<(), LogError> {
+        let Episode { episode_id, steps, fingerprint, .. } = episode;
+        let end = EpisodeMessage::End {
+            episode_id: episode_id.clone(),
+            steps: steps.len(),
+            fingerprint: fingerprint.clone(),
+            episode_hash: Some(episode_hash::of(episode)),
+        };
+        self.json(self.channels.episode, time, &end)?;
+        self.out.finish().map_err(LogError::writing(&self.path))?;
+        let failed = |error| LogError::io("write", &self.path)(error);
+        let file = self.out.into_inner().into_inner().map_err(|error| failed(error.into_error()))?;
+        file.commit().map_err(failed)
+    }
+
+    fn json(&mut self, channel: u16, time: u64, message: &impl Serialize) -> Result<(), LogError> {
+        let data = serde_json::to_vec(message).map_err(|error| LogError::io("write", &self.path)(error.into()))?;
+        self.write(channel, time, &data)
+    }
+
+    fn protobuf(&mut self, channel: u16, time: u64, message: &impl Encode) -> Result<(), LogError> {
+        let mut data = Vec::with_capacity(message.encoded_len().unwrap_or_default());
+        let encoded = message.encode(&mut data);
+        encoded.map_err(|error| LogError::io("write", &self.path)(std::io::Error::other(error.to_string())))?;
+        self.write(channel, time, &data)
+    }
+
+    fn write(&mut self, channel_id: u16, time: u64, data: &[u8]) -> Result<(), LogError> {
+        self.sequence += 1;
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time: time, publish_time: time };
+        self.out.write_to_known_channel(&header, data).map_err(LogError::writing(&self.path))
+    }
+}
+
+fn channels(out: &mut Writer<Out>, census: &serde_json::Value) -> mcap::McapResult<Channels> {
+    let mut json = |name: &str, title: &str, schema: &serde_json::Value| {
+        let schema = out.add_schema(title, "jsonschema", schema.to_string().as_bytes())?;
+        out.add_channel(schema, name, "json", &BTreeMap::new())
+    };
+    let episode = json(topic::EPISODE, "mirrorstats.Episode", &serde_json::json!(schema_for!(EpisodeMessage)))?;
+    let census = json(topic::CENSUS, "mirrorstats.Census", census)?;
+    let decision = json(topic::DECISION, "mirrorstats.Decision", &serde_json::json!(schema_for!(Decision)))?;
+    let mut protobuf = |name: &str, schema: Option<Schema>| {
+        let schema = match schema {
+            Some(schema) => out.add_schema(&schema.name, &schema.encoding, &schema.data)?,
+            None => 0,
+        };
+        out.add_channel(schema, name, "protobuf", &BTreeMap::new())
+    };
+    Ok(Channels {
+        episode,
+        census,
+        decision,
+        camera: protobuf(topic::CAMERA, CompressedImage::get_schema())?,
+        transforms: protobuf(topic::TRANSFORMS, FrameTransforms::get_schema())?,
+        scene: protobuf(topic::SCENE, SceneUpdate::get_schema())?,
+    })
+}
+
+fn vector([x, y, z]: [f64; 3]) -> Vector3 {
+    Vector3 { x, y, z }
+}
+
+fn quaternion([w, x, y, z]: [f64; 4]) -> Quaternion {
+    Quaternion { x, y, z, w }
+}
+
+fn transform(placed: &Placed, timestamp: Option<Timestamp>) -> FrameTransform {
+    FrameTransform {
+        timestamp,
+        parent_frame_id: ROOM.to_owned(),
+        child_frame_id: placed.name.clone(),
+        translation: Some(vector(placed.position)),
+        rotation: Some(quaternion(placed.rotation)),
+    }
+}
+
+/// One entity for each shape, by its name, so that the next step's replaces it.
+fn entity(solid: &Solid, timestamp: Option<Timestamp>) -> SceneEntity {
+    let [r, g, b, a] = solid.rgba.map(f64::from);
+    let color = Some(Color { r, g, b, a });
+    let pose = Some(Pose { position: Some(vector(solid.position)), orientation: Some(quaternion(solid.rotation)) });
+    let mut entity =
+        SceneEntity { timestamp, frame_id: ROOM.to_owned(), id: solid.name.clone(), ..SceneEntity::default() };
+    match solid.form {
+        Form::Box(edges) => entity.cubes.push(CubePrimitive { pose, size: Some(vector(edges)), color }),
+        Form::Sphere(radius) => {
+            entity.spheres.push(SpherePrimitive { pose, size: Some(vector([2.0 * radius; 3])), color });
+        }
+        Form::Capsule { radius, length } => {
+            let size = Some(vector([2.0 * radius, 2.0 * radius, length]));
+            entity.cylinders.push(CylinderPrimitive { pose, size, bottom_scale: 1.0, top_scale: 1.0, color });
+            for end in [-0.5, 0.5] {
+                let position = along_z(solid, end * length);
+                let pose =
+                    Some(Pose { position: Some(vector(position)), orientation: Some(quaternion(solid.rotation)) });
+                entity.spheres.push(SpherePrimitive { pose, size: Some(vector([2.0 * radius; 3])), color });
+            }
+        }
+    }
+    entity
+}
+
+/// A point on the shape's own z axis, in the frame of the room.
+fn along_z(solid: &Solid, distance: f64) -> [f64; 3] {
+    let [w, x, y, z] = solid.rotation;
+    let axis = [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)];
+    std::array::from_fn(|at| solid.position[at] + distance * axis[at])
+}

@@ -1,0 +1,478 @@
+//! Decodes a row group into rows of few types: bool, integer (64 bits), float (64 bits), text (a dictionary).
+//!
+//! Rule: whatever bytes a file holds, decoding gives rows or a finding, never a panic.
+
+use std::sync::Arc;
+
+use arrow::array::{Array, ArrayRef, AsArray as _, new_null_array};
+use arrow::compute::{cast, concat};
+use arrow::datatypes::{DataType, Int32Type, UInt64Type};
+use arrow::error::ArrowError;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader, RowSelection, RowSelector};
+use parquet::basic::Type as Physical;
+
+use super::budget::{INFLATED_PER_BYTE, check_names};
+use super::column::{Column, Runs, all_within};
+use super::footer::{plain, rows_of};
+use super::open::{Readable, TraceFile, text_type};
+use super::pages::{self, Cursor, FaultSlot, Form, Place, Store, Unsupported};
+use super::projection::{EPISODE_ID, Layout, LayoutColumn, T};
+use crate::catch_panic::contained;
+use crate::diagnostic::{Code, Finding};
+use crate::schema::Kind;
+
+/// Rows that are decoded at a time: the columns of so many stay in a core's cache.
+const BATCH_ROWS: usize = 32 * 1024;
+
+/// Bytes of one column's texts that are decoded at a time, about: the decoder makes room for them several
+/// times, and texts are not all as long.
+const BATCH_TEXT: u64 = 64 << 20;
+
+/// Some rows of one row group: a column for each of the layout, in its order.
+#[derive(Clone, Debug)]
+pub(crate) struct Rows {
+    pub(crate) columns: Vec<Column>,
+    pub(crate) row_group: usize,
+    /// Where they start in the row group.
+    pub(crate) first: usize,
+    /// Whether the last episode is known to end with them.
+    pub(crate) whole: bool,
+}
+
+impl Rows {
+    pub(crate) fn len(&self) -> usize {
+        self.columns[T].len()
+    }
+
+    /// `length` rows from row `start`; nothing is copied.
+    pub(crate) fn slice(&self, start: usize, length: usize) -> Self {
+        let columns = self.columns.iter().map(|column| column.slice(start, length)).collect();
+        let whole = self.whole && start + length == self.len();
+        Self { columns, row_group: self.row_group, first: self.first + start, whole }
+    }
+
+    /// The episode of a row.
+    pub(crate) fn episode(&self, row: usize) -> Option<&str> {
+        self.columns[EPISODE_ID].text(row)
+    }
+}
+
+/// The ids of a row group.
+pub(crate) struct Ids {
+    pub(crate) runs: Runs,
+    /// Whether its first row is known to begin an episode.
+    pub(crate) begins: bool,
+    /// Whether its last row is known to end one.
+    pub(crate) ends: bool,
+}
+
+/// The rows of one row group, in order, until its end or its first fault.
+pub(crate) struct RowGroup<'a> {
+    file: &'a TraceFile,
+    layout: &'a Layout,
+    readable: Arc<Readable>,
+    index: usize,
+    /// The ids of the episodes, if they are known already.
+    ids: Option<Ids>,
+    /// Where the values of each column of the layout come from.
+    sources: Vec<Source>,
+    /// Where the next rows start in the row group.
+    first: usize,
+    /// Rows that are decoded at a time.
+    at_a_time: usize,
+    /// Nothing more comes: the end, or a fault.
+    over: bool,
+}
+
+/// Where the values of a column come from.
+enum Source {
+    /// The file does not have the column.
+    Absent,
+    /// The ids of the episodes, which are known already.
+    Ahead,
+    /// Its pages.
+    Pages { root: usize, cursor: Box<Cursor> },
+    /// The Parquet library.
+    Library(Box<Library>),
+}
+
+/// A column as the Parquet library decodes it, so many rows at a time.
+struct Library {
+    reader: ParquetRecordBatchReader,
+    /// Decoded rows that are still to be given.
+    held: Vec<ArrayRef>,
+    /// Where the first fault of a page is found.
+    slot: FaultSlot,
+}
+
+impl Library {
+    fn rows(&self) -> usize {
+        self.held.iter().map(Array::len).sum()
+    }
+
+    /// The next rows, of which that many are held.
+    fn take(&mut self, count: usize) -> Result<ArrayRef, ArrowError> {
+        if let [values] = self.held.as_slice() {
+            let (values, rest) = (values.slice(0, count), values.slice(count, values.len() - count));
+            self.held.clear();
+            self.held.extend((!rest.is_empty()).then_some(rest));
+            return Ok(values);
+        }
+        let all: Vec<&dyn Array> = self.held.iter().map(AsRef::as_ref).collect();
+        self.held = vec![concat(&all)?];
+        self.take(count)
+    }
+}
+
+impl<'a> RowGroup<'a> {
+    /// A row group of which the ids of the episodes may be known already.
+    pub(crate) fn open(
+        file: &'a TraceFile,
+        layout: &'a Layout,
+        row_group: usize,
+        ids: Option<Ids>,
+    ) -> Result<Self, Box<Finding>> {
+        let store = store(file)?;
+        let readable = file.footer()?;
+        let roots = (0..layout.columns.len()).filter_map(|at| root(file, layout, at));
+        let text = roots.filter_map(|root| text_bytes(&readable.footer, root, row_group)).max().unwrap_or(0);
+        let at_a_time = rows_at_a_time(file.row_group_rows(row_group), text);
+        let sources = Vec::new();
+        let mut rows =
+            Self { file, layout, readable, index: row_group, ids, sources, first: 0, at_a_time, over: false };
+        for at in 0..layout.columns.len() {
+            let source = match root(file, layout, at) {
+                None => Source::Absent,
+                Some(_) if at == EPISODE_ID && rows.ids.is_some() => Source::Ahead,
+                Some(root) => match contained(|| cursor(&rows.readable, &store, root, row_group, form(layout, at))) {
+                    Ok(Ok(cursor)) => Source::Pages { root, cursor: Box::new(cursor) },
+                    Ok(Err(Unsupported)) | Err(_) => rows.library(at, root)?,
+                },
+            };
+            rows.sources.push(source);
+        }
+        Ok(rows)
+    }
+
+    /// A column as the library decodes it, from the next row on.
+    fn library(&self, at: usize, root: usize) -> Result<Source, Box<Finding>> {
+        let (store, slot) = (store(self.file)?, FaultSlot::default());
+        let made = contained(|| self.reader(store, root, self.first, &slot));
+        match made.and_then(|reader| reader.map_err(|error| plain(&error))) {
+            Ok(reader) => Ok(Source::Library(Box::new(Library { reader, held: Vec::new(), slot }))),
+            Err(error) => Err(self.damaged(at, &slot, &error)),
+        }
+    }
+
+    /// A column that the library cannot decode, or that it is not given because of a page.
+    fn damaged(&self, at: usize, slot: &FaultSlot, error: &str) -> Box<Finding> {
+        let finding = pages::damaged(self.file.name(), slot, error).in_row_group(self.index);
+        Box::new(finding.in_column(&self.layout.columns[at].name))
+    }
+
+    fn decode(&mut self) -> Result<Option<Rows>, Box<Finding>> {
+        let left = self.file.row_group_rows(self.index) - self.first;
+        // Whole episodes where it is known where they end.
+        let most = self.at_a_time.min(left);
+        let count = self.ids.as_ref().filter(|_| left > 0).map_or(most, |ids| ids.runs.until(self.first, most));
+        let columns =
+            (0..self.sources.len()).map(|at| self.column(at, count).and_then(|column| self.within(at, column)));
+        let columns: Vec<Column> = columns.collect::<Result<_, _>>()?;
+        if count == 0 {
+            return Ok(None);
+        }
+        let whole = self.ids.as_ref().is_some_and(|ids| match left - count {
+            0 => ids.ends,
+            _ => ids.runs.text(self.first + count - 1) != ids.runs.text(self.first + count),
+        });
+        let rows = Rows { columns, row_group: self.index, first: self.first, whole };
+        self.first += count;
+        Ok(Some(rows))
+    }
+
+    /// A column, if its texts are within the budgets.
+    fn within(&self, at: usize, column: Column) -> Result<Column, Box<Finding>> {
+        let LayoutColumn { name, kind, known, .. } = &self.layout.columns[at];
+        if *kind != Kind::String {
+            return Ok(column);
+        }
+        let names = if known.is_some_and(|known| known.constant) { check_names(&column) } else { Ok(()) };
+        let place = (self.index, root(self.file, self.layout, at).unwrap_or(usize::MAX));
+        let checked = names.and_then(|()| self.file.expansion().rows(place, self.first, &column));
+        let over =
+            |exceeded| Finding::over_budget(self.file.name(), &exceeded).in_row_group(self.index).in_column(name);
+        checked.map(|()| column).map_err(|exceeded| Box::new(over(exceeded)))
+    }
+
+    /// The next `count` rows of a column. At the end, where that is none, there must be none.
+    fn column(&mut self, at: usize, count: usize) -> Result<Column, Box<Finding>> {
+        let kind = self.layout.columns[at].kind;
+        if let Source::Pages { root, cursor } = &mut self.sources[at] {
+            if let Ok(Ok(column)) = contained(|| cursor.read(count)) {
+                return Ok(column);
+            }
+            let root = *root;
+            self.sources[at] = self.library(at, root)?;
+        }
+        if let (Source::Ahead, Some(ids)) = (&self.sources[at], &self.ids) {
+            return Ok(Column::Runs(ids.runs.slice(self.first, count)));
+        }
+        let Source::Library(library) = &mut self.sources[at] else {
+            return Ok(new_null_array(&held_as(kind), count).into());
+        };
+        loop {
+            let held = library.rows();
+            if count == 0 && held > 0 {
+                return Err(self.other_rows(self.first + held));
+            }
+            if held >= count && count > 0 {
+                let column = library.take(count);
+                return column.map(Column::Flat).map_err(|error| corrupt(self.file, self.index, &error.to_string()));
+            }
+            let batch = contained(|| library.reader.next())
+                .and_then(|next| next.transpose().map_err(|error| error.to_string()));
+            let batch = match batch {
+                Ok(batch) => batch,
+                Err(error) => {
+                    let slot = Arc::clone(&library.slot);
+                    return Err(self.damaged(at, &slot, &error));
+                }
+            };
+            let Some(batch) = batch else {
+                if count == 0 {
+                    return Ok(new_null_array(&held_as(kind), 0).into());
+                }
+                return Err(self.other_rows(self.first + held));
+            };
+            if count == 0 {
+                return Err(self.other_rows(self.first + held + batch.num_rows()));
+            }
+            let column = contained(|| normal_column(batch.column(0), kind))
+                .unwrap_or_else(|panic| Err(Refused::Unreadable(panic)));
+            match column {
+                Ok(column) => library.held.push(column),
+                Err(refused) => return Err(self.refusal(refused, at, self.first + held)),
+            }
+        }
+    }
+
+    /// A column ends early, or goes on.
+    fn other_rows(&self, found: usize) -> Box<Finding> {
+        let expected = format!("{} rows", self.file.row_group_rows(self.index));
+        let finding = Finding::new(Code::CorruptData, self.file.name(), expected, found.to_string());
+        Box::new(finding.in_row_group(self.index))
+    }
+
+    /// Why a column is refused whose rows from `first` on were decoded.
+    fn refusal(&self, refused: Refused, column: usize, first: usize) -> Box<Finding> {
+        let at_column = |finding: Finding| Box::new(finding.in_column(&self.layout.columns[column].name));
+        match refused {
+            Refused::Unreadable(why) => at_column(*corrupt(self.file, self.index, &why)),
+            Refused::TooLarge { row, value } => {
+                let expected = format!("a number up to {}", i64::MAX);
+                let finding = Finding::new(Code::OutOfRange, self.file.name(), expected, value.to_string());
+                let mut finding = finding.in_row_group(self.index);
+                finding.episode = self.anew(EPISODE_ID, first).and_then(|ids| ids.text(row).map(str::to_owned));
+                finding = finding.at(self.anew(T, first).and_then(|t| t.int(row)));
+                at_column(finding)
+            }
+        }
+    }
+
+    /// A column from a row on, read once more.
+    fn anew(&self, at: usize, first: usize) -> Option<Column> {
+        let root = root(self.file, self.layout, at)?;
+        let (store, slot) = (store(self.file).ok()?, FaultSlot::default());
+        let read = || self.reader(store, root, first, &slot).ok()?.next()?.ok();
+        let decoded = contained(read).ok()?;
+        normal_column(decoded?.column(0), self.layout.columns[at].kind).ok().map(Column::Flat)
+    }
+
+    /// A reader of one column, from a row on.
+    fn reader(
+        &self,
+        store: Store,
+        root: usize,
+        first: usize,
+        slot: &FaultSlot,
+    ) -> parquet::errors::Result<ParquetRecordBatchReader> {
+        let Readable { footer, chunks } = &*self.readable;
+        let rows = rows_of(footer.metadata().row_group(self.index));
+        let (metadata, checksums, slot) = (Arc::clone(footer.metadata()), chunks.clone(), Arc::clone(slot));
+        let library =
+            pages::Library { store, metadata, checksums, row_groups: vec![self.index], slot, writes_out: false };
+        let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
+        let selection = (first > 0).then(|| RowSelection::from(rest));
+        let column = ProjectionMask::roots(footer.parquet_schema(), [root]);
+        library.reader(column, Some(footer.schema().fields()), rows.clamp(1, self.at_a_time), selection)
+    }
+}
+
+impl Iterator for RowGroup<'_> {
+    type Item = Result<Rows, Box<Finding>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.over {
+            return None;
+        }
+        let next = self.decode().transpose();
+        self.over = !matches!(next, Some(Ok(_)));
+        next
+    }
+}
+
+/// The ids of the episodes of a row group, if its pages are such that they can be had without the other columns.
+pub(crate) fn ids(file: &TraceFile, layout: &Layout, row_group: usize) -> Option<Column> {
+    let root = root(file, layout, EPISODE_ID)?;
+    let (store, readable) = (store(file).ok()?, file.footer().ok()?);
+    let read = || cursor(&readable, &store, root, row_group, Form::Runs)?.read(file.row_group_rows(row_group));
+    // Who reads them with the other columns says what is wrong with them.
+    contained(read).ok()?.ok().filter(|ids| check_names(ids).is_ok())
+}
+
+fn store(file: &TraceFile) -> Result<Store, Box<Finding>> {
+    file.store().map_err(|error| {
+        Box::new(Finding::new(Code::Unreadable, file.name(), "a file that can be read", error.to_string()))
+    })
+}
+
+/// Where a file has a column.
+fn root(file: &TraceFile, layout: &Layout, at: usize) -> Option<usize> {
+    file.columns().iter().position(|column| column.name == layout.columns[at].name)
+}
+
+/// How a column is best held.
+fn form(layout: &Layout, at: usize) -> Form {
+    if at == EPISODE_ID || layout.columns[at].constant { Form::Runs } else { Form::Rows }
+}
+
+fn cursor(
+    readable: &Readable,
+    store: &Store,
+    root: usize,
+    row_group: usize,
+    form: Form,
+) -> Result<Cursor, Unsupported> {
+    let Readable { footer, chunks } = readable;
+    let leaf = leaf(footer, root).ok_or(Unsupported)?;
+    let place = Place { metadata: footer.metadata(), checksums: chunks, row_group, column: leaf };
+    Cursor::open(store, place, footer.schema().field(root).data_type(), form)
+}
+
+fn leaf(footer: &ArrowReaderMetadata, root: usize) -> Option<usize> {
+    let schema = footer.parquet_schema();
+    (0..schema.num_columns()).find(|leaf| schema.get_column_root_idx(*leaf) == root)
+}
+
+/// The bytes of a column's texts in a row group, written out if the file says so; `None` for other columns.
+fn text_bytes(footer: &ArrowReaderMetadata, root: usize, row_group: usize) -> Option<u64> {
+    let column = footer.metadata().row_group(row_group).columns().get(leaf(footer, root)?)?;
+    let written_out = column.unencoded_byte_array_data_bytes().unwrap_or_default();
+    // What the file says may be too little. Of the first MiB no more than this is inflated, and memory is promised for small
+    // files alone.
+    let most = column.compressed_size().saturating_mul(INFLATED_PER_BYTE.cast_signed());
+    let bytes = u64::try_from(column.uncompressed_size().max(written_out).max(most)).unwrap_or_default();
+    (column.column_type() == Physical::BYTE_ARRAY).then_some(bytes)
+}
+
+/// Rows to decode at a time of a row group whose largest column has so many bytes of text.
+fn rows_at_a_time(rows: usize, text: u64) -> usize {
+    let fitting = u64::try_from(rows).unwrap_or(u64::MAX).saturating_mul(BATCH_TEXT).checked_div(text);
+    let fitting = fitting.and_then(|rows| usize::try_from(rows).ok()).unwrap_or(usize::MAX);
+    fitting.clamp(1, BATCH_ROWS)
+}
+
+fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {
+    Box::new(pages::damaged(file.name(), &FaultSlot::default(), found).in_row_group(row_group))
+}
+
+/// How a column of this kind is held in memory.
+pub(crate) fn held_as(kind: Kind) -> DataType {
+    match kind {
+        Kind::Bool => DataType::Boolean,
+        Kind::Int => DataType::Int64,
+        Kind::Float => DataType::Float64,
+        Kind::String => text_type(),
+        Kind::Unsupported => DataType::Null,
+    }
+}
+
+/// Why a decoded column is not taken.
+pub(crate) enum Refused {
+    Unreadable(String),
+    TooLarge { row: usize, value: u64 },
+}
+
+pub(crate) fn normal_column(column: &ArrayRef, kind: Kind) -> Result<ArrayRef, Refused> {
+    let held = held_as(kind);
+    match column.data_type() {
+        same if *same == held => {
+            if kind == Kind::String {
+                check_keys(column)?;
+                check_texts(column)?;
+            }
+            Ok(Arc::clone(column))
+        }
+        DataType::Null => Ok(new_null_array(&held, column.len())),
+        DataType::UInt64 => {
+            let values = column.as_primitive::<UInt64Type>();
+            let too_large =
+                (0..values.len()).find(|row| values.is_valid(*row) && i64::try_from(values.value(*row)).is_err());
+            match too_large {
+                Some(row) => Err(Refused::TooLarge { row, value: values.value(row) }),
+                None => cast(column, &held).map_err(|error| Refused::Unreadable(error.to_string())),
+            }
+        }
+        _ => cast(column, &held).map_err(|error| Refused::Unreadable(error.to_string())),
+    }
+}
+
+/// Every key that is not null leads to a value that is not null.
+fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
+    let column = column.as_dictionary::<Int32Type>();
+    let count = column.values().len();
+    let within = |key: i32| usize::try_from(key).is_ok_and(|key| key < count);
+    // What stands in the place of nulls is nearly always within, too, and then there is no need to look at them.
+    let good = column.values().null_count() == 0
+        && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
+    if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
+}
+
+/// Every text is UTF-8. The Parquet library looks at all texts of a delta-encoded page at once, and takes a character of
+/// which one text has the first bytes and the next text the rest.
+fn check_texts(column: &ArrayRef) -> Result<(), Refused> {
+    let texts = column.as_any_dictionary().values().as_string::<i32>();
+    let (bytes, offsets) = (texts.value_data(), texts.value_offsets());
+    let begins = |offset: &i32| {
+        let next = usize::try_from(*offset).ok().and_then(|at| bytes.get(at..))?.first();
+        // A byte that goes on with a character begins none.
+        Some(next.is_none_or(|byte| byte & 0xc0 != 0x80))
+    };
+    let (first, last) = (offsets.first().copied().unwrap_or(0), offsets.last().copied().unwrap_or(0));
+    let range = usize::try_from(first).ok().zip(usize::try_from(last).ok());
+    let is_text = range.and_then(|(first, last)| std::str::from_utf8(bytes.get(first..last)?).ok()).is_some();
+    if is_text && offsets.iter().all(|offset| begins(offset) == Some(true)) {
+        return Ok(());
+    }
+    Err(Refused::Unreadable("texts that are not UTF-8".into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BATCH_ROWS, BATCH_TEXT, rows_at_a_time};
+
+    #[test]
+    fn long_texts_are_decoded_some_rows_at_a_time() {
+        for (rows, text, expected) in [
+            (0, 0, BATCH_ROWS),
+            (100_000, 0, BATCH_ROWS),
+            (100_000, 100_000 * 100, BATCH_ROWS),
+            (100_000, 100_000 << 16, 1024),
+            (10, 10 * BATCH_TEXT, 1),
+            (10, u64::MAX, 1),
+        ] {
+            assert_eq!(rows_at_a_time(rows, text), expected, "{rows} rows, {text} bytes");
+        }
+    }
+}

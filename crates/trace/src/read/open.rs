@@ -1,0 +1,419 @@
+//! Opens traces: reads every footer, checks it against the schema, and knows what each column is over all files.
+//!
+//! No row is read here. A file is held by its name and what it is made of, never by an open handle, so that any number of
+//! files can be open at once.
+
+use std::collections::HashMap;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+
+use arrow::datatypes::{DataType, Schema};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+use parquet::arrow::parquet_to_arrow_schema;
+use parquet::basic::ConvertedType;
+use parquet::file::metadata::{KeyValue, ParquetMetaData};
+use parquet::schema::types::SchemaDescriptor;
+
+use super::budget::{Expansion, MOST_COLUMNS};
+use super::footer::bounds;
+use super::footer::{Extent, Footer, footer, plain, rows_of};
+use super::pages::Store;
+use crate::catch_panic::contained;
+use crate::checksums::{Checksums, ChunkChecksums};
+use crate::declared_experiment::{self, DeclaredExperiment};
+use crate::diagnostic::{Code, Finding};
+use crate::error::TraceError;
+use crate::inputs::Input;
+use crate::schema::colors::palette::{Declared, Palette};
+use crate::schema::{self, COLUMNS, Kind};
+use exact::escape::visible;
+use exact::input;
+use exact::suggest::nearest;
+
+/// Traces that are open: every footer is read and good, no row is read yet.
+#[derive(Debug)]
+pub struct TraceSet {
+    files: Vec<TraceFile>,
+}
+
+/// One trace whose footer is good.
+#[derive(Debug)]
+pub struct TraceFile {
+    name: String,
+    path: PathBuf,
+    bytes: u64,
+    version: u32,
+    columns: Vec<FileColumn>,
+    /// The rows of each row group.
+    rows: Vec<usize>,
+    pairs: Vec<KeyValue>,
+    colors: Declared,
+    experiments: Vec<DeclaredExperiment>,
+    checksums: Checksums,
+    /// What a reader needs, while somebody reads: footers of many row groups are large.
+    footer: Mutex<Weak<Readable>>,
+    /// What was made of its bytes.
+    expansion: Arc<Expansion>,
+}
+
+/// What a reader of a file needs.
+#[derive(Debug)]
+pub(crate) struct Readable {
+    /// The footer; strings are read as dictionaries.
+    pub(crate) footer: ArrowReaderMetadata,
+    pub(crate) chunks: ChunkChecksums,
+}
+
+/// A column of one file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct FileColumn {
+    /// Its name.
+    pub name: String,
+    /// Its logical type; `None` for a column that is declared to hold nothing but nulls, which goes with any type.
+    pub kind: Option<Kind>,
+}
+
+/// What a column is over all files of a set.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnUse {
+    /// The logical type, the same in all files that have the column; [`Kind::Unsupported`] where they differ.
+    pub kind: Kind,
+    /// The name of a file that does not have the column, if there is one; its rows read as null.
+    pub missing_from: Option<String>,
+    /// Two files that disagree on the type, and the types they have.
+    pub conflict: Option<[(String, Kind); 2]>,
+}
+
+impl TraceSet {
+    /// Opens these files, ordered as they are given ([`resolve`](crate::inputs::resolve) orders them by name).
+    pub fn open(inputs: &[Input]) -> Result<Self, TraceError> {
+        let mut files = Vec::with_capacity(inputs.len());
+        let mut faults = Vec::new();
+        for input in inputs {
+            match TraceFile::open(input) {
+                Ok(file) => files.push(file),
+                Err(findings) => faults.extend(findings),
+            }
+        }
+        match TraceError::of(faults) {
+            Some(error) => Err(error),
+            None => Ok(Self { files }),
+        }
+    }
+
+    /// Files that were opened one by one.
+    pub fn of(files: Vec<TraceFile>) -> Self {
+        Self { files }
+    }
+
+    /// The files, in their order.
+    pub fn files(&self) -> &[TraceFile] {
+        &self.files
+    }
+
+    /// What the column of this name is over all files; `None` if no file has it.
+    pub fn column(&self, name: &str) -> Option<ColumnUse> {
+        let mut seen: Option<(&TraceFile, Kind)> = None;
+        let (mut present, mut missing_from, mut conflict) = (false, None, None);
+        for file in &self.files {
+            match (file.column(name).map(|column| column.kind), seen) {
+                (None, _) => missing_from = missing_from.or_else(|| Some(file.name.clone())),
+                (Some(None), _) => present = true,
+                (Some(Some(kind)), None) => seen = Some((file, kind)),
+                (Some(Some(kind)), Some((first, known))) if kind != known && conflict.is_none() => {
+                    conflict = Some([(first.name.clone(), known), (file.name.clone(), kind)]);
+                }
+                (Some(Some(_)), Some(_)) => {}
+            }
+        }
+        // A column that is null in every file has the schema's type, or text where the schema does not know it.
+        let unseen = || schema::column(name).map_or(Kind::String, |column| column.stored.kind());
+        let kind = if conflict.is_some() { Kind::Unsupported } else { seen.map_or_else(unseen, |(_, kind)| kind) };
+        (present || seen.is_some()).then_some(ColumnUse { kind, missing_from, conflict })
+    }
+
+    /// Whether some file has the schema's column of this name.
+    pub fn declares(&self, name: &str) -> bool {
+        self.files.iter().any(|file| file.declares(name))
+    }
+
+    /// The names of all columns of all files: those of the schema in its order, then the others in the order of the
+    /// files.
+    pub fn column_names(&self) -> Vec<&str> {
+        let known = COLUMNS.iter().map(|column| column.name);
+        let mut names: Vec<&str> =
+            known.filter(|name| self.files.iter().any(|file| file.column(name).is_some())).collect();
+        for column in self.files.iter().flat_map(|file| &file.columns) {
+            if !names.contains(&column.name.as_str()) {
+                names.push(&column.name);
+            }
+        }
+        names
+    }
+}
+
+impl TraceFile {
+    /// Reads and checks the footer of one file.
+    pub fn open(input: &Input) -> Result<Self, Vec<Finding>> {
+        let opened = footer(input, Extent::Pages).map_err(|finding| vec![*finding])?;
+        let Footer { bytes, metadata, checksums, .. } = opened;
+        let version = version_of(&input.name, &metadata).map_err(|finding| vec![*finding])?;
+        let columns = columns_of(&input.name, metadata.file_metadata().schema_descr())?;
+        let pairs = metadata.file_metadata().key_value_metadata();
+        let recording = pairs.and_then(|pairs| value(pairs, schema::RECORDING_KEY));
+        let absent = declared_experiment::absent(&input.name, recording);
+        let mut findings = check_columns(&input.name, &columns, version, &absent);
+        findings.extend(bounds::fault(&input.name, bytes, &metadata));
+        if !findings.is_empty() {
+            return Err(findings);
+        }
+        let rows = metadata.row_groups().iter().map(rows_of).collect();
+        let mut pairs = metadata.file_metadata().key_value_metadata().cloned().unwrap_or_default();
+        // They are verified, long, and of no other file.
+        pairs.retain(|pair| pair.key != schema::CHECKSUMS_KEY);
+        let recording = value(&pairs, schema::RECORDING_KEY);
+        let colors = Declared::of(&input.name, recording).map_err(|f| vec![*f])?;
+        let experiments = declared_experiment::of_recording(&input.name, recording).map_err(|f| vec![*f])?;
+        readable(metadata, &columns)
+            .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
+        let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
+        let expansion = Arc::new(Expansion::new(bytes));
+        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, experiments, checksums, footer, expansion })
+    }
+
+    /// The name in messages and outputs.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Opens the file itself for reading.
+    pub fn reader(&self) -> io::Result<File> {
+        input::open(&self.path)
+    }
+
+    /// The file as its pages are read.
+    pub(crate) fn store(&self) -> io::Result<Store> {
+        self.reader().map(|file| Store::new(file, Arc::clone(&self.expansion)))
+    }
+
+    /// What was made of its bytes so far.
+    pub(crate) fn expansion(&self) -> &Arc<Expansion> {
+        &self.expansion
+    }
+
+    /// Where it is, for an engine that reads files by itself.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The columns in the file's order.
+    pub fn columns(&self) -> &[FileColumn] {
+        &self.columns
+    }
+
+    /// The column of this name.
+    pub fn column(&self, name: &str) -> Option<&FileColumn> {
+        self.columns.iter().find(|column| column.name == name)
+    }
+
+    /// Whether the file has the schema's column of this name, and not one of its own that is called so: a trace of an older
+    /// version may have used a name that the schema knows by now.
+    pub fn declares(&self, name: &str) -> bool {
+        self.column(name).is_some() && schema::column(name).is_some_and(|known| known.since <= self.version)
+    }
+
+    pub fn rows(&self) -> u64 {
+        self.rows.iter().map(|rows| *rows as u64).sum()
+    }
+
+    /// The number of row groups.
+    pub fn row_groups(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// The number of rows in a row group.
+    ///
+    /// # Panics
+    /// For a row group that the file has not.
+    pub fn row_group_rows(&self, row_group: usize) -> usize {
+        self.rows[row_group]
+    }
+
+    pub fn checksums(&self) -> Checksums {
+        self.checksums
+    }
+
+    /// The footer's key-value metadata, without its checksums.
+    pub(crate) fn pairs(&self) -> &[KeyValue] {
+        &self.pairs
+    }
+
+    /// The palette that the footer declares, if it declares one.
+    pub fn palette(&self) -> Option<&Palette> {
+        self.colors.palette.as_ref()
+    }
+
+    /// The colours that the footer declares.
+    pub(crate) fn colors(&self) -> &Declared {
+        &self.colors
+    }
+
+    /// The experiments that the footer declares, each once.
+    pub fn experiments(&self) -> &[DeclaredExperiment] {
+        &self.experiments
+    }
+
+    /// A value of the footer's key-value metadata.
+    pub fn metadata_value(&self, key: &str) -> Option<&str> {
+        value(&self.pairs, key)
+    }
+
+    /// What a reader needs; strings are read as dictionaries. Read again unless somebody holds it.
+    pub(crate) fn footer(&self) -> Result<Arc<Readable>, Box<Finding>> {
+        let mut held = self.footer.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(footer) = held.upgrade() {
+            return Ok(footer);
+        }
+        let Footer { metadata, chunks, .. } = self.footer_again(Extent::Pages)?;
+        let corrupt = |error| Box::new(Finding::new(Code::CorruptFooter, &self.name, "a readable schema", error));
+        let footer = readable(metadata, &self.columns).map_err(corrupt)?;
+        let footer = Arc::new(Readable { footer, chunks });
+        *held = Arc::downgrade(&footer);
+        Ok(footer)
+    }
+
+    pub(crate) fn footer_again(&self, extent: Extent) -> Result<Footer, Box<Finding>> {
+        let input = Input { name: self.name.clone(), ..Input::new(&self.path) };
+        let again = footer(&input, extent)?;
+        let columns = columns_of(&self.name, again.metadata.file_metadata().schema_descr()).ok();
+        let has_rows = again.metadata.row_groups().iter().map(rows_of).eq(self.rows.iter().copied());
+        if again.bytes == self.bytes && has_rows && columns.as_ref() == Some(&self.columns) {
+            return Ok(again);
+        }
+        let expected = "the file as it was when it was opened";
+        Err(Box::new(Finding::new(Code::Unreadable, &self.name, expected, "another one in its place")))
+    }
+}
+
+fn value<'a>(pairs: &'a [KeyValue], key: &str) -> Option<&'a str> {
+    pairs.iter().find(|pair| pair.key == key)?.value.as_deref()
+}
+
+/// The version of the schema that a file follows.
+fn version_of(file: &str, metadata: &ParquetMetaData) -> Result<u32, Box<Finding>> {
+    // A file of another writer has none; its columns are checked all the same.
+    let pairs = metadata.file_metadata().key_value_metadata();
+    let Some(text) = pairs.and_then(|pairs| value(pairs, schema::VERSION_KEY)) else {
+        return Ok(schema::SCHEMA_VERSION);
+    };
+    match text.parse::<u32>() {
+        Ok(version) if version > schema::SCHEMA_VERSION => {
+            let expected = format!("schema version {} or older", schema::SCHEMA_VERSION);
+            Err(Box::new(Finding::new(Code::NewerSchema, file, expected, format!("version {version}"))))
+        }
+        Ok(version) if version > 0 => Ok(version),
+        _ => {
+            let expected = format!("`{}` to be a whole number from 1", schema::VERSION_KEY);
+            Err(Box::new(Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", visible(text)))))
+        }
+    }
+}
+
+/// The columns of the file, or that it has none that can be made out.
+pub(crate) fn columns_of(file: &str, descriptor: &SchemaDescriptor) -> Result<Vec<FileColumn>, Vec<Finding>> {
+    let corrupt = |found| vec![Finding::new(Code::CorruptFooter, file, "a schema of known types", found)];
+    let fields = contained(|| parquet_to_arrow_schema(descriptor, None))
+        .map_err(corrupt)?
+        .map_err(|error| corrupt(plain(&error)))?;
+    let roots = descriptor.root_schema().get_fields();
+    let nested: Vec<Finding> =
+        roots.iter().filter(|root| root.is_group()).map(|root| is_nested(file, root.name())).collect();
+    if !nested.is_empty() {
+        return Err(nested);
+    }
+    let columns = fields.fields().iter().zip(roots).map(|(field, root)| {
+        let text = root.get_basic_info().converted_type() == ConvertedType::UTF8;
+        FileColumn { name: field.name().clone(), kind: kind_of(field.data_type(), text) }
+    });
+    Ok(columns.collect())
+}
+
+/// Lists, structs and maps are refused whether or not somebody reads them: their levels declare how many values there are,
+/// and no count of the file bounds those.
+pub(crate) fn is_nested(file: &str, column: &str) -> Finding {
+    let expected = "a column with one value per row; leave it out, or write its parts as columns of their own";
+    Finding::new(Code::WrongType, file, expected, "a list, a struct or a map").in_column(column)
+}
+
+fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
+    match stored {
+        DataType::Null => None,
+        DataType::Boolean => Some(Kind::Bool),
+        integer if integer.is_integer() => Some(Kind::Int),
+        float if float.is_floating() => Some(Kind::Float),
+        // Text that is only annotated as JSON is not checked to be UTF-8 by the decoder.
+        DataType::Utf8 if text => Some(Kind::String),
+        _ => Some(Kind::Unsupported),
+    }
+}
+
+fn check_columns(file: &str, columns: &[FileColumn], version: u32, absent: &[&str]) -> Vec<Finding> {
+    if let Err(exceeded) = MOST_COLUMNS.check(columns.len() as u64) {
+        return vec![Finding::over_budget(file, &exceeded)];
+    }
+    let (mut findings, mut counts) = (Vec::new(), HashMap::new());
+    for column in columns {
+        let count = counts.entry(column.name.as_str()).or_insert(0);
+        *count += 1;
+        if *count == 2 {
+            let finding = Finding::new(Code::RepeatedColumn, file, "one column of that name", "more than one");
+            findings.push(finding.in_column(&column.name));
+        }
+    }
+    for known in COLUMNS.iter().filter(|known| known.since <= version) {
+        let wanted = known.stored.kind();
+        match columns.iter().find(|column| column.name == known.name) {
+            None if known.required && !absent.contains(&known.name) => {
+                let strangers = columns.iter().map(|column| column.name.as_str());
+                let like = nearest(known.name, strangers.filter(|name| schema::column(name).is_none()));
+                let found = like.map_or("none".to_owned(), |name| format!("none, though there is `{name}`"));
+                let expected = format!("a column `{}` of type {}", known.name, wanted.name());
+                findings.push(Finding::new(Code::MissingColumn, file, expected, found).in_column(known.name));
+            }
+            Some(column)
+                if column.kind.is_some_and(|kind| kind != wanted) || column.kind.is_none() && !known.nullable =>
+            {
+                let found = column.kind.map_or("nothing but nulls", Kind::name);
+                let finding = Finding::new(Code::WrongType, file, wanted.name(), found);
+                findings.push(finding.in_column(known.name));
+            }
+            None | Some(_) => {}
+        }
+    }
+    findings
+}
+
+/// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
+pub(crate) fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
+    let make = || {
+        let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
+        let fields = plain_schema.fields().iter().zip(columns).map(|(field, column)| match column.kind {
+            Some(Kind::String) => Arc::new(field.as_ref().clone().with_data_type(text_type())),
+            _ => Arc::clone(field),
+        });
+        let wanted = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+        ArrowReaderMetadata::try_new(Arc::new(metadata), ArrowReaderOptions::new().with_schema(wanted))
+    };
+    contained(make)?.map_err(|error| plain(&error))
+}
+
+/// How text is held in memory: keys into the distinct values.
+pub(crate) fn text_type() -> DataType {
+    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
+}

@@ -1,0 +1,124 @@
+//! The bytes of a file, from the disk or from memory, and where those of a column lie.
+
+use std::fs::File;
+use std::io::{self, Read as _, Seek as _, SeekFrom};
+use std::sync::Arc;
+
+use bytes::Bytes;
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+
+use crate::checksums::{self, ChunkChecksums};
+use crate::read::budget::Expansion;
+use crate::read::footer::rows_of;
+
+/// One column of one row group of a file.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<'a> {
+    /// The file's footer.
+    pub(crate) metadata: &'a ParquetMetaData,
+    pub(crate) checksums: &'a ChunkChecksums,
+    pub(crate) row_group: usize,
+    /// The column, counted among the leaves of the schema.
+    pub(crate) column: usize,
+}
+
+impl<'a> Place<'a> {
+    pub(super) fn chunk(self) -> &'a ColumnChunkMetaData {
+        self.metadata.row_group(self.row_group).column(self.column)
+    }
+
+    /// The CRC-32 of the chunk's bytes, where the file has checksums.
+    pub(super) fn checksum(self) -> Option<u32> {
+        self.checksums.of(self.row_group, self.column)
+    }
+
+    pub(super) fn rows(self) -> usize {
+        rows_of(self.metadata.row_group(self.row_group))
+    }
+}
+
+/// Larger columns of a row group are read a page at a time, for the sake of memory.
+const LARGEST: u64 = 8 << 20;
+
+/// A file, or part of one in memory, addressed as the file is.
+pub(crate) struct Store {
+    held: Held,
+    expansion: Arc<Expansion>,
+}
+
+enum Held {
+    File(File),
+    Memory { start: u64, bytes: Bytes },
+}
+
+impl Store {
+    /// A file, and what was made of it so far.
+    pub(crate) fn new(file: File, expansion: Arc<Expansion>) -> Self {
+        Self { held: Held::File(file), expansion }
+    }
+
+    /// Bytes that start at a place of a file, of which nothing was made so far; a fuzz target gives any.
+    #[cfg(feature = "fuzz")]
+    pub(crate) fn of_memory(start: u64, bytes: Bytes) -> Self {
+        let expansion = Arc::new(Expansion::new(bytes.len() as u64));
+        Self { held: Held::Memory { start, bytes }, expansion }
+    }
+
+    /// What was made of the file so far.
+    pub(super) fn expansion(&self) -> &Arc<Expansion> {
+        &self.expansion
+    }
+
+    fn of(&self, held: Held) -> Self {
+        Self { held, expansion: Arc::clone(&self.expansion) }
+    }
+
+    /// The same, to be read by somebody else. Handles of one file share their position: one thread may have them.
+    pub(crate) fn again(&self) -> io::Result<Self> {
+        Ok(self.of(match &self.held {
+            Held::File(file) => Held::File(file.try_clone()?),
+            Held::Memory { start, bytes } => Held::Memory { start: *start, bytes: bytes.clone() },
+        }))
+    }
+
+    /// A range of bytes, held in memory if it is small.
+    pub(super) fn part(&self, start: u64, length: u64) -> io::Result<Self> {
+        if length > LARGEST {
+            return self.again();
+        }
+        let most = usize::try_from(length).unwrap_or(usize::MAX);
+        Ok(self.of(Held::Memory { start, bytes: self.read(start, most)? }))
+    }
+
+    /// The CRC-32 of `length` bytes from `start` on, or of fewer where the end comes before.
+    pub(super) fn sum(&self, start: u64, length: u64) -> io::Result<u32> {
+        match &self.held {
+            Held::File(file) => {
+                checksums::sum(file, start, length).map_err(|fault| io::Error::other(fault.to_string()))
+            }
+            Held::Memory { .. } => {
+                self.read(start, usize::try_from(length).unwrap_or(usize::MAX)).map(|bytes| crc32fast::hash(&bytes))
+            }
+        }
+    }
+
+    /// `length` bytes from `start` on, or fewer where the end comes before.
+    pub(super) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
+        match &self.held {
+            Held::File(file) => {
+                let mut file = file;
+                // All of it in one call; what a footer claims beyond that grows as it is read.
+                let most = usize::try_from(LARGEST).unwrap_or(usize::MAX);
+                let mut bytes = Vec::with_capacity(length.min(most));
+                file.seek(SeekFrom::Start(start))?;
+                file.take(length as u64).read_to_end(&mut bytes)?;
+                Ok(bytes.into())
+            }
+            Held::Memory { start: first, bytes } => {
+                let from = start.checked_sub(*first).and_then(|from| usize::try_from(from).ok());
+                let from = from.map_or(bytes.len(), |from| from.min(bytes.len()));
+                Ok(bytes.slice(from..from.saturating_add(length).min(bytes.len())))
+            }
+        }
+    }
+}

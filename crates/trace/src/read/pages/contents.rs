@@ -1,0 +1,295 @@
+//! What the decompressed pages of a column hold, checked before the Parquet library decodes them.
+//!
+//! The library takes any level that is not 0 for 1, and ignores what stands behind the last level. Rule: a page that is
+//! let through has a sound level for each row, as many values as its levels say, and keys within its dictionary. Bytes behind
+//! the values are ignored: fastparquet writes eight. Delta encodings are checked for their number of values only; their
+//! blocks are the library's.
+
+use bytes::Bytes;
+use parquet::basic::{Encoding, Type as Physical};
+use parquet::column::page::Page;
+use parquet::schema::types::ColumnDescriptor;
+
+use super::delta;
+use super::error::Unsupported;
+use super::header::width;
+use super::rle::{Hybrid, Span, prefixed};
+
+/// The pages of one flat column of one row group, in their order.
+pub(super) struct Contents {
+    physical: Physical,
+    /// The bytes of a value of fixed size.
+    width: usize,
+    optional: bool,
+    /// How many values the dictionary has.
+    keys: Option<usize>,
+    texts: Texts,
+}
+
+/// What the texts of pages take when they are written out: keys into a dictionary that are not left as keys, and texts
+/// that are stored as what differs from the one before.
+struct Texts {
+    /// The lengths of the dictionary's, where they may be long.
+    lengths: Vec<u32>,
+    /// Whether keys are written out; the library does that to those before a page without keys, too.
+    writes_out: bool,
+    /// Bytes behind keys that were not written out so far.
+    behind_keys: u64,
+    /// Bytes that the page under way adds.
+    added: u64,
+}
+
+/// The texts of a smaller dictionary are not counted: they are short.
+const SMALL_DICTIONARY: usize = 64 << 10;
+
+impl Texts {
+    fn of_dictionary(&mut self, mut values: &[u8]) {
+        if values.len() <= SMALL_DICTIONARY {
+            return;
+        }
+        // They are known to be there.
+        while let Some((length, rest)) = values.split_first_chunk() {
+            let length = u32::from_le_bytes(*length);
+            self.lengths.push(length);
+            values = rest.get(length as usize..).unwrap_or_default();
+        }
+    }
+
+    fn key(&mut self, key: u32, count: usize) {
+        if let Some(length) = self.lengths.get(key as usize) {
+            self.behind_keys = self.behind_keys.saturating_add(u64::from(*length).saturating_mul(count as u64));
+        }
+    }
+
+    fn other_page(&mut self) {
+        self.writes_out = true;
+    }
+
+    /// What is written out with this page.
+    fn take(&mut self) -> u64 {
+        if self.writes_out {
+            self.added = self.added.saturating_add(std::mem::take(&mut self.behind_keys));
+        }
+        std::mem::take(&mut self.added)
+    }
+}
+
+/// What is wrong with a page: expected and found.
+type Fault = (&'static str, String);
+
+/// The rows of a data page: how many are there, and how many of them null where that is declared.
+struct Declared {
+    rows: usize,
+    nulls: Option<usize>,
+}
+
+impl Contents {
+    pub(super) fn new(column: &ColumnDescriptor, writes_out: bool) -> Self {
+        let declared = usize::try_from(column.type_length()).unwrap_or_default();
+        let physical = column.physical_type();
+        Self {
+            physical,
+            width: width(physical, declared),
+            optional: column.max_def_level() > 0,
+            keys: None,
+            texts: Texts { lengths: Vec::new(), writes_out, behind_keys: 0, added: 0 },
+        }
+    }
+
+    /// Checks the next page: the bytes that its texts take when they are written out, beyond its own.
+    pub(super) fn check(&mut self, page: &Page) -> Result<u64, Fault> {
+        self.check_page(page)?;
+        Ok(self.texts.take())
+    }
+
+    fn check_page(&mut self, page: &Page) -> Result<(), Fault> {
+        match page {
+            Page::DictionaryPage { buf, num_values, .. } => {
+                let count = *num_values as usize;
+                self.keys = Some(count);
+                self.plain(buf, count)?;
+                if self.physical == Physical::BYTE_ARRAY {
+                    self.texts.of_dictionary(buf);
+                }
+                Ok(())
+            }
+            Page::DataPage { buf, num_values, encoding, def_level_encoding, .. } => {
+                let declared = Declared { rows: *num_values as usize, nulls: None };
+                match (self.optional, def_level_encoding) {
+                    (false, _) => self.data(&declared, None, buf, *encoding),
+                    (true, Encoding::RLE) => {
+                        let (levels, values) = prefixed(buf).map_err(|Unsupported| levels("fewer bytes"))?;
+                        self.data(&declared, Some(levels), &values, *encoding)
+                    }
+                    // One bit a level, which can say nothing but 0 and 1.
+                    (true, _) => Ok(()),
+                }
+            }
+            Page::DataPageV2 {
+                buf, num_values, encoding, num_nulls, def_levels_byte_len, rep_levels_byte_len, ..
+            } => {
+                let start = *rep_levels_byte_len as usize;
+                let end = start + *def_levels_byte_len as usize;
+                if end > buf.len() {
+                    return Err(levels("fewer bytes"));
+                }
+                let declared = Declared { rows: *num_values as usize, nulls: Some(*num_nulls as usize) };
+                no_levels(buf.slice(..start), declared.rows)?;
+                let levels = buf.slice(start..end);
+                if !self.optional {
+                    no_levels(levels.clone(), declared.rows)?;
+                }
+                self.data(&declared, self.optional.then_some(levels), &buf.slice(end..), *encoding)
+            }
+        }
+    }
+
+    fn data(
+        &mut self,
+        declared: &Declared,
+        stored: Option<Bytes>,
+        values: &Bytes,
+        encoding: Encoding,
+    ) -> Result<(), Fault> {
+        let count = match stored {
+            Some(stored) => ones(stored, declared.rows)
+                .map_err(|Unsupported| levels("runs of another length, or levels above 1"))?,
+            None => declared.rows,
+        };
+        if let Some(nulls) = declared.nulls
+            && nulls + count != declared.rows
+        {
+            return Err(("as many nulls as its header says", format!("{}, not {nulls}", declared.rows - count)));
+        }
+        if !matches!(encoding, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) {
+            self.texts.other_page();
+        }
+        match (encoding, self.physical) {
+            (Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY, _) => self.dictionary(values, count),
+            (Encoding::PLAIN, _) => self.plain(values, count),
+            (Encoding::RLE, Physical::BOOLEAN) => {
+                let truths = prefixed(values).and_then(|(truths, _)| Hybrid::new(truths, 1, count));
+                let sound = truths.and_then(|mut truths| {
+                    each_span(&mut truths, count, |_| ())?;
+                    truths.finish_values()
+                });
+                sound.map_err(|Unsupported| ("a truth value for each row", "runs of another length".into()))
+            }
+            // Where a byte of a value lies depends on how many there are.
+            (Encoding::BYTE_STREAM_SPLIT, _) if count.checked_mul(self.width) == Some(values.len()) => Ok(()),
+            (Encoding::BYTE_STREAM_SPLIT, _) => Err(other_bytes(values, count, self.width)),
+            (Encoding::DELTA_BYTE_ARRAY, _) => {
+                delta(values, count)?;
+                if count == 0 {
+                    return Ok(());
+                }
+                let shared = delta::sum(values).map_err(|Unsupported| ("lengths from 0", "others".to_owned()))?;
+                self.texts.added = self.texts.added.saturating_add(shared);
+                Ok(())
+            }
+            (Encoding::DELTA_BINARY_PACKED | Encoding::DELTA_LENGTH_BYTE_ARRAY, _) => delta(values, count),
+            _ => Ok(()),
+        }
+    }
+
+    /// Keys of so many values.
+    fn dictionary(&mut self, values: &Bytes, count: usize) -> Result<(), Fault> {
+        let fault = |found: &str| ("keys within the dictionary, one for each value", found.to_owned());
+        let keys = self.keys.ok_or_else(|| fault("no dictionary"))?;
+        if values.is_empty() && count == 0 {
+            return Ok(());
+        }
+        let width = *values.first().ok_or_else(|| fault("none"))?;
+        let mut hybrid =
+            Hybrid::new(values.slice(1..), width, count).map_err(|Unsupported| fault("keys of over 32 bits"))?;
+        let (mut within, texts) = (true, &mut self.texts);
+        each_span(&mut hybrid, count, |span| match span {
+            Span::Same { value, count } => {
+                within &= (value as usize) < keys;
+                texts.key(value, count);
+            }
+            Span::Packed(packed) => packed.each(|key| {
+                within &= (key as usize) < keys;
+                texts.key(key, 1);
+            }),
+        })
+        .and_then(|()| hybrid.finish_values())
+        .map_err(|Unsupported| fault("runs of another length"))?;
+        if within { Ok(()) } else { Err(fault("a key beyond it")) }
+    }
+
+    fn plain(&self, values: &[u8], count: usize) -> Result<(), Fault> {
+        if count == 0 && values.iter().any(|byte| *byte != 0) {
+            return Err(("as many values as its levels say", "some, not 0".to_owned()));
+        }
+        match self.physical {
+            Physical::BOOLEAN if values.len() >= count.div_ceil(8) => Ok(()),
+            Physical::BOOLEAN => Err(("a bit for each value", format!("{} bytes for {count}", values.len()))),
+            Physical::BYTE_ARRAY => texts(values, count)
+                .map_err(|Unsupported| ("texts as long as their lengths say", "texts that end beyond the page".into())),
+            _ if count.checked_mul(self.width).is_some_and(|bytes| bytes <= values.len()) => Ok(()),
+            _ => Err(other_bytes(values, count, self.width)),
+        }
+    }
+}
+
+/// The levels of a column of which there is but one: nothing, or runs of numbers of no bits.
+fn no_levels(stored: Bytes, rows: usize) -> Result<(), Fault> {
+    if stored.is_empty() {
+        return Ok(());
+    }
+    let mut hybrid =
+        Hybrid::new(stored, 0, rows).map_err(|Unsupported| levels("runs of another length, or levels above 1"))?;
+    let over = each_span(&mut hybrid, rows, |_| ()).and_then(|()| hybrid.finish());
+    over.map_err(|Unsupported| levels("some above 0"))
+}
+
+/// How many numbers of one bit are 1; there are `count`.
+fn ones(stored: Bytes, count: usize) -> Result<usize, Unsupported> {
+    let mut ones = 0;
+    let mut hybrid = Hybrid::new(stored, 1, count)?;
+    each_span(&mut hybrid, count, |span| match span {
+        Span::Same { value, count } => ones += value as usize * count,
+        Span::Packed(packed) => packed.each(|bit| ones += bit as usize),
+    })?;
+    hybrid.finish().map(|()| ones)
+}
+
+/// Goes through all of `count` numbers.
+fn each_span(hybrid: &mut Hybrid, mut count: usize, mut take: impl FnMut(Span<'_>)) -> Result<(), Unsupported> {
+    while count > 0 {
+        let span = hybrid.span(count)?;
+        count -= span.count();
+        take(span);
+    }
+    Ok(())
+}
+
+fn other_bytes(values: &[u8], count: usize, width: usize) -> Fault {
+    ("as many bytes as its values take", format!("{} for {count} of {width}", values.len()))
+}
+
+fn texts(mut values: &[u8], count: usize) -> Result<(), Unsupported> {
+    for _ in 0..count {
+        let (length, rest) = values.split_first_chunk().ok_or(Unsupported)?;
+        values = rest.get(u32::from_le_bytes(*length) as usize..).ok_or(Unsupported)?;
+    }
+    Ok(())
+}
+
+/// The number of values that a delta encoding declares: the third number, behind the sizes of its blocks.
+fn delta(values: &[u8], count: usize) -> Result<(), Fault> {
+    if values.is_empty() && count == 0 {
+        return Ok(());
+    }
+    let opening = delta::Opening::read(values).map_err(|Unsupported| {
+        ("the number of its values", "the end of the page, or blocks that are none".to_owned())
+    })?;
+    let declared = opening.count;
+    let fault = || ("as many values as its levels say", format!("{declared}, not {count}"));
+    if declared == count as u64 { Ok(()) } else { Err(fault()) }
+}
+
+fn levels(found: &str) -> Fault {
+    ("a definition level of 0 or 1 for each row, and no other level", found.to_owned())
+}

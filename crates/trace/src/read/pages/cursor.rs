@@ -1,0 +1,379 @@
+//! One column of one row group, read some rows at a time.
+
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray};
+use arrow::buffer::NullBuffer;
+use arrow::datatypes::DataType;
+use bytes::Bytes;
+use parquet::basic::{Encoding, Type as Physical};
+use parquet::column::page::{Page, PageReader as _};
+
+use super::bytes::{Place, Store};
+use super::dictionary::Dictionary;
+use super::error::{FaultSlot, Unsupported};
+use super::reader::Pages;
+use super::rle::{Hybrid, Number, Span, prefixed};
+use super::spread::{spread_bits, spread_keys};
+use crate::bits::Bits;
+use crate::read::column::{Column, Runs};
+
+/// How rows are to be held.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// One value per row, or one key per row.
+    Rows,
+    /// One value per run.
+    Runs,
+}
+
+/// Where the reading of a column is.
+pub(crate) struct Cursor {
+    pages: Pages,
+    physical: Physical,
+    /// Whether there may be nulls.
+    optional: bool,
+    form: Form,
+    dictionary: Option<Dictionary>,
+    page: Option<DataPage>,
+    /// Rows of the column that no page has given yet.
+    unread: usize,
+}
+
+/// A page of values and what is left of it.
+struct DataPage {
+    rows: usize,
+    /// Values that were there so far, and that are expected, where the header says how many.
+    valid: usize,
+    expected: Option<usize>,
+    /// One bit a row: whether there is a value.
+    levels: Option<Hybrid>,
+    values: Stored,
+}
+
+enum Stored {
+    /// Keys into the dictionary, or runs of truth values.
+    Hybrid(Hybrid),
+    /// Truth values from this bit on.
+    Bits(Bytes, usize),
+}
+
+/// Runs in the making.
+#[derive(Default)]
+struct Stretches {
+    /// One key per run.
+    keys: Vec<i32>,
+    /// The row before which each ends.
+    ends: Vec<u32>,
+}
+
+impl Cursor {
+    /// A column that is stored as `stored`.
+    pub(crate) fn open(store: &Store, place: Place<'_>, stored: &DataType, form: Form) -> Result<Self, Unsupported> {
+        let (column, rows) = (place.chunk(), place.rows());
+        let about = column.column_descr();
+        let physical = about.physical_type();
+        let known = match stored {
+            DataType::Boolean => physical == Physical::BOOLEAN,
+            DataType::Int32 => physical == Physical::INT32,
+            DataType::Int64 => physical == Physical::INT64,
+            DataType::Dictionary(_, _) => physical == Physical::BYTE_ARRAY,
+            _ => false,
+        };
+        let alone = about.max_rep_level() == 0 && about.max_def_level() <= 1 && about.path().parts().len() == 1;
+        let whole = usize::try_from(column.num_values()).is_ok_and(|values| values == rows);
+        let keyed = physical == Physical::BOOLEAN || column.dictionary_page_offset().is_some();
+        if !(known && alone && whole && keyed) {
+            return Err(Unsupported);
+        }
+        Ok(Self {
+            pages: Pages::new(store, place, FaultSlot::default()).map_err(|_| Unsupported)?,
+            physical,
+            optional: about.max_def_level() == 1,
+            form: if physical == Physical::BOOLEAN { Form::Rows } else { form },
+            dictionary: None,
+            page: None,
+            unread: rows,
+        })
+    }
+
+    pub(crate) fn read(&mut self, count: usize) -> Result<Column, Unsupported> {
+        if count > 0 {
+            // The dictionary stands before the first values.
+            self.page()?;
+        }
+        if self.physical == Physical::BOOLEAN {
+            return self.truths(count);
+        }
+        if self.form == Form::Runs {
+            return self.runs(count);
+        }
+        if self.dictionary()?.is_small() {
+            let (keys, nulls) = self.keys(count)?;
+            return self.dictionary()?.keys(keys, nulls).map(Column::Keys);
+        }
+        let (keys, nulls) = self.keys(count)?;
+        self.dictionary()?.values(keys, nulls).map(Column::Flat)
+    }
+
+    fn dictionary(&self) -> Result<&Dictionary, Unsupported> {
+        self.dictionary.as_ref().ok_or(Unsupported)
+    }
+
+    fn truths(&mut self, count: usize) -> Result<Column, Unsupported> {
+        let mut bits = Bits::with_capacity(count);
+        let nulls = self.rows(count, |stored, _, values| stored.bits(values, &mut bits))?;
+        let bits = bits.finish();
+        let bits = nulls.as_ref().map_or_else(|| bits.clone(), |nulls| spread_bits(&bits, nulls.inner()));
+        Ok(Column::Flat(Arc::new(BooleanArray::new(bits, nulls)) as ArrayRef))
+    }
+
+    fn runs(&mut self, count: usize) -> Result<Column, Unsupported> {
+        let mut stretches = Stretches::default();
+        self.rows(count, |stored, rows, values| {
+            // Nulls among rows that are to be runs: rare, and the library's to decode.
+            if rows == values { stored.runs(values, &mut stretches) } else { Err(Unsupported) }
+        })?;
+        Ok(Column::Runs(Runs::new(self.dictionary()?.values(stretches.keys, None)?, stretches.ends)))
+    }
+
+    /// The keys of the next rows, 0 where there is none.
+    fn keys<N: Number>(&mut self, count: usize) -> Result<(Vec<N>, Option<NullBuffer>), Unsupported> {
+        let mut keys = Vec::with_capacity(count);
+        let nulls = self.rows(count, |stored, _, values| stored.hybrid()?.append(values, &mut keys))?;
+        let keys = match &nulls {
+            Some(nulls) => spread_keys(&keys, nulls.inner()),
+            None => keys,
+        };
+        Ok((keys, nulls))
+    }
+
+    /// Goes through the next rows page by page. `take` gets what is stored, the number of rows and that of values;
+    /// the others are null.
+    fn rows(
+        &mut self,
+        count: usize,
+        mut take: impl FnMut(&mut Stored, usize, usize) -> Result<(), Unsupported>,
+    ) -> Result<Option<NullBuffer>, Unsupported> {
+        let mut nulls = self.optional.then(|| Bits::with_capacity(count));
+        let mut left = count;
+        while left > 0 {
+            let page = self.page()?;
+            let rows = left.min(page.rows);
+            page.rows -= rows;
+            let values = match (&mut page.levels, &mut nulls) {
+                (Some(levels), Some(nulls)) => validity(levels, rows, nulls)?,
+                _ => rows,
+            };
+            page.valid += values;
+            take(&mut page.values, rows, values)?;
+            self.unread -= rows;
+            left -= rows;
+        }
+        if self.unread == 0 {
+            self.close_page()?;
+            if self.next_page()?.is_some() {
+                return Err(Unsupported);
+            }
+        }
+        Ok(nulls.map(|nulls| NullBuffer::new(nulls.finish())).filter(|nulls| nulls.null_count() > 0))
+    }
+
+    /// The page under way, which has rows left.
+    fn page(&mut self) -> Result<&mut DataPage, Unsupported> {
+        while self.page.as_ref().is_none_or(|page| page.rows == 0) {
+            self.close_page()?;
+            self.page = Some(self.next_page()?.ok_or(Unsupported)?);
+        }
+        self.page.as_mut().ok_or(Unsupported)
+    }
+
+    /// The page under way is read: nothing must be left of it.
+    fn close_page(&mut self) -> Result<(), Unsupported> {
+        self.page.take().map_or(Ok(()), |page| page.finish())
+    }
+
+    /// The next page with values, the dictionary before it taken in.
+    fn next_page(&mut self) -> Result<Option<DataPage>, Unsupported> {
+        loop {
+            let Some(page) = self.pages.get_next_page().map_err(|_| Unsupported)? else { return Ok(None) };
+            match page {
+                Page::DictionaryPage { buf, num_values, encoding, .. } => {
+                    if self.dictionary.is_some() || !matches!(encoding, Encoding::PLAIN | Encoding::PLAIN_DICTIONARY) {
+                        return Err(Unsupported);
+                    }
+                    let count = num_values as usize;
+                    self.dictionary = Some(match self.physical {
+                        Physical::BYTE_ARRAY => Dictionary::texts(&buf, count)?,
+                        Physical::INT32 => Dictionary::ints(&buf, count, false)?,
+                        _ => Dictionary::ints(&buf, count, true)?,
+                    });
+                }
+                Page::DataPage { buf, num_values, encoding, def_level_encoding, .. } => {
+                    let (levels, values) = match self.optional {
+                        true if def_level_encoding == Encoding::RLE => {
+                            let (levels, values) = prefixed(&buf)?;
+                            (Some(levels), values)
+                        }
+                        true => return Err(Unsupported),
+                        false => (None, buf),
+                    };
+                    return self.data_page((num_values, None), levels, values, encoding).map(Some);
+                }
+                Page::DataPageV2 {
+                    buf,
+                    num_values,
+                    num_nulls,
+                    encoding,
+                    def_levels_byte_len,
+                    rep_levels_byte_len,
+                    ..
+                } => {
+                    let levels = def_levels_byte_len as usize;
+                    // Levels where there is but one: rare, and checked on the library's path.
+                    if levels > buf.len() || rep_levels_byte_len > 0 || (levels > 0 && !self.optional) {
+                        return Err(Unsupported);
+                    }
+                    let valid = num_values.checked_sub(num_nulls).ok_or(Unsupported)?;
+                    let values = buf.slice(levels..);
+                    let levels = self.optional.then(|| buf.slice(..levels));
+                    return self.data_page((num_values, Some(valid)), levels, values, encoding).map(Some);
+                }
+            }
+        }
+    }
+
+    /// A page of so many rows, and of so many values where its header says that.
+    fn data_page(
+        &self,
+        (rows, valid): (u32, Option<u32>),
+        levels: Option<Bytes>,
+        values: Bytes,
+        encoding: Encoding,
+    ) -> Result<DataPage, Unsupported> {
+        let rows = rows as usize;
+        if rows > self.unread {
+            return Err(Unsupported);
+        }
+        let levels = levels.map(|levels| Hybrid::new(levels, 1, rows)).transpose()?;
+        let values = match (self.physical, encoding) {
+            (Physical::BOOLEAN, Encoding::PLAIN) => Stored::Bits(values, 0),
+            (Physical::BOOLEAN, Encoding::RLE) => Stored::Hybrid(Hybrid::new(prefixed(&values)?.0, 1, rows)?),
+            (Physical::BOOLEAN, _) => return Err(Unsupported),
+            (_, Encoding::RLE_DICTIONARY | Encoding::PLAIN_DICTIONARY) if self.dictionary.is_some() => {
+                // A page of nothing but nulls may have no width at all: the library says whether it takes that.
+                let width = *values.first().ok_or(Unsupported)?;
+                Stored::Hybrid(Hybrid::new(values.slice(1..), width, rows)?)
+            }
+            _ => return Err(Unsupported),
+        };
+        Ok(DataPage { rows, valid: 0, expected: valid.map(|valid| valid as usize), levels, values })
+    }
+}
+
+impl DataPage {
+    /// All rows are read: whether they were all that there is.
+    fn finish(&self) -> Result<(), Unsupported> {
+        if self.rows > 0 || self.expected.is_some_and(|expected| expected != self.valid) {
+            return Err(Unsupported);
+        }
+        self.levels.as_ref().map_or(Ok(()), Hybrid::finish)?;
+        match &self.values {
+            Stored::Hybrid(values) => values.finish_values(),
+            Stored::Bits(values, 0) if values.iter().any(|byte| *byte != 0) => Err(Unsupported),
+            Stored::Bits(..) => Ok(()),
+        }
+    }
+}
+
+impl Stored {
+    fn hybrid(&mut self) -> Result<&mut Hybrid, Unsupported> {
+        match self {
+            Self::Hybrid(hybrid) => Ok(hybrid),
+            Self::Bits(..) => Err(Unsupported),
+        }
+    }
+
+    fn runs(&mut self, mut count: usize, runs: &mut Stretches) -> Result<(), Unsupported> {
+        while count > 0 {
+            match self.hybrid()?.span(count)? {
+                Span::Same { value, count: same } => {
+                    runs.add(value.cast_signed(), same)?;
+                    count -= same;
+                }
+                Span::Packed(packed) => {
+                    packed.blocks(|values| runs.add_each(values))?;
+                    count -= packed.count;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn bits(&mut self, mut count: usize, bits: &mut Bits) -> Result<(), Unsupported> {
+        match self {
+            Self::Bits(data, at) => {
+                let end = *at + count;
+                if end > data.len() * 8 {
+                    return Err(Unsupported);
+                }
+                bits.append(data, *at, count);
+                *at = end;
+            }
+            Self::Hybrid(hybrid) => {
+                while count > 0 {
+                    count -= append(hybrid.span(count)?, bits).0;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Stretches {
+    /// Adds rows of one key.
+    fn add(&mut self, key: i32, count: usize) -> Result<(), Unsupported> {
+        let count = u32::try_from(count).map_err(|_| Unsupported)?;
+        match (self.keys.last(), self.ends.last_mut()) {
+            (Some(last), Some(end)) if *last == key => *end += count,
+            (_, end) => {
+                let before = end.map_or(0, |end| *end);
+                self.keys.push(key);
+                self.ends.push(before + count);
+            }
+        }
+        Ok(())
+    }
+
+    /// Adds a row of each key.
+    fn add_each(&mut self, keys: &[i32]) -> Result<(), Unsupported> {
+        // Mostly the keys are those of two episodes, or of one.
+        keys.chunk_by(|a, b| a == b).try_for_each(|same| self.add(same[0], same.len()))
+    }
+}
+
+/// Adds numbers of one bit: how many, and how many of them are 1.
+fn append(span: Span<'_>, out: &mut Bits) -> (usize, usize) {
+    match span {
+        Span::Same { value, count } => {
+            // A number of one bit: runs of others are refused.
+            out.fill(count, value == 1);
+            (count, if value == 1 { count } else { 0 })
+        }
+        Span::Packed(packed) => {
+            let (data, start) = packed.bits();
+            (packed.count, out.append(data, start, packed.count))
+        }
+    }
+}
+
+/// Which of the next rows have a value, and how many do.
+fn validity(levels: &mut Hybrid, count: usize, nulls: &mut Bits) -> Result<usize, Unsupported> {
+    let (mut left, mut valid) = (count, 0);
+    while left > 0 {
+        let (rows, ones) = append(levels.span(left)?, nulls);
+        left -= rows;
+        valid += ones;
+    }
+    Ok(valid)
+}

@@ -1,0 +1,87 @@
+//! The distinct values of a column.
+
+use std::sync::Arc;
+
+use arrow::array::{
+    Array as _, ArrayRef, AsArray as _, DictionaryArray, Int32Array, Int64Array, StringBuilder, UInt8Array,
+};
+use arrow::buffer::{NullBuffer, ScalarBuffer};
+use arrow::datatypes::{Int32Type, Int64Type};
+
+use super::error::Unsupported;
+use crate::read::column::Keys;
+
+/// What the keys of a column stand for.
+pub(super) enum Dictionary {
+    Texts(ArrayRef),
+    Ints(ArrayRef),
+}
+
+impl Dictionary {
+    /// Texts, each after its length.
+    pub(super) fn texts(mut data: &[u8], count: usize) -> Result<Self, Unsupported> {
+        let mut texts = StringBuilder::with_capacity(count.min(data.len()), data.len());
+        for _ in 0..count {
+            let (length, rest) = data.split_first_chunk().ok_or(Unsupported)?;
+            let length = usize::try_from(u32::from_le_bytes(*length)).map_err(|_| Unsupported)?;
+            let (text, rest) = rest.split_at_checked(length).ok_or(Unsupported)?;
+            texts.append_value(std::str::from_utf8(text).map_err(|_| Unsupported)?);
+            data = rest;
+        }
+        Ok(Self::Texts(Arc::new(texts.finish())))
+    }
+
+    /// Integers of 32 or 64 bits.
+    pub(super) fn ints(data: &[u8], count: usize, long: bool) -> Result<Self, Unsupported> {
+        let ints: Vec<i64> = if long {
+            data.chunks_exact(8)
+                .filter_map(|bytes| bytes.first_chunk())
+                .map(|bytes| i64::from_le_bytes(*bytes))
+                .collect()
+        } else {
+            let ints = data.chunks_exact(4).filter_map(|bytes| bytes.first_chunk());
+            ints.map(|bytes| i64::from(i32::from_le_bytes(*bytes))).collect()
+        };
+        let ints = ints.get(..count).ok_or(Unsupported)?;
+        Ok(Self::Ints(Arc::new(Int64Array::from(ints.to_vec()))))
+    }
+
+    /// Whether a byte is enough for a key.
+    pub(super) fn is_small(&self) -> bool {
+        let (Self::Texts(values) | Self::Ints(values)) = self;
+        values.len() <= 1 << u8::BITS
+    }
+
+    /// Keys of a byte and their values; a null's key is 0.
+    pub(super) fn keys(&self, keys: Vec<u8>, nulls: Option<NullBuffer>) -> Result<Keys, Unsupported> {
+        let (Self::Texts(values) | Self::Ints(values)) = self;
+        let keys = UInt8Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
+        Keys::new(keys, values.clone()).ok_or(Unsupported)
+    }
+
+    /// The values of keys; a null's key is 0.
+    pub(super) fn values(&self, keys: Vec<i32>, nulls: Option<NullBuffer>) -> Result<ArrayRef, Unsupported> {
+        match self {
+            Self::Texts(texts) => {
+                let keys = Int32Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
+                let column = DictionaryArray::<Int32Type>::try_new(keys, texts.clone()).map_err(|_| Unsupported)?;
+                Ok(Arc::new(column))
+            }
+            Self::Ints(ints) => {
+                let ints = ints.as_primitive::<Int64Type>().values();
+                let mut within = true;
+                let value = |key: &i32| {
+                    let value = usize::try_from(*key).ok().and_then(|key| ints.get(key));
+                    within &= value.is_some();
+                    value.copied().unwrap_or_default()
+                };
+                let values: ScalarBuffer<i64> = keys.iter().map(value).collect();
+                let all_null = || nulls.as_ref().is_some_and(|nulls| nulls.null_count() == keys.len());
+                if !within && !all_null() {
+                    return Err(Unsupported);
+                }
+                Ok(Arc::new(Int64Array::try_new(values, nulls).map_err(|_| Unsupported)?))
+            }
+        }
+    }
+}

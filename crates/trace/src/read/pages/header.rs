@@ -1,0 +1,198 @@
+//! Page headers, and what must hold between one and the column that it stands in.
+//!
+//! Source: the Parquet format's `parquet.thrift`. A page's checksum does not cover its header, so that everything that
+//! can be checked of a header is.
+
+use parquet::basic::{Compression, Type as Physical};
+
+use crate::read::thrift::{Compact, Fault, Field, Wire};
+
+/// The header of a page.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Header {
+    /// How long it is itself, in bytes.
+    pub(super) length: usize,
+    /// The page's bytes as stored and when decompressed, both without the header.
+    pub(super) stored: usize,
+    pub(super) whole: usize,
+    /// The CRC-32 of the bytes as stored.
+    pub(super) checksum: Option<u32>,
+    pub(super) kind: Kind,
+    /// Values, the nulls among them; keys of a dictionary.
+    pub(super) values: usize,
+    /// What only a page of version 2 declares; the levels, in bytes, are not compressed.
+    nulls: usize,
+    rows: usize,
+    pub(super) levels: usize,
+    is_plain: bool,
+}
+
+/// What a page is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Kind {
+    #[default]
+    Data,
+    Index,
+    Dictionary,
+    DataV2,
+}
+
+/// What the footer says of a column of a row group.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct About {
+    pub(super) codec: Compression,
+    pub(super) physical: Physical,
+    /// The bytes of a value of `FIXED_LEN_BYTE_ARRAY`.
+    pub(super) width: usize,
+    /// Whether there may be nulls.
+    pub(super) optional: bool,
+    pub(super) rows: usize,
+}
+
+impl Header {
+    /// The header at the start of some bytes.
+    pub(super) fn parse(data: &[u8]) -> Result<Self, Fault> {
+        let mut compact = Compact::new(data);
+        let (mut header, mut code, mut seen, mut last) = (Self::default(), 0, 0_u16, 0);
+        while let Some(field) = compact.field(last)? {
+            once(&mut seen, field)?;
+            match field.id {
+                1 => code = compact.int(field)?,
+                2 => header.whole = size(compact.int(field)?)?,
+                3 => header.stored = size(compact.int(field)?)?,
+                4 => header.checksum = Some(compact.int(field)?.cast_unsigned()),
+                5 | 7 | 8 if field.wire == Wire::Struct => header.fields(&mut compact, field.id)?,
+                5..=8 if field.wire != Wire::Struct => return Err(Fault::Invalid("a field of another type")),
+                _ => compact.skip(field.wire)?,
+            }
+            last = field.id;
+        }
+        let (kind, own) = match code {
+            0 => (Kind::Data, 5),
+            1 => (Kind::Index, 6),
+            2 => (Kind::Dictionary, 7),
+            3 => (Kind::DataV2, 8),
+            _ => return Err(Fault::Invalid("a page of an unknown kind")),
+        };
+        // Type, both sizes, and the header of this kind and of no other.
+        if seen & 0b1110 != 0b1110 || seen & 0b1_1110_0000 != 1 << own {
+            return Err(Fault::Invalid("fields that are missing, or of another kind of page"));
+        }
+        Ok(Self { kind, length: compact.position(), ..header })
+    }
+
+    /// The header of one kind of page.
+    fn fields(&mut self, compact: &mut Compact<'_>, kind: i16) -> Result<(), Fault> {
+        let (mut seen, mut last) = (0, 0);
+        while let Some(field) = compact.field(last)? {
+            once(&mut seen, field)?;
+            match (kind, field.id) {
+                (_, 1) => self.values = size(compact.int(field)?)?,
+                (8, 2) => self.nulls = size(compact.int(field)?)?,
+                (8, 3) => self.rows = size(compact.int(field)?)?,
+                (8, 5 | 6) => self.levels += size(compact.int(field)?)?,
+                (8, 7) if matches!(field.wire, Wire::True | Wire::False) => {
+                    self.is_plain = field.wire == Wire::False;
+                }
+                (8, 7) => return Err(Fault::Invalid("a field of another type")),
+                (5, 2..=4) | (7, 2) | (8, 4) => drop(compact.int(field)?),
+                _ => compact.skip(field.wire)?,
+            }
+            last = field.id;
+        }
+        let required = match kind {
+            5 => 0b1_1110,
+            7 => 0b110,
+            _ => 0b111_1110,
+        };
+        if seen & required == required { Ok(()) } else { Err(Fault::Invalid("fields that are missing")) }
+    }
+
+    /// What is wrong with a page of a flat column of which `read` values came before: expected and found.
+    pub(super) fn fault(&self, about: &About, read: usize) -> Option<(String, String)> {
+        let fault = |expected: String, found: String| Some((expected, found));
+        if self.whole > most(about.codec, self.stored) || (self.is_stored_plain(about) && self.whole != self.stored) {
+            return fault(format!("a size that {} bytes can hold", self.stored), format!("{} bytes", self.whole));
+        }
+        if self.kind == Kind::Dictionary {
+            return self.dictionary_fault(about);
+        }
+        let left = about.rows.saturating_sub(read);
+        if self.values > left {
+            return fault(format!("at most {left} values"), self.values.to_string());
+        }
+        let Self { nulls, rows, levels, .. } = *self;
+        match self.kind {
+            Kind::DataV2 if rows != self.values => fault(format!("{} rows", self.values), rows.to_string()),
+            Kind::DataV2 if nulls > if about.optional { self.values } else { 0 } => {
+                fault("no more nulls than there can be".into(), nulls.to_string())
+            }
+            Kind::DataV2 if levels > self.whole.min(self.stored) => {
+                fault(format!("levels of at most {} bytes", self.whole.min(self.stored)), levels.to_string())
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether the page is stored as it is.
+    fn is_stored_plain(&self, about: &About) -> bool {
+        about.codec == Compression::UNCOMPRESSED || (self.kind == Kind::DataV2 && self.is_plain)
+    }
+
+    /// Whether the page, but for its levels, is a Zstandard frame.
+    pub(super) fn is_zstd(&self, about: &About) -> bool {
+        matches!(about.codec, Compression::ZSTD(_)) && !self.is_stored_plain(about)
+    }
+
+    fn dictionary_fault(&self, about: &About) -> Option<(String, String)> {
+        // A text takes its length at least.
+        let least = match about.physical {
+            Physical::BYTE_ARRAY => self.values.saturating_mul(4),
+            physical => self.values.saturating_mul(width(physical, about.width)),
+        };
+        let fits = least <= self.whole;
+        let found = || (format!("keys for {} bytes of values", self.whole), self.values.to_string());
+        (!fits).then(found)
+    }
+}
+
+/// The bytes of a value of fixed size.
+pub(super) fn width(physical: Physical, declared: usize) -> usize {
+    match physical {
+        Physical::INT32 | Physical::FLOAT => 4,
+        Physical::INT64 | Physical::DOUBLE => 8,
+        Physical::INT96 => 12,
+        Physical::FIXED_LEN_BYTE_ARRAY => declared,
+        Physical::BOOLEAN | Physical::BYTE_ARRAY => 0,
+    }
+}
+
+/// The most bytes that a codec can make of `stored` ones. A page is given its memory before it is decompressed.
+fn most(codec: Compression, stored: usize) -> usize {
+    let (ratio, free) = match codec {
+        Compression::UNCOMPRESSED => (1, 0),
+        // Copies of 64 bytes take three.
+        Compression::SNAPPY => (22, 64),
+        Compression::LZ4 | Compression::LZ4_RAW => (256, 64),
+        Compression::GZIP(_) => (1033, 1024),
+        // A block of 128 KiB of one byte takes four.
+        Compression::ZSTD(_) => (1 << 15, 1 << 17),
+        // 16 MiB take some bytes; such pages are not expected to be larger.
+        _ => (1 << 15, 1 << 24),
+    };
+    stored.saturating_mul(ratio).saturating_add(free)
+}
+
+/// A field that comes for the first time.
+fn once(seen: &mut u16, field: Field) -> Result<(), Fault> {
+    let bit = u32::try_from(field.id).ok().and_then(|id| 1_u16.checked_shl(id)).unwrap_or(0);
+    if *seen & bit != 0 {
+        return Err(Fault::Invalid("a field that is there twice"));
+    }
+    *seen |= bit;
+    Ok(())
+}
+
+fn size(number: i32) -> Result<usize, Fault> {
+    usize::try_from(number).map_err(|_| Fault::Invalid("a number below zero"))
+}

@@ -1,0 +1,93 @@
+//! The Parquet library's reader of rows, on pages that are verified.
+
+use std::sync::Arc;
+use std::vec;
+
+use arrow::datatypes::Fields;
+use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, RowGroups, RowSelection};
+use parquet::arrow::{ProjectionMask, parquet_to_arrow_field_levels};
+use parquet::column::page::{PageIterator, PageReader};
+use parquet::errors::{ParquetError, Result};
+use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
+
+use super::bytes::{Place, Store};
+use super::error::FaultSlot;
+use super::reader::Pages;
+use crate::checksums::ChunkChecksums;
+use crate::read::footer::rows_of;
+
+/// Some row groups of a file, to be read by the library.
+pub(crate) struct Library {
+    /// The file.
+    pub(crate) store: Store,
+    /// Its footer.
+    pub(crate) metadata: Arc<ParquetMetaData>,
+    pub(crate) checksums: ChunkChecksums,
+    /// The row groups, in this order.
+    pub(crate) row_groups: Vec<usize>,
+    /// Where the first fault of a page is left.
+    pub(crate) slot: FaultSlot,
+    /// Whether texts are asked for row by row, not as keys into a dictionary.
+    pub(crate) writes_out: bool,
+}
+
+impl Library {
+    /// A reader of some columns, as `fields` wants them held.
+    pub(crate) fn reader(
+        &self,
+        columns: ProjectionMask,
+        fields: Option<&Fields>,
+        batch: usize,
+        selection: Option<RowSelection>,
+    ) -> Result<ParquetRecordBatchReader> {
+        let schema = self.metadata.file_metadata().schema_descr();
+        let levels = parquet_to_arrow_field_levels(schema, columns, fields)?;
+        ParquetRecordBatchReader::try_new_with_row_groups(&levels, self, batch, selection)
+    }
+}
+
+impl RowGroups for Library {
+    fn num_rows(&self) -> usize {
+        self.row_groups().map(rows_of).sum()
+    }
+
+    fn column_chunks(&self, column: usize) -> Result<Box<dyn PageIterator>> {
+        let store = self.store.again().map_err(|error| ParquetError::External(Box::new(error)))?;
+        let (metadata, checksums) = (Arc::clone(&self.metadata), self.checksums.clone());
+        let (row_groups, slot) = (self.row_groups.clone().into_iter(), Arc::clone(&self.slot));
+        let writes_out = self.writes_out;
+        Ok(Box::new(Chunks { store, metadata, checksums, column, row_groups, slot, writes_out }))
+    }
+
+    fn row_groups(&self) -> Box<dyn Iterator<Item = &RowGroupMetaData> + '_> {
+        Box::new(self.row_groups.iter().map(|at| self.metadata.row_group(*at)))
+    }
+
+    fn metadata(&self) -> &ParquetMetaData {
+        &self.metadata
+    }
+}
+
+/// The pages of one column, row group by row group.
+struct Chunks {
+    store: Store,
+    metadata: Arc<ParquetMetaData>,
+    checksums: ChunkChecksums,
+    column: usize,
+    row_groups: vec::IntoIter<usize>,
+    slot: FaultSlot,
+    writes_out: bool,
+}
+
+impl Iterator for Chunks {
+    type Item = Result<Box<dyn PageReader>>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (metadata, checksums) = (&*self.metadata, &self.checksums);
+        let place = Place { metadata, checksums, row_group: self.row_groups.next()?, column: self.column };
+        let pages = Pages::checked(&self.store, place, Arc::clone(&self.slot), self.writes_out);
+        Some(pages.map(|pages| Box::new(pages) as _))
+    }
+}
+
+impl PageIterator for Chunks {}

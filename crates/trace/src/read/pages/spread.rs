@@ -1,0 +1,31 @@
+//! Values that are stored without the nulls between them, put at their rows.
+
+use arrow::buffer::BooleanBuffer;
+
+use super::rle::Number;
+use crate::bits::Bits;
+
+/// The keys of rows that have one, at their rows.
+pub(super) fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {
+    let mut spread = vec![N::default(); valid.len()];
+    let mut keys = keys;
+    for (start, end) in valid.set_slices() {
+        let (here, rest) = keys.split_at(keys.len().min(end - start));
+        spread[start..start + here.len()].copy_from_slice(here);
+        keys = rest;
+    }
+    spread
+}
+
+/// The bits of rows that have one, at their rows.
+pub(super) fn spread_bits(bits: &BooleanBuffer, valid: &BooleanBuffer) -> BooleanBuffer {
+    let mut spread = Bits::with_capacity(valid.len());
+    let mut taken = bits.offset();
+    for (start, end) in valid.set_slices() {
+        spread.fill(start - spread.count(), false);
+        spread.append(bits.values(), taken, end - start);
+        taken += end - start;
+    }
+    spread.fill(valid.len() - spread.count(), false);
+    spread.finish()
+}

@@ -1,0 +1,236 @@
+//! The stored pages of one column of one row group, verified while they are read.
+//!
+//! Rule: whoever decodes a page of a trace gets its bytes from here, so that no header that contradicts the footer, and
+//! no page or chunk of pages that contradicts its checksum, is decoded by anyone. A chunk is summed before its first page is
+//! given, as who reads it may stop before its end; one that is too large to be held is read twice for that.
+
+use std::fmt;
+use std::io;
+use std::sync::{Mutex, PoisonError};
+
+use bytes::Bytes;
+use bytes::buf::{Buf as _, Reader};
+use parquet::errors::{ParquetError, Result};
+use parquet::file::reader::{ChunkReader, Length};
+
+use super::bytes::{Place, Store};
+use super::error::{FaultSlot, PageFault, Part};
+use super::header::{About, Header, Kind};
+use super::zstd;
+use crate::diagnostic::Code;
+use crate::read::thrift;
+use exact::budget::Exceeded;
+
+/// How much of a file is read to find a header in; most are shorter than 100 bytes.
+const HEADER: usize = 1 << 10;
+/// The longest header: texts among its statistics may be long.
+const LONGEST_HEADER: usize = 16 << 20;
+
+/// The pages of a column as they are stored.
+pub(super) struct Verified {
+    store: Store,
+    /// The row group and the column.
+    place: (usize, usize),
+    column: String,
+    start: u64,
+    end: u64,
+    about: About,
+    /// Whether the column has one value per row, null or not.
+    flat: bool,
+    progress: Mutex<Progress>,
+    slot: FaultSlot,
+}
+
+/// How far the pages are read.
+#[derive(Default)]
+struct Progress {
+    /// Where the page under way starts, and its header.
+    page: Option<(u64, Header)>,
+    /// Pages before it, and their values.
+    pages: usize,
+    values: usize,
+}
+
+impl Verified {
+    /// The pages of a column of a row group.
+    pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
+        let column = place.chunk();
+        let (start, length) = column.byte_range();
+        let described = column.column_descr();
+        let about = About {
+            codec: column.compression(),
+            physical: described.physical_type(),
+            width: usize::try_from(described.type_length()).unwrap_or_default(),
+            optional: described.max_def_level() > 0,
+            rows: place.rows(),
+        };
+        let flat = described.max_rep_level() == 0 && described.path().parts().len() == 1;
+        let unreadable = |error: io::Error| ParquetError::External(Box::new(error));
+        let pages = Self {
+            store: store.part(start, length).map_err(unreadable)?,
+            place: (place.row_group, place.column),
+            column: column.column_path().string(),
+            start,
+            end: start.saturating_add(length),
+            about,
+            flat,
+            progress: Mutex::default(),
+            slot,
+        };
+        let declared = place.checksum();
+        let sums = declared.map(|declared| pages.store.sum(start, length).map(|found| (declared, found)));
+        match sums.transpose().map_err(unreadable)? {
+            Some((declared, found)) if declared != found => {
+                let expected = format!("bytes with the CRC-32 {declared:08x}");
+                Err(pages.fault_of(Part::Chunk(start, pages.end), expected, format!("{found:08x}")))
+            }
+            _ => Ok(pages),
+        }
+    }
+
+    /// Reads all pages, and decodes none.
+    pub(super) fn walk(&self) -> Result<()> {
+        let mut at = self.start;
+        while at < self.end {
+            let header = self.enter(at)?.1;
+            let body = at + header.length as u64;
+            self.body(body, header.stored)?;
+            at = body + header.stored as u64;
+        }
+        self.finish()
+    }
+
+    /// At the end of the column: whether it had a value for each row.
+    pub fn finish(&self) -> Result<()> {
+        let values = self.progress.lock().unwrap_or_else(PoisonError::into_inner).values;
+        if self.flat && values != self.about.rows {
+            return Err(self.fault(self.start, format!("pages of {} values", self.about.rows), values));
+        }
+        Ok(())
+    }
+
+    /// Where the page of which the bytes were read last starts.
+    pub(super) fn offset(&self) -> u64 {
+        self.progress.lock().unwrap_or_else(PoisonError::into_inner).page.as_ref().map_or(self.start, |page| page.0)
+    }
+
+    /// The error of a page at `offset`, kept for whoever asked for the column.
+    pub(super) fn fault(&self, offset: u64, expected: impl Into<String>, found: impl fmt::Display) -> ParquetError {
+        self.keep(Code::CorruptData, Part::Page(offset), expected.into(), found.to_string())
+    }
+
+    /// The error of a page that asks for more than the budget of its file.
+    pub(super) fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
+        self.keep(Code::OverBudget, Part::Page(offset), exceeded.expected(), "more".to_owned())
+    }
+
+    fn fault_of(&self, part: Part, expected: String, found: String) -> ParquetError {
+        self.keep(Code::CorruptData, part, expected, found)
+    }
+
+    fn keep(&self, code: Code, part: Part, expected: String, found: String) -> ParquetError {
+        let (row_group, column) = (self.place.0, self.column.clone());
+        let fault = PageFault { code, row_group, column, part, expected, found };
+        let _ = self.slot.set(fault.clone());
+        ParquetError::External(Box::new(fault))
+    }
+
+    /// The texts of a page take so many bytes when they are written out.
+    pub(super) fn texts(&self, bytes: u64) -> Result<()> {
+        let offset = self.offset();
+        self.store.expansion().texts(self.place, offset, bytes).map_err(|exceeded| self.over(offset, &exceeded))
+    }
+
+    /// The page that starts at `offset`: the bytes of its header, and what they say.
+    fn enter(&self, offset: u64) -> Result<(Bytes, Header)> {
+        let left = usize::try_from(self.end.saturating_sub(offset)).unwrap_or(usize::MAX);
+        let (bytes, header) = self.header(offset, left)?;
+        let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        if header.stored > left - header.length {
+            let expected = format!("a page of at most {} bytes", left - header.length);
+            return Err(self.fault(offset, expected, header.stored));
+        }
+        if header.kind == Kind::Dictionary && progress.pages > 0 {
+            return Err(self.fault(offset, "a dictionary before all other pages", "one behind them"));
+        }
+        if self.flat
+            && let Some((expected, found)) = header.fault(&self.about, progress.values)
+        {
+            return Err(self.fault(offset, expected, found));
+        }
+        self.store
+            .expansion()
+            .page(self.place, offset, header.whole)
+            .map_err(|exceeded| self.over(offset, &exceeded))?;
+        progress.pages += 1;
+        if matches!(header.kind, Kind::Data | Kind::DataV2) {
+            progress.values += header.values;
+        }
+        progress.page = Some((offset, header.clone()));
+        Ok((bytes.slice(..header.length), header))
+    }
+
+    fn header(&self, offset: u64, left: usize) -> Result<(Bytes, Header)> {
+        let mut most = HEADER;
+        loop {
+            let bytes = self.store.read(offset, most.min(left)).map_err(|error| self.fault(offset, "a page", error))?;
+            match Header::parse(&bytes) {
+                Ok(header) => return Ok((bytes, header)),
+                Err(thrift::Fault::Ends) if bytes.len() == most && most < LONGEST_HEADER => most *= 8,
+                Err(fault) => return Err(self.fault(offset, "a page header", fault)),
+            }
+        }
+    }
+
+    /// The bytes of the page under way.
+    fn body(&self, start: u64, length: usize) -> Result<Bytes> {
+        let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        let page = progress
+            .page
+            .as_ref()
+            .filter(|(offset, header)| start == offset + header.length as u64 && length == header.stored);
+        let Some((offset, header)) = page else {
+            return Err(self.fault(start, "a page header that has one meaning", "one that can be read in two ways"));
+        };
+        let bytes = self.store.read(start, length).map_err(|error| self.fault(*offset, "a page", error))?;
+        if bytes.len() != length {
+            return Err(self.fault(*offset, format!("a page of {length} bytes"), bytes.len()));
+        }
+        match header.checksum.map(|declared| (declared, crc32fast::hash(&bytes))) {
+            Some((declared, computed)) if declared != computed => {
+                let (expected, found) = (format!("bytes with the CRC-32 {declared:08x}"), format!("{computed:08x}"));
+                Err(self.fault(*offset, expected, found))
+            }
+            _ => Ok(bytes),
+        }
+    }
+}
+
+impl Length for Verified {
+    fn len(&self) -> u64 {
+        self.end
+    }
+}
+
+impl ChunkReader for Verified {
+    type T = Reader<Bytes>;
+
+    /// The header of the page at `start`, and nothing behind it.
+    fn get_read(&self, start: u64) -> Result<Self::T> {
+        self.enter(start).map(|(header, _)| header.reader())
+    }
+
+    /// The bytes of the page under way, decompressed if [`zstd`] does that.
+    fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
+        let stored = self.body(start, length)?;
+        let progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        match &progress.page {
+            Some((offset, header)) if header.is_zstd(&self.about) => {
+                zstd::inflated(&stored, header.levels, header.whole)
+                    .map(Bytes::from)
+                    .map_err(|found| self.fault(*offset, "a page that zstd decompresses to its size", found))
+            }
+            _ => Ok(stored),
+        }
+    }
+}

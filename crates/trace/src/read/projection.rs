@@ -1,0 +1,92 @@
+//! The columns of one pass: which are read, as what, and what is known about them.
+
+use super::open::TraceSet;
+use crate::error::TraceError;
+use crate::schema::{self, Column, Kind};
+
+/// Columns that every pass reads, at these positions.
+pub(crate) const KEYS: [&str; 7] = ["episode_id", "model", "experiment", "seed", "run", "body_color", "t"];
+pub(crate) const EPISODE_ID: usize = 0;
+pub(crate) const T: usize = 6;
+
+/// The columns that a pass reads: [`KEYS`], then those asked for.
+#[derive(Clone, Debug)]
+pub(crate) struct Layout {
+    pub(crate) columns: Vec<LayoutColumn>,
+}
+
+/// One column of a pass.
+#[derive(Clone, Debug)]
+pub(crate) struct LayoutColumn {
+    pub(crate) name: String,
+    pub(crate) kind: Kind,
+    /// What the schema says of it, if it does.
+    pub(crate) known: Option<&'static Column>,
+    /// Whether it must be the same in all rows of an episode.
+    pub(crate) constant: bool,
+}
+
+impl Layout {
+    /// The keys and these columns, each once.
+    pub(crate) fn new<'a>(
+        set: &TraceSet,
+        steps: impl IntoIterator<Item = &'a str>,
+        constants: impl IntoIterator<Item = &'a str>,
+    ) -> Result<Self, TraceError> {
+        let mut layout = Self { columns: Vec::new() };
+        for name in KEYS.into_iter().chain(steps) {
+            layout.add(set, name, false)?;
+        }
+        for name in constants {
+            layout.add(set, name, true)?;
+        }
+        Ok(layout)
+    }
+
+    fn add(&mut self, set: &TraceSet, name: &str, constant: bool) -> Result<(), TraceError> {
+        if let Some(at) = self.position(name) {
+            self.columns[at].constant |= constant;
+            return Ok(());
+        }
+        // A name that only older traces have is a column of their own.
+        let known = schema::column(name).filter(|known| known.since == 1 || set.declares(name));
+        let kind = kind_in(set, name)?;
+        let constant = constant || known.is_some_and(|column| column.constant);
+        self.columns.push(LayoutColumn { name: name.to_owned(), kind, known, constant });
+        Ok(())
+    }
+
+    /// Takes the values of a column as they are, whatever the schema says of them.
+    pub(crate) fn without_rules(&mut self, name: &str) {
+        for column in self.columns.iter_mut().filter(|column| column.name == name) {
+            column.known = None;
+        }
+    }
+
+    /// Where the column of this name is.
+    pub(crate) fn position(&self, name: &str) -> Option<usize> {
+        self.columns.iter().position(|column| column.name == name)
+    }
+}
+
+fn kind_in(set: &TraceSet, name: &str) -> Result<Kind, TraceError> {
+    let refused = |found| TraceError::Column { column: name.to_owned(), expected: "a column of the traces", found };
+    let Some(column) = set.column(name) else {
+        return Err(refused(format!("none; they have {}", set.column_names().join(", "))));
+    };
+    match column {
+        column if column.kind != Kind::Unsupported => Ok(column.kind),
+        column => Err(match column.conflict {
+            Some([(one, this), (other, that)]) => TraceError::Column {
+                column: name.to_owned(),
+                expected: "the same type in all files",
+                found: format!("{} in {one} and {} in {other}; cast one of them", this.name(), that.name()),
+            },
+            None => TraceError::Column {
+                column: name.to_owned(),
+                expected: "bool, integer, float or string",
+                found: "another type; cast it where the file is written".into(),
+            },
+        }),
+    }
+}

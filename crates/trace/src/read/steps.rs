@@ -1,0 +1,200 @@
+//! The steps of traces as Arrow batches, for programs that go on with them: the same columns of the same types from every
+//! file, null where a file has none.
+
+use std::collections::BTreeSet;
+use std::io;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::vec;
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, RecordBatch, RecordBatchOptions, new_null_array};
+use arrow::compute::{CastOptions, cast, cast_with_options, filter_record_batch};
+use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
+
+use super::budget::Expansion;
+use super::footer::plain;
+use super::open::{Readable, TraceFile, TraceSet};
+use super::pages::{FaultSlot, Library, Store, damaged};
+use super::projection::Layout;
+use crate::catch_panic::contained;
+use crate::diagnostic::{Code, Finding};
+use crate::error::TraceError;
+use crate::schema::{self, Kind, Stored};
+use exact::input;
+
+const BATCH_ROWS: usize = 8 * 1024;
+/// The column by which episodes are told apart.
+const EPISODE_ID: &str = "episode_id";
+
+/// The rows of all files in their order, some at a time. No rule of traces is checked, checksums are.
+///
+/// Nothing follows an error.
+pub struct Steps {
+    schema: SchemaRef,
+    files: vec::IntoIter<Pending>,
+    reader: Option<Reader>,
+    /// The episodes whose rows are wanted; all if absent.
+    episodes: Option<BTreeSet<String>>,
+}
+
+/// A file whose rows are still to come.
+struct Pending {
+    name: String,
+    path: PathBuf,
+    readable: Arc<Readable>,
+    expansion: Arc<Expansion>,
+}
+
+/// The rows of one file.
+struct Reader {
+    name: String,
+    rows: ParquetRecordBatchReader,
+    slot: FaultSlot,
+}
+
+impl Steps {
+    /// The steps of these episodes, of all if absent, with these columns in this order, all if absent.
+    pub fn new(
+        set: &TraceSet,
+        columns: Option<&[String]>,
+        episodes: Option<BTreeSet<String>>,
+    ) -> Result<Self, TraceError> {
+        let all = || set.column_names().into_iter().filter(|name| is_readable(set, name)).map(str::to_owned).collect();
+        let names: Vec<String> = columns.map_or_else(all, <[String]>::to_vec);
+        let layout = Layout::new(set, [], names.iter().map(String::as_str))?;
+        let field = |name: &String| {
+            let kind = layout.position(name).map_or(Kind::String, |at| layout.columns[at].kind);
+            Field::new(name, data_type(name, kind), true)
+        };
+        let schema = Arc::new(Schema::new(names.iter().map(field).collect::<Vec<_>>()));
+        let files = set.files().iter().map(|file| Pending::of(file).map_err(|found| TraceError::from(*found)));
+        let files = files.collect::<Result<Vec<_>, _>>()?.into_iter();
+        Ok(Self { schema, files, reader: None, episodes })
+    }
+
+    /// The columns: those of the schema as it has them, others as text, int64, float64 or bool; all may be null.
+    pub fn schema(&self) -> SchemaRef {
+        Arc::clone(&self.schema)
+    }
+
+    /// The next rows, as a file has them.
+    fn rows(&mut self) -> Option<Result<RecordBatch, Box<Finding>>> {
+        loop {
+            if self.reader.is_none() {
+                match self.files.next()?.reader(&self.schema) {
+                    Ok(reader) => self.reader = Some(reader),
+                    Err(found) => return Some(Err(found)),
+                }
+            }
+            match self.reader.as_mut()?.next() {
+                None => self.reader = None,
+                some => return some,
+            }
+        }
+    }
+
+    /// The rows as they are promised.
+    fn complete(&self, rows: &RecordBatch) -> Result<RecordBatch, TraceError> {
+        let column = |field: &Arc<Field>| -> Result<ArrayRef, arrow::error::ArrowError> {
+            let options = CastOptions { safe: false, ..CastOptions::default() };
+            match rows.column_by_name(field.name()) {
+                Some(values) => cast_with_options(values, field.data_type(), &options),
+                None => Ok(new_null_array(field.data_type(), rows.num_rows())),
+            }
+        };
+        let columns = self.schema.fields().iter().map(column).collect::<Result<Vec<_>, _>>();
+        // With no column at all there is nothing else to tell how many rows there are.
+        let options = RecordBatchOptions::new().with_row_count(Some(rows.num_rows()));
+        let batch = columns.and_then(|columns| RecordBatch::try_new_with_options(self.schema(), columns, &options));
+        let batch = batch.map_err(TraceError::Memory)?;
+        let (Some(episodes), Some(ids)) = (&self.episodes, rows.column_by_name(EPISODE_ID)) else { return Ok(batch) };
+        let ids = cast(ids, &DataType::Utf8).map_err(TraceError::Memory)?;
+        let ids = ids.as_string::<i32>();
+        let wanted: BooleanArray =
+            (0..ids.len()).map(|row| Some(ids.is_valid(row) && episodes.contains(ids.value(row)))).collect();
+        filter_record_batch(&batch, &wanted).map_err(TraceError::Memory)
+    }
+}
+
+impl Iterator for Steps {
+    type Item = Result<RecordBatch, TraceError>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let rows = self.rows()?;
+        let batch = rows.map_err(|found| TraceError::from(*found)).and_then(|rows| self.complete(&rows));
+        if batch.is_err() {
+            (self.reader, self.files) = (None, Vec::new().into_iter());
+        }
+        Some(batch)
+    }
+}
+
+/// Whether the column can be given: its type is one of the schema's in every file.
+fn is_readable(set: &TraceSet, name: &str) -> bool {
+    set.column(name).is_some_and(|column| column.kind != Kind::Unsupported || column.conflict.is_some())
+}
+
+/// The type of a column: as the schema has it, as wide as can be where the schema does not know it.
+fn data_type(name: &str, kind: Kind) -> DataType {
+    let known = schema::column(name).filter(|column| column.stored.kind() == kind).map(|column| column.stored);
+    match (known, kind) {
+        (Some(Stored::Bool), _) | (None, Kind::Bool) => DataType::Boolean,
+        (Some(Stored::Int8), _) => DataType::Int8,
+        (Some(Stored::Int32), _) => DataType::Int32,
+        (Some(Stored::Int64), _) | (None, Kind::Int) => DataType::Int64,
+        (Some(Stored::Float32), _) => DataType::Float32,
+        (Some(Stored::Float64), _) | (None, Kind::Float) => DataType::Float64,
+        (Some(Stored::String), _) | (None, Kind::String | Kind::Unsupported) => DataType::Utf8,
+    }
+}
+
+impl Pending {
+    fn of(file: &TraceFile) -> Result<Self, Box<Finding>> {
+        let (name, path) = (file.name().to_owned(), file.path().to_owned());
+        Ok(Self { name, path, readable: file.footer()?, expansion: Arc::clone(file.expansion()) })
+    }
+
+    /// Opens the file: one at a time is open.
+    fn reader(self, schema: &Schema) -> Result<Reader, Box<Finding>> {
+        let Self { name, path, readable, expansion } = self;
+        let unreadable = |error: io::Error| {
+            Box::new(Finding::new(Code::Unreadable, &name, "a file that can be read", error.to_string()))
+        };
+        let store = Store::new(input::open(&path).map_err(unreadable)?, expansion);
+        let metadata = Arc::clone(readable.footer.metadata());
+        let (checksums, slot) = (readable.chunks.clone(), FaultSlot::default());
+        let row_groups = (0..metadata.num_row_groups()).collect();
+        let described = metadata.file_metadata().schema_descr();
+        let wanted = described.columns().iter().enumerate().filter(|(_, column)| {
+            let path = column.path().parts();
+            path.len() == 1 && (path[0] == EPISODE_ID || schema.field_with_name(&path[0]).is_ok())
+        });
+        let columns = ProjectionMask::leaves(described, wanted.map(|(at, _)| at).collect::<Vec<_>>());
+        let library = Library {
+            store,
+            metadata: Arc::clone(&metadata),
+            checksums,
+            row_groups,
+            slot: Arc::clone(&slot),
+            writes_out: true,
+        };
+        match contained(|| library.reader(columns, None, BATCH_ROWS, None).map_err(|error| plain(&error))) {
+            Ok(Ok(rows)) => Ok(Reader { name, rows, slot }),
+            Ok(Err(error)) | Err(error) => Err(Box::new(damaged(&name, &slot, &error))),
+        }
+    }
+}
+
+impl Reader {
+    fn next(&mut self) -> Option<Result<RecordBatch, Box<Finding>>> {
+        let rows = &mut self.rows;
+        let found = match contained(|| rows.next()) {
+            Ok(None) => return None,
+            Ok(Some(batch)) => batch.map_err(|error| error.to_string()),
+            Err(panic) => Err(panic),
+        };
+        Some(found.map_err(|error| Box::new(damaged(&self.name, &self.slot, &error))))
+    }
+}

@@ -1,0 +1,270 @@
+//! Scans traces for scoring: one streaming pass over the columns asked for, checked while it goes.
+//!
+//! Rule: what reaches `work` is whole episodes that keep every rule of the schema in the columns that are read; the
+//! first fault by file, row group and row ends the scan, the same one for any number of threads.
+
+use std::collections::HashMap;
+use std::num::NonZeroUsize;
+use std::ops::Range;
+use std::sync::Arc;
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch, RecordBatchOptions, StringArray, UInt8Array};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Field, Schema};
+use arrow::error::ArrowError;
+
+use super::diagnostic::Finding;
+use super::error::TraceError;
+use super::read::open::TraceSet;
+use super::read::parallel_scan::{Episodes, Event, pass};
+use super::read::projection::Layout;
+use super::validate::color_set::{Spellings, other_names};
+use super::validate::duplicate_ids::{Prints, hashes};
+use super::validate::episode_hashes;
+use super::validate::rules::Rules;
+
+/// The columns that a scan delivers, and what it checks beyond the schema.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Projection {
+    /// Columns with one value per step.
+    pub steps: Vec<String>,
+    /// Columns with one value per step that are taken as they are: the schema's rules about values do not count.
+    pub unchecked: Vec<String>,
+    /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
+    pub constants: Vec<String>,
+    /// The experiments that are known; an episode of another one is a fault. Any if `None`.
+    pub experiments: Option<Vec<String>>,
+}
+
+impl Projection {
+    /// The columns with one value per step.
+    fn step_columns(&self) -> impl Iterator<Item = &str> {
+        self.steps.iter().chain(&self.unchecked).map(String::as_str)
+    }
+}
+
+/// The first columns of [`EpisodeBatch::episodes`].
+pub const EPISODE_COLUMNS: [&str; 5] = ["episode_id", "model", "experiment", "seed", "run"];
+
+/// Some whole episodes of one file.
+///
+/// Columns have one of four types whatever the file stores: bool, `Int64`, `Float64`, and text as
+/// `Dictionary(Int32, Utf8)` or, where few texts are different, as [`Texts`]. A dictionary may hold values that no row has, and
+/// a value under two keys. A column that the file does not have is null throughout.
+#[derive(Clone, Debug)]
+pub struct EpisodeBatch {
+    /// The rows of episode `i` in `steps` are `offsets[i]..offsets[i + 1]`; its timesteps are 1, 2, ... in that order.
+    pub offsets: Vec<usize>,
+    /// One row per step: the columns of [`Projection::steps`] and [`Projection::unchecked`], but for those in `texts`.
+    pub steps: RecordBatch,
+    /// Columns of [`Projection::steps`] and [`Projection::unchecked`].
+    pub texts: Vec<Texts>,
+    /// One row per episode: [`EPISODE_COLUMNS`], then the columns of [`Projection::constants`].
+    pub episodes: RecordBatch,
+    /// Where the first row is.
+    pub origin: Origin,
+}
+
+/// A column of steps with texts of which few are different, one byte per row.
+///
+/// An Arrow dictionary would say the same; to make one is to look at each key once more.
+#[derive(Clone, Debug)]
+pub struct Texts {
+    /// The column.
+    pub name: String,
+    /// One key per row, the position of its text; null for null.
+    pub keys: UInt8Array,
+    /// The texts; none is null.
+    pub texts: StringArray,
+}
+
+impl Texts {
+    /// `length` rows from row `start`; nothing is copied.
+    #[must_use]
+    pub fn slice(&self, start: usize, length: usize) -> Self {
+        Self { keys: self.keys.slice(start, length), ..self.clone() }
+    }
+}
+
+/// A row of a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Origin {
+    /// The file's position in [`TraceSet::files`].
+    pub file: usize,
+    /// The row group of the file.
+    pub row_group: usize,
+    /// The row of the row group.
+    pub row: usize,
+}
+
+/// What a scan went through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ScanSummary {
+    /// Whole episodes.
+    pub episodes: u64,
+    /// Their steps.
+    pub steps: u64,
+}
+
+impl TraceSet {
+    /// Reads all episodes once, `threads` row groups at a time, and gives `sink` the results of `work` in the order
+    /// of files and rows.
+    pub fn scan<T: Send, E: Send + From<TraceError>>(
+        &self,
+        projection: &Projection,
+        threads: NonZeroUsize,
+        work: impl Fn(EpisodeBatch) -> Result<T, E> + Sync,
+        mut sink: impl FnMut(T) -> Result<(), E>,
+    ) -> Result<ScanSummary, E> {
+        let mut layout = Layout::new(
+            self,
+            projection.step_columns(),
+            EPISODE_COLUMNS.into_iter().chain(projection.constants.iter().map(String::as_str)),
+        )?;
+        for column in &projection.unchecked {
+            layout.without_rules(column);
+        }
+        let rules = Rules { layout: &layout, experiments: projection.experiments.as_deref() };
+        let shape = Shape::new(&layout, projection);
+        let mut prints = Prints::default();
+        let mut spellings = Spellings::new(self.files());
+        let mut summary = ScanSummary::default();
+        let checked = |episodes: Episodes| {
+            let file = &self.files()[episodes.file];
+            let mut faults = rules.check(file, &episodes);
+            faults.extend(episode_hashes::check(file, &layout, &episodes));
+            let fault = faults.into_iter().min_by_key(|fault| fault.row);
+            let last = fault.as_ref().map_or(usize::MAX, |fault| fault.row);
+            let ids = hashes(&episodes, last);
+            let (count, steps) = (episodes.len(), episodes.columns[0].len());
+            let colors = other_names(&layout, &episodes);
+            let result = match fault {
+                Some(fault) => Err(Box::new(fault.finding)),
+                None => Ok(shape.batch(episodes).map_err(E::from).and_then(&work)),
+            };
+            Checked { ids, count, steps, colors, result }
+        };
+        let passed = pass(self.files(), &layout, threads, &checked, |_, event| {
+            let checked = match event {
+                Event::Whole(checked) => checked,
+                Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
+            };
+            prints.add(&checked.ids);
+            spellings.add(checked.colors);
+            summary.episodes += checked.count as u64;
+            summary.steps += checked.steps as u64;
+            match checked.result {
+                Ok(result) => sink(result?),
+                Err(finding) => Err(TraceError::from(*finding).into()),
+            }
+        });
+        // An id that was there before is found at the end, though it comes before whatever ended the pass.
+        if let Some(finding) = prints.first_repeated(self.files(), &layout)? {
+            return Err(TraceError::from(*finding).into());
+        }
+        passed?;
+        // That two names are spellings of one colour shows when all are known.
+        match spellings.first_conflict(self.files(), &layout, threads)? {
+            Some(finding) => Err(TraceError::from(finding).into()),
+            None => Ok(summary),
+        }
+    }
+}
+
+/// Where an episode is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EpisodePlace {
+    /// The file's position in [`TraceSet::files`].
+    pub file: usize,
+    /// Its rows, counted from the first of the file.
+    pub rows: Range<usize>,
+}
+
+/// Where each episode is, by its id: one pass over the columns that tell episodes apart.
+pub fn episode_places(traces: &TraceSet, threads: NonZeroUsize) -> Result<HashMap<String, EpisodePlace>, TraceError> {
+    let mut places = HashMap::new();
+    let work = |batch: EpisodeBatch| -> Result<Vec<(String, EpisodePlace)>, TraceError> {
+        let Origin { file, row_group, row } = batch.origin;
+        let before: usize = (0..row_group).map(|group| traces.files()[file].row_group_rows(group)).sum();
+        let start = before + row;
+        let ids = batch.episodes.column_by_name("episode_id").expect("every batch names its episodes");
+        let ids = cast(ids, &DataType::Utf8).map_err(TraceError::Memory)?;
+        let ids = ids.as_string::<i32>();
+        let ends = batch.offsets.windows(2).map(|pair| start + pair[0]..start + pair[1]);
+        Ok(ends.enumerate().map(|(at, rows)| (ids.value(at).to_owned(), EpisodePlace { file, rows })).collect())
+    };
+    traces.scan(&Projection::default(), threads, work, |found| {
+        places.extend(found);
+        Ok(())
+    })?;
+    Ok(places)
+}
+
+/// What a worker found out about some episodes.
+struct Checked<T, E> {
+    /// The hashes of the ids of the episodes up to the fault, if there is one.
+    ids: Vec<u64>,
+    count: usize,
+    steps: usize,
+    /// Names of colours beyond those of the study.
+    colors: Vec<String>,
+    /// What the work gave, where no rule is broken.
+    result: Result<Result<T, E>, Box<Finding>>,
+}
+
+/// Which columns of the layout go where in a batch.
+struct Shape<'a> {
+    layout: &'a Layout,
+    steps: Vec<usize>,
+    episodes: Vec<usize>,
+}
+
+impl<'a> Shape<'a> {
+    fn new(layout: &'a Layout, projection: &Projection) -> Self {
+        let constants = projection.constants.iter().map(String::as_str);
+        Self {
+            layout,
+            steps: projection.step_columns().filter_map(|name| layout.position(name)).collect(),
+            episodes: EPISODE_COLUMNS.into_iter().chain(constants).filter_map(|name| layout.position(name)).collect(),
+        }
+    }
+
+    fn batch(&self, episodes: Episodes) -> Result<EpisodeBatch, TraceError> {
+        let rows = episodes.columns[0].len();
+        let firsts = &episodes.offsets[..episodes.len()];
+        let (mut texts, mut others) = (Vec::new(), Vec::new());
+        for &place in &self.steps {
+            match episodes.columns[place].byte_texts() {
+                Some((keys, values)) => {
+                    let name = self.layout.columns[place].name.clone();
+                    texts.push(Texts { name, keys: keys.clone(), texts: values.clone() });
+                }
+                None => others.push(place),
+            }
+        }
+        let steps = self.part(&others, rows, |place| episodes.columns[place].flat())?;
+        let constants = self.part(&self.episodes, episodes.len(), |place| episodes.columns[place].at(firsts))?;
+        let first = episodes.pieces[0];
+        let origin = Origin { file: episodes.file, row_group: first.row_group, row: first.row };
+        Ok(EpisodeBatch { offsets: episodes.offsets, steps, texts, episodes: constants, origin })
+    }
+
+    /// Some columns of the layout, `rows` values each.
+    fn part(
+        &self,
+        places: &[usize],
+        rows: usize,
+        values: impl Fn(usize) -> Result<ArrayRef, ArrowError>,
+    ) -> Result<RecordBatch, TraceError> {
+        let values = places.iter().map(|place| values(*place)).collect::<Result<Vec<_>, _>>();
+        let values = values.map_err(TraceError::Memory)?;
+        let field = |(place, values): (&usize, &ArrayRef)| {
+            let column = &self.layout.columns[*place];
+            let nullable = column.known.is_none_or(|known| known.nullable);
+            Field::new(&column.name, values.data_type().clone(), nullable)
+        };
+        let schema = Schema::new(places.iter().zip(&values).map(field).collect::<Vec<_>>());
+        let options = RecordBatchOptions::new().with_row_count(Some(rows));
+        RecordBatch::try_new_with_options(Arc::new(schema), values, &options).map_err(TraceError::Memory)
+    }
+}

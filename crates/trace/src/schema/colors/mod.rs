@@ -1,0 +1,166 @@
+//! Colours are checked values: lower-case names, of the palette that a trace declares where it declares one.
+//!
+//! Metrics compare colours byte by byte, so that `Red` beside `red` would turn a right answer into a wrong one.
+//!
+//! | file | what it knows |
+//! |---|---|
+//! | `spelling` | how a colour is spelled |
+//! | `palette` | the palette in a footer |
+//! | `mod` | what a column may hold, one value by itself |
+//! | `validate::color_set` | what the values of all inputs say together |
+//!
+//! Rule: the scan, `validate`, `import`, the writer and the check on Spark all ask this module.
+
+pub mod palette;
+pub mod spelling;
+
+use self::palette::Palette;
+use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spelling_key, study_color};
+use crate::schema;
+
+/// A column of colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ColorColumn {
+    pub name: &'static str,
+    /// The one of [`WORDS`] that the column may hold.
+    pub word: Option<&'static str>,
+    /// What to do about one that it may not hold.
+    advice: &'static str,
+}
+
+/// All columns of colours.
+pub const COLOR_COLUMNS: [ColorColumn; 7] = [
+    ColorColumn { name: "body_color", word: None, advice: "give the true colour of the body" },
+    ColorColumn { name: "self_color", word: Some("unknown"), advice: "`unknown`, or null where the reply gave none" },
+    ColorColumn { name: "selected_cube", word: Some("none"), advice: "`none`, or null where the reply gave none" },
+    ColorColumn { name: "stated_color", word: None, advice: "null where no colour was stated" },
+    ColorColumn { name: "shown_color", word: None, advice: "null where no mirror or window shows another colour" },
+    ColorColumn { name: "mark_color", word: None, advice: "null where there is no mark" },
+    ColorColumn { name: "mark_report", word: Some("none"), advice: "`none`, or null where the reply gave none" },
+];
+
+/// The column of this name, if it holds colours.
+pub fn column(name: &str) -> Option<ColorColumn> {
+    COLOR_COLUMNS.into_iter().find(|column| column.name == name)
+}
+
+impl ColorColumn {
+    /// Whether the column may hold this text. The empty text is left to the rule about names.
+    pub fn may_hold(self, text: &str, palette: Option<&Palette>) -> bool {
+        if text.is_empty() || self.word == Some(text) {
+            return true;
+        }
+        match palette {
+            Some(palette) => palette.has(text),
+            None => !WORDS.contains(&text) && is_well_spelled(text),
+        }
+    }
+
+    /// What the column holds, for a message.
+    pub(crate) fn expected(self, palette: Option<&Palette>) -> String {
+        let colors = match palette {
+            Some(palette) => format!("a colour of the palette ({})", palette.names().join(", ")),
+            None => "the lower-case name of a colour".to_owned(),
+        };
+        let word = self.word.map(|word| format!(", `{word}`")).unwrap_or_default();
+        let null = if schema::column(self.name).is_some_and(|column| column.nullable) { ", or null" } else { "" };
+        format!("{colors}{word}{null}")
+    }
+
+    /// What to do about a text that the column may not hold.
+    pub fn help(self, text: &str, palette: Option<&Palette>) -> String {
+        let likely = normal(text);
+        if likely.is_empty() || WORDS.contains(&likely.as_str()) && self.word != Some(likely.as_str()) {
+            return self.advice.to_owned();
+        }
+        if self.word == Some(likely.as_str()) {
+            return did_you_mean(&likely);
+        }
+        let like = if is_well_spelled(&likely) { likely } else { spelling_key(text) };
+        let Some(palette) = palette else { return meant_by(text, study_color(text).unwrap_or(&like)) };
+        match palette.nearest(text) {
+            Some(color) => meant_by(text, color),
+            None => "use a name of the palette, or add the colour to the palette".to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::palette::Palette;
+    use super::spelling::normal;
+    use super::{COLOR_COLUMNS, column};
+    use crate::schema;
+
+    /// Texts that no column may hold without a palette, and the colour meant.
+    const MISSPELLED: [(&str, &str); 12] = [
+        ("Red", "red"),
+        ("RED", "red"),
+        (" red", "red"),
+        ("red ", "red"),
+        ("red\u{a0}", "red"),
+        ("red\n", "red"),
+        ("\u{feff}red", "red"),
+        ("r\u{200b}ed", "red"),
+        ("re d", "red"),
+        ("dark\u{a0}red", "dark red"),
+        ("dark  red", "dark red"),
+        ("Teal", "teal"),
+    ];
+
+    #[test]
+    fn every_column_of_colors_is_one_of_the_schema() {
+        assert!(COLOR_COLUMNS.iter().all(|color| schema::column(color.name).is_some_and(schema::Column::names)));
+        assert_eq!(column("action"), None);
+    }
+
+    #[test]
+    fn a_name_that_differs_by_case_or_white_space_is_none() {
+        for column in COLOR_COLUMNS {
+            for (text, meant) in MISSPELLED {
+                assert!(!column.may_hold(text, None), "{} {text:?}", column.name);
+                assert_eq!(column.help(text, None), format!("did you mean `{meant}`?"), "{} {text:?}", column.name);
+                assert_eq!(normal(&normal(text)), normal(text));
+            }
+            for text in
+                ["red", "teal", "dark red", "dark-red", "olive2", "grün", "gru\u{308}n", "красный", "赤い色", ""]
+            {
+                assert!(column.may_hold(text, None), "{} {text:?}", column.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_word_has_its_own_column() {
+        let holds = |name: &str, text| column(name).unwrap().may_hold(text, None);
+        for name in ["body_color", "stated_color", "self_color", "selected_cube"] {
+            assert_eq!(holds(name, "unknown"), name == "self_color");
+            assert_eq!(holds(name, "none"), name == "selected_cube");
+            assert!(!holds(name, "None") && !holds(name, "UNKNOWN") && !holds(name, "unknown "), "{name}");
+        }
+        let help = |name: &str, text| column(name).unwrap().help(text, None);
+        assert_eq!(help("self_color", "Unknown"), "did you mean `unknown`?");
+        assert_eq!(help("self_color", "NONE"), "`unknown`, or null where the reply gave none");
+        assert_eq!(help("selected_cube", "unknown"), "`none`, or null where the reply gave none");
+        assert_eq!(help("body_color", "none"), "give the true colour of the body");
+        assert_eq!(help("stated_color", "\u{a0}"), "null where no colour was stated");
+    }
+
+    #[test]
+    fn a_palette_is_all_there_is() {
+        let palette = Palette::new(["teal", "magenta"].map(str::to_owned).to_vec());
+        let [body, claim] = [column("body_color").unwrap(), column("self_color").unwrap()];
+        assert!(claim.may_hold("teal", Some(&palette)) && claim.may_hold("unknown", Some(&palette)));
+        for (text, help) in [
+            ("Teal", "did you mean `teal`?"),
+            ("magneta", "did you mean `magenta`?"),
+            ("red", "use a name of the palette, or add the colour to the palette"),
+        ] {
+            assert!(!body.may_hold(text, Some(&palette)), "{text}");
+            assert_eq!(body.help(text, Some(&palette)), help);
+        }
+        assert!(!body.may_hold("unknown", Some(&palette)));
+        assert_eq!(claim.expected(Some(&palette)), "a colour of the palette (teal, magenta), `unknown`, or null");
+        assert_eq!(body.expected(None), "the lower-case name of a colour");
+    }
+}

@@ -1,0 +1,198 @@
+//! What the footer's `mirrorstats.recording` says of colours: `palette`, a list of names, or that the world is this
+//! program's, whose colours are those of the study.
+
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::Value;
+
+use super::spelling::{WORDS, did_you_mean, is_well_spelled, most_like, normal, study_color};
+use crate::diagnostic::{Code, Finding};
+use crate::palette::Color;
+use crate::schema::RECORDING_KEY;
+use exact::escape::visible;
+
+/// The colours of a recording; never empty.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Palette(Vec<String>);
+
+/// Why names are no palette.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum NoPalette {
+    #[error("expected at least one colour, found none")]
+    Empty,
+    #[error("expected lower-case names of colours, found `{}`{}", visible(found), hint(meant.as_deref()))]
+    NoColor { found: String, meant: Option<String> },
+    #[error("expected each colour once, found `{0}` twice")]
+    Twice(String),
+}
+
+fn hint(meant: Option<&str>) -> String {
+    meant.map_or_else(String::new, |meant| format!("; {}", did_you_mean(meant)))
+}
+
+/// The colours that a file declares.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Declared {
+    /// The palette, if there is one.
+    pub(crate) palette: Option<Palette>,
+    /// Whether the episodes are of this program's world.
+    is_of_world: bool,
+}
+
+/// What a recording says of colours; its other keys are not looked at.
+#[derive(Deserialize)]
+struct Recording {
+    palette: Option<Value>,
+    scene_version: Option<IgnoredAny>,
+}
+
+impl Declared {
+    /// What the recording of a file declares.
+    pub(crate) fn of(file: &str, recording: Option<&str>) -> Result<Self, Box<Finding>> {
+        // A recording that is no JSON object declares nothing.
+        let recording = recording.and_then(|text| serde_json::from_str::<Recording>(text).ok());
+        let Some(Recording { palette, scene_version }) = recording else { return Ok(Self::default()) };
+        let palette = palette.map(|palette| Palette::read(file, &palette)).transpose()?;
+        Ok(Self { palette, is_of_world: scene_version.is_some() })
+    }
+
+    /// Whether a body of the recorded world may have this colour, for all that the file says.
+    pub(crate) fn has(&self, name: &str) -> bool {
+        match &self.palette {
+            Some(palette) => palette.has(name),
+            None => self.is_of_world && Color::named(name).is_some(),
+        }
+    }
+}
+
+impl Palette {
+    pub fn new(names: Vec<String>) -> Self {
+        Self(names)
+    }
+
+    /// The ten colours of the study.
+    pub fn of_study() -> Self {
+        Self(Color::ALL.map(|color| color.name().to_owned()).to_vec())
+    }
+
+    /// The palette of these names, in their order.
+    pub fn of_names<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, NoPalette> {
+        let mut palette: Vec<String> = Vec::new();
+        for name in names {
+            if !is_color(name) {
+                let meant = Some(study_color(name).map_or_else(|| normal(name), str::to_owned));
+                return Err(NoPalette::NoColor {
+                    found: name.to_owned(),
+                    meant: meant.filter(|meant| is_color(meant)),
+                });
+            }
+            if palette.iter().any(|before| before == name) {
+                return Err(NoPalette::Twice(name.to_owned()));
+            }
+            palette.push(name.to_owned());
+        }
+        if palette.is_empty() { Err(NoPalette::Empty) } else { Ok(Self(palette)) }
+    }
+
+    fn read(file: &str, palette: &Value) -> Result<Self, Box<Finding>> {
+        let names: Option<Vec<String>> = serde_json::from_value(palette.clone()).ok();
+        match names.filter(|names| !names.is_empty() && names.iter().all(|name| is_color(name))) {
+            Some(names) => Ok(Self(names)),
+            None => Err(Box::new(invalid(file, palette))),
+        }
+    }
+
+    /// All names of these palettes, in their order; `None` if one is missing, or there are none.
+    pub fn of_all<'a>(palettes: impl Iterator<Item = Option<&'a Self>>) -> Option<Self> {
+        let mut names: Vec<String> = Vec::new();
+        for palette in palettes {
+            let new = palette?.0.iter().filter(|name| !names.contains(name)).cloned().collect::<Vec<_>>();
+            names.extend(new);
+        }
+        (!names.is_empty()).then_some(Self(names))
+    }
+
+    /// The names, in the order of the footer.
+    pub fn names(&self) -> &[String] {
+        &self.0
+    }
+
+    /// Whether a text is one of the names.
+    pub(crate) fn has(&self, text: &str) -> bool {
+        self.0.iter().any(|name| name == text)
+    }
+
+    /// The name most like a text, if one is like it at all.
+    pub(super) fn nearest(&self, text: &str) -> Option<&str> {
+        most_like(text, self.0.iter().map(String::as_str))
+    }
+}
+
+/// Whether a name may stand in a palette.
+fn is_color(name: &str) -> bool {
+    !name.is_empty() && !WORDS.contains(&name) && is_well_spelled(name)
+}
+
+fn invalid(file: &str, palette: &Value) -> Finding {
+    const LONGEST: usize = 80;
+    let shown: String = palette.to_string().chars().take(LONGEST).collect();
+    let expected = format!("`palette` in `{RECORDING_KEY}` to be a list of lower-case names of colours");
+    Finding::new(Code::InvalidMetadata, file, expected, format!("`{}`", visible(&shown)))
+        .with_help("correct the palette in the footer, or leave it out")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Declared, Palette};
+    use crate::palette::Color;
+
+    #[test]
+    fn a_palette_is_read_where_there_is_one() {
+        let names = |text| Declared::of("a.parquet", Some(text)).unwrap().palette.map(|palette| palette.0);
+        assert_eq!(
+            names(r#"{"world":{},"palette":["teal","dark red"]}"#),
+            Some(vec!["teal".into(), "dark red".into()])
+        );
+        for text in ["{}", r#"{"palette":null}"#, "no JSON", "7"] {
+            assert_eq!(names(text), None, "{text}");
+        }
+        assert_eq!(Declared::of("a.parquet", None).unwrap(), Declared::default());
+    }
+
+    #[test]
+    fn a_recording_of_this_world_has_the_colors_of_the_study() {
+        let has = |text, name| Declared::of("a.parquet", Some(text)).unwrap().has(name);
+        assert!(has(r#"{"scene_version":1}"#, "pink") && !has(r#"{"scene_version":1}"#, "teal"));
+        assert!(!has(r#"{"kind":"import"}"#, "pink"));
+        assert!(has(r#"{"scene_version":1,"palette":["teal"]}"#, "teal"));
+        assert!(!has(r#"{"scene_version":1,"palette":["teal"]}"#, "pink"));
+    }
+
+    #[test]
+    fn names_are_a_palette_or_it_is_said_why_not() {
+        let palette = |names: &[&'static str]| Palette::of_names(names.iter().copied());
+        assert_eq!(palette(&["teal", "dark red"]).unwrap().names(), ["teal", "dark red"]);
+        assert_eq!(Palette::of_study(), palette(&Color::ALL.map(Color::name)).unwrap());
+        for (names, words) in [
+            (&[][..], "expected at least one colour, found none"),
+            (&["Teal"], "expected lower-case names of colours, found `Teal`; did you mean `teal`?"),
+            (&["re d"], "expected lower-case names of colours, found `re d`; did you mean `red`?"),
+            (&["none"], "expected lower-case names of colours, found `none`"),
+            (&[""], "expected lower-case names of colours, found ``"),
+            (&["red", "red"], "expected each colour once, found `red` twice"),
+        ] {
+            assert_eq!(palette(names).unwrap_err().to_string(), words);
+        }
+    }
+
+    #[test]
+    fn a_palette_that_is_none_is_refused() {
+        for palette in ["[]", "7", "\"red\"", "[1]", "[\"Red\"]", "[\"none\"]", "[\"red \"]", "[\"\"]", "{\"red\":1}"] {
+            let text = format!("{{\"palette\":{palette}}}");
+            let finding = Declared::of("a.parquet", Some(&text)).unwrap_err();
+            assert_eq!(finding.code.name(), "invalid-metadata", "{palette}");
+            assert!(finding.expected.contains("a list of lower-case names"), "{finding}");
+        }
+    }
+}

@@ -1,0 +1,187 @@
+//! What is known of a column: its name, its type, what it means, and the field behind it.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::field_access::{Access, Value};
+use crate::episode::Episode;
+
+/// One column of a trace.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Column {
+    /// The column's name in the file.
+    pub name: &'static str,
+    /// The type that the writer stores; readers take any of the same [`Kind`].
+    #[serde(rename = "type")]
+    pub stored: Stored,
+    /// Whether every trace has the column.
+    pub required: bool,
+    /// Whether a row may have none.
+    pub nullable: bool,
+    /// Whether the value is the same in all rows of an episode.
+    pub constant: bool,
+    /// What a number counts or measures.
+    pub unit: Option<&'static str>,
+    /// What the column means.
+    pub doc: &'static str,
+    /// The only values that the column takes, where they are fixed.
+    pub values: &'static [&'static str],
+    /// The first version of the schema that has the column. An older trace may have a column of this name that means
+    /// something else.
+    pub since: u32,
+    /// What a trace without the column, and a row without a value, mean: an expression in the language of definitions.
+    /// `null` where a trace without the column is one without a value in any row, so that definitions may read it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub default: Option<&'static str>,
+    #[serde(skip)]
+    pub(super) access: Access,
+}
+
+/// The type of a column as the writer stores it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Stored {
+    /// True or false.
+    Bool,
+    /// A signed integer of 8 bits.
+    Int8,
+    /// A signed integer of 32 bits.
+    Int32,
+    /// A signed integer of 64 bits.
+    Int64,
+    /// A floating-point number of 32 bits.
+    Float32,
+    /// A floating-point number of 64 bits.
+    Float64,
+    /// Text in UTF-8.
+    String,
+}
+
+/// The logical type of a column as a reader sees it, whatever its width or encoding in the file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    /// True or false.
+    Bool,
+    /// An integer, read as 64 bits signed.
+    Int,
+    /// A floating-point number, read as 64 bits.
+    Float,
+    /// Text.
+    String,
+    /// Anything else: kept in the file, and of no use to a definition.
+    Unsupported,
+}
+
+impl Kind {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bool => "bool",
+            Self::Int => "integer",
+            Self::Float => "float",
+            Self::String => "string",
+            Self::Unsupported => "unsupported",
+        }
+    }
+}
+
+impl Stored {
+    /// The name in documentation and messages, `int32`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bool => "bool",
+            Self::Int8 => "int8",
+            Self::Int32 => "int32",
+            Self::Int64 => "int64",
+            Self::Float32 => "float32",
+            Self::Float64 => "float64",
+            Self::String => "string",
+        }
+    }
+
+    pub const fn kind(self) -> Kind {
+        match self {
+            Self::Bool => Kind::Bool,
+            Self::Int8 | Self::Int32 | Self::Int64 => Kind::Int,
+            Self::Float32 | Self::Float64 => Kind::Float,
+            Self::String => Kind::String,
+        }
+    }
+
+    /// The smallest and largest integer of the type, where it is one.
+    pub const fn range(self) -> Option<(i64, i64)> {
+        match self {
+            Self::Int8 => Some((i8::MIN as i64, i8::MAX as i64)),
+            Self::Int32 => Some((i32::MIN as i64, i32::MAX as i64)),
+            Self::Int64 => Some((i64::MIN, i64::MAX)),
+            Self::Bool | Self::Float32 | Self::Float64 | Self::String => None,
+        }
+    }
+}
+
+impl PartialEq for Column {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
+    }
+}
+
+impl Eq for Column {}
+
+impl Column {
+    pub(super) const fn new(name: &'static str, stored: Stored, doc: &'static str, access: Access) -> Self {
+        let (required, nullable, constant, unit) = (false, true, false, None);
+        let (values, since, default) = (&[] as &[&str], 1, None);
+        Self { name, stored, required, nullable, constant, unit, doc, values, since, default, access }
+    }
+
+    pub(super) const fn required(self) -> Self {
+        Self { required: true, nullable: false, ..self }
+    }
+
+    pub(super) const fn nullable(self) -> Self {
+        Self { nullable: true, ..self }
+    }
+
+    pub(super) const fn constant(self) -> Self {
+        Self { constant: true, ..self }
+    }
+
+    pub(super) const fn unit(self, unit: &'static str) -> Self {
+        Self { unit: Some(unit), ..self }
+    }
+
+    pub(super) const fn values(self, values: &'static [&'static str]) -> Self {
+        Self { values, ..self }
+    }
+
+    pub(super) const fn since(self, since: u32) -> Self {
+        Self { since, ..self }
+    }
+
+    pub(super) const fn default(self, default: &'static str) -> Self {
+        Self { default: Some(default), ..self }
+    }
+
+    /// Whether the column counts something, so that a negative number is a fault.
+    pub fn counts(&self) -> bool {
+        matches!(self.unit, Some("px" | "ms" | "tokens" | "USD" | "agents" | "mm"))
+    }
+
+    /// What no value means, where that is a text or a number and not an expression over other columns.
+    pub fn default_text(&self) -> Option<&'static str> {
+        let text = self.default?;
+        let quoted = text.strip_prefix('\'').and_then(|text| text.strip_suffix('\''));
+        quoted.or_else(|| text.bytes().all(|byte| byte.is_ascii_digit()).then_some(text))
+    }
+
+    /// The values of all steps; `None` for null.
+    pub fn of_steps<'a>(&self, episode: &'a Episode) -> impl Iterator<Item = Option<Value<'a>>> {
+        let get = self.access.get;
+        (0..episode.steps.len()).map(move |at| get(episode, at))
+    }
+
+    /// Puts the value at the step of an index; says no, and changes nothing, where the field cannot hold it.
+    pub(crate) fn put(&self, episode: &mut Episode, at: usize, value: Option<Value<'_>>) -> bool {
+        (self.access.set)(episode, at, value)
+    }
+}

@@ -1,0 +1,53 @@
+//! The schema as a document: what `mirrorstats schema` prints and `schemas/trace.schema.json` holds.
+
+use serde::Serialize;
+
+use crate::diagnostic::{Code, Severity};
+use crate::schema::{COLUMNS, Column, METADATA, MetadataKey, SCHEMA_VERSION};
+
+/// All that a writer or reader of traces must know.
+#[derive(Clone, Debug, Serialize)]
+pub struct SchemaDocument {
+    /// What this document is.
+    pub title: &'static str,
+    /// What the format is, in a few sentences.
+    pub description: &'static str,
+    /// The version of the schema.
+    pub version: u32,
+    /// The columns, required ones first.
+    pub columns: &'static [Column],
+    /// The key-value metadata of the footer.
+    pub metadata: &'static [MetadataKey],
+    /// The rules that `mirrorstats validate` checks.
+    pub rules: Vec<Rule>,
+}
+
+/// One rule and the code that its findings have.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Rule {
+    /// The stable code.
+    pub code: Code,
+    /// Whether breaking it makes a trace unusable.
+    pub severity: Severity,
+    /// What must hold.
+    pub rule: &'static str,
+    /// What to do where it does not.
+    pub help: &'static str,
+}
+
+impl SchemaDocument {
+    /// The schema of this program.
+    pub fn current() -> Self {
+        let rule = |code: Code| Rule { code, severity: code.severity(), rule: code.explain(), help: code.help() };
+        Self {
+            title: "mirrorstats trace",
+            description: "A Parquet file of whole episodes: the rows of an episode are together, and t runs 1..T. \
+                          Readers take plain and dictionary strings, and integers of any width. \
+                          Columns that are not listed are kept and can be used in definitions.",
+            version: SCHEMA_VERSION,
+            columns: COLUMNS,
+            metadata: METADATA,
+            rules: Code::ALL.into_iter().map(rule).collect(),
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! The rules about the values of columns, once: which ones a column has, in which order, and what each asks for.
+//!
+//! `validate::rules` checks them on the columns of whole episodes, the check on Spark as aggregates over rows; both take
+//! code, order and words from here.
+
+use super::colors::palette::Palette;
+use super::colors::{self, ColorColumn};
+use super::{Column, Kind, Stored, Value};
+use crate::diagnostic::Code;
+
+/// A rule of a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rule<'a> {
+    pub code: Code,
+    pub asks: Requirement<'a>,
+}
+
+/// What a rule asks for. Only [`Present`](Self::Present) and [`Constant`](Self::Constant) are about nulls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Requirement<'a> {
+    /// No null.
+    Present,
+    /// No empty text.
+    Name,
+    /// One of these texts.
+    OneOf(&'static [&'static str]),
+    /// A colour that the column may hold.
+    Color(ColorColumn, Option<&'a Palette>),
+    /// An integer within these bounds of a type.
+    Within(i64, i64, &'static str),
+    /// A number that is not below zero.
+    Count,
+    /// The same in all rows of an episode.
+    Constant,
+    /// A known experiment; that it has a name is another rule.
+    Experiment(&'a [String]),
+    /// 1 in an episode's first row.
+    FromOne,
+    /// Each number once.
+    Once,
+    /// No number left out.
+    WithoutGap,
+}
+
+/// What the values are held against besides the schema.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Known<'a> {
+    /// The palette of the footer.
+    pub palette: Option<&'a Palette>,
+    /// The experiments that the definitions know; any if `None`.
+    pub experiments: Option<&'a [String]>,
+}
+
+impl Column {
+    // Beside the rules, since a column by itself does not know which columns hold colours.
+    /// Whether the column's text names something, so that an empty one is a fault.
+    pub fn names(&self) -> bool {
+        self.stored == Stored::String && (self.required || self.constant || colors::column(self.name).is_some())
+    }
+}
+
+/// The rules of a column of the schema, in the order in which they are told.
+pub fn rules_of<'a>(column: &Column, known: Known<'a>) -> Vec<Rule<'a>> {
+    let mut rules = Vec::new();
+    let mut rule = |code, asks| rules.push(Rule { code, asks });
+    if !column.nullable {
+        rule(Code::NullInRequired, Requirement::Present);
+    }
+    match column.name {
+        "action" => rule(Code::UnknownAction, Requirement::OneOf(column.values)),
+        "reply_status" => rule(Code::UnknownReplyStatus, Requirement::OneOf(column.values)),
+        _ if column.names() => rule(Code::EmptyString, Requirement::Name),
+        _ => {}
+    }
+    if let Some(color) = colors::column(column.name) {
+        rule(Code::InvalidColor, Requirement::Color(color, known.palette));
+    }
+    // That t counts from 1 says more than any range, and every integer is within the widest one.
+    if let Some((lowest, highest)) = column.stored.range().filter(|(lowest, _)| *lowest > i64::MIN)
+        && column.name != "t"
+    {
+        rule(Code::OutOfRange, Requirement::Within(lowest, highest, column.stored.name()));
+    }
+    if column.counts() && matches!(column.stored.kind(), Kind::Int | Kind::Float) {
+        rule(Code::NegativeCount, Requirement::Count);
+    }
+    if column.constant && column.name != "episode_id" {
+        rule(Code::InconsistentConstant, Requirement::Constant);
+    }
+    match (column.name, known.experiments) {
+        ("experiment", Some(experiments)) => {
+            rule(Code::UnknownExperiment, Requirement::Experiment(experiments));
+        }
+        ("t", _) => {
+            rule(Code::TStart, Requirement::FromOne);
+            rule(Code::TDuplicate, Requirement::Once);
+            rule(Code::TGap, Requirement::WithoutGap);
+        }
+        _ => {}
+    }
+    rules
+}
+
+impl Rule<'_> {
+    /// What would do, for a message. Whoever sees single rows may say more of a constant, and of the steps.
+    pub fn expected(&self) -> String {
+        match self.asks {
+            Requirement::Present => "a value".to_owned(),
+            Requirement::Name => "a name".to_owned(),
+            Requirement::OneOf(values) => values.join(", "),
+            Requirement::Color(column, palette) => column.expected(palette),
+            Requirement::Within(lowest, highest, stored) => format!("{lowest} to {highest}, an {stored}"),
+            Requirement::Count => "0 or more".to_owned(),
+            Requirement::Constant => "one value in all rows of the episode".to_owned(),
+            Requirement::Experiment(known) => format!("one of {}", known.join(", ")),
+            Requirement::FromOne => "t = 1 in the episode's first row".to_owned(),
+            Requirement::Once => "every t once, in one file".to_owned(),
+            Requirement::WithoutGap => "every t up to the last".to_owned(),
+        }
+    }
+
+    /// Whether the rule allows a value; so does every rule that is not about single ones.
+    pub(crate) fn allows_value(&self, value: Value<'_>) -> bool {
+        match value {
+            Value::Bool(_) => true,
+            Value::Int(number) => self.allows_int(number),
+            Value::Float(number) => self.allows_float(number),
+            Value::Text(text) => self.allows(text),
+        }
+    }
+
+    /// Whether the rule allows a text; so does every rule that is not about texts.
+    pub(crate) fn allows(&self, text: &str) -> bool {
+        match self.asks {
+            Requirement::Name => !text.is_empty(),
+            Requirement::OneOf(values) => values.contains(&text),
+            Requirement::Color(column, palette) => column.may_hold(text, palette),
+            Requirement::Experiment(known) => text.is_empty() || known.iter().any(|name| name == text),
+            _ => true,
+        }
+    }
+
+    /// Whether the rule allows an integer; so does every rule that is not about single ones.
+    pub(crate) fn allows_int(&self, value: i64) -> bool {
+        match self.asks {
+            Requirement::Within(lowest, highest, _) => lowest <= value && value <= highest,
+            Requirement::Count => value >= 0,
+            _ => true,
+        }
+    }
+
+    /// Whether the rule allows a number.
+    pub(crate) fn allows_float(&self, value: f64) -> bool {
+        self.asks != Requirement::Count || value >= 0.0
+    }
+}

@@ -1,0 +1,219 @@
+//! Whether each episode has an id of its own.
+//!
+//! Rule: exact. Eight bytes are kept per episode: the hash of its id. Where two hashes are equal, the traces are read
+//! again and the ids themselves compared.
+
+use std::collections::{HashMap, HashSet};
+use std::hash::{DefaultHasher, Hasher};
+use std::num::NonZeroUsize;
+
+use super::rules::Located;
+use crate::diagnostic::{Code, Finding};
+use crate::error::TraceError;
+use crate::read::open::TraceFile;
+use crate::read::parallel_scan::{Episodes, Event, pass};
+use crate::read::projection::Layout;
+
+/// The hashes of the ids of the episodes that begin at a row up to `last`; an episode without an id has none.
+pub(crate) fn hashes(episodes: &Episodes, last: usize) -> Vec<u64> {
+    let firsts = &episodes.offsets[..episodes.len()];
+    let begins = &firsts[..firsts.partition_point(|row| *row <= last)];
+    episodes.ids(begins).flatten().map(hash).collect()
+}
+
+/// A number that two ids nearly never share, the same one at every run.
+fn hash(id: &str) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(id.as_bytes());
+    hasher.finish()
+}
+
+/// The ids of the episodes met so far, as their hashes.
+#[derive(Default)]
+pub(crate) struct Prints(Vec<u64>);
+
+/// The end of the search for the first repeated id.
+struct Stop(Result<Option<Box<Finding>>, TraceError>);
+
+impl From<TraceError> for Stop {
+    fn from(error: TraceError) -> Self {
+        Self(Err(error))
+    }
+}
+
+impl Prints {
+    pub(crate) fn add(&mut self, hashes: &[u64]) {
+        self.0.extend_from_slice(hashes);
+    }
+
+    /// The first episode by file and row whose id an episode before it has, if there is one among those met.
+    pub(crate) fn first_repeated(
+        self,
+        files: &[TraceFile],
+        layout: &Layout,
+    ) -> Result<Option<Box<Finding>>, TraceError> {
+        let alike = repeated_numbers(&self.0);
+        // Equal hashes nearly always are equal ids.
+        if alike.is_empty() { Ok(None) } else { first_equal(files, layout, &alike, self.0.len()) }
+    }
+}
+
+/// The numbers that are there more than once.
+fn repeated_numbers(numbers: &[u64]) -> HashSet<u64> {
+    // A bit stands for all numbers with the same beginning. With 32 times as many bits as numbers, few share theirs with
+    // another one, and only those need to be sorted.
+    let bits = (numbers.len() * 32).next_power_of_two().max(64);
+    let place = |number: u64| {
+        let bit = usize::try_from(number >> (u64::BITS - bits.ilog2())).expect("there are as many bits as this says");
+        (bit / 64, 1_u64 << (bit % 64))
+    };
+    let (mut once, mut twice) = (vec![0; bits / 64], vec![0; bits / 64]);
+    for number in numbers {
+        let (word, bit) = place(*number);
+        twice[word] |= once[word] & bit;
+        once[word] |= bit;
+    }
+    let comes_twice = |number: &u64| {
+        let (word, bit) = place(*number);
+        twice[word] & bit != 0
+    };
+    let mut shared: Vec<u64> = numbers.iter().copied().filter(comes_twice).collect();
+    shared.sort_unstable();
+    shared.windows(2).filter(|pair| pair[0] == pair[1]).map(|pair| pair[0]).collect()
+}
+
+/// Reads the first `count` episodes again, in the order of the files, and compares the ids whose hash is one of these.
+fn first_equal(
+    files: &[TraceFile],
+    layout: &Layout,
+    alike: &HashSet<u64>,
+    count: usize,
+) -> Result<Option<Box<Finding>>, TraceError> {
+    let (mut ids, mut left) = (Ids::default(), count);
+    let name = |file: usize| files[file].name().to_owned();
+    let search = pass(files, layout, NonZeroUsize::MIN, &|episodes| starts(&episodes), |file, event| {
+        let starts = match event {
+            Event::Whole(starts) => starts,
+            Event::Fault(finding) => return Err(TraceError::from(*finding).into()),
+        };
+        for start in starts {
+            if left == 0 {
+                return Err(Stop(Ok(None)));
+            }
+            left -= 1;
+            if alike.contains(&hash(&start.id))
+                && let Some(Located { finding, .. }) = ids.admit(start, file, name)
+            {
+                return Err(Stop(Ok(Some(Box::new(finding)))));
+            }
+        }
+        Ok(())
+    });
+    search.map_or_else(|Stop(end)| end, |()| Ok(None))
+}
+
+/// That an id was there before: in another file if `other` names it; `groups` are the row groups, before and again.
+fn repeated(file: &str, id: &str, other: Option<&str>, groups: (usize, usize)) -> Finding {
+    let finding = match other {
+        None => {
+            let found = format!("rows of it in row group {} already", groups.0);
+            Finding::new(Code::EpisodeTwice, file, "the episode once in the file, its rows together", found)
+        }
+        Some(other) => {
+            let found = format!("its id in {other} too");
+            Finding::new(Code::EpisodeInTwoFiles, file, "the episode in one of the files only", found)
+        }
+    };
+    finding.in_row_group(groups.1).in_episode(id).in_column("episode_id")
+}
+
+/// The ids met so far, in the order of the files: for those who want each repeated one, at the price of memory.
+#[derive(Default)]
+pub(crate) struct Ids {
+    /// File and row group where each one was met first.
+    seen: HashMap<String, (usize, usize)>,
+}
+
+/// The start of an episode.
+pub(crate) struct Start {
+    pub(crate) id: String,
+    pub(crate) row: usize,
+    pub(crate) row_group: usize,
+}
+
+impl Ids {
+    /// Takes note of an episode; a finding if its id was met before. `names` are the names of the files.
+    pub(crate) fn admit(&mut self, start: Start, file: usize, name: impl Fn(usize) -> String) -> Option<Located> {
+        let Start { id, row, row_group } = start;
+        let Some(&(before, group)) = self.seen.get(&id) else {
+            self.seen.insert(id, (file, row_group));
+            return None;
+        };
+        let other = (before != file).then(|| name(before));
+        Some(Located { row, finding: repeated(&name(file), &id, other.as_deref(), (group, row_group)) })
+    }
+}
+
+/// The episodes' starts, without those that have no id.
+pub(crate) fn starts(episodes: &Episodes) -> Vec<Start> {
+    let rows = &episodes.offsets[..episodes.len()];
+    let start = |(id, &row): (Option<&str>, &usize)| {
+        Some(Start { id: id?.to_owned(), row, row_group: episodes.row_group(row) })
+    };
+    episodes.ids(rows).zip(rows).filter_map(start).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::collection::vec;
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::inputs::resolve;
+    use crate::read::open::TraceSet;
+
+    proptest! {
+        #[test]
+        fn numbers_that_come_twice_are_found(
+            numbers in vec((0..4_u64, 0..4_u64).prop_map(|(high, low)| high << 62 | high << 55 | low), 0..40),
+        ) {
+            let mut times: BTreeMap<u64, usize> = BTreeMap::new();
+            for number in &numbers {
+                *times.entry(*number).or_default() += 1;
+            }
+            times.retain(|_, times| *times > 1);
+            prop_assert_eq!(repeated_numbers(&numbers), times.into_keys().collect::<HashSet<u64>>());
+        }
+    }
+
+    #[test]
+    fn equal_hashes_of_different_ids_are_no_repetition() {
+        let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../fixtures/paper").to_owned();
+        let inputs = resolve(&[folder.into()], std::io::empty()).unwrap();
+        let set = TraceSet::open(&inputs).unwrap();
+        let layout = Layout::new(&set, [], []).unwrap();
+        let mut all = HashSet::new();
+        pass::<_, TraceError>(
+            set.files(),
+            &layout,
+            NonZeroUsize::MIN,
+            &|episodes| hashes(&episodes, usize::MAX),
+            |_, event| {
+                let Event::Whole(hashes) = event else { panic!("a fault in a fixture") };
+                all.extend(hashes);
+                Ok(())
+            },
+        )
+        .unwrap();
+        assert_eq!(all.len(), 840);
+        // As if they were alike: the ids themselves are compared, those of the first file twice.
+        assert!(first_equal(set.files(), &layout, &all, 840).unwrap().is_none());
+        let twice = TraceSet::open(&[&inputs[..1], &inputs].concat()).unwrap();
+        let found = first_equal(twice.files(), &layout, &all, 861).unwrap().unwrap();
+        assert_eq!(found.code, Code::EpisodeInTwoFiles);
+        // Only episodes that were met the first time count.
+        assert!(first_equal(twice.files(), &layout, &all, 21).unwrap().is_none());
+    }
+}

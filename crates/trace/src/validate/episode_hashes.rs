@@ -1,0 +1,78 @@
+//! Whether the hash that an episode carries is that of its rows.
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _};
+use arrow::datatypes::{DataType, Float64Type, Int32Type, Int64Type};
+
+use super::rules::Located;
+use crate::diagnostic::{Code, Finding};
+use crate::episode_hash::{EPISODE_HASH, Form, IDENTIFICATION, SELF_COLOR, columns};
+use crate::read::open::TraceFile;
+use crate::read::parallel_scan::Episodes;
+use crate::read::projection::Layout;
+use crate::schema::Value;
+
+/// What to do about rows that were changed.
+const HELP: &str =
+    "the rows were changed: restore the file from its source; where the change is meant, leave the column out";
+
+/// The episodes among these whose hash is that of other rows, where all columns that are hashed are read.
+pub(crate) fn check(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> Vec<Located> {
+    let declared = |name: &str| layout.position(name).filter(|_| file.declares(name));
+    let Some(hashes) = declared(EPISODE_HASH).map(|at| &episodes.columns[at]) else { return Vec::new() };
+    let present: Vec<&str> = columns().filter(|name| file.declares(name)).collect();
+    if present.iter().any(|name| layout.position(name).is_none()) {
+        return Vec::new();
+    }
+    let held = present.into_iter().filter_map(|name| {
+        let values = episodes.columns[declared(name)?].flat();
+        Some(values.map(|values| (name, values)))
+    });
+    let held: Vec<(&str, ArrayRef)> = match held.collect() {
+        Ok(held) => held,
+        Err(why) => {
+            let finding = Finding::new(Code::CorruptData, file.name(), "rows that fit into memory", why.to_string());
+            return vec![Located { row: 0, finding }];
+        }
+    };
+    let starts = &episodes.offsets[..episodes.len()];
+    let stated = hashes.texts(starts);
+    let mut found = Vec::new();
+    for (ends, stated) in episodes.offsets.windows(2).zip(stated) {
+        let hash = hash(&held, ends[0]..ends[1]);
+        if let Some(stated) = stated.filter(|stated| **stated != hash) {
+            let mut finding =
+                Finding::new(Code::CorruptData, file.name(), format!("the hash {hash} of its rows"), stated)
+                    .in_row_group(episodes.row_group(ends[0]))
+                    .in_column(EPISODE_HASH)
+                    .with_help(HELP);
+            finding.episode = episodes.id(ends[0]).map(str::to_owned);
+            found.push(Located { row: ends[0], finding });
+        }
+    }
+    found
+}
+
+/// The hash of some rows.
+fn hash(held: &[(&str, ArrayRef)], rows: std::ops::Range<usize>) -> String {
+    let identification = held.iter().find(|(name, _)| *name == IDENTIFICATION).map(|(_, values)| values);
+    let mut form = Form::new();
+    for (name, values) in held {
+        let derived = |row: usize| *name == SELF_COLOR && identification.is_some_and(|texts| texts.is_valid(row));
+        form.add(name, rows.clone().map(|row| value(values, row).filter(|_| !derived(row))));
+    }
+    form.finish()
+}
+
+/// A value of a column as it is held in memory.
+fn value(values: &ArrayRef, row: usize) -> Option<Value<'_>> {
+    values.is_valid(row).then(|| match values.data_type() {
+        DataType::Boolean => Value::Bool(values.as_boolean().value(row)),
+        DataType::Int64 => Value::Int(values.as_primitive::<Int64Type>().value(row)),
+        DataType::Float64 => Value::Float(values.as_primitive::<Float64Type>().value(row)),
+        DataType::Utf8 => Value::Text(values.as_string::<i32>().value(row)),
+        _ => {
+            let texts = values.as_dictionary::<Int32Type>();
+            Value::Text(texts.values().as_string::<i32>().value(texts.key(row).unwrap_or_default()))
+        }
+    })
+}

@@ -1,0 +1,257 @@
+//! Checks traces against every rule of the schema and reports all that is wrong, not only the first fault.
+//!
+//! A damaged file does not keep the others from being checked. Columns that the schema does not know are not decoded; their
+//! pages and checksums are checked like all others.
+
+pub(crate) mod color_set;
+pub(crate) mod duplicate_ids;
+pub(crate) mod episode_hashes;
+pub(crate) mod rules;
+
+use std::num::NonZeroUsize;
+
+use indexmap::IndexSet;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::checksums::Checksums;
+use super::diagnostic::{Code, Finding, Severity};
+use super::error::TraceError;
+use super::inputs::Input;
+use super::read::open::{TraceFile, TraceSet};
+use super::read::parallel_scan::{Episodes, Event, pass};
+use super::read::projection::Layout;
+use super::read::verify::verify_columns;
+use super::replies::{REPLY_STATUS, ReplyCounts};
+use super::schema::{self, COLUMNS};
+use color_set::{Tally, sightings};
+use duplicate_ids::{Ids, Start, starts};
+use rules::{Located, Rules};
+
+/// What was checked and what was found.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Validation {
+    /// The files, in their order.
+    pub files: Vec<CheckedFile>,
+    /// All findings, by file, row group and row; what only all inputs together show comes last of its file.
+    pub findings: Vec<Finding>,
+}
+
+/// One file that was looked at.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct CheckedFile {
+    /// Its name.
+    pub name: String,
+    /// Whether all of its rows were checked; not so where the file cannot be read to its end.
+    pub complete: bool,
+    /// Episodes that were checked.
+    pub episodes: u64,
+    /// Their rows.
+    pub steps: u64,
+    /// Whether it has checksums; without them damage may not be found.
+    pub checksums: Checksums,
+}
+
+/// Findings that an abridged report leaves out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rest<'a> {
+    /// The file.
+    pub file: &'a str,
+    /// The rule.
+    pub code: Code,
+    /// How many there are.
+    pub count: usize,
+}
+
+impl Validation {
+    /// How many findings have this severity.
+    pub fn count(&self, severity: Severity) -> usize {
+        self.findings.iter().filter(|finding| finding.severity == severity).count()
+    }
+
+    /// The first `limit` findings of each file and rule, and how many more each has.
+    pub fn abridged(&self, limit: usize) -> (Vec<&Finding>, Vec<Rest<'_>>) {
+        let (mut shown, mut rest) = (Vec::new(), Vec::<Rest>::new());
+        let mut counts = indexmap::IndexMap::<_, usize>::new();
+        for finding in &self.findings {
+            let count = counts.entry((finding.file.as_str(), finding.code)).or_default();
+            *count += 1;
+            if *count <= limit {
+                shown.push(finding);
+            }
+        }
+        for ((file, code), count) in counts {
+            if count > limit {
+                rest.push(Rest { file, code, count: count - limit });
+            }
+        }
+        (shown, rest)
+    }
+}
+
+/// Checks these files. Experiments are checked against `experiments` if it is given, and what the files declare.
+pub fn validate(
+    inputs: &[Input],
+    experiments: Option<&[String]>,
+    threads: NonZeroUsize,
+) -> Result<Validation, TraceError> {
+    let mut report = Validation::default();
+    let mut found: Vec<Vec<Finding>> = Vec::new();
+    let (mut opened, mut places) = (Vec::new(), Vec::new());
+    for (place, input) in inputs.iter().enumerate() {
+        let file = TraceFile::open(input);
+        let checksums = file.as_ref().map(TraceFile::checksums).unwrap_or_default();
+        let (name, complete) = (input.name.clone(), file.is_ok());
+        report.files.push(CheckedFile { name, complete, episodes: 0, steps: 0, checksums });
+        match file {
+            Ok(file) => {
+                opened.push(file);
+                places.push(place);
+                found.push(Vec::new());
+            }
+            Err(findings) => found.push(findings),
+        }
+    }
+    let set = TraceSet::of(opened);
+    let known = experiments.map(|known| with_declared(known, &set));
+    let mut replies = vec![ReplyCounts::default(); inputs.len()];
+    check_rows(&set, known.as_deref(), threads, |file, checked| {
+        let place = places[file];
+        match checked {
+            Event::Fault(finding) => {
+                report.files[place].complete = false;
+                found[place].push(*finding);
+            }
+            Event::Whole(checked) => {
+                report.files[place].episodes += checked.episodes;
+                report.files[place].steps += checked.steps;
+                found[place].extend(checked.findings);
+                replies[place].merge(&checked.replies);
+            }
+        }
+    })?;
+    for (file, place) in set.files().iter().zip(&places) {
+        if report.files[*place].complete
+            && let Err(finding) = verify_columns(file, |name| schema::column(name).is_none())
+        {
+            report.files[*place].complete = false;
+            found[*place].push(*finding);
+        }
+        found[*place].extend(stale(file));
+    }
+    for ((found, input), replies) in found.iter_mut().zip(inputs).zip(replies) {
+        // A status that the schema does not know is a finding already.
+        found.extend(unreadable(&input.name, &replies.of_known_statuses()));
+    }
+    report.findings = found.into_iter().flatten().collect();
+    Ok(report)
+}
+
+/// A note for a file whose checksums are another file's.
+fn stale(file: &TraceFile) -> Option<Finding> {
+    let expected = format!("a file of which `{}` has the checksums", schema::CHECKSUMS_KEY);
+    let found = "one that another program wrote again: they are not checked";
+    (file.checksums() == Checksums::Stale).then(|| Finding::new(Code::StaleChecksums, file.name(), expected, found))
+}
+
+/// These experiments, and those that the files declare.
+fn with_declared(known: &[String], set: &TraceSet) -> Vec<String> {
+    let declared = set.files().iter().flat_map(TraceFile::experiments).map(|declared| declared.name.clone());
+    let all: IndexSet<String> = known.iter().cloned().chain(declared).collect();
+    all.into_iter().collect()
+}
+
+/// A note for a file with replies that gave no decision.
+fn unreadable(file: &str, replies: &ReplyCounts) -> Option<Finding> {
+    let (bad, all) = (replies.all_unreadable(), replies.replies);
+    let finding = || {
+        let found = format!("{bad} of {all} steps with another status: {replies}");
+        Finding::new(Code::UnreadableReplies, file, "the status `ok` or `repaired`", found).in_column(REPLY_STATUS)
+    };
+    (bad > 0).then(finding)
+}
+
+/// What there is to say of some whole episodes.
+struct Checked {
+    findings: Vec<Finding>,
+    episodes: u64,
+    steps: u64,
+    replies: ReplyCounts,
+}
+
+fn check_rows(
+    set: &TraceSet,
+    experiments: Option<&[String]>,
+    threads: NonZeroUsize,
+    mut receive: impl FnMut(usize, Event<Checked>),
+) -> Result<(), TraceError> {
+    let present = COLUMNS.iter().map(|column| column.name).filter(|name| set.column(name).is_some());
+    if set.files().is_empty() {
+        return Ok(());
+    }
+    let layout = Layout::new(set, present, [])?;
+    let rules = Rules { layout: &layout, experiments };
+    let statuses = layout.position(REPLY_STATUS);
+    let name = |file: usize| set.files()[file].name().to_owned();
+    let work = |episodes: Episodes| {
+        let mut found = rules.check(&set.files()[episodes.file], &episodes);
+        found.extend(split(&name(episodes.file), &episodes));
+        found.extend(episode_hashes::check(&set.files()[episodes.file], &layout, &episodes));
+        let checked = Checked {
+            findings: Vec::new(),
+            episodes: episodes.len() as u64,
+            steps: episodes.columns[0].len() as u64,
+            replies: statuses.map_or_else(ReplyCounts::default, |at| ReplyCounts::of_column(&episodes.columns[at])),
+        };
+        let colors = sightings(&set.files()[episodes.file], &layout, &episodes);
+        (found, colors, starts(&episodes), checked)
+    };
+    let (mut ids, mut tally) = (Ids::default(), Tally::new(set.files()));
+    pass(set.files(), &layout, threads, &work, |file, event| {
+        let event = match event {
+            Event::Fault(finding) => Event::Fault(finding),
+            Event::Whole((found, colors, starts, checked)) => {
+                tally.add(set.files(), file, colors);
+                Event::Whole(Checked { findings: with_repeated(found, starts, &mut ids, file, name), ..checked })
+            }
+        };
+        receive(file, event);
+        Ok::<_, TraceError>(())
+    })?;
+    for (file, finding) in tally.findings(set.files()) {
+        let checked = Checked { findings: vec![finding], episodes: 0, steps: 0, replies: ReplyCounts::default() };
+        receive(file, Event::Whole(checked));
+    }
+    Ok(())
+}
+
+/// The findings of some episodes and those about their ids, by row.
+fn with_repeated(
+    mut found: Vec<Located>,
+    starts: Vec<Start>,
+    ids: &mut Ids,
+    file: usize,
+    name: impl Fn(usize) -> String,
+) -> Vec<Finding> {
+    let repeated: Vec<_> = starts.into_iter().filter_map(|start| ids.admit(start, file, &name)).collect();
+    // Rows of one episode that lie apart: that they do not start at t = 1 is no fault of its own.
+    let apart = |row| repeated.iter().any(|again| again.row == row && again.finding.code == Code::EpisodeTwice);
+    found.retain(|located| located.finding.code != Code::TStart || !apart(located.row));
+    let mut all = repeated;
+    all.extend(found);
+    all.sort_by_key(|located| located.row);
+    all.into_iter().map(|located| located.finding).collect()
+}
+
+/// A note for an episode whose rows are in several row groups.
+fn split(file: &str, episodes: &Episodes) -> Option<Located> {
+    let groups: Vec<_> = episodes.pieces.iter().map(|piece| piece.row_group).collect();
+    let (first, last) = (*groups.first()?, *groups.last()?);
+    if first == last {
+        return None;
+    }
+    let id = episodes.id(0)?;
+    let found = format!("its rows in row groups {first} to {last}");
+    let finding = Finding::new(Code::SplitEpisode, file, "the episode in one row group", found);
+    Some(Located { row: 0, finding: finding.in_row_group(first).in_episode(id) })
+}

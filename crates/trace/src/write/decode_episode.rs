@@ -1,0 +1,77 @@
+//! From the rows of an episode back to the episode that a writer gave: the inverse of writing.
+//!
+//! Columns of the schema that a file does not have are absent; columns that the schema does not know are not read.
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, RecordBatch};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Float64Type, Int64Type};
+
+use crate::episode::{Episode, Step};
+use crate::schema::{COLUMNS, Column, Kind, OF_SOME_TASKS, Value};
+use crate::write::row_groups::data_type;
+
+/// Rows that are no episode of the schema.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("column `{column}`: expected {expected}, found {found}")]
+pub struct NotAnEpisode {
+    column: String,
+    expected: String,
+    found: String,
+}
+
+/// The episode of these rows, which are one's.
+pub(crate) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
+    let mut episode = Episode { steps: vec![Step::default(); rows.num_rows()], ..Episode::default() };
+    for column in COLUMNS {
+        match rows.column_by_name(column.name) {
+            Some(values) => fill(&mut episode, column, values)?,
+            None if column.required && !OF_SOME_TASKS.contains(&column.name) => {
+                return Err(fault(column, "the column", "none"));
+            }
+            None => {}
+        }
+    }
+    Ok(episode)
+}
+
+/// Puts the values of a column into their fields; those of a constant are all in the first row.
+fn fill(episode: &mut Episode, column: &Column, values: &ArrayRef) -> Result<(), NotAnEpisode> {
+    let held = match column.stored.kind() {
+        Kind::Int => DataType::Int64,
+        Kind::Float => DataType::Float64,
+        _ => data_type(column.stored),
+    };
+    let stored = data_type(column.stored);
+    let values = cast(values, &stored).and_then(|values| cast(&values, &held));
+    let values = values.map_err(|error| fault(column, &stored.to_string(), &error.to_string()))?;
+    let rows = if column.constant { values.len().min(1) } else { values.len() };
+    for row in 0..rows {
+        let value = value_at(&values, row);
+        if !column.put(episode, row, value) {
+            return Err(misfit(column, value));
+        }
+    }
+    Ok(())
+}
+
+fn value_at(values: &ArrayRef, row: usize) -> Option<Value<'_>> {
+    values.is_valid(row).then(|| match values.data_type() {
+        DataType::Boolean => Value::Bool(values.as_boolean().value(row)),
+        DataType::Int64 => Value::Int(values.as_primitive::<Int64Type>().value(row)),
+        DataType::Float64 => Value::Float(values.as_primitive::<Float64Type>().value(row)),
+        _ => Value::Text(values.as_string::<i32>().value(row)),
+    })
+}
+
+fn misfit(column: &Column, value: Option<Value<'_>>) -> NotAnEpisode {
+    match (value, column.stored.kind()) {
+        (Some(Value::Text(name)), _) => fault(column, "a known action", name),
+        (_, Kind::Bool) => fault(column, "true or false", "null"),
+        (_, Kind::Int) => fault(column, "an integer", "none"),
+        _ => fault(column, "a value", "none"),
+    }
+}
+
+fn fault(column: &Column, expected: &str, found: &str) -> NotAnEpisode {
+    NotAnEpisode { column: column.name.to_owned(), expected: expected.to_owned(), found: found.to_owned() }
+}

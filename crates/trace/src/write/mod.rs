@@ -1,0 +1,287 @@
+//! Writes traces: whole episodes into row groups, and a file that appears whole or not at all.
+//!
+//! Rule: what this writer makes passes `validate` without a note, and the same episodes give the same bytes. A palette that
+//! the recording declares holds for what is written, too. An `episode_hash` is made here, whatever an episode
+//! that has one says.
+//! The optional columns of a file are declared when it is created, so that memory stays flat; a value for a
+//! column that was not declared is refused, never dropped.
+
+pub mod decode_episode;
+pub mod merge;
+pub(super) mod rewrite;
+pub(super) mod row_groups;
+
+use std::collections::HashSet;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use arrow::datatypes::SchemaRef;
+use parquet::errors::ParquetError;
+
+use self::row_groups::{Gathered, RowGroups};
+use super::episode::Episode;
+use super::episode_hash::{self, EPISODE_HASH};
+use super::error::TraceError;
+use super::schema::colors::palette::{Declared, Palette};
+use super::schema::rules::{Known, Requirement, Rule, rules_of};
+use super::schema::{COLUMNS, Column, OF_SOME_TASKS, Value};
+use exact::escape::visible;
+use exact::replace::NewFile;
+
+/// What a trace file is created with, besides its episodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TraceMetadata {
+    /// How the recording was made, a JSON object (scene and prompt hashes, view size, ...); left out if `None`.
+    pub recording: Option<serde_json::Value>,
+    /// The optional columns that the file has.
+    pub columns: OptionalColumns,
+}
+
+/// Columns that a trace may have besides the required ones, in the order of the schema.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct OptionalColumns {
+    given: Vec<&'static Column>,
+    /// Names of required columns that have no meaning for the task.
+    absent: Vec<&'static str>,
+}
+
+/// Columns that no recording of the five experiments gives.
+const OF_OTHER_TASKS: [&str; 7] =
+    ["participant", "start_distance", "shown_color", "mark_color", "mark_report", "mirror_mark_px", "target_distance"];
+
+impl OptionalColumns {
+    /// No optional column.
+    pub const NONE: Self = Self { given: Vec::new(), absent: Vec::new() };
+
+    pub fn all() -> Self {
+        Self::of(COLUMNS.iter().filter(|column| !column.required))
+    }
+
+    fn of(given: impl Iterator<Item = &'static Column>) -> Self {
+        Self { given: given.collect(), absent: Vec::new() }
+    }
+
+    /// Those of a recording: all of the schema but what its task and its agent never give. Of the required columns those are
+    /// left out that the experiment says to be absent.
+    pub fn recorded(recording: &serde_json::Value) -> Self {
+        let agent = &recording["agent"];
+        let reads_replies = agent.is_object() && agent.get("scripted").is_none();
+        let is_there = |list: &serde_json::Value, name: &str| {
+            list.as_array().is_some_and(|all| all.iter().any(|one| *one == *name))
+        };
+        let experiment = &recording["experiment"];
+        let has_marks = experiment["mark"].is_array() || is_there(&experiment["reply"], "mark");
+        let is_given = |name: &str| match name {
+            "reply_repair" => reads_replies,
+            "participant" => agent.get("human").is_some(),
+            "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
+            "shown_color" => shows_another_color(&experiment["mirror"]),
+            "start_distance" | "target_distance" => experiment["hand"].is_object(),
+            _ => !OF_OTHER_TASKS.contains(&name),
+        };
+        let absent = OF_SOME_TASKS.into_iter().filter(|name| is_there(&experiment["absent"], name));
+        let given = Self::of(Self::all().given.into_iter().filter(|column| is_given(column.name)));
+        Self { absent: absent.collect(), ..given }
+    }
+
+    /// Those of these names; `None` if one is no optional column of the schema.
+    pub fn named(names: &[&str]) -> Option<Self> {
+        let columns = Self::of(Self::all().given.into_iter().filter(|column| names.contains(&column.name)));
+        names.iter().all(|name| columns.given.iter().any(|column| column.name == *name)).then_some(columns)
+    }
+
+    /// Those that have a value in one of these episodes.
+    pub fn used_by<'a>(episodes: impl IntoIterator<Item = &'a Episode>) -> Self {
+        let mut used = Vec::new();
+        let mut unused: Vec<_> = COLUMNS.iter().filter(|column| !column.required).collect();
+        for episode in episodes {
+            let (found, rest) = unused.into_iter().partition::<Vec<_>, _>(|column| has_value(column, episode));
+            used.extend(found);
+            unused = rest;
+        }
+        Self::of(COLUMNS.iter().filter(|column| used.contains(column)))
+    }
+
+    /// The columns of a file that has these, and those that it has not.
+    fn split(&self) -> (Vec<&'static Column>, Vec<&'static Column>) {
+        let is_there = |column: &Column| {
+            if column.required { !self.absent.contains(&column.name) } else { self.given.contains(&column) }
+        };
+        COLUMNS.iter().partition(|column| is_there(column))
+    }
+}
+
+/// What starts the file of a trace.
+type Make<W> = fn(W, &SchemaRef, Option<&serde_json::Value>) -> parquet::errors::Result<RowGroups<W>>;
+
+/// Encodes episodes as a trace into anything that bytes can be written to.
+pub struct TraceEncoder<W: Write + Send> {
+    file: RowGroups<W>,
+    columns: Vec<&'static Column>,
+    gathered: Gathered,
+    undeclared: Vec<&'static Column>,
+    palette: Option<Palette>,
+    seen: HashSet<String>,
+}
+
+impl<W: Write + Send> TraceEncoder<W> {
+    pub fn new(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        Self::with(RowGroups::new, out, metadata)
+    }
+
+    /// Starts a trace without checksums: the bytes that versions before them gave.
+    pub fn without_checksums(out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        Self::with(RowGroups::without_checksums, out, metadata)
+    }
+
+    fn with(make: Make<W>, out: W, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        let recording = metadata.recording.as_ref().map(ToString::to_string);
+        let palette = Declared::of("stream", recording.as_deref()).map_err(|finding| *finding)?.palette;
+        let (columns, undeclared) = metadata.columns.split();
+        let gathered = Gathered::of_columns(columns.iter().copied());
+        let file = make(out, &gathered.layout, metadata.recording.as_ref()).map_err(failed)?;
+        Ok(Self { file, columns, gathered, undeclared, palette, seen: HashSet::new() })
+    }
+
+    /// Adds an episode; t is 1, 2, ... in the order of its steps.
+    pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
+        check(episode, &self.undeclared, self.palette.as_ref())?;
+        if !self.seen.insert(episode.episode_id.clone()) {
+            return refused(episode, "an id of its own".into(), "the id of an episode before it".into());
+        }
+        gather(&mut self.gathered, &self.columns, episode);
+        self.file.end_episode(&mut self.gathered).map_err(failed)
+    }
+
+    /// Writes what is left and the footer.
+    pub fn finish(self) -> Result<W, TraceError> {
+        self.file.finish(Some(self.gathered)).map_err(failed)
+    }
+}
+
+/// Whether one of the mirrors and windows of an experiment may show a body in another colour than the own body's: one of
+/// them says a colour that is not the own one.
+fn shows_another_color(panes: &serde_json::Value) -> bool {
+    let colors = panes.as_array().into_iter().flatten().filter_map(|pane| pane["color"].as_str());
+    colors.into_iter().any(|color| color != "own")
+}
+
+/// Adds the rows of an episode, with the hash that they have where the episode is to have one.
+fn gather(gathered: &mut Gathered, columns: &[&'static Column], episode: &Episode) {
+    for (column, values) in columns.iter().zip(&mut gathered.columns) {
+        let is_hash = column.name == EPISODE_HASH && episode.episode_hash.is_some();
+        let hash = is_hash.then(|| episode_hash::of(episode));
+        for value in column.of_steps(episode) {
+            let value = hash.as_deref().map(Value::Text).or(value);
+            values.push(value).expect("a field gives values of its column's type");
+        }
+    }
+    gathered.rows += episode.steps.len();
+}
+
+fn check(episode: &Episode, undeclared: &[&'static Column], palette: Option<&Palette>) -> Result<(), TraceError> {
+    let steps = episode.steps.len();
+    if steps == 0 || i32::try_from(steps).is_err() {
+        return refused(episode, format!("1 to {} steps", i32::MAX), steps.to_string());
+    }
+    for column in COLUMNS {
+        let rules = rules_of(column, Known { palette, experiments: None });
+        let broken = |value| rules.iter().find(|rule| !rule.allows_value(value)).map(|rule| (rule, value));
+        if let Some((rule, value)) = column.of_steps(episode).flatten().find_map(broken) {
+            return refused(episode, format!("`{}` {}", column.name, expected(rule)), found(rule, value));
+        }
+    }
+    match undeclared.iter().find(|column| has_value(column, episode)) {
+        None => Ok(()),
+        Some(column) => {
+            let expected = format!("no value for `{}`, which was not declared when the file was created", column.name);
+            refused(episode, expected, "one".into())
+        }
+    }
+}
+
+/// What a rule asks for, behind a column's name.
+fn expected(rule: &Rule<'_>) -> String {
+    match rule.asks {
+        Requirement::Name => "not to be empty".to_owned(),
+        Requirement::Count => "not to be below zero".to_owned(),
+        Requirement::OneOf(_) => format!("to be one of {}", rule.expected()),
+        _ => format!("to be {}", rule.expected()),
+    }
+}
+
+/// What breaks a rule, and for a colour what to write instead.
+fn found(rule: &Rule<'_>, value: Value<'_>) -> String {
+    match (rule.asks, value) {
+        (Requirement::Color(color, palette), Value::Text(text)) => {
+            format!("{} ({})", shown(value), color.help(text, palette))
+        }
+        _ => shown(value),
+    }
+}
+
+fn shown(value: Value<'_>) -> String {
+    match value {
+        Value::Bool(truth) => truth.to_string(),
+        Value::Int(number) => number.to_string(),
+        Value::Float(number) => number.to_string(),
+        Value::Text(text) => format!("`{}`", visible(text)),
+    }
+}
+
+fn has_value(column: &Column, episode: &Episode) -> bool {
+    column.of_steps(episode).any(|value| value.is_some())
+}
+
+fn refused(episode: &Episode, expected: String, found: String) -> Result<(), TraceError> {
+    Err(TraceError::Refused { episode: episode.episode_id.clone(), expected, found })
+}
+
+pub(super) fn failed(error: ParquetError) -> TraceError {
+    TraceError::Write { file: "stream".into(), source: Box::new(error) }
+}
+
+/// Writes a trace file, which appears under its name when [`finish`](Self::finish) returns.
+pub struct TraceWriter {
+    encoder: TraceEncoder<NewFile>,
+    path: PathBuf,
+}
+
+impl TraceWriter {
+    /// Starts the trace that will be at `path`, replacing what is there; its folder must exist.
+    pub fn create(path: &Path, metadata: &TraceMetadata) -> Result<Self, TraceError> {
+        let file = NewFile::create(path).map_err(|source| unwritable(path, source))?;
+        let encoder = TraceEncoder::new(file, metadata).map_err(|error| error.writing(path))?;
+        Ok(Self { encoder, path: path.to_owned() })
+    }
+
+    /// Adds an episode; t is 1, 2, ... in the order of its steps.
+    pub fn write(&mut self, episode: &Episode) -> Result<(), TraceError> {
+        self.encoder.write(episode).map_err(|error| error.writing(&self.path))
+    }
+
+    /// Completes the file, synchronises it with the disk and gives it its name.
+    pub fn finish(self) -> Result<(), TraceError> {
+        let Self { encoder, path } = self;
+        let file = encoder.finish().map_err(|error| error.writing(&path))?;
+        file.commit().map_err(|source| unwritable(&path, source))
+    }
+}
+
+/// Writes these episodes as one trace file with the optional columns that they use.
+pub fn write_episodes(
+    path: &Path,
+    recording: Option<serde_json::Value>,
+    episodes: &[Episode],
+) -> Result<(), TraceError> {
+    let metadata = TraceMetadata { recording, columns: OptionalColumns::used_by(episodes) };
+    let mut writer = TraceWriter::create(path, &metadata)?;
+    for episode in episodes {
+        writer.write(episode)?;
+    }
+    writer.finish()
+}
+
+pub(super) fn unwritable(path: &Path, source: io::Error) -> TraceError {
+    TraceError::Write { file: path.display().to_string(), source: Box::new(source) }
+}

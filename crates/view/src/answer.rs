@@ -1,0 +1,48 @@
+//! What is asked, and the answer: one function for the server and for files.
+
+use super::error::ViewError;
+use super::filter::{Query, number, required};
+use super::snapshot::Snapshot;
+use super::{View, changes, compare, episode, list, map, overview};
+use study::Part;
+
+/// What an answer is.
+pub(super) enum Answer {
+    /// JSON.
+    Json(Vec<u8>),
+    /// A picture, PNG.
+    Png(Vec<u8>),
+}
+
+/// The answer to a question of the page; `None` where there is no such question.
+pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<Answer, ViewError>> {
+    if name == "live" {
+        return Some(Ok(Answer::Json(view.live().to_string().into_bytes())));
+    }
+    let snapshot = view.newest();
+    if name == "frame" {
+        return Some(frame(&snapshot, query).map(Answer::Png));
+    }
+    let told = match name {
+        "study" => Ok(overview::study(&snapshot)),
+        "overview" => overview::sections(&snapshot, query, Part::Tables),
+        "figures" => overview::sections(&snapshot, query, Part::Figures),
+        "statistics" => overview::sections(&snapshot, query, Part::Statistics),
+        "episodes" => list::answer(&snapshot, query),
+        "episode" => episode::answer(&snapshot, query),
+        "text" => episode::text(&snapshot, query),
+        "map" => map::answer(&snapshot, query),
+        "compare" => compare::answer(&snapshot, query),
+        "same_frame" => compare::same_frame(&snapshot, query),
+        "changes" => changes::answer(&snapshot),
+        _ => return None,
+    };
+    Some(told.map(|value| Answer::Json(value.to_string().into_bytes())))
+}
+
+/// The frame of a step.
+fn frame(snapshot: &Snapshot, query: &Query) -> Result<Vec<u8>, ViewError> {
+    let opened = snapshot.episode(required(query, "id")?)?;
+    let t = number(query, "t")?.unwrap_or(1);
+    snapshot.frame(&opened, t)?.ok_or_else(|| ViewError::Absent(format!("no frame of t = {t}")))
+}

@@ -1,0 +1,61 @@
+//! Why something cannot be shown.
+
+use std::error::Error as _;
+use std::io;
+use std::path::PathBuf;
+
+use exact::escape::{visible, visible_lines};
+use study::StudyError;
+use trace::error::TraceError;
+use trace::log::LogError;
+
+/// Why something cannot be shown.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum ViewError {
+    #[error(transparent)]
+    Study(Box<StudyError>),
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    #[error(transparent)]
+    Log(#[from] LogError),
+    #[error("cannot list the folder `{}`: {source}", visible(&folder.to_string_lossy()))]
+    Folder { folder: PathBuf, source: io::Error },
+    #[cfg(feature = "sim")]
+    #[error("no frames: {0}")]
+    Replay(#[from] Box<world::replay::error::ReplayError>),
+    #[error("{0}")]
+    Absent(String),
+    #[error("{0}")]
+    Request(String),
+    #[error("cannot write the page: {0}")]
+    Write(#[from] exact::replace::FolderError),
+}
+
+impl From<StudyError> for ViewError {
+    fn from(error: StudyError) -> Self {
+        Self::Study(Box::new(error))
+    }
+}
+
+impl ViewError {
+    /// In words for the page: faults of a filter underlined, causes named.
+    pub(super) fn words(&self) -> String {
+        if let Self::Study(error) = self
+            && let Some(faults) = error.faults()
+        {
+            return faults.render(false);
+        }
+        let mut words = visible_lines(&self.to_string());
+        let mut cause = self.source();
+        while let Some(error) = cause {
+            let text = visible_lines(&error.to_string());
+            if !words.contains(&text) {
+                words.push('\n');
+                words.push_str(&text);
+            }
+            cause = error.source();
+        }
+        words
+    }
+}

@@ -1,0 +1,86 @@
+//! The local web application: a study as a page, each episode step by step, two of them beside each other.
+//!
+//! ```text
+//! found ──► snapshot ──► filter ──► list, overview, episode, map, compare, changes   (answers: JSON, PNG)
+//! (files)   (one scan)              │
+//!           live                    ├──► routes   (a server for one machine, behind `base::web`)
+//!           (a newer snapshot)      └──► export   (the same answers as files)
+//! ```
+//!
+//! Rule: the program computes and the page shows: no number is made in the browser. An id in a request is looked up among
+//! the episodes that are open and never made part of a path. Nothing is written into the folders that are looked at.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+mod answer;
+mod changes;
+mod compare;
+mod episode;
+mod error;
+pub mod export;
+mod filter;
+mod found;
+mod list;
+mod live;
+mod map;
+mod overview;
+mod page;
+#[cfg(feature = "sim")]
+mod rendered;
+pub mod routes;
+mod snapshot;
+
+use std::ffi::OsString;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+
+use study::Question;
+
+pub use error::ViewError;
+use snapshot::Snapshot;
+
+/// What is looked at, and how.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Traces, logs, and folders of them.
+    pub runs: Vec<OsString>,
+    /// Definitions, a filter, groups, as for a report.
+    pub question: Question,
+    /// Definitions to hold the others against, by name or path; none if absent.
+    pub against: Option<PathBuf>,
+    /// How tables look.
+    pub style: String,
+    /// How many threads to use.
+    pub threads: NonZeroUsize,
+}
+
+/// Recordings that are open, the newest state that was read of them.
+#[derive(Debug)]
+pub struct View {
+    options: Options,
+    newest: RwLock<Arc<Snapshot>>,
+    /// Held by whoever looks for a newer state.
+    watch: Mutex<live::Watch>,
+}
+
+impl View {
+    pub fn open(options: Options) -> Result<Self, ViewError> {
+        let snapshot = Arc::new(Snapshot::open(&options, 0)?);
+        Ok(Self { options, newest: RwLock::new(snapshot), watch: Mutex::default() })
+    }
+
+    /// How many episodes are there.
+    pub fn episodes(&self) -> usize {
+        self.newest().episodes()
+    }
+
+    /// Whether an episode is there, whole or under way.
+    pub fn has_episode(&self, id: &str) -> bool {
+        self.newest().has(id)
+    }
+
+    fn newest(&self) -> Arc<Snapshot> {
+        Arc::clone(&self.newest.read().unwrap_or_else(PoisonError::into_inner))
+    }
+}

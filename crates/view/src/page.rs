@@ -1,0 +1,97 @@
+//! The page: one document, its style sheet, and its script as modules.
+//!
+//! Rule: a module imports by whole lines at its top and exports by a word before a declaration, so that all of them make one
+//! classic script by leaving these out: from a disk browsers load no modules.
+
+use report::html;
+
+const BODY: &str = include_str!("../../../assets/view/body.html");
+
+/// The style of the application; that of reports comes before it.
+const STYLE: &str = include_str!("../../../assets/view/view.css");
+
+/// The modules, each after those that it imports.
+const MODULES: [(&str, &str); 12] = [
+    ("dom.js", include_str!("../../../assets/view/dom.js")),
+    ("where.js", include_str!("../../../assets/view/where.js")),
+    ("data.js", include_str!("../../../assets/view/data.js")),
+    ("state.js", include_str!("../../../assets/view/state.js")),
+    ("filters.js", include_str!("../../../assets/view/filters.js")),
+    ("overview.js", include_str!("../../../assets/view/overview.js")),
+    ("list.js", include_str!("../../../assets/view/list.js")),
+    ("map.js", include_str!("../../../assets/view/map.js")),
+    ("episode.js", include_str!("../../../assets/view/episode.js")),
+    ("compare.js", include_str!("../../../assets/view/compare.js")),
+    ("live.js", include_str!("../../../assets/view/live.js")),
+    ("main.js", include_str!("../../../assets/view/main.js")),
+];
+
+/// A file of the page: its content and its type.
+pub(super) fn file(name: &str) -> Option<(String, &'static str)> {
+    match name {
+        "" => Some((document("<script type=\"module\" src=\"assets/main.js\"></script>"), "text/html; charset=utf-8")),
+        "assets/view.css" => Some((style(), "text/css; charset=utf-8")),
+        _ => {
+            let name = name.strip_prefix("assets/")?;
+            let (_, text) = MODULES.iter().find(|(known, _)| *known == name)?;
+            Some(((*text).to_owned(), "text/javascript; charset=utf-8"))
+        }
+    }
+}
+
+/// The document that loads this script.
+pub(super) fn document(script: &str) -> String {
+    web::page("mirrorstats view", "assets/view.css", &BODY.replace("<!-- script -->", script))
+}
+
+/// The style sheet of the page.
+pub(super) fn style() -> String {
+    format!("{}\n{STYLE}", html::style_sheet())
+}
+
+/// All modules as one classic script.
+pub(super) fn classic() -> String {
+    let bodies = MODULES.iter().map(|(_, text)| {
+        let lines = text.lines().filter(|line| !line.starts_with("import "));
+        lines
+            .map(|line| line.strip_prefix("export ").unwrap_or(line))
+            .fold(String::new(), |all, line| all + line + "\n")
+    });
+    format!("(() => {{\n\"use strict\";\n{}}})();\n", bodies.collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MODULES, classic};
+
+    #[test]
+    fn a_module_imports_only_from_those_before_it() {
+        for (at, (name, text)) in MODULES.iter().enumerate() {
+            for line in text.lines().filter(|line| line.starts_with("import ")) {
+                let from = line.rsplit_once("\"./").and_then(|(_, rest)| rest.strip_suffix("\";")).unwrap();
+                assert!(MODULES[..at].iter().any(|(known, _)| *known == from), "{name} imports {from}");
+            }
+            assert!(
+                !text.contains("innerHTML ="),
+                "{name}: text becomes elements by the program's own templates alone"
+            );
+        }
+    }
+
+    #[test]
+    fn no_name_stands_at_the_top_of_two_modules() {
+        let mut names = std::collections::BTreeSet::new();
+        for line in classic().lines() {
+            let words: Vec<&str> = line.trim_end().split([' ', '(', '=']).filter(|word| *word != "async").collect();
+            if let ["function" | "const" | "let" | "class", name, ..] = words[..] {
+                assert!(name.starts_with(['[', '{']) || names.insert(name.to_owned()), "{name}");
+            }
+        }
+        assert!(names.len() > 50);
+    }
+
+    #[test]
+    fn the_classic_script_has_no_word_of_modules() {
+        assert!(!classic().lines().any(|line| line.starts_with("import ") || line.starts_with("export ")));
+    }
+}

@@ -1,0 +1,45 @@
+//! Frames of episodes without a log, rendered again by a replay: some steps at a time, the last ones kept.
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
+use serde_json::Value;
+
+use super::error::ViewError;
+use trace::episode::Episode;
+use world::replay::frames::frames;
+
+/// How many steps are rendered together: a world is made once for them.
+const TOGETHER: usize = 16;
+
+/// How many such blocks are kept, some megabytes.
+const KEPT: usize = 16;
+
+type Block = BTreeMap<i32, Vec<u8>>;
+
+/// What was rendered last.
+#[derive(Debug, Default)]
+pub(super) struct Rendered(Mutex<BTreeMap<(String, usize), Block>>);
+
+impl Rendered {
+    /// The frame of a step; `None` where the episode has no such step. One replay at a time: whoever asks meanwhile waits, and
+    /// often gets what that one rendered.
+    pub fn frame(&self, recording: Option<&Value>, episode: &Episode, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
+        let Some(block) = t.checked_sub(1).filter(|at| *at < episode.steps.len()).map(|at| at / TOGETHER) else {
+            return Ok(None);
+        };
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = (episode.episode_id.clone(), block);
+        if !kept.contains_key(&key) {
+            let first = i32::try_from(block * TOGETHER + 1).unwrap_or(i32::MAX);
+            let last = i32::try_from((block + 1) * TOGETHER).unwrap_or(i32::MAX);
+            let rendered = frames(recording, episode, &(first..=last)).map_err(Box::new)?;
+            if kept.len() >= KEPT {
+                kept.clear();
+            }
+            kept.insert(key.clone(), rendered);
+        }
+        let frames = kept.get(&key);
+        Ok(i32::try_from(t).ok().and_then(|t| frames?.get(&t).cloned()))
+    }
+}

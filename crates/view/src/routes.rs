@@ -1,0 +1,87 @@
+//! The server: the page and its answers, for GET alone.
+
+use std::net::{SocketAddr, TcpListener};
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::{Path, Query, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse as _, Response};
+use axum::routing::get;
+
+use super::answer::{Answer, answer};
+use super::error::ViewError;
+use super::{View, page};
+use web::{self, Guard};
+
+/// Binds the address of a server, so that its link can be told before anything is asked.
+pub fn bind(host: &str, port: u16) -> std::io::Result<(TcpListener, SocketAddr)> {
+    let listener = TcpListener::bind((host, port))?;
+    let address = listener.local_addr()?;
+    Ok((listener, address))
+}
+
+/// Answers until the process ends.
+pub fn serve(view: Arc<View>, listener: TcpListener, guard: Guard) -> std::io::Result<()> {
+    let routes = Router::new()
+        .route("/", get(document))
+        .route("/assets/{name}", get(asset))
+        .route("/api/{name}", get(api))
+        .route("/robots.txt", get(robots))
+        .with_state(view);
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build()?;
+    runtime.block_on(web::serve(listener, web::guarded(routes, guard)))
+}
+
+async fn document() -> Response {
+    file("")
+}
+
+async fn asset(Path(name): Path<String>) -> Response {
+    file(&format!("assets/{name}"))
+}
+
+async fn robots() -> &'static str {
+    super::export::ROBOTS
+}
+
+fn file(name: &str) -> Response {
+    match page::file(name) {
+        Some((text, kind)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
+        None => refused(StatusCode::NOT_FOUND, "no such file"),
+    }
+}
+
+async fn api(
+    State(view): State<Arc<View>>,
+    Path(name): Path<String>,
+    Query(query): Query<Vec<(String, String)>>,
+) -> Response {
+    // Reading files and scoring take their time, and must not keep others waiting.
+    let answered = tokio::task::spawn_blocking(move || answer(&view, &name, &query)).await;
+    match answered {
+        Ok(Some(Ok(Answer::Json(bytes)))) => ([(header::CONTENT_TYPE, "application/json")], bytes).into_response(),
+        Ok(Some(Ok(Answer::Png(bytes)))) => {
+            let kept = (header::CACHE_CONTROL, "private, max-age=600");
+            ([(header::CONTENT_TYPE, "image/png"), kept], bytes).into_response()
+        }
+        Ok(Some(Err(error))) => {
+            let status = match &error {
+                ViewError::Absent(_) => StatusCode::NOT_FOUND,
+                ViewError::Request(_) | ViewError::Study(_) => StatusCode::BAD_REQUEST,
+                _ => StatusCode::INTERNAL_SERVER_ERROR,
+            };
+            refused(status, &error.words())
+        }
+        Ok(None) => refused(StatusCode::NOT_FOUND, "no such question"),
+        Err(_) => {
+            refused(StatusCode::INTERNAL_SERVER_ERROR, "the answer could not be made; this is a fault of mirrorstats")
+        }
+    }
+}
+
+fn refused(status: StatusCode, words: &str) -> Response {
+    let text = [(header::CONTENT_TYPE, "text/plain; charset=utf-8")];
+    (status, text, Body::from(words.to_owned())).into_response()
+}

@@ -1,0 +1,316 @@
+//! The state of recordings at one time: their episodes, scored, and where each is.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::Options;
+use super::error::ViewError;
+use super::found::{Found, Stamp};
+use exact::escape::visible;
+use study::{Outputs, Question, Results, Study};
+use trace::episode::Episode;
+use trace::inputs::Input;
+use trace::log::LogError;
+use trace::log::frames::{self, LogIndex, Moment, Shape};
+use trace::merge;
+use trace::scan::{EpisodePlace, episode_places};
+
+/// How many indices of logs are kept.
+const KEPT_INDICES: usize = 64;
+
+/// Recordings as they were when they were read.
+#[derive(Debug)]
+pub(super) struct Snapshot {
+    /// Raised with each newer state.
+    pub generation: u64,
+    /// What was asked.
+    pub options: Options,
+    /// What was scored; `None` where no episode is whole yet.
+    pub scored: Option<Arc<Scored>>,
+    /// Episodes under way, by their logs.
+    pub running: Vec<Running>,
+    /// Why others that are under way cannot be shown.
+    pub unreadable: Vec<String>,
+    /// The state of the files.
+    pub stamps: Vec<Stamp>,
+    logs: Vec<PathBuf>,
+    indices: Mutex<BTreeMap<PathBuf, Option<Arc<LogIndex>>>>,
+    #[cfg(feature = "sim")]
+    rendered: Arc<super::rendered::Rendered>,
+}
+
+/// Episodes with their scores.
+#[derive(Debug)]
+pub(super) struct Scored {
+    /// The traces, opened.
+    pub study: Study,
+    /// The episode table and what goes with it.
+    pub results: Results,
+    /// Where each row of the table is, by the episode's id.
+    pub rows: HashMap<String, usize>,
+    /// The files.
+    pub inputs: Vec<Input>,
+    places: HashMap<String, EpisodePlace>,
+}
+
+/// An episode under way.
+#[derive(Clone, Debug)]
+pub(super) struct Running {
+    /// Its log.
+    pub log: PathBuf,
+    /// What is there of it.
+    pub episode: Episode,
+}
+
+/// An episode, and whether it is still being recorded.
+#[derive(Clone, Debug)]
+pub(super) struct Opened {
+    /// The episode, or what is there of it.
+    pub episode: Episode,
+    /// The log of an episode under way.
+    pub running: Option<PathBuf>,
+    /// The trace.
+    pub input: Option<Input>,
+}
+
+impl Snapshot {
+    /// Reads the state of the recordings now.
+    pub fn open(options: &Options, generation: u64) -> Result<Self, ViewError> {
+        report::style::Style::load(&options.style).map_err(study::StudyError::from)?;
+        let found = Found::of(&options.runs)?;
+        let stamps = found.stamps();
+        let scored = Self::scored(options, &found)?.map(Arc::new);
+        let (running, unreadable) = running(&found, scored.as_deref());
+        if scored.is_none() && running.is_empty() {
+            let runs = options.runs.iter().map(|run| visible(&run.to_string_lossy())).collect::<Vec<_>>().join(", ");
+            return Err(ViewError::Absent(format!(
+                "{runs}: expected traces, or a recording that has begun, found no episode\n  help: `mirrorstats recover` makes \
+                 a trace of a log"
+            )));
+        }
+        Ok(Self {
+            generation,
+            options: options.clone(),
+            scored,
+            running,
+            unreadable,
+            stamps,
+            logs: found.logs,
+            indices: Mutex::default(),
+            #[cfg(feature = "sim")]
+            rendered: Arc::default(),
+        })
+    }
+
+    /// The same with the episodes under way as they are now.
+    pub fn grown(&self, found: &Found) -> Self {
+        let (running, unreadable) = running(found, self.scored.as_deref());
+        Self {
+            generation: self.generation + 1,
+            options: self.options.clone(),
+            scored: self.scored.clone(),
+            running,
+            unreadable,
+            stamps: self.stamps.clone(),
+            logs: self.logs.clone(),
+            indices: Mutex::default(),
+            #[cfg(feature = "sim")]
+            rendered: Arc::clone(&self.rendered),
+        }
+    }
+
+    /// The steps of the episodes under way.
+    pub fn steps_under_way(&self) -> u64 {
+        self.running.iter().map(|running| running.episode.steps.len() as u64).sum()
+    }
+
+    /// Scores what is whole. Parts that a recording is just taking over into a trace are there twice for a moment, or gone.
+    fn scored(options: &Options, found: &Found) -> Result<Option<Scored>, ViewError> {
+        let with_parts: Vec<Input> = found.traces.iter().chain(&found.parts).cloned().collect();
+        if with_parts.is_empty() {
+            return Ok(None);
+        }
+        match Scored::of(options, with_parts) {
+            Err(_) if !found.parts.is_empty() && !found.traces.is_empty() => {
+                Scored::of(options, found.traces.clone()).map(Some)
+            }
+            scored => scored.map(Some),
+        }
+    }
+
+    /// How many episodes are whole.
+    pub fn episodes(&self) -> usize {
+        self.scored.as_ref().map_or(0, |scored| scored.results.episodes.len())
+    }
+
+    /// Whether an episode is there, whole or under way.
+    pub fn has(&self, id: &str) -> bool {
+        self.scored.as_ref().is_some_and(|scored| scored.rows.contains_key(id))
+            || self.running.iter().any(|running| running.episode.episode_id == id)
+    }
+
+    /// The episodes with their scores.
+    pub fn table(&self) -> Result<&Scored, ViewError> {
+        self.scored.as_deref().ok_or_else(|| ViewError::Absent("no episode is whole yet".to_owned()))
+    }
+
+    /// An episode by its id.
+    pub fn episode(&self, id: &str) -> Result<Opened, ViewError> {
+        if let Some(scored) = &self.scored
+            && let Some(place) = scored.places.get(id)
+        {
+            let input = &scored.inputs[place.file];
+            let rows = merge::read_rows(&input.path, place.rows.clone())?;
+            let own = rows.iter().find(|rows| rows.episode_id == id);
+            let own =
+                own.ok_or_else(|| ViewError::Absent(format!("`{}` was replaced; load the page again", input.name)))?;
+            let episode = own.episode().map_err(|fault| ViewError::Absent(format!("`{}`: {fault}", input.name)))?;
+            return Ok(Opened { episode, running: None, input: Some(input.clone()) });
+        }
+        // What there is by now, not what there was: it grows.
+        let own = self.running.iter().find(|running| running.episode.episode_id == id);
+        let own = own.ok_or_else(|| ViewError::Absent(format!("no episode `{id}`")))?;
+        let now = unfinished(&own.log)?.unwrap_or_else(|| own.episode.clone());
+        Ok(Opened { episode: now, running: Some(own.log.clone()), input: None })
+    }
+
+    /// What the logs have of a step.
+    pub fn moment(&self, opened: &Opened, t: usize) -> Result<Option<Moment>, ViewError> {
+        let Some(time) = time_of(&opened.episode, t) else { return Ok(None) };
+        if let Some(log) = &opened.running {
+            return Ok(frames::unfinished_step(log, time)?);
+        }
+        for log in self.logs_of(opened) {
+            let Some(index) = self.index(log)? else { continue };
+            if let Some(moment) = index.step(&opened.episode.episode_id, time)? {
+                return Ok(Some(moment));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The frame of a step, PNG: out of a log, or rendered again where no log has it and the program can.
+    pub fn frame(&self, opened: &Opened, t: usize) -> Result<Option<Vec<u8>>, ViewError> {
+        if let Some(frame) = self.moment(opened, t)?.and_then(|moment| moment.frame) {
+            return Ok(Some(frame));
+        }
+        #[cfg(feature = "sim")]
+        if self.renders(opened) {
+            return self.rendered.frame(self.recording(opened).as_ref(), &opened.episode, t);
+        }
+        Ok(None)
+    }
+
+    /// Whether frames of an episode can be rendered again: its trace says how its world was made, and this build has worlds.
+    pub fn renders(&self, opened: &Opened) -> bool {
+        let is_whole = self.scored.is_some() && opened.running.is_none();
+        #[cfg(feature = "sim")]
+        let has_world = world::replay::frames::is_recipe(self.recording(opened).as_ref());
+        #[cfg(not(feature = "sim"))]
+        let has_world = false;
+        is_whole && has_world
+    }
+
+    /// What the trace of an episode says of how it was recorded.
+    #[cfg(feature = "sim")]
+    fn recording(&self, opened: &Opened) -> Option<serde_json::Value> {
+        let scored = self.scored.as_ref()?;
+        let place = scored.places.get(&opened.episode.episode_id)?;
+        let file = scored.study.traces().ok()?.files().get(place.file)?;
+        serde_json::from_str(file.metadata_value(trace::schema::RECORDING_KEY)?).ok()
+    }
+
+    /// The shapes of each step, by its t; nothing where there is no log.
+    pub fn shapes(&self, opened: &Opened) -> Result<BTreeMap<usize, Vec<Shape>>, ViewError> {
+        let times: BTreeMap<u64, usize> =
+            (1..=opened.episode.steps.len()).filter_map(|t| Some((time_of(&opened.episode, t)?, t))).collect();
+        let named = |found: BTreeMap<u64, Vec<Shape>>| -> BTreeMap<usize, Vec<Shape>> {
+            found.into_iter().filter_map(|(time, shapes)| Some((*times.get(&time)?, shapes))).collect()
+        };
+        if let Some(log) = &opened.running {
+            return Ok(named(frames::unfinished_shapes(log)?));
+        }
+        let wanted: BTreeSet<u64> = times.keys().copied().collect();
+        for log in self.logs_of(opened) {
+            let Some(index) = self.index(log)? else { continue };
+            let found = index.shapes(&opened.episode.episode_id, &wanted)?;
+            if !found.is_empty() {
+                return Ok(named(found));
+            }
+        }
+        Ok(BTreeMap::new())
+    }
+
+    /// The logs where an episode may be: the one beside its trace, then those that were named.
+    fn logs_of(&self, opened: &Opened) -> impl Iterator<Item = &PathBuf> {
+        let beside = opened.input.as_ref().map(|input| input.path.with_extension("mcap"));
+        let own = self.logs.iter().find(|log| Some(*log) == beside.as_ref());
+        let others = if own.is_none() { self.logs.as_slice() } else { &[] };
+        own.into_iter().chain(others)
+    }
+
+    /// The index of a log, read once; `None` where it has none, or is no log of a recording.
+    fn index(&self, log: &Path) -> Result<Option<Arc<LogIndex>>, LogError> {
+        let mut indices = self.indices.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(index) = indices.get(log) {
+            return Ok(index.clone());
+        }
+        if indices.len() >= KEPT_INDICES {
+            indices.clear();
+        }
+        let index = match LogIndex::open(log) {
+            Err(LogError::Foreign { .. }) => None,
+            opened => opened?.map(Arc::new),
+        };
+        indices.insert(log.to_owned(), index.clone());
+        Ok(index)
+    }
+}
+
+impl Scored {
+    fn of(options: &Options, inputs: Vec<Input>) -> Result<Self, ViewError> {
+        let study = Self::study(options, inputs.clone(), options.question.clone())?;
+        let places = episode_places(study.traces()?, options.threads)?;
+        let outputs = Outputs { losses: true, quality: true, hashes: false, ..Outputs::default() };
+        let results = study.scan(outputs)?;
+        let rows = results.episodes.keys.iter().enumerate().map(|(at, key)| (key.episode_id.to_owned(), at)).collect();
+        Ok(Self { study, results, rows, inputs, places })
+    }
+
+    /// These files under another question.
+    pub fn study(options: &Options, inputs: Vec<Input>, question: Question) -> Result<Study, ViewError> {
+        Ok(Study::of(inputs)?.threads(options.threads).asked(question)?)
+    }
+}
+
+/// The time of a step in its log, ns.
+fn time_of(episode: &Episode, t: usize) -> Option<u64> {
+    let step = episode.steps.get(t.checked_sub(1)?)?;
+    u64::try_from(step.extra.frame_time?).ok()
+}
+
+/// What is there of a log under way; nothing where it has been taken over into a trace meanwhile.
+fn unfinished(log: &Path) -> Result<Option<Episode>, LogError> {
+    match frames::unfinished(log) {
+        Err(LogError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
+        read => Ok(read?.map(|found| found.episode)),
+    }
+}
+
+/// The episodes under way, and why some cannot be read; one that is whole by now is none of them.
+fn running(found: &Found, scored: Option<&Scored>) -> (Vec<Running>, Vec<String>) {
+    let (mut running, mut unreadable) = (Vec::new(), Vec::new());
+    for log in &found.unfinished {
+        match unfinished(log) {
+            Ok(Some(episode)) => running.push(Running { log: log.clone(), episode }),
+            Ok(None) => {}
+            Err(error) => unreadable.push(ViewError::from(error).words()),
+        }
+    }
+    running.retain(|running| scored.is_none_or(|scored| !scored.rows.contains_key(&running.episode.episode_id)));
+    running.sort_by(|a, b| a.episode.episode_id.cmp(&b.episode.episode_id));
+    running.dedup_by(|a, b| a.episode.episode_id == b.episode.episode_id);
+    (running, unreadable)
+}

@@ -1,0 +1,112 @@
+//! What is said to a program or a function in one episode: the words and the frame that a model gets, as messages.
+
+use std::fmt;
+use std::path::Path;
+
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+
+use super::Images;
+use super::message::{Image, Message, ObservationMessage, PROTOCOL, Position, TaskMessage};
+use crate::agent::prompt::{self, Prompt, Rendered};
+use crate::agent::reply::{self, Ending};
+use crate::agent::{Lost, Observation, Reply, Task, Usage};
+use exact::replace::TemporaryFolder;
+
+/// What the temporary folder of an episode's frames is named after.
+const FRAMES: &str = "frames";
+
+/// One episode's messages, and how its replies are read.
+#[derive(Debug)]
+pub(in crate::agent) struct Conversation {
+    task: Task,
+    episode_id: String,
+    prompt: Prompt,
+    frames: Option<Frames>,
+}
+
+impl Conversation {
+    /// The conversation of an episode; frames that are files lie below `scratch`.
+    pub(in crate::agent) fn new(task: Task, episode_id: &str, images: Images, scratch: &Path) -> Result<Self, Lost> {
+        let prompt = Prompt::of(task.experiment).map_err(unusable)?;
+        let frames = match images {
+            Images::Path => Some(Frames::new(scratch)?),
+            Images::Base64 => None,
+        };
+        Ok(Self { task, episode_id: episode_id.to_owned(), prompt, frames })
+    }
+
+    /// The task, before the first observation alone, and the observation.
+    pub(in crate::agent) fn messages(&self, observation: &Observation) -> Result<(Option<Message>, Message), Lost> {
+        let Rendered { system, user } = self.prompt.render(&self.task, observation).map_err(unusable)?;
+        let task = (observation.t == 1).then(|| self.task_message(system));
+        Ok((task, self.observation_message(observation, user)?))
+    }
+
+    fn task_message(&self, system_prompt: String) -> Message {
+        let experiment = self.episode_id.split('/').next().unwrap_or_default().to_owned();
+        Message::Task(TaskMessage {
+            protocol: PROTOCOL,
+            episode_id: self.episode_id.clone(),
+            experiment,
+            family: self.task.experiment.prompt.replace('-', "_"),
+            stated_color: self.task.stated_color.clone(),
+            max_steps: self.task.step_budget,
+            seed: self.task.seed,
+            system_prompt,
+            reply_schema: reply::structure(&self.task.experiment.reply),
+        })
+    }
+
+    fn observation_message(&self, observation: &Observation, user_prompt: String) -> Result<Message, Lost> {
+        let png = observation.frame.to_png().map_err(unusable)?;
+        let image = match &self.frames {
+            Some(frames) => Image::Path(frames.keep(observation.t, png)?),
+            None => Image::Base64(STANDARD.encode(png)),
+        };
+        let (last_action, last_thought) = observation.history.clone().unwrap_or_default();
+        Ok(Message::Observation(ObservationMessage {
+            t: observation.t,
+            remaining_steps: observation.remaining,
+            position: Position { x: observation.x, y: observation.y },
+            orientation: observation.yaw,
+            wall_warning: observation.bumped,
+            last_action: last_action.map(|action| prompt::letter(action).to_owned()),
+            last_thought,
+            user_prompt,
+            image,
+        }))
+    }
+
+    /// The reply in a text, read as that of a model.
+    pub(in crate::agent) fn read(&self, text: String, usage: Usage) -> Reply {
+        reply::read(&text, &self.task.experiment, Ending::Whole).into_reply(text, usage)
+    }
+}
+
+/// Something between the world and the agent cannot be made.
+pub(super) fn unusable(fault: impl fmt::Display) -> Lost {
+    Lost::because(format!("the observation cannot be made: {fault}"))
+}
+
+/// The frames of one episode as files.
+#[derive(Debug)]
+struct Frames(TemporaryFolder);
+
+impl Frames {
+    fn new(scratch: &Path) -> Result<Self, Lost> {
+        let made = std::path::absolute(scratch).and_then(|folder| TemporaryFolder::create(&folder, FRAMES));
+        made.map(Self).map_err(unusable)
+    }
+
+    /// Writes a frame and says where it is.
+    fn keep(&self, t: i32, png: &[u8]) -> Result<String, Lost> {
+        let path = self.0.path().join(format!("{t:03}.png"));
+        std::fs::write(&path, png).map_err(unusable)?;
+        path.into_os_string().into_string().map_err(|_| {
+            unusable(
+                "the folder's name is not UTF-8, which JSON cannot hold\n  help: --exec-images base64 needs no file",
+            )
+        })
+    }
+}

@@ -1,0 +1,251 @@
+//! Agents that are programs of one's own: any command that takes JSON lines and gives JSON lines.
+//!
+//! | file | what it knows |
+//! |---|---|
+//! | [`message`] | the lines that a program is sent |
+//! | `conversation` | which lines an episode has, and how replies are read |
+//! | [`program`] | running it, and the names of what can go wrong |
+//! | [`said`] | what it says on standard error |
+//! | [`group`] | that nothing of it stays behind |
+//! | [`files`] | the files that the command names, by what they hold |
+//!
+//! One process plays one episode. A reply is read as that of a model is: what is not the object asked for is a step
+//! without a decision. A program that ends, hangs or talks out of turn loses its episode, as a broken network does.
+//!
+//! Rule: a program sees the words and the frame that a model gets. It inherits the environment, keys included, but no
+//! value of a variable that holds a key is kept of what it says.
+
+pub(super) mod conversation;
+pub mod files;
+pub mod group;
+pub mod message;
+pub mod program;
+pub mod said;
+
+use std::path::PathBuf;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use self::conversation::{Conversation, unusable};
+use self::files::Unreadable;
+use self::group::Groups;
+use self::message::{EndMessage, Message, PROTOCOL};
+use self::program::{Failure, Program};
+use self::said::Kept;
+use super::vlm::secrets::{Secret, from_every_key_variable};
+use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Status, Task, Usage, Words};
+use exact::hash;
+
+/// What the shell's exit code says of a command that there is not, or that cannot be run.
+const NO_COMMAND: [i32; 2] = [126, 127];
+
+/// How a program gets its frames.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Images {
+    /// As files, which are there until the episode ends.
+    #[default]
+    Path,
+    /// Within the line.
+    Base64,
+}
+
+impl Images {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Path => "path",
+            Self::Base64 => "base64",
+        }
+    }
+}
+
+/// A command, and how it is dealt with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Settings {
+    /// The name in tables.
+    pub model: String,
+    /// The command, for the shell.
+    pub command: String,
+    /// How frames are passed.
+    pub images: Images,
+    /// How long a reply may take; the first one includes the program's start.
+    pub timeout: Duration,
+    /// The folder in which each episode gets one for its frames.
+    pub scratch: PathBuf,
+    /// The folder in which each episode gets a file with what its program said on standard error.
+    pub standard_error: PathBuf,
+}
+
+/// A command as a player.
+#[derive(Debug)]
+pub struct Exec {
+    shared: Arc<Shared>,
+}
+
+/// What the episodes share.
+#[derive(Debug)]
+struct Shared {
+    settings: Settings,
+    /// The hash of the files that the command names, as they are when the recording starts.
+    files: Option<String>,
+    groups: Arc<Groups>,
+    secrets: Arc<[Secret]>,
+    /// Why no further episode makes sense, once there is such a reason.
+    stop: OnceLock<String>,
+}
+
+impl Exec {
+    /// A player that runs the command once per episode.
+    pub fn new(settings: Settings) -> Result<Self, Unreadable> {
+        let files = files::fingerprint(&settings.command)?;
+        let (groups, secrets, stop) = (Arc::default(), from_every_key_variable().into(), OnceLock::new());
+        Ok(Self { shared: Arc::new(Shared { settings, files, groups, secrets, stop }) })
+    }
+}
+
+impl Player for Exec {
+    fn model(&self) -> &str {
+        &self.shared.settings.model
+    }
+
+    /// The command by its hash, as typed it may hold paths of a machine, or a key; the files that it names by theirs, null
+    /// if it names none.
+    fn description(&self) -> serde_json::Value {
+        let Settings { model, command, images, .. } = &self.shared.settings;
+        serde_json::json!({
+            "exec": model,
+            "command": hash::of_bytes(command.as_bytes()),
+            "files": self.shared.files,
+            "protocol": PROTOCOL,
+            "images": images.name(),
+            "identification_version": trace::identification::VERSION,
+        })
+    }
+
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
+        let shared = Arc::clone(&self.shared);
+        let Settings { images, scratch, .. } = &shared.settings;
+        let conversation = Conversation::new(task, episode_id, *images, scratch)?;
+        let kept = Kept::new(&shared.settings.standard_error, episode_id, Arc::clone(&shared.secrets));
+        let program = Program::start(&shared.settings.command, &shared.groups, &kept.said);
+        let program = program.map_err(|failure| lost(&failure))?;
+        Ok(Box::new(ExecAgent { shared, conversation, program: Some(program), kept, steps: 0 }))
+    }
+
+    fn waits(&self) -> bool {
+        true
+    }
+
+    fn stopped(&self) -> Option<String> {
+        self.shared.stop.get().cloned()
+    }
+
+    fn abandon(&self) {
+        self.shared.groups.kill_all();
+    }
+}
+
+/// A program in one episode.
+#[derive(Debug)]
+struct ExecAgent {
+    shared: Arc<Shared>,
+    conversation: Conversation,
+    /// `None` once it is of no use.
+    program: Option<Program>,
+    kept: Kept,
+    steps: i32,
+}
+
+impl Agent for ExecAgent {
+    fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
+        Box::pin(self.step(observation))
+    }
+
+    fn end(&mut self, reason: Ended) -> Farewell<'_> {
+        let (program, steps) = (self.program.take(), self.steps);
+        Box::pin(async move {
+            let Some(program) = program else { return };
+            if let Ok(line) = Message::End(EndMessage { reason, steps }).line() {
+                program.end(&line).await;
+            }
+        })
+    }
+}
+
+impl ExecAgent {
+    async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
+        self.steps = observation.t;
+        let (task, question) = self.lines(observation)?;
+        let Some(program) = &mut self.program else { return Err(Lost::because("the program has ended")) };
+        let start = Instant::now();
+        match program.ask(task.as_deref(), &question, self.shared.settings.timeout).await {
+            Ok(line) => Ok(self.read(&line, start.elapsed())),
+            Err(failure) => Err(self.give_up(&failure).await),
+        }
+    }
+
+    /// The task, before the first observation alone, and the observation.
+    fn lines(&self, observation: &Observation) -> Result<(Option<Vec<u8>>, Vec<u8>), Lost> {
+        let (task, question) = self.conversation.messages(observation)?;
+        let task = task.map(|task| task.line()).transpose();
+        Ok((task.map_err(unusable)?, question.line().map_err(unusable)?))
+    }
+
+    /// The reply in a line, read as that of a model.
+    fn read(&self, line: &[u8], latency: Duration) -> Reply {
+        let usage =
+            Usage { latency_ms: Some(i32::try_from(latency.as_millis()).unwrap_or(i32::MAX)), ..Usage::default() };
+        match str::from_utf8(line) {
+            Ok(text) => {
+                let text = self.shared.without_secrets(text);
+                self.conversation.read(text, usage)
+            }
+            // With its bytes replaced it might pass for something that the program did not say.
+            Err(_) => Reply {
+                status: Status::ParseFailed,
+                repairs: Vec::new(),
+                action: None,
+                self_color: None,
+                selected_cube: None,
+                mark_report: None,
+                words: Words::default(),
+                raw: Some(self.shared.without_secrets(&String::from_utf8_lossy(line))),
+                usage,
+                model: None,
+            },
+        }
+    }
+
+    /// The program is of no use any more, nor is any other if the command cannot be run at all.
+    async fn give_up(&mut self, failure: &Failure) -> Lost {
+        let Some(program) = self.program.take() else { return lost(failure) };
+        let lost = lost(failure);
+        program.close().await;
+        let words = self.kept.said.last_words(&self.shared.secrets);
+        let words = words.map_or_else(String::new, |words| format!("; its last words:\n{words}"));
+        // What came before the reply spoilt the step before, though it is noticed now.
+        let earlier = matches!(failure, Failure::Chatter { .. }).then(|| self.steps - 1);
+        let step = earlier.unwrap_or(self.steps);
+        let cause = self.shared.without_secrets(&format!("step {step}: {}{words}", lost.cause));
+        if let Failure::Ended(status) = failure
+            && self.steps == 1
+            && status.code().is_some_and(|code| NO_COMMAND.contains(&code))
+        {
+            self.shared.stop.get_or_init(|| format!("the command of --agent exec: cannot be run: {cause}"));
+        }
+        Lost { cause, step: earlier, ..lost }
+    }
+}
+
+impl Shared {
+    fn without_secrets(&self, text: &str) -> String {
+        said::without(&self.secrets, text)
+    }
+}
+
+fn lost(failure: &Failure) -> Lost {
+    let status = match failure {
+        Failure::Slow(_) => Status::Timeout,
+        _ => Status::ServerError,
+    };
+    Lost::counted_as(status, failure.to_string())
+}

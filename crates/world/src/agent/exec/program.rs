@@ -1,0 +1,224 @@
+//! A program that runs for one episode: lines in, lines out, and what can go wrong between.
+//!
+//! Rule: nothing of a program outlives its [`Program`]: it has a process group of its own, which is killed when the
+//! value is dropped, whatever the program has started meanwhile. What it says on standard error is read all the time.
+//!
+//! A line is a reply if the program had begun to read the question when it wrote it. Where the system says how much of a
+//! pipe is unread, one that came before is known for what it is; elsewhere only if it came before the question was sent.
+
+use std::io;
+use std::process::{ExitStatus, Stdio};
+use std::sync::Arc;
+use std::time::Duration;
+
+use futures_util::FutureExt as _;
+use tokio::io::{AsyncBufReadExt as _, AsyncReadExt as _, AsyncWriteExt as _, BufReader};
+use tokio::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command};
+use tokio::task::JoinHandle;
+use tokio::time::timeout;
+
+use super::group::{Group, Groups};
+use super::said::Said;
+
+/// Bytes of one reply.
+pub const LONGEST_REPLY: u64 = 1 << 20;
+/// How long a program may take to leave after its standard input was closed.
+const FAREWELL: Duration = Duration::from_secs(5);
+/// How long the end of a process may come after the end of its output.
+const CLOSING: Duration = Duration::from_secs(1);
+/// How often it is looked whether the program has read its task.
+const GLANCE: Duration = Duration::from_millis(2);
+/// Bytes of a line that are shown.
+const SHOWN: usize = 100;
+
+/// Why there is no reply.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum Failure {
+    #[error("the program cannot be started: {0}")]
+    Start(io::Error),
+    #[error(
+        "the program wrote a line that nobody had asked for: `{line}`; the line before it was taken for its reply: `{before}` \
+         (one line on standard output for each observation; everything else belongs on standard error)"
+    )]
+    OutOfTurn { line: String, before: String },
+    #[error(
+        "the program wrote `{chatter}` where its reply was expected, and its reply would have come after it: `{line}` (one line \
+         on standard output for each observation, the JSON object of the reply; everything else belongs on standard error)"
+    )]
+    Chatter { chatter: String, line: String },
+    #[error(
+        "the program wrote a line before it was asked for its first reply: `{0}` (one line on standard output for each \
+         observation; everything else belongs on standard error)"
+    )]
+    Early(String),
+    #[error("the program ended ({0}) before its reply")]
+    Ended(ExitStatus),
+    #[error("the program closed its standard output before its reply")]
+    Closed,
+    #[error("the program's output cannot be read: {0}")]
+    Unreadable(io::Error),
+    #[error("no reply within {} s (--exec-timeout allows more)", .0.as_secs())]
+    Slow(Duration),
+    #[error("the reply is longer than {LONGEST_REPLY} bytes")]
+    TooLong,
+}
+
+/// A running program.
+#[derive(Debug)]
+pub struct Program {
+    child: Child,
+    group: Group,
+    input: ChildStdin,
+    output: BufReader<ChildStdout>,
+    listener: JoinHandle<()>,
+    /// The beginning of its last reply.
+    last: String,
+}
+
+impl Program {
+    /// Starts a command of the shell; what it says on standard error is added to `said`.
+    pub fn start(command: &str, groups: &Arc<Groups>, said: &Arc<Said>) -> Result<Self, Failure> {
+        let mut shell = shell(command);
+        shell.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).kill_on_drop(true);
+        let (mut child, group) = Group::start(&mut shell, groups).map_err(Failure::Start)?;
+        let gone = || Failure::Start(io::Error::other("it has no standard streams"));
+        let (input, output) = (child.stdin.take().ok_or_else(gone)?, child.stdout.take().ok_or_else(gone)?);
+        let listener = tokio::spawn(listen(child.stderr.take().ok_or_else(gone)?, Arc::clone(said)));
+        Ok(Self { child, group, input, output: BufReader::new(output), listener, last: String::new() })
+    }
+
+    /// Sends a question and waits for a line, which is given without its end. The first question comes after the task, which
+    /// asks for no line.
+    pub async fn ask(&mut self, task: Option<&[u8]>, question: &[u8], patience: Duration) -> Result<Vec<u8>, Failure> {
+        let asked = async {
+            match task {
+                Some(task) => self.tell(task).await?,
+                None => self.is_silent().await?,
+            }
+            let line = self.exchange(question).await?;
+            if self.unread() >= question.len() as u64 {
+                return Err(match task {
+                    Some(_) => Failure::Early(beginning(&line)),
+                    None => self.out_of_turn(&line),
+                });
+            }
+            self.last = beginning(&line);
+            Ok(line)
+        };
+        timeout(patience, asked).await.unwrap_or(Err(Failure::Slow(patience)))
+    }
+
+    /// Sends the task, and waits until the program has read it: what it writes before is no reply.
+    async fn tell(&mut self, task: &[u8]) -> Result<(), Failure> {
+        // A program that no longer listens has ended or is about to, which reading finds.
+        let _ = self.input.write_all(task).await;
+        loop {
+            // In this order: what was written before the task was read is there to be seen after it.
+            let is_read = self.unread() == 0;
+            match timeout(GLANCE, self.output.fill_buf()).await {
+                Ok(Ok(early)) if !early.is_empty() => return Err(Failure::Early(beginning(early))),
+                // Its output has ended, which the next reading finds.
+                Ok(_) => return Ok(()),
+                Err(_) if is_read => return Ok(()),
+                Err(_) => {}
+            }
+        }
+    }
+
+    async fn exchange(&mut self, question: &[u8]) -> Result<Vec<u8>, Failure> {
+        let _ = self.input.write_all(question).await;
+        let mut line = Vec::new();
+        let read = (&mut self.output).take(LONGEST_REPLY + 1).read_until(b'\n', &mut line).await;
+        read.map_err(Failure::Unreadable)?;
+        if line.pop_if(|last| *last == b'\n').is_some() {
+            line.pop_if(|last| *last == b'\r');
+            return Ok(line);
+        }
+        if line.len() as u64 > LONGEST_REPLY {
+            return Err(Failure::TooLong);
+        }
+        match timeout(CLOSING, self.child.wait()).await {
+            Ok(Ok(status)) => Err(Failure::Ended(status)),
+            Ok(Err(_)) | Err(_) => Err(Failure::Closed),
+        }
+    }
+
+    /// Nothing waits to be read: a line from before the question would be taken for the answer.
+    async fn is_silent(&mut self) -> Result<(), Failure> {
+        // Lets what has arrived be noticed.
+        tokio::task::yield_now().await;
+        let early = match self.output.fill_buf().now_or_never() {
+            Some(Ok(early)) if !early.is_empty() => beginning(early),
+            _ => return Ok(()),
+        };
+        Err(self.out_of_turn(early.as_bytes()))
+    }
+
+    fn out_of_turn(&self, line: &[u8]) -> Failure {
+        let (line, before) = (beginning(line), self.last.clone());
+        // Of two lines for one question, the one that is no object was not meant as the reply.
+        if before.trim_start().starts_with('{') {
+            Failure::OutOfTurn { line, before }
+        } else {
+            Failure::Chatter { chatter: before, line }
+        }
+    }
+
+    /// Bytes that the program was sent and has not read, as far as the system says.
+    fn unread(&self) -> u64 {
+        #[cfg(target_os = "linux")]
+        return rustix::io::ioctl_fionread(&self.input).unwrap_or(0);
+        #[cfg(not(target_os = "linux"))]
+        return 0;
+    }
+
+    /// Ends it at once, and waits until all that it said is read.
+    pub async fn close(self) {
+        let Self { child, group, input, output, listener, last: _ } = self;
+        drop((child, group, input, output));
+        // What has left the group may hold standard error open.
+        let _ = timeout(CLOSING, listener).await;
+    }
+
+    /// Says a last line, closes standard input, and waits for the program to leave; one that stays is killed.
+    pub async fn end(self, line: &[u8]) {
+        let Self { mut child, group, mut input, output, listener, last: _ } = self;
+        let leaving = async {
+            let _ = input.write_all(line).await;
+            drop(input);
+            child.wait().await
+        };
+        // It leaves, or it is killed with its group right here.
+        let _ = timeout(FAREWELL, leaving).await;
+        drop((child, group, output));
+        let _ = timeout(CLOSING, listener).await;
+    }
+}
+
+/// The beginning of a line, for a message.
+fn beginning(bytes: &[u8]) -> String {
+    let line = bytes.split(|byte| *byte == b'\n').next().unwrap_or_default();
+    String::from_utf8_lossy(&line[..line.len().min(SHOWN)]).into_owned()
+}
+
+#[cfg(unix)]
+fn shell(command: &str) -> Command {
+    let mut shell = Command::new("sh");
+    shell.arg("-c").arg(command).process_group(0);
+    shell
+}
+
+#[cfg(not(unix))]
+fn shell(command: &str) -> Command {
+    let mut shell = Command::new("cmd");
+    shell.arg("/C").arg(command);
+    shell
+}
+
+async fn listen(mut stream: ChildStderr, said: Arc<Said>) {
+    let mut bytes = [0; 4096];
+    while let Ok(count @ 1..) = stream.read(&mut bytes).await {
+        said.add(&bytes[..count]);
+    }
+}

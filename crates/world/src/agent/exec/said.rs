@@ -1,0 +1,171 @@
+//! What a program says on standard error: its end is kept, for messages and in a file of the episode.
+//!
+//! Rule: no value of a variable that holds a key is in what leaves this file, not even a part of one that was cut off at the
+//! beginning. In the file all else is as the program wrote it, characters that act on a terminal included.
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::{fs, io};
+
+use crate::agent::vlm::secrets::Secret;
+use exact::replace::{folder_of, make_folder, replace};
+
+/// Bytes of the file of an episode.
+pub const IN_FILE: usize = 256 * 1024;
+const IN_MESSAGE: usize = 2_000;
+/// Bytes that are kept before those of the file: longer than any key, which may be cut off among them.
+const MARGIN: usize = 4_096;
+
+/// What was said, while more may come.
+#[derive(Debug, Default)]
+pub struct Said(Mutex<Tail>);
+
+#[derive(Debug, Default)]
+struct Tail {
+    bytes: VecDeque<u8>,
+    is_cut: bool,
+}
+
+impl Said {
+    pub fn add(&self, bytes: &[u8]) {
+        let mut tail = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        tail.bytes.extend(bytes);
+        let surplus = tail.bytes.len().saturating_sub(IN_FILE + MARGIN);
+        tail.is_cut |= surplus > 0;
+        tail.bytes.drain(..surplus);
+    }
+
+    /// The newest bytes without keys, at most [`IN_FILE`].
+    pub fn bytes(&self, secrets: &[Secret]) -> Vec<u8> {
+        let (raw, is_cut) = {
+            let tail = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            (tail.bytes.iter().copied().collect::<Vec<_>>(), tail.is_cut)
+        };
+        let mut kept = Vec::with_capacity(raw.len());
+        for chunk in raw.utf8_chunks() {
+            kept.extend_from_slice(without(secrets, chunk.valid()).as_bytes());
+            kept.extend_from_slice(chunk.invalid());
+        }
+        let least = if is_cut { MARGIN } else { 0 };
+        kept.drain(..least.max(kept.len().saturating_sub(IN_FILE)).min(kept.len()));
+        kept
+    }
+
+    /// The last lines of it, indented, each whole where there is more than one; `None` if nothing was said.
+    pub fn last_words(&self, secrets: &[Secret]) -> Option<String> {
+        let bytes = self.bytes(secrets);
+        let text = String::from_utf8_lossy(last_lines(&bytes)).replace('\t', "    ");
+        let lines = text.lines().map(str::trim_end).filter(|line| !line.is_empty());
+        let lines: Vec<String> = lines.map(|line| format!("    {line}")).collect();
+        (!lines.is_empty()).then(|| lines.join("\n"))
+    }
+}
+
+/// The newest bytes that a message holds, from the beginning of a line where one begins among them.
+fn last_lines(bytes: &[u8]) -> &[u8] {
+    let cut = bytes.len().saturating_sub(IN_MESSAGE);
+    let begins = |at: usize| at == 0 || bytes[at - 1] == b'\n';
+    let first = (cut..bytes.len()).find(|&at| begins(at)).unwrap_or(cut);
+    &bytes[first..]
+}
+
+/// A text without any of these keys.
+pub fn without(secrets: &[Secret], text: &str) -> String {
+    secrets.iter().fold(text.to_owned(), |text, secret| secret.without(&text))
+}
+
+/// The file of an episode, written when this is dropped: whether it is recorded, lost or stopped.
+#[derive(Debug)]
+pub struct Kept {
+    pub(super) said: Arc<Said>,
+    path: PathBuf,
+    secrets: Arc<[Secret]>,
+}
+
+impl Kept {
+    /// What the program of an episode is going to say, for a file in this folder.
+    pub fn new(folder: &Path, episode_id: &str, secrets: Arc<[Secret]>) -> Self {
+        let path = folder.join(format!("{}.log", episode_id.replace('/', "-")));
+        Self { said: Arc::default(), path, secrets }
+    }
+
+    fn write(&self) -> io::Result<()> {
+        let bytes = self.said.bytes(&self.secrets);
+        if bytes.is_empty() {
+            // What was said the last time is not of this time.
+            return fs::remove_file(&self.path);
+        }
+        make_folder(folder_of(&self.path))?;
+        replace(&self.path, &bytes)
+    }
+}
+
+impl Drop for Kept {
+    fn drop(&mut self) {
+        // A convenience: the episode does not depend on it, and a full disk is told by what does.
+        let _ = self.write();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{IN_FILE, IN_MESSAGE, Kept, MARGIN, Said, Secret};
+
+    #[test]
+    fn the_end_of_what_was_said_is_kept() {
+        let said = Said::default();
+        assert_eq!((said.bytes(&[]), said.last_words(&[])), (Vec::new(), None));
+        said.add(b" \n");
+        assert_eq!(said.last_words(&[]), None);
+        said.add(&vec![b'x'; IN_FILE]);
+        said.add(b"\n\x1b[1mthe\tend\xff\n");
+        assert_eq!(said.last_words(&[]).unwrap(), "    \u{1b}[1mthe    end\u{fffd}");
+        let bytes = said.bytes(&[]);
+        assert!(bytes.len() == IN_FILE && bytes.ends_with(b"x\n\x1b[1mthe\tend\xff\n"));
+        said.add(&vec![b'y'; 3 * IN_FILE]);
+        assert_eq!(said.bytes(&[]), vec![b'y'; IN_FILE]);
+    }
+
+    #[test]
+    fn last_words_keep_their_lines() {
+        let said = Said::default();
+        said.add(b"Traceback (most recent call last):\r\n  File \"agent.py\", line 4, in f\n\n\tg()\nValueError: 12\n");
+        let expected =
+            ["Traceback (most recent call last):", "  File \"agent.py\", line 4, in f", "    g()", "ValueError: 12"];
+        assert_eq!(said.last_words(&[]).unwrap(), expected.map(|line| format!("    {line}")).join("\n"));
+        // A line that is longer than a message has its end there.
+        said.add(&vec![b'x'; 2 * IN_MESSAGE]);
+        assert_eq!(said.last_words(&[]).unwrap(), format!("    {}", "x".repeat(IN_MESSAGE)));
+    }
+
+    #[test]
+    fn no_part_of_a_key_stays_wherever_it_is_cut() {
+        let key = "sk-0123456789abcdef";
+        let secrets = [Secret::new(key.to_owned())];
+        for after in (IN_FILE + MARGIN - key.len() - 1)..=(IN_FILE + MARGIN) {
+            let said = Said::default();
+            said.add(key.as_bytes());
+            said.add(&vec![b'.'; after - 2 * key.len()]);
+            said.add(key.as_bytes());
+            said.add(&vec![b'.'; key.len()]);
+            let text = String::from_utf8(said.bytes(&secrets)).unwrap();
+            assert!(text.contains("[key]...") && !text.contains("cdef") && !text.contains("sk-"), "{after}");
+        }
+    }
+
+    #[test]
+    fn a_file_is_of_the_last_time_and_none_if_nothing_was_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let of = |words: &[u8]| {
+            let kept = Kept::new(&folder.path().join("stderr"), "E1/own/s1/r2", [].into());
+            kept.said.add(words);
+            drop(kept);
+            std::fs::read(folder.path().join("stderr/E1-own-s1-r2.log")).ok()
+        };
+        assert_eq!(of(b""), None);
+        assert_eq!(of(b"\x1b[1mone\r\n").as_deref(), Some(&b"\x1b[1mone\r\n"[..]));
+        assert_eq!(of(b"two").as_deref(), Some(&b"two"[..]));
+        assert_eq!(of(b""), None);
+    }
+}

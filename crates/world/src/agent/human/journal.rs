@@ -1,0 +1,193 @@
+//! What people answered, a line each, as it came: a recording that was ended goes on where they were.
+//!
+//! Rule: a code, a time and an answer, and nothing else of a person. An answer is on the disk before its step is done.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use exact::budget::Limit;
+use exact::hash;
+use exact::input;
+use exact::replace;
+
+/// The name of the file in the folder of a recording.
+const NAME: &str = "participants.jsonl";
+
+/// An answer may be long, and is no book.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of the journal of participants", 4 << 20);
+
+/// An answer.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Entry {
+    /// The code of who answered.
+    pub participant: String,
+    /// The episode.
+    pub episode_id: String,
+    /// The step, from 1.
+    pub t: i32,
+    /// From the frame to the reply, ms.
+    pub latency_ms: i32,
+    /// The JSON object of the reply.
+    pub reply: String,
+}
+
+/// A line.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(untagged)]
+enum Line {
+    Answer(Entry),
+    /// Somebody agreed to words of this hash.
+    Agreed {
+        participant: String,
+        consent: String,
+    },
+    /// Somebody has the practice behind.
+    Practised {
+        participant: String,
+        practised: bool,
+    },
+}
+
+impl Line {
+    fn participant(&self) -> &str {
+        match self {
+            Self::Answer(Entry { participant, .. })
+            | Self::Agreed { participant, .. }
+            | Self::Practised { participant, .. } => participant,
+        }
+    }
+}
+
+/// The journal of a recording.
+#[derive(Debug)]
+pub struct Journal {
+    /// `None` where nothing is recorded.
+    file: Option<File>,
+    lines: Vec<Line>,
+}
+
+impl Journal {
+    /// Opens the journal in a folder, which is made if need be.
+    pub fn open(folder: &Path) -> io::Result<Self> {
+        replace::make_folder(folder)?;
+        let path = path(folder);
+        let lines = read(&path)?;
+        let mut file = OpenOptions::new().append(true).create(true).open(&path)?;
+        if !lines.is_empty() {
+            // Behind a line that was cut off a new one begins.
+            file.write_all(b"\n")?;
+        }
+        Ok(Self { file: Some(file), lines })
+    }
+
+    pub const fn none() -> Self {
+        Self { file: None, lines: Vec::new() }
+    }
+
+    /// The answers that were there when it was opened.
+    pub fn entries(&self) -> Vec<Entry> {
+        let answer = |line: &Line| if let Line::Answer(entry) = line { Some(entry.clone()) } else { None };
+        self.lines.iter().filter_map(answer).collect()
+    }
+
+    pub(super) fn has_agreed(&self, code: &str, words: Option<&str>) -> bool {
+        let own = words.map(|words| hash::of_bytes(words.as_bytes()));
+        self.lines.iter().any(|line| {
+            matches!(line, Line::Agreed { participant, consent } if participant == code && Some(consent) == own.as_ref())
+        })
+    }
+
+    pub(super) fn has_practised(&self, code: &str) -> bool {
+        self.lines.iter().any(|line| matches!(line, Line::Practised { participant, .. } if participant == code))
+    }
+
+    pub(super) fn keep(&mut self, entry: Entry) -> io::Result<()> {
+        self.write(&Line::Answer(entry))
+    }
+
+    pub(super) fn agreed(&mut self, code: &str, words: &str) -> io::Result<()> {
+        let consent = hash::of_bytes(words.as_bytes());
+        self.write(&Line::Agreed { participant: code.to_owned(), consent })
+    }
+
+    pub(super) fn practised(&mut self, code: &str) -> io::Result<()> {
+        self.write(&Line::Practised { participant: code.to_owned(), practised: true })
+    }
+
+    fn write(&mut self, line: &Line) -> io::Result<()> {
+        let Some(file) = &mut self.file else { return Ok(()) };
+        let mut bytes = serde_json::to_vec(line)?;
+        bytes.push(b'\n');
+        file.write_all(&bytes)?;
+        file.sync_data()
+    }
+}
+
+/// Removes all that the journal of a folder has of a person; gives the number of lines.
+pub fn remove(folder: &Path, code: &str) -> io::Result<usize> {
+    let path = path(folder);
+    let lines = read(&path)?;
+    let kept: Vec<&Line> = lines.iter().filter(|line| line.participant() != code).collect();
+    let removed = lines.len() - kept.len();
+    if removed > 0 {
+        let mut bytes = Vec::new();
+        for line in kept {
+            serde_json::to_writer(&mut bytes, line)?;
+            bytes.push(b'\n');
+        }
+        let mut file = replace::NewFile::create(&path)?;
+        file.as_file_mut().write_all(&bytes)?;
+        file.commit()?;
+    }
+    Ok(removed)
+}
+
+fn path(folder: &Path) -> PathBuf {
+    folder.join(NAME)
+}
+
+/// The lines of a journal; nothing where there is none.
+fn read(path: &Path) -> io::Result<Vec<Line>> {
+    let lines = match input::lines(path, LONGEST_LINE) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        lines => lines?,
+    };
+    let mut found = Vec::new();
+    for line in lines {
+        found.extend(serde_json::from_slice(&line?).ok());
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Entry, Journal, remove};
+
+    #[test]
+    fn answers_come_back_and_a_person_can_be_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let entry = |participant: &str, t| Entry {
+            participant: participant.to_owned(),
+            episode_id: "E1/human/s1/r1".to_owned(),
+            t,
+            latency_ms: 5,
+            reply: "{}".to_owned(),
+        };
+        let mut journal = Journal::open(folder.path()).unwrap();
+        journal.agreed("P1", "words").unwrap();
+        journal.keep(entry("P1", 1)).unwrap();
+        journal.practised("P2").unwrap();
+        journal.keep(entry("P2", 2)).unwrap();
+        drop(journal);
+        let journal = Journal::open(folder.path()).unwrap();
+        assert_eq!(journal.entries(), [entry("P1", 1), entry("P2", 2)]);
+        assert!(journal.has_agreed("P1", Some("words")) && !journal.has_agreed("P1", Some("other words")));
+        assert!(journal.has_practised("P2") && !journal.has_practised("P1"));
+        assert_eq!(remove(folder.path(), "P1").unwrap(), 2);
+        assert!(!std::fs::read_to_string(folder.path().join("participants.jsonl")).unwrap().contains("P1"));
+        assert_eq!(Journal::open(folder.path()).unwrap().entries(), [entry("P2", 2)]);
+    }
+}

@@ -1,0 +1,183 @@
+//! A person in the agent's place: the same frame, the same words, the same reply, in a browser.
+//!
+//! | file | what it knows |
+//! |---|---|
+//! | [`hub`] | which person is asked what, and what was answered |
+//! | [`server`] | the pages that people play on; it has no other |
+//! | [`journal`] | what was answered, so that a recording that was ended goes on in the middle of an episode |
+//!
+//! Rule: a person gets what a model gets and nothing else: no colour of a body, no count of pixels, no id. Each has a link of
+//! their own and a code; nothing else is kept of them.
+
+pub mod hub;
+pub mod journal;
+pub mod server;
+
+use std::sync::Arc;
+
+use serde_json::{Value, json};
+
+use self::hub::{Given, Hub, Question};
+use self::journal::Entry;
+use super::prompt::{self, Prompt, Rendered};
+use super::reply::{self, Ending};
+use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, Task, Usage};
+use exact::hash;
+
+/// The version of what people are shown and asked.
+const PROTOCOL: u32 = 2;
+
+/// People as a player.
+#[derive(Debug)]
+pub struct Human {
+    model: String,
+    /// SHA-256 of the words of consent; `None` where nobody is asked for it.
+    consent: Option<String>,
+    hub: Arc<Hub>,
+}
+
+impl Human {
+    /// A player of this name whose episodes go to the people of a hub.
+    pub fn new(model: &str, hub: Arc<Hub>) -> Self {
+        let consent = hub.consent().map(|words| hash::of_bytes(words.as_bytes()));
+        Self { model: model.to_owned(), consent, hub }
+    }
+}
+
+impl Player for Human {
+    fn model(&self) -> &str {
+        &self.model
+    }
+
+    /// What every person was shown and asked, and how.
+    fn description(&self) -> Value {
+        json!({
+            "human": self.model,
+            "protocol": PROTOCOL,
+            "view": {
+                "frame": "the frame of a model, drawn as large as the window allows",
+                "words": "the system prompt and the user prompt of a model",
+                "history": "what the prompt tells of the steps before: action and summary of the last one, or every action where a hand reaches",
+                "position": true,
+                "remaining_steps": true,
+            },
+            "reply": "the keys of a model's reply: actions by keys or buttons, colours from a list, free text; all but the \
+                      action may stay empty; the identification stays from step to step, and is empty as an episode begins",
+            "practice": "one episode of another scene before the first, not recorded; its end is announced",
+            "time_limit": null,
+            "consent": self.consent,
+            "identification_version": trace::identification::VERSION,
+        })
+    }
+
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
+        let prompt = Prompt::of(task.experiment).map_err(|fault| Lost::because(fault.to_string()))?;
+        let seat = self.hub.seat(episode_id).ok_or_else(|| Lost::because("every participant plays another episode"))?;
+        let code = self.hub.code(seat);
+        let hub = Arc::clone(&self.hub);
+        let (practice, episode_id, has_ended) = (None, episode_id.to_owned(), false);
+        Ok(Box::new(HumanAgent { hub, seat, code, task, practice, prompt, episode_id, has_ended }))
+    }
+
+    fn waits(&self) -> bool {
+        true
+    }
+
+    fn in_flight(&self) -> usize {
+        self.hub.seats()
+    }
+
+    fn most_in_flight(&self) -> usize {
+        self.hub.seats()
+    }
+
+    fn ended(&self, is_complete: bool) {
+        self.hub.end(is_complete);
+    }
+}
+
+/// A person in one episode.
+#[derive(Debug)]
+struct HumanAgent {
+    hub: Arc<Hub>,
+    seat: usize,
+    code: String,
+    task: Task,
+    /// What is practised now.
+    practice: Option<Task>,
+    prompt: Prompt,
+    episode_id: String,
+    has_ended: bool,
+}
+
+impl Drop for HumanAgent {
+    /// An episode that is lost is told of no end.
+    fn drop(&mut self) {
+        if !self.has_ended {
+            self.hub.over(self.seat, false);
+        }
+    }
+}
+
+impl Agent for HumanAgent {
+    fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
+        Box::pin(self.step(observation))
+    }
+
+    fn end(&mut self, ended: Ended) -> Farewell<'_> {
+        self.has_ended = true;
+        self.hub.over(self.seat, ended != Ended::Stopped);
+        Box::pin(std::future::ready(()))
+    }
+
+    fn participant(&self) -> Option<&str> {
+        Some(&self.code)
+    }
+
+    fn wants_practice(&self) -> bool {
+        !self.hub.has_practised(self.seat)
+    }
+
+    fn practise(&mut self, task: Option<Task>) {
+        if task.is_none() {
+            self.hub.practised(self.seat);
+        }
+        self.practice = task;
+    }
+}
+
+impl HumanAgent {
+    async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
+        let task = self.practice.as_ref().unwrap_or(&self.task);
+        let is_practice = self.practice.is_some();
+        if let Some(entry) = self.hub.answered(self.seat, &self.episode_id, observation.t).filter(|_| !is_practice) {
+            return Ok(read(&entry.reply, task, entry.latency_ms));
+        }
+        let unusable = |fault: String| Lost::because(format!("the observation cannot be made: {fault}"));
+        let Rendered { system, user } =
+            self.prompt.render(task, observation).map_err(|fault| unusable(fault.to_string()))?;
+        let question = Question {
+            frame: Arc::clone(&observation.frame),
+            system,
+            user,
+            t: observation.t,
+            is_practice,
+            keys: task.experiment.reply.iter().map(|key| key.name()).collect(),
+            actions: prompt::actions(task.experiment.actions).iter().map(|action| prompt::letter(*action)).collect(),
+        };
+        let given = self.hub.ask(self.seat, question).await;
+        let Given { reply, latency_ms } = given.ok_or_else(|| Lost::because("the server of the people has ended"))?;
+        if !is_practice {
+            let (participant, episode_id) = (self.code.clone(), self.episode_id.clone());
+            let entry = Entry { participant, episode_id, t: observation.t, latency_ms, reply: reply.clone() };
+            self.hub.keep(entry).map_err(|error| Lost::because(format!("the journal cannot be written: {error}")))?;
+        }
+        Ok(read(&reply, task, latency_ms))
+    }
+}
+
+/// A reply, read as that of a model.
+fn read(text: &str, task: &Task, latency_ms: i32) -> Reply {
+    let usage = Usage { latency_ms: Some(latency_ms), ..Usage::default() };
+    reply::read(text, &task.experiment, Ending::Whole).into_reply(text.to_owned(), usage)
+}

@@ -1,0 +1,134 @@
+//! The pages that people play on.
+//!
+//! Rule: it answers what a model is told, to whoever has the link of a person, and has no other route: nothing here opens a
+//! trace or knows what is true.
+
+use std::net::TcpListener;
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::Bytes;
+use axum::extract::{DefaultBodyLimit, Query, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
+
+use super::hub::Hub;
+use web::{self, Guard};
+
+const BODY: &str = include_str!("../../../../../assets/player/body.html");
+const STYLE: &str = include_str!("../../../../../assets/player/player.css");
+const SCRIPT: &str = include_str!("../../../../../assets/player/player.js");
+
+/// The most bytes of a reply.
+const LONGEST: usize = 1 << 20;
+
+/// Whose link it is.
+#[derive(Debug, Deserialize)]
+struct Link {
+    p: Option<String>,
+}
+
+/// A reply as the page sends it.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Sent {
+    number: u64,
+    reply: Map<String, Value>,
+}
+
+/// Serves people on a thread of its own, until the process ends.
+pub fn start(hub: Arc<Hub>, listener: TcpListener, guard: Guard) -> std::io::Result<()> {
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build()?;
+    std::thread::Builder::new().name("people".to_owned()).spawn(move || {
+        // A server that fails leaves the episodes waiting, which Ctrl-C ends.
+        let _ = runtime.block_on(web::serve(listener, web::guarded(routes(hub), guard.taking_posts())));
+    })?;
+    Ok(())
+}
+
+fn routes(hub: Arc<Hub>) -> Router {
+    Router::new()
+        .route("/", get(|| async { file(web::page("Mirror room", "player.css", BODY), "text/html; charset=utf-8") }))
+        .route("/player.css", get(|| async { file(STYLE, "text/css; charset=utf-8") }))
+        .route("/player.js", get(|| async { file(SCRIPT, "text/javascript; charset=utf-8") }))
+        .route("/state", get(state))
+        .route("/frame", get(frame))
+        .route("/agree", post(agree))
+        .route("/begin", post(begin))
+        .route("/pause", post(pause))
+        .route("/resume", post(resume))
+        .route("/reply", post(reply))
+        .layer(DefaultBodyLimit::max(LONGEST))
+        .with_state(hub)
+}
+
+fn file(text: impl IntoResponse, kind: &'static str) -> Response {
+    ([(header::CONTENT_TYPE, kind)], text).into_response()
+}
+
+fn told(value: &Value) -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], value.to_string()).into_response()
+}
+
+/// Does something for the person whose link it is.
+fn for_person(hub: &Hub, link: &Link, does: impl FnOnce(usize) -> Response) -> Response {
+    match link.p.as_deref().and_then(|token| hub.seat_of(token)) {
+        Some(seat) => does(seat),
+        None => (StatusCode::UNAUTHORIZED, "open the link that you were given").into_response(),
+    }
+}
+
+async fn state(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    for_person(&hub, &link, |seat| told(&hub.told(seat)))
+}
+
+async fn frame(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    for_person(&hub, &link, |seat| {
+        let frame = hub.frame(seat);
+        match frame.as_ref().and_then(|frame| frame.to_png().ok()) {
+            Some(png) => ([(header::CONTENT_TYPE, "image/png")], png.to_vec()).into_response(),
+            None => (StatusCode::NOT_FOUND, "no frame").into_response(),
+        }
+    })
+}
+
+async fn agree(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    for_person(&hub, &link, |seat| match hub.agree(seat) {
+        Ok(()) => told(&hub.told(seat)),
+        Err(_) => (StatusCode::INTERNAL_SERVER_ERROR, "it could not be written down; tell the lab").into_response(),
+    })
+}
+
+async fn begin(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    for_person(&hub, &link, |seat| {
+        hub.begin(seat);
+        told(&hub.told(seat))
+    })
+}
+
+async fn pause(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    for_person(&hub, &link, |seat| {
+        hub.pause(seat, true);
+        told(&hub.told(seat))
+    })
+}
+
+async fn resume(State(hub): State<Arc<Hub>>, Query(link): Query<Link>) -> Response {
+    for_person(&hub, &link, |seat| {
+        hub.pause(seat, false);
+        told(&hub.told(seat))
+    })
+}
+
+async fn reply(State(hub): State<Arc<Hub>>, Query(link): Query<Link>, body: Bytes) -> Response {
+    for_person(&hub, &link, |seat| {
+        let Ok(Sent { number, reply }) = serde_json::from_slice(&body) else {
+            return (StatusCode::BAD_REQUEST, "no reply").into_response();
+        };
+        let taken = hub.answer(seat, number, Value::Object(reply).to_string());
+        told(&json!({ "taken": taken }))
+    })
+}

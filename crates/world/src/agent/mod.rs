@@ -1,0 +1,301 @@
+//! Who decides the next action.
+//!
+//! An agent gets what a vision-language model gets, the frame and the words around it, and nothing else: no pose of
+//! another body, no label, no ground truth. It answers with a [`Reply`], which the recorder writes down as it is.
+//!
+//! Rule: an agent is a function of its task and its observations (and, for a model behind a network, of what that said).
+
+#[cfg(feature = "sim")]
+pub mod exec;
+#[cfg(feature = "sim")]
+pub mod function;
+#[cfg(all(feature = "sim", feature = "view"))]
+pub mod human;
+#[cfg(feature = "sim")]
+pub mod perception;
+pub mod prompt;
+pub mod reply;
+#[cfg(feature = "sim")]
+pub mod scripted;
+#[cfg(feature = "sim")]
+pub mod vlm;
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+
+use crate::experiment::Experiment;
+use exact::names;
+use reply::Repair;
+use trace::episode::Action;
+use trace::frame::Frame;
+
+/// What an agent is told once, before the first step.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Task {
+    /// What is asked, and how: its prompt and the keys of a reply.
+    pub experiment: Experiment,
+    /// The false colour of the first line of the prompt in E3.
+    pub stated_color: Option<String>,
+    /// Steps after which the episode ends by itself (100 in the paper).
+    pub step_budget: i32,
+    /// The only source of chance for an agent; differs from episode to episode, equal from recording to recording.
+    pub seed: u64,
+}
+
+/// What an agent perceives before it acts.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    /// The timestep, from 1.
+    pub t: i32,
+    /// Steps left, this one included.
+    pub remaining: i32,
+    /// Where the body stands, m, in the coordinates of the room.
+    pub x: f32,
+    /// See `x`.
+    pub y: f32,
+    /// Where the body faces: degrees, counter-clockwise from +x, a multiple of 30.
+    pub yaw: f32,
+    /// The last move was blocked.
+    pub bumped: bool,
+    /// The step before: what was done, and the summary of the last reply that gave a decision; `None` at t = 1.
+    pub history: Option<(Option<Action>, Option<String>)>,
+    /// All steps before, the first one first; a prompt may tell them all.
+    pub past: Arc<Vec<Past>>,
+    /// What the eye sees.
+    pub frame: Arc<Frame>,
+    /// The vertical field of view of the frame, degrees: 110 in the study. For scripted agents alone: models and programs
+    /// are not told.
+    pub fov_y: f64,
+}
+
+/// A step that is over.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Past {
+    /// What was decided; `None` where the reply gave no decision.
+    pub action: Option<Action>,
+    /// The move was stopped.
+    pub bumped: bool,
+    /// The summary of its reply.
+    pub thought: Option<String>,
+}
+
+/// What an agent answered, and how that was got.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reply {
+    /// The outcome of getting and reading it.
+    pub status: Status,
+    /// What had to be repaired to read it, in order.
+    pub repairs: Vec<Repair>,
+    /// The action; `None` where the reply gave none: the body stands still.
+    pub action: Option<Action>,
+    /// The self-attribution: a colour of the palette, `unknown`, or `None` where the reply gave none.
+    pub self_color: Option<String>,
+    /// The cube: a colour, `none`, or `None` where the reply gave none.
+    pub selected_cube: Option<String>,
+    /// The mark on the own body: a colour, `none`, or `None` where the reply gave none.
+    pub mark_report: Option<String>,
+    /// The words around the decision, as given.
+    pub words: Words,
+    /// The whole reply, as it came.
+    pub raw: Option<String>,
+    /// What it cost.
+    pub usage: Usage,
+    /// The id of the model as the provider returned it; `None` where no provider answers.
+    pub model: Option<String>,
+}
+
+/// The free text of a reply; the keys of the reply's JSON object in the paper.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Words {
+    /// `view-description`.
+    pub view_description: Option<String>,
+    /// `reasoning`.
+    pub reasoning: Option<String>,
+    /// `summary`; comes back as the history of the next step.
+    pub summary: Option<String>,
+    /// `identification`, of which the self-attribution is the normal form.
+    pub identification: Option<String>,
+}
+
+/// Time, tokens and money of one reply; `None` where nobody counted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Usage {
+    /// From sending the request to the whole reply, ms.
+    pub latency_ms: Option<i32>,
+    /// Tokens of the request.
+    pub prompt_tokens: Option<i32>,
+    /// Tokens of the reply.
+    pub completion_tokens: Option<i32>,
+    /// US dollars.
+    pub cost_usd: Option<f64>,
+}
+
+/// The outcome of getting and reading a reply: the values of the trace's `reply_status` column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Status {
+    /// Valid as it came.
+    Ok,
+    /// Valid after a named repair.
+    Repaired,
+    /// No JSON object in it.
+    ParseFailed,
+    /// A JSON object, but not the one asked for.
+    SchemaInvalid,
+    /// The model declined.
+    Refusal,
+    /// Cut off by the limit of tokens.
+    Truncated,
+    /// Nothing in it.
+    Empty,
+    /// The provider's limit of requests, to the last attempt.
+    RateLimited,
+    /// The provider failed, to the last attempt.
+    ServerError,
+    /// No whole reply in time, to the last attempt.
+    Timeout,
+}
+
+names!(Status {
+    Ok: "ok",
+    Repaired: "repaired",
+    ParseFailed: "parse_failed",
+    SchemaInvalid: "schema_invalid",
+    Refusal: "refusal",
+    Truncated: "truncated",
+    Empty: "empty",
+    RateLimited: "rate_limited",
+    ServerError: "server_error",
+    Timeout: "timeout",
+});
+
+/// The episode cannot go on, and that is not the agent's doing: the infrastructure failed. Such an episode is counted
+/// apart and recorded again by the next run of the command; it is never scored.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{cause}")]
+pub struct Lost {
+    /// What the failure counts as, where it is one of a reply.
+    pub status: Option<Status>,
+    /// What failed, without any key.
+    pub cause: String,
+    /// The step that went wrong, where it is an earlier one than that at which it was noticed.
+    pub step: Option<i32>,
+    /// Nothing failed: a limit of what may be spent is reached, and the episode waits for a higher one.
+    pub by_limit: bool,
+}
+
+impl Lost {
+    /// Lost to something other than a reply.
+    pub fn because(cause: impl Into<String>) -> Self {
+        Self { status: None, cause: cause.into(), step: None, by_limit: false }
+    }
+
+    /// Lost to the failure of a reply, which counts as this status.
+    pub fn counted_as(status: Status, cause: impl Into<String>) -> Self {
+        Self { status: Some(status), cause: cause.into(), step: None, by_limit: false }
+    }
+
+    /// Stopped by a limit that whoever records has set.
+    pub fn by_limit(cause: impl Into<String>) -> Self {
+        Self { status: None, cause: cause.into(), step: None, by_limit: true }
+    }
+}
+
+/// A decision that may take its time: scripted agents are ready at once, others wait for a network or a program.
+pub type Decision<'a> = Pin<Box<dyn Future<Output = Result<Reply, Lost>> + 'a>>;
+
+/// What an agent does when its episode is over.
+pub type Farewell<'a> = Pin<Box<dyn Future<Output = ()> + 'a>>;
+
+/// One agent in one episode.
+pub trait Agent {
+    fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a>;
+
+    /// The code of the person who plays; `None` where no person does.
+    fn participant(&self) -> Option<&str> {
+        None
+    }
+
+    /// Whether an episode of another scene is to be played first, which is not recorded.
+    fn wants_practice(&self) -> bool {
+        false
+    }
+
+    /// Hears that what follows is practice, on this task, or that the practice is over.
+    fn practise(&mut self, _task: Option<Task>) {}
+
+    /// Hears that there is nothing more to decide; not called for an episode that is lost.
+    fn end(&mut self, _ended: Ended) -> Farewell<'_> {
+        Box::pin(std::future::ready(()))
+    }
+}
+
+/// How an episode ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Ended {
+    /// The agent was done, or what was to be reached is reached.
+    Done,
+    /// The steps were used up.
+    Budget,
+    /// The recording is being stopped; the episode is recorded another time.
+    Stopped,
+}
+
+/// Who plays: makes the agent of each episode.
+pub trait Player: Send + Sync {
+    /// The name shown in tables.
+    fn model(&self) -> &str;
+
+    /// What goes into recordings: everything that shapes the agent's decisions, and nothing that differs from one start of
+    /// the same recording to the next.
+    fn description(&self) -> serde_json::Value;
+
+    /// The agent of one episode.
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost>;
+
+    /// Whether the agent looks at frames; one that does not may be given empty ones.
+    fn looks(&self) -> bool {
+        true
+    }
+
+    /// Whether its agents wait for something outside of this process, so that a recording takes its time.
+    fn waits(&self) -> bool {
+        false
+    }
+
+    /// How many episodes of a thread are worth having under way at once; more than one where agents wait.
+    fn in_flight(&self) -> usize {
+        1
+    }
+
+    /// The most episodes that can be under way at once, whatever is asked for.
+    fn most_in_flight(&self) -> usize {
+        usize::MAX
+    }
+
+    /// Hears that the recording is over, and whether all of its episodes were played.
+    fn ended(&self, _is_complete: bool) {}
+
+    /// Hears that episodes of this recording are there from an earlier start.
+    fn resumes(&self) {}
+
+    /// What was spent so far on all that it played into the folder, over all starts; `None` for agents that cost nothing.
+    #[cfg(feature = "sim")]
+    fn spend(&self) -> Option<vlm::limits::Spend> {
+        None
+    }
+
+    /// Looks, before the first episode is begun, whether what the agents need is there; asks nobody anything.
+    fn check(&self) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// Why no further episode makes sense, once there is such a reason.
+    fn stopped(&self) -> Option<String> {
+        None
+    }
+
+    /// The process is about to end with episodes under way: what runs for their agents ends now.
+    fn abandon(&self) {}
+}

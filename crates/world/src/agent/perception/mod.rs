@@ -1,0 +1,62 @@
+//! What a scripted agent makes of a picture: how the room of the study looks, to somebody who knows how rooms look.
+//!
+//! ```text
+//! frame ──► paint (colour of a pixel) ──► patches ──► things (cubes, bodies)
+//!   └─────► ground (feet of the walls, and what lies beyond them)
+//! ```
+//!
+//! Rule: a view is a function of the frame and of the pose and field of view that the observation states. It knows no scene, no label and no
+//! configuration but the field of view, and it does not tell a thing from its reflection: that takes memory.
+
+pub mod camera;
+pub mod ground;
+pub mod paint;
+pub mod patches;
+pub mod things;
+
+use std::sync::Arc;
+
+use crate::agent::Observation;
+use trace::frame::Frame;
+
+use camera::{Camera, Pose};
+use ground::Foot;
+use things::Thing;
+
+/// Patches of fewer pixels are edges between two things.
+const LEAST_OF_PATCH: usize = 6;
+
+/// One picture, read.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Where it was taken.
+    pub pose: Pose,
+    /// How it was taken.
+    pub camera: Camera,
+    /// The picture.
+    pub frame: Arc<Frame>,
+    /// Cubes that are whole in view.
+    pub cubes: Vec<Thing>,
+    /// Bodies, whole or in part.
+    pub bodies: Vec<Thing>,
+    /// Feet of walls.
+    pub feet: Vec<Foot>,
+}
+
+impl View {
+    /// Reads what an observation shows.
+    pub fn of(observation: &Observation) -> Self {
+        let frame = Arc::clone(&observation.frame);
+        let pose = Pose::of(observation);
+        let camera = Camera::new(pose, frame.width, frame.height, observation.fov_y);
+        let patches = patches::patches(&frame, LEAST_OF_PATCH);
+        Self {
+            pose,
+            camera,
+            cubes: things::cubes(&patches, &camera, frame.width, frame.height),
+            bodies: things::bodies(&patches, &camera, frame.width, frame.height),
+            feet: ground::feet(&frame, &camera),
+            frame,
+        }
+    }
+}

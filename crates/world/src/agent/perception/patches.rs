@@ -1,0 +1,173 @@
+//! Patches: connected pixels of one colour of the palette.
+//!
+//! Rule: eight neighbours connect; order is that of the first pixel, row by row, so that it depends on the picture alone.
+
+use trace::frame::Frame;
+use trace::palette::Color;
+
+use super::paint;
+
+/// Connected pixels of one colour, and the box around them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patch {
+    /// Their colour.
+    pub color: Color,
+    /// How many there are.
+    pub pixels: usize,
+    /// The first column.
+    pub left: usize,
+    /// The last column.
+    pub right: usize,
+    /// The first row.
+    pub top: usize,
+    /// The last row.
+    pub bottom: usize,
+}
+
+impl Patch {
+    pub const fn width(&self) -> usize {
+        self.right - self.left + 1
+    }
+
+    pub const fn height(&self) -> usize {
+        self.bottom - self.top + 1
+    }
+
+    /// The middle of the box, in columns.
+    #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+    pub fn middle(&self) -> f64 {
+        (self.left + self.right + 1) as f64 / 2.0
+    }
+
+    /// The box and the pixels of both.
+    #[must_use]
+    pub fn joined(&self, other: &Self) -> Self {
+        Self {
+            color: self.color,
+            pixels: self.pixels + other.pixels,
+            left: self.left.min(other.left),
+            right: self.right.max(other.right),
+            top: self.top.min(other.top),
+            bottom: self.bottom.max(other.bottom),
+        }
+    }
+}
+
+/// Pixels of one colour side by side in a row; `right` is the last one.
+#[derive(Clone, Copy)]
+struct Run {
+    color: Color,
+    row: usize,
+    left: usize,
+    right: usize,
+}
+
+/// All patches of at least `least` pixels.
+pub fn patches(frame: &Frame, least: usize) -> Vec<Patch> {
+    let runs = runs(frame);
+    let roots = connect(&runs);
+    let mut found: Vec<Option<Patch>> = vec![None; runs.len()];
+    for (run, &root) in runs.iter().zip(&roots) {
+        let piece = Patch {
+            color: run.color,
+            pixels: run.right - run.left + 1,
+            left: run.left,
+            right: run.right,
+            top: run.row,
+            bottom: run.row,
+        };
+        found[root] = Some(found[root].map_or(piece, |patch| patch.joined(&piece)));
+    }
+    found.into_iter().flatten().filter(|patch| patch.pixels >= least).collect()
+}
+
+fn runs(frame: &Frame) -> Vec<Run> {
+    let mut runs: Vec<Run> = Vec::new();
+    for (row, line) in frame.rgb.chunks_exact(3 * frame.width.max(1)).enumerate() {
+        let mut open: Option<Run> = None;
+        for (column, pixel) in line.chunks_exact(3).enumerate() {
+            let color = paint::color(pixel);
+            if let Some(run) = open.as_mut().filter(|run| Some(run.color) == color) {
+                run.right = column;
+            } else {
+                runs.extend(open.take());
+                open = color.map(|color| Run { color, row, left: column, right: column });
+            }
+        }
+        runs.extend(open);
+    }
+    runs
+}
+
+/// For each run the first run of its patch.
+fn connect(runs: &[Run]) -> Vec<usize> {
+    let mut parent: Vec<usize> = (0..runs.len()).collect();
+    let mut above = 0;
+    for (at, run) in runs.iter().enumerate() {
+        // `above` never passes a run that a later run of this row may touch.
+        while runs[above].row + 1 < run.row || (runs[above].row < run.row && runs[above].right + 1 < run.left) {
+            above += 1;
+        }
+        let candidates = runs[above..at].iter().take_while(|other| other.row < run.row && other.left <= run.right + 1);
+        for (offset, other) in candidates.enumerate() {
+            if other.color == run.color {
+                let (first, second) = (root(&mut parent, above + offset), root(&mut parent, at));
+                parent[first.max(second)] = first.min(second);
+            }
+        }
+    }
+    (0..runs.len()).map(|at| root(&mut parent, at)).collect()
+}
+
+fn root(parent: &mut [usize], mut at: usize) -> usize {
+    while parent[at] != at {
+        parent[at] = parent[parent[at]];
+        at = parent[at];
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture of letters: `R` red, `G` green, anything else grey.
+    fn picture(rows: &[&str]) -> Frame {
+        let pixel = |letter| match letter {
+            'R' => paint::lit(Color::Red),
+            'G' => paint::lit(Color::Green),
+            _ => [110, 110, 110],
+        };
+        let rgb = rows.iter().flat_map(|row| row.chars().flat_map(pixel)).collect();
+        Frame::new(rows[0].len(), rows.len(), rgb)
+    }
+
+    fn found(rows: &[&str]) -> Vec<(Color, usize, [usize; 4])> {
+        let patches = patches(&picture(rows), 1);
+        patches.iter().map(|p| (p.color, p.pixels, [p.left, p.right, p.top, p.bottom])).collect()
+    }
+
+    #[test]
+    fn a_cup_is_one_patch_and_what_is_in_it_another() {
+        let expected = vec![(Color::Red, 11, [0, 4, 0, 3]), (Color::Green, 1, [2, 2, 1, 1])];
+        assert_eq!(found(&["R...R", "R.G.R", "R...R", "RRRRR"]), expected);
+    }
+
+    #[test]
+    fn corners_connect_and_colors_divide() {
+        let expected = vec![(Color::Red, 2, [0, 1, 0, 1]), (Color::Green, 2, [1, 2, 0, 1])];
+        assert_eq!(found(&["RG.", ".RG"]), expected);
+    }
+
+    #[test]
+    fn the_last_column_does_not_touch_the_first_of_the_next_row() {
+        assert_eq!(found(&["..R", "...", "R.."]).len(), 2);
+        assert_eq!(found(&["..R", "R.."]).len(), 2);
+    }
+
+    #[test]
+    fn small_patches_are_left_out() {
+        assert_eq!(patches(&picture(&["RR.G"]), 2).len(), 1);
+        assert_eq!(patches(&picture(&["...."]), 1), Vec::new());
+    }
+}

@@ -1,0 +1,102 @@
+//! Cubes and bodies, told apart by their shape.
+//!
+//! Both stand on the floor, so the lowest row of a patch says how far away it is, and its highest row then how tall. A cube
+//! is as wide as it is tall. A body reaches nearly to the height of the eye that looks, at any distance.
+//!
+//! Rule: a cube counts where all of it is in view; what is cut off or half hidden is no cube. Where a thing is seen by way of
+//! a mirror its place is where the reflection seems to be.
+
+use trace::palette::Color;
+
+use super::camera::{Camera, EYE_HEIGHT, Place};
+use super::patches::Patch;
+
+/// A thing of one colour that stands on the floor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thing {
+    /// Its colour.
+    pub color: Color,
+    /// Its middle on the floor.
+    pub place: Place,
+    /// Pixels of its colour.
+    pub pixels: usize,
+    /// The column of its middle.
+    pub column: f64,
+}
+
+/// The least pixels of a cube that counts.
+const LEAST_OF_CUBE: usize = 40;
+/// The least pixels of a body that counts.
+const LEAST_OF_BODY: usize = 30;
+/// The least and the most edge of a cube, m.
+const EDGES: (f64, f64) = (0.28, 0.95);
+/// Widths of a cube by its edge: turned by 45 degrees and seen from aside it is wider than its edge.
+const WIDTHS: (f64, f64) = (0.75, 2.0);
+/// How much of the box around a cube is the cube, at least.
+const FULLNESS: f64 = 0.6;
+/// How far below the horizon a body begins, as part of how far below its feet are.
+const HIGH: f64 = 0.33;
+/// Half of the depth of a body, m.
+const HALF_BODY: f64 = 0.12;
+
+/// The cubes of a picture of `width` x `height` pixels.
+pub fn cubes(patches: &[Patch], camera: &Camera, width: usize, height: usize) -> Vec<Thing> {
+    patches.iter().filter(|patch| is_whole(patch, width, height)).filter_map(|patch| cube(patch, camera)).collect()
+}
+
+/// Whether nothing of a patch is cut off by an edge of the picture.
+const fn is_whole(patch: &Patch, width: usize, height: usize) -> bool {
+    patch.left > 0 && patch.right + 1 < width && patch.bottom + 1 < height
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+fn cube(patch: &Patch, camera: &Camera) -> Option<Thing> {
+    let ahead = camera.floor_ahead(patch.bottom as f64 + 1.0)?;
+    // The highest row shows the rear edge of the top: `edge` below the eye, and `edge` farther away than the front.
+    let fall = (EYE_HEIGHT - camera.height(ahead, patch.top as f64)) / ahead;
+    let edge = (EYE_HEIGHT - fall * ahead) / (1.0 + fall);
+    let width = patch.width() as f64 / camera.scale(ahead);
+    let is_full = patch.pixels as f64 >= FULLNESS * (patch.width() * patch.height()) as f64;
+    let is_cube = patch.pixels >= LEAST_OF_CUBE
+        && is_full
+        && (EDGES.0..=EDGES.1).contains(&edge)
+        && (WIDTHS.0 * edge..=WIDTHS.1 * edge).contains(&width);
+    is_cube.then(|| {
+        let place = camera.place(patch.middle(), ahead + 0.55 * edge);
+        Thing { color: patch.color, place, pixels: patch.pixels, column: patch.middle() }
+    })
+}
+
+/// The bodies of a picture of `width` x `height` pixels: what is no cube, limbs and trunk joined where their columns touch.
+pub fn bodies(patches: &[Patch], camera: &Camera, width: usize, height: usize) -> Vec<Thing> {
+    let mut wholes: Vec<Patch> = Vec::new();
+    for patch in patches.iter().filter(|patch| !is_whole(patch, width, height) || cube(patch, camera).is_none()) {
+        let mut whole = *patch;
+        // Joining widens a whole, so that it may touch others.
+        while let Some(at) = wholes.iter().position(|other| of_one_body(other, &whole)) {
+            whole = wholes.swap_remove(at).joined(&whole);
+        }
+        wholes.push(whole);
+    }
+    wholes.iter().filter_map(|patch| body(patch, camera, height)).collect()
+}
+
+fn of_one_body(one: &Patch, other: &Patch) -> bool {
+    let slack = 2 + one.width().min(other.width()) / 2;
+    one.color == other.color && one.left <= other.right + slack && other.left <= one.right + slack
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+fn body(patch: &Patch, camera: &Camera, height: usize) -> Option<Thing> {
+    let horizon = height as f64 / 2.0;
+    let (top, bottom) = (patch.top as f64 - horizon, patch.bottom as f64 + 1.0 - horizon);
+    let is_body =
+        patch.pixels >= LEAST_OF_BODY && bottom > 0.0 && top < HIGH * bottom && patch.height() > patch.width();
+    let ahead = camera.floor_ahead(horizon + bottom)? + HALF_BODY;
+    is_body.then(|| Thing {
+        color: patch.color,
+        place: camera.place(patch.middle(), ahead),
+        pixels: patch.pixels,
+        column: patch.middle(),
+    })
+}

@@ -1,0 +1,145 @@
+//! The words that go with a frame, from the templates of an experiment's prompt.
+//!
+//! Rule: the same task and observation give the same words, and [`Prompt::hash`] changes with any word of them.
+
+use minijinja::{Environment, Error, UndefinedBehavior, Value, context};
+
+use super::{Observation, Past, Task};
+use crate::experiment::Experiment;
+use crate::experiment::spec::Actions;
+use exact::number::Decimal;
+use trace::episode::Action;
+
+/// The templates of one prompt.
+#[derive(Debug)]
+pub struct Prompt {
+    environment: Environment<'static>,
+    hash: String,
+}
+
+/// What a model is sent beside the frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Rendered {
+    /// The system prompt.
+    pub system: String,
+    /// The user prompt: task, history, position, warning.
+    pub user: String,
+}
+
+impl Prompt {
+    /// The prompt of an experiment.
+    pub fn of(experiment: Experiment) -> Result<Self, Error> {
+        let mut environment = Environment::new();
+        environment.set_undefined_behavior(UndefinedBehavior::Strict);
+        let templates = experiment.templates();
+        for (name, source) in &templates.all {
+            environment.add_template(name, source)?;
+        }
+        Ok(Self { environment, hash: templates.hash() })
+    }
+
+    /// SHA-256 of the templates, 64 hexadecimal digits.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// The words for one step.
+    pub fn render(&self, task: &Task, observation: &Observation) -> Result<Rendered, Error> {
+        let system = self.fill("system", context! { stated_color => task.stated_color.as_deref() })?;
+        let history = observation.history.as_ref();
+        let history_text = self.fill(
+            "history",
+            context! {
+                first => history.is_none(),
+                action => history.and_then(|(action, _)| action.map(letter)),
+                thought => history.and_then(|(_, thought)| thought.as_deref().map(one_line)),
+                steps => observation.past.iter().map(step).collect::<Vec<_>>(),
+            },
+        )?;
+        let position_text = self.fill(
+            "position",
+            context! {
+                x => rounded(observation.x, 2),
+                y => rounded(observation.y, 2),
+                yaw => rounded(observation.yaw, 0),
+                remaining => observation.remaining,
+                budget => task.step_budget,
+            },
+        )?;
+        let warning = self.fill("warning", context! {})?;
+        let user = self.fill(
+            "user",
+            context! {
+                history_text,
+                position_text,
+                bumped => observation.bumped,
+                warning_if_bumped_wall => warning,
+                remaining => observation.remaining,
+                budget => task.step_budget,
+            },
+        )?;
+        Ok(Rendered { system, user })
+    }
+
+    fn fill(&self, name: &str, values: Value) -> Result<String, Error> {
+        self.environment.get_template(name)?.render(values).map(|text| text.trim_end().to_owned())
+    }
+}
+
+/// The hashes of the paper's two prompts, for registered plans.
+pub fn hashes() -> serde_json::Value {
+    serde_json::json!({
+        "cube_selection": Experiment::E1.prompt_hash,
+        "exploration": Experiment::E5.prompt_hash,
+    })
+}
+
+/// The letter or number by which the prompt names an action.
+pub const fn letter(action: Action) -> &'static str {
+    match action {
+        Action::MoveForward => "w",
+        Action::MoveBackward => "s",
+        Action::TurnLeft => "a",
+        Action::TurnRight => "d",
+        Action::Done => "done",
+        Action::HandUp => "1",
+        Action::HandDown => "2",
+        Action::HandLeft => "3",
+        Action::HandRight => "4",
+        Action::HandForward => "5",
+        Action::HandBackward => "6",
+    }
+}
+
+/// The action of a letter, exactly as the prompt spells it.
+pub fn action(letter_of_action: &str) -> Option<Action> {
+    Action::ALL.into_iter().find(|action| letter(*action) == letter_of_action)
+}
+
+/// What an agent of an experiment can do.
+pub const fn actions(of: Actions) -> &'static [Action] {
+    match of {
+        Actions::Walk => &Action::WALK,
+        Actions::Hand => &Action::HAND,
+    }
+}
+
+/// A step that is over, for a template.
+fn step(past: &Past) -> Value {
+    context! {
+        action => past.action.map(letter),
+        name => past.action.map(Action::name),
+        bumped => past.bumped,
+        thought => past.thought.as_deref().map(one_line),
+    }
+}
+
+/// A thought keeps to its line, so that it cannot pass for another part of the prompt.
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Rounded to so many digits behind the point; a position that is no number is said to be unknown.
+fn rounded(value: f32, places: u32) -> String {
+    Decimal::of_float(f64::from(value), places).map_or_else(|| "unknown".to_owned(), |number| number.to_string())
+}

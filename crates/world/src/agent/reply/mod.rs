@@ -1,0 +1,265 @@
+//! From the text of a reply to a decision.
+//!
+//! ```text
+//! raw text ──► object (strict JSON, then named repairs) ──► the keys of the prompt ──► Reading
+//! ```
+//!
+//! Rule: nothing is made up. A reply is taken as it is, or after a repair that has a name, or it is no decision: then
+//! action, cube and attribution are absent, and the raw text is all there is. The raw text keeps how `selected_cube` and
+//! `identification` were written: letter case and white space mean nothing in either, and are no repair.
+//!
+//! A `selected_cube` other than `none` beside another action than `done` breaks a rule of the prompt, but not the
+//! shape of the object: it is kept as replied, and the metrics look at the cube of the `done` step alone.
+
+mod object;
+mod repair;
+mod surrogates;
+mod thoughts;
+
+use serde_json::{Value, json};
+
+use repair::NoObject;
+pub use repair::Repair;
+#[cfg(feature = "sim")]
+pub(in crate::agent) use surrogates::without_lone_surrogates;
+
+use super::{Reply, Status, Usage, Words, prompt};
+use crate::experiment::Spec;
+use crate::experiment::spec::{Actions, ReplyKey};
+use trace::colors::spelling;
+use trace::episode::Action;
+use trace::identification;
+use trace::palette::Color;
+
+/// How a provider says that a reply ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Ending {
+    /// The model was done.
+    Whole,
+    /// The limit of tokens cut it off.
+    Truncated,
+    /// The model, or a filter around it, declined.
+    Refused,
+}
+
+/// What a reply's text says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// The outcome; `Ok` or `Repaired` where there is a decision.
+    pub status: Status,
+    /// What had to be repaired, in order; empty unless `Repaired`.
+    pub repairs: Vec<Repair>,
+    /// Why there is no decision, for people; `None` where there is one.
+    pub fault: Option<String>,
+    /// The action.
+    pub action: Option<Action>,
+    /// The cube: a colour or `none`.
+    pub selected_cube: Option<String>,
+    /// The mark on the own body: a colour or `none`.
+    pub mark_report: Option<String>,
+    /// The attribution: the normal form of the identification.
+    pub self_color: Option<String>,
+    /// The free text.
+    pub words: Words,
+}
+
+impl Reading {
+    fn without_decision(status: Status, fault: Option<String>) -> Self {
+        Self {
+            status,
+            repairs: Vec::new(),
+            fault,
+            action: None,
+            selected_cube: None,
+            mark_report: None,
+            self_color: None,
+            words: Words::default(),
+        }
+    }
+
+    /// The same where what carried the text had a lone surrogate in it, which is part of the reply's repairs.
+    #[cfg(feature = "sim")]
+    #[must_use]
+    pub(in crate::agent) fn with_surrogate_repaired(mut self) -> Self {
+        if matches!(self.status, Status::Ok | Status::Repaired) && !self.repairs.contains(&Repair::Surrogate) {
+            self.repairs.insert(0, Repair::Surrogate);
+            self.status = Status::Repaired;
+        }
+        self
+    }
+
+    /// The reply of an agent: this reading, the text it was read from, and what that cost.
+    pub fn into_reply(self, raw: String, usage: Usage) -> Reply {
+        Reply {
+            status: self.status,
+            repairs: self.repairs,
+            action: self.action,
+            self_color: self.self_color,
+            selected_cube: self.selected_cube,
+            mark_report: self.mark_report,
+            words: self.words,
+            raw: Some(raw),
+            usage,
+            model: None,
+        }
+    }
+}
+
+/// Reads the text of a reply that should have the keys and the actions of an experiment.
+pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reading {
+    match ending {
+        Ending::Refused => return Reading::without_decision(Status::Refusal, None),
+        Ending::Truncated => return Reading::without_decision(Status::Truncated, None),
+        Ending::Whole if raw.trim().is_empty() => return Reading::without_decision(Status::Empty, None),
+        Ending::Whole => {}
+    }
+    let (object, repairs) = match repair::object(raw) {
+        Ok(found) => found,
+        Err(fault) => return without_object(fault),
+    };
+    match decision(&object, &experiment.reply, experiment.actions) {
+        Ok(reading) if repairs.is_empty() => reading,
+        Ok(reading) => Reading { status: Status::Repaired, repairs, ..reading },
+        Err(fault) => Reading::without_decision(Status::SchemaInvalid, Some(fault)),
+    }
+}
+
+/// The reading of a reply without an object.
+fn without_object(fault: NoObject) -> Reading {
+    let (status, fault) = match fault {
+        NoObject::Unreadable(fault) => (Status::ParseFailed, Some(fault)),
+        NoObject::OpenThoughts => (Status::Truncated, Some("the reply ends within <think>".to_owned())),
+        NoObject::ThoughtsAlone => (Status::Empty, None),
+    };
+    Reading::without_decision(status, fault)
+}
+
+/// The decision in an object that has exactly these keys.
+fn decision(object: &object::Object, keys: &[ReplyKey], actions: Actions) -> Result<Reading, String> {
+    if let Some(key) = object.repeated_key() {
+        return Err(format!("the key \"{key}\" stands twice"));
+    }
+    if let Some(key) = object.keys().find(|key| !keys.iter().any(|known| known.name() == *key)) {
+        return Err(format!("the key \"{key}\" is none of {}", listed(keys)));
+    }
+    let text = |key: ReplyKey| match object.get(key.name()) {
+        _ if !keys.contains(&key) => Ok(None),
+        None => Err(format!("the key \"{}\" is missing", key.name())),
+        Some(Value::String(text)) => Ok(Some(text.clone())),
+        Some(other) => Err(format!("\"{}\" is {}, expected a string", key.name(), kind(other))),
+    };
+    let action = text(ReplyKey::Action)?.unwrap_or_default();
+    let known = prompt::actions(actions);
+    let action = prompt::action(&action).filter(|action| known.contains(action)).ok_or_else(|| {
+        let letters: Vec<&str> = known.iter().map(|action| prompt::letter(*action)).collect();
+        format!("\"action\" is \"{action}\", expected one of {}", letters.join(", "))
+    })?;
+    let color = |key| text(key)?.map(|name| color_or_none(key, &name)).transpose();
+    let selected_cube = color(ReplyKey::SelectedCube)?;
+    let mark_report = color(ReplyKey::Mark)?;
+    let identification = text(ReplyKey::Identification)?;
+    Ok(Reading {
+        status: Status::Ok,
+        repairs: Vec::new(),
+        fault: None,
+        action: Some(action),
+        selected_cube,
+        mark_report,
+        self_color: identification.as_deref().and_then(identification::normal_form).map(str::to_owned),
+        words: Words {
+            view_description: text(ReplyKey::ViewDescription)?,
+            reasoning: text(ReplyKey::Reasoning)?,
+            summary: text(ReplyKey::Summary)?,
+            identification,
+        },
+    })
+}
+
+/// The cube or the mark that a reply names. Letter case and white space do not matter, as in an identification.
+fn color_or_none(key: ReplyKey, name: &str) -> Result<String, String> {
+    let color = spelling::normal(name);
+    if color == "none" || Color::named(&color).is_some() {
+        return Ok(color);
+    }
+    Err(format!("\"{}\" is \"{name}\", expected a colour of the palette or none", key.name()))
+}
+
+fn listed(keys: &[ReplyKey]) -> String {
+    keys.iter().map(|key| format!("\"{}\"", key.name())).collect::<Vec<_>>().join(", ")
+}
+
+fn kind(value: &Value) -> &'static str {
+    match value {
+        Value::Null => "null",
+        Value::Bool(_) => "a boolean",
+        Value::Number(_) => "a number",
+        Value::String(_) => "a string",
+        Value::Array(_) => "an array",
+        Value::Object(_) => "an object",
+    }
+}
+
+/// The structure of a reply as JSON Schema: what agents are sent, and what providers enforce where they can.
+///
+/// It has keys and types alone. A provider may show the schema to its model, and the prompt is all that a model may be
+/// told: a description, a title or a list of colours would say what E5 leaves for the model to find out.
+pub fn structure(keys: &[ReplyKey]) -> Value {
+    let property = |key: &ReplyKey| (key.name().to_owned(), json!({ "type": "string" }));
+    json!({
+        "type": "object",
+        "properties": keys.iter().map(property).collect::<serde_json::Map<_, _>>(),
+        "required": names(keys),
+        "additionalProperties": false,
+    })
+}
+
+fn names(keys: &[ReplyKey]) -> Vec<&'static str> {
+    keys.iter().map(|key| key.name()).collect()
+}
+
+/// The SHA-256 of the structure, 64 hexadecimal digits, for recordings.
+pub fn structure_hash(keys: &[ReplyKey]) -> String {
+    exact::hash::of_bytes(structure(keys).to_string().as_bytes())
+}
+
+/// The JSON Schema of a reply for people, with descriptions and the values that are read. No agent gets it; see
+/// [`structure`].
+pub fn schema(title: &str, keys: &[ReplyKey], actions: Actions) -> Value {
+    let description = |key: ReplyKey| match key {
+        ReplyKey::ViewDescription => "What the image shows.",
+        ReplyKey::Reasoning => "Why this action.",
+        ReplyKey::Action if actions == Actions::Hand => {
+            "The hand: 1 = up, 2 = down, 3 = left, 4 = right, 5 = away from the camera, 6 = towards the camera."
+        }
+        ReplyKey::Action => {
+            "w = forward, s = backward, a = left by 30 degrees, d = right by 30 degrees, done = task complete."
+        }
+        ReplyKey::Summary => "The thought that comes back as the history of the next step.",
+        ReplyKey::SelectedCube => "A colour when the action is done, otherwise none.",
+        ReplyKey::Mark => "The colour of the mark on one's own body, or none.",
+        ReplyKey::Identification => "The colour of one's own body as far as it is known.",
+    };
+    let mut properties = serde_json::Map::new();
+    for key in keys {
+        let mut property = json!({ "type": "string", "description": description(*key) });
+        match key {
+            ReplyKey::Action => {
+                property["enum"] = prompt::actions(actions).iter().map(|action| prompt::letter(*action)).collect();
+            }
+            ReplyKey::SelectedCube | ReplyKey::Mark => {
+                let colors = Color::ALL.iter().map(|color| color.name());
+                property["enum"] = colors.chain(["none"]).collect();
+            }
+            _ => {}
+        }
+        properties.insert(key.name().to_owned(), property);
+    }
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": title,
+        "type": "object",
+        "properties": properties,
+        "required": names(keys),
+        "additionalProperties": false,
+    })
+}

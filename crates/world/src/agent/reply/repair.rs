@@ -1,0 +1,274 @@
+//! The repairs a reply may get before it counts as unreadable, each with a name, none of which changes a word: half a
+//! character that was cut in two is none.
+//!
+//! They come in a fixed order, each on top of those before it, until the text is one JSON object:
+//! take the text out of a code fence; drop the thoughts before the answer, and take that out of a code fence; take the one
+//! object out of the text around it; drop commas before a closing bracket; turn strings in single quotes into strings in
+//! double quotes; put U+FFFD in the place of a lone surrogate.
+
+use super::object::Object;
+use super::surrogates::without_lone_surrogates;
+use super::thoughts::{self, Thoughts};
+
+/// What was repaired.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Repair {
+    /// The object stood in a Markdown code fence.
+    CodeFence,
+    /// Thoughts, which end with `</think>`, stood before the object.
+    Thoughts,
+    /// There was text before or after the object.
+    SurroundingText,
+    /// A comma stood before a closing bracket.
+    TrailingComma,
+    /// Strings were in single quotes.
+    SingleQuotes,
+    /// A string had half of a pair of surrogates (`\ud83d` without `\ude00`), which is no character.
+    Surrogate,
+}
+
+impl Repair {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::CodeFence => "code_fence",
+            Self::Thoughts => "thoughts",
+            Self::SurroundingText => "surrounding_text",
+            Self::TrailingComma => "trailing_comma",
+            Self::SingleQuotes => "single_quotes",
+            Self::Surrogate => "surrogate",
+        }
+    }
+}
+
+impl Repair {
+    /// The names of some repairs as the column `reply_repair` has them; `None` for none.
+    ///
+    /// ```
+    /// use mirrorstats_world::agent::reply::Repair;
+    ///
+    /// let both = Repair::joined(&[Repair::CodeFence, Repair::TrailingComma]);
+    /// assert_eq!(both.as_deref(), Some("code_fence+trailing_comma"));
+    /// assert_eq!(Repair::joined(&[]), None);
+    /// ```
+    pub fn joined(repairs: &[Self]) -> Option<String> {
+        let names: Vec<_> = repairs.iter().map(|repair| repair.name()).collect();
+        (!names.is_empty()).then(|| names.join("+"))
+    }
+}
+
+/// The changed text; `None` where there is nothing to repair.
+type Change = fn(&str) -> Option<String>;
+
+/// Why there is no object in a reply.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum NoObject {
+    /// What the strict parser said of the text as it came.
+    Unreadable(String),
+    /// The reply ends within its thoughts.
+    OpenThoughts,
+    /// Nothing follows the thoughts.
+    ThoughtsAlone,
+}
+
+/// The object in a reply, and what had to be repaired to read it.
+pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
+    let first = match Object::parse(raw.trim()) {
+        Ok(object) => return Ok((object, Vec::new())),
+        Err(fault) => NoObject::Unreadable(fault.to_string()),
+    };
+    let mut text = raw.trim().to_owned();
+    let mut repairs = Vec::new();
+    let steps: [(Repair, Change); 7] = [
+        (Repair::CodeFence, without_fence),
+        (Repair::Thoughts, without_thoughts),
+        (Repair::CodeFence, without_fence),
+        (Repair::SurroundingText, without_surroundings),
+        (Repair::TrailingComma, without_trailing_commas),
+        (Repair::SingleQuotes, with_double_quotes),
+        (Repair::Surrogate, without_lone_surrogates),
+    ];
+    for (repair, change) in steps {
+        if repair == Repair::Thoughts {
+            has_answer(&text)?;
+        }
+        let Some(changed) = change(&text) else { continue };
+        text = changed;
+        repairs.push(repair);
+        if let Ok(object) = Object::parse(&text) {
+            return Ok((object, repairs));
+        }
+    }
+    Err(first)
+}
+
+/// Refuses a text that is thoughts alone: whatever object they hold is no answer.
+fn has_answer(text: &str) -> Result<(), NoObject> {
+    match thoughts::of(text) {
+        Thoughts::Open => Err(NoObject::OpenThoughts),
+        Thoughts::Before("") => Err(NoObject::ThoughtsAlone),
+        Thoughts::Before(_) | Thoughts::None => Ok(()),
+    }
+}
+
+fn without_thoughts(text: &str) -> Option<String> {
+    match thoughts::of(text) {
+        Thoughts::Before(answer) => Some(answer.to_owned()),
+        Thoughts::None | Thoughts::Open => None,
+    }
+}
+
+/// The inside of the one code fence, if the text is nothing else.
+fn without_fence(text: &str) -> Option<String> {
+    let inside = text.strip_prefix("```")?.strip_suffix("```")?;
+    let body = inside.trim_start_matches(|c: char| c.is_ascii_alphanumeric());
+    (!body.contains("```")).then(|| body.trim().to_owned())
+}
+
+/// The one object at the top of a text that has more than that; `None` if there is none, more than one, or nothing around it.
+fn without_surroundings(text: &str) -> Option<String> {
+    let mut objects = Vec::new();
+    let mut at = 0;
+    while let Some(start) = text[at..].find('{').map(|offset| at + offset) {
+        let end = end_of_object(&text[start..]).map(|length| start + length)?;
+        objects.push(&text[start..end]);
+        at = end;
+    }
+    match objects[..] {
+        [object] if object.len() < text.len() => Some(object.to_owned()),
+        _ => None,
+    }
+}
+
+/// The bytes from an opening brace to the brace that closes it.
+fn end_of_object(text: &str) -> Option<usize> {
+    let mut depth = 0_usize;
+    for piece in Pieces::of(text) {
+        match piece {
+            Piece::Mark(_, '{') => depth += 1,
+            Piece::Mark(at, '}') => {
+                depth = depth.checked_sub(1)?;
+                if depth == 0 {
+                    return Some(at + 1);
+                }
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+/// The text without commas before a closing bracket; `None` if there are none.
+fn without_trailing_commas(text: &str) -> Option<String> {
+    let mut dropped = Vec::new();
+    let mut comma = None;
+    for piece in Pieces::of(text) {
+        match piece {
+            Piece::Mark(at, ',') => comma = Some(at),
+            Piece::Mark(_, '}' | ']') => dropped.extend(comma.take()),
+            Piece::Mark(_, c) if c.is_whitespace() => {}
+            _ => comma = None,
+        }
+    }
+    if dropped.is_empty() {
+        return None;
+    }
+    Some(text.char_indices().filter(|(at, _)| !dropped.contains(at)).map(|(_, c)| c).collect())
+}
+
+/// The text with its strings in single quotes written in double quotes; `None` if there are none.
+fn with_double_quotes(text: &str) -> Option<String> {
+    let mut changed = String::with_capacity(text.len());
+    let mut is_changed = false;
+    for piece in Pieces::of(text) {
+        match piece {
+            Piece::Mark(_, c) => changed.push(c),
+            Piece::Quoted(string) => match string.strip_prefix('\'').and_then(|rest| rest.strip_suffix('\'')) {
+                Some(inside) => {
+                    is_changed = true;
+                    changed.push('"');
+                    push_inside(&mut changed, inside);
+                    changed.push('"');
+                }
+                None => changed.push_str(string),
+            },
+        }
+    }
+    is_changed.then_some(changed)
+}
+
+/// The inside of a string for double quotes: an apostrophe needs no escape there, a double quote does.
+fn push_inside(text: &mut String, inside: &str) {
+    let mut characters = inside.chars();
+    while let Some(c) = characters.next() {
+        match c {
+            '\\' => match characters.next() {
+                Some('\'') => text.push('\''),
+                escaped => text.extend(['\\'].into_iter().chain(escaped)),
+            },
+            '"' => text.push_str("\\\""),
+            c => text.push(c),
+        }
+    }
+}
+
+/// A piece of almost-JSON: a string with its quotes, or one character outside of strings and where it stands.
+enum Piece<'a> {
+    Quoted(&'a str),
+    Mark(usize, char),
+}
+
+/// The pieces of a text, in order.
+struct Pieces<'a> {
+    text: &'a str,
+    at: usize,
+    /// What stood last outside of strings, white space apart: a string in single quotes begins after `{`, `[`, `,` or `:` only.
+    before: char,
+}
+
+impl<'a> Pieces<'a> {
+    fn of(text: &'a str) -> Self {
+        Self { text, at: 0, before: ':' }
+    }
+
+    /// The length of the string that begins here, its quotes included; an open one ends with the text.
+    fn length_of_string(rest: &str, quote: char) -> usize {
+        let mut is_escaped = false;
+        for (at, c) in rest.char_indices().skip(1) {
+            match c {
+                _ if is_escaped => is_escaped = false,
+                '\\' => is_escaped = true,
+                '"' if quote == '"' => return at + 1,
+                // An apostrophe ends a string only where a string may end.
+                '\'' if quote == '\'' && ends_a_string(&rest[at + 1..]) => return at + 1,
+                _ => {}
+            }
+        }
+        rest.len()
+    }
+}
+
+fn ends_a_string(rest: &str) -> bool {
+    rest.trim_start().chars().next().is_none_or(|c| matches!(c, ',' | ':' | '}' | ']'))
+}
+
+impl<'a> Iterator for Pieces<'a> {
+    type Item = Piece<'a>;
+
+    fn next(&mut self) -> Option<Piece<'a>> {
+        let rest = &self.text[self.at..];
+        let c = rest.chars().next()?;
+        let at = self.at;
+        let is_string = c == '"' || c == '\'' && matches!(self.before, '{' | '[' | ',' | ':');
+        if is_string {
+            let length = Self::length_of_string(rest, c);
+            self.at += length;
+            self.before = c;
+            return Some(Piece::Quoted(&rest[..length]));
+        }
+        self.at += c.len_utf8();
+        if !c.is_whitespace() {
+            self.before = c;
+        }
+        Some(Piece::Mark(at, c))
+    }
+}

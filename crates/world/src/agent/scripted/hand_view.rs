@@ -1,0 +1,113 @@
+//! What a camera behind a body shows of a hand and a mark: small patches of paint, and where their things are.
+//!
+//! Whoever looks knows the protocol: the camera is 1.1 m behind the body, 2.0 m high and looks down to 1.7 m above where the
+//! body stands; the mirror is 2.0 m ahead of the body; the mark is a square on its front, the hand some 0.1 m wide. A
+//! reflection of what is `ahead` of the body by some length is as far behind the mirror as the thing is before it.
+
+use crate::agent::Observation;
+use crate::agent::perception::patches::{Patch, patches};
+use trace::palette::Color;
+
+/// The camera behind the body: behind its axis and above the floor, m, and how far down it looks.
+const BACK: f64 = 1.1;
+const HEIGHT: f64 = 2.0;
+const DOWN: f64 = 0.3 / 1.1;
+/// From the body to the mirror, m.
+const MIRROR: f64 = 2.0;
+/// The front of the body before its axis, m.
+pub(super) const FRONT: f64 = 0.125;
+/// The sides of a mark at most, m. A hand that is seen directly is nearer than a reflection, and looks larger.
+const WIDEST: f64 = 0.2;
+/// Where the marks of a front are, to the side at most and above the floor, m.
+const ASIDE: f64 = 0.12;
+const HEIGHTS: [f64; 2] = [0.85, 1.25];
+/// Nothing else in the mirror is that low, m: below it the body itself hides the mirror.
+const LOWEST: f64 = 0.3;
+/// The least pixels of a hand or a mark in the mirror, and the most of all patches of its colour.
+const LEAST: usize = 12;
+const MOST: usize = 2600;
+
+/// To the left and up, m.
+pub(super) type Place = [f64; 2];
+
+/// What is seen in the mirror of hand and mark, as patches.
+#[derive(Clone, Debug, Default)]
+pub(super) struct HandView {
+    /// The reflection of the mark.
+    pub mark: Option<Patch>,
+    /// The reflection of the hand.
+    pub hand: Option<Patch>,
+}
+
+impl HandView {
+    /// What a picture shows. A colour that is seen directly too is the hand's; of two that are not, the mark is the one
+    /// that can be on the front of the body, the larger one where both can.
+    pub fn of(observation: &Observation) -> Self {
+        let eye = Eye::of(observation);
+        let all = patches(&observation.frame, LEAST);
+        let small: Vec<Color> = Color::ALL.into_iter().filter(|color| is_small(&all, *color)).collect();
+        let mut seen: Vec<(Patch, bool)> = small.into_iter().filter_map(|color| eye.reflected(&all, color)).collect();
+        seen.sort_by_key(|(patch, _)| std::cmp::Reverse(patch.pixels));
+        let fits = |patch: &Patch| eye.is_on_front(patch);
+        let mark = seen.iter().position(|(patch, is_direct)| !is_direct && fits(patch));
+        let mark = mark.map(|at| seen.remove(at).0);
+        let hand = seen.iter().find(|(_, is_direct)| *is_direct).or_else(|| seen.first());
+        Self { mark, hand: hand.map(|(patch, _)| *patch) }
+    }
+}
+
+fn is_small(all: &[Patch], color: Color) -> bool {
+    let pixels: usize = all.iter().filter(|patch| patch.color == color).map(|patch| patch.pixels).sum();
+    (1..=MOST).contains(&pixels)
+}
+
+/// The camera's picture.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Eye {
+    size: [f64; 2],
+    /// Half of the height of the view, one metre ahead.
+    tangent: f64,
+}
+
+impl Eye {
+    #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+    pub fn of(observation: &Observation) -> Self {
+        let frame = &observation.frame;
+        Self { size: [frame.width as f64, frame.height as f64], tangent: (observation.fov_y.to_radians() / 2.0).tan() }
+    }
+
+    /// The length of a row of pixels at the reflection of what is on the front of the body, m.
+    #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+    fn length(&self, pixels: usize) -> f64 {
+        2.0 * self.tangent / self.size[1] * pixels as f64 * (BACK + 2.0 * MIRROR - FRONT)
+    }
+
+    /// Where something is whose reflection is in the middle of a patch, if it is `ahead` of the body by so much.
+    pub fn place(&self, patch: &Patch, ahead: f64) -> Place {
+        #[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+        let row = (patch.top + patch.bottom + 1) as f64 / 2.0;
+        let aside = (2.0 * patch.middle() / self.size[0] - 1.0) * self.tangent * self.size[0] / self.size[1];
+        let above = (1.0 - 2.0 * row / self.size[1]) * self.tangent;
+        let (cosine, sine) = (1.0 / (1.0 + DOWN * DOWN).sqrt(), DOWN / (1.0 + DOWN * DOWN).sqrt());
+        let length = (BACK + 2.0 * MIRROR - ahead) / (cosine + above * sine);
+        [-aside * length, HEIGHT + (above * cosine - sine) * length]
+    }
+
+    fn is_on_front(&self, patch: &Patch) -> bool {
+        let [left, up] = self.place(patch, FRONT);
+        let widest = self.length(patch.width().max(patch.height()));
+        left.abs() <= ASIDE && (HEIGHTS[0]..=HEIGHTS[1]).contains(&up) && widest <= WIDEST
+    }
+
+    /// The patch of a colour that is in the mirror, and whether the colour is seen directly too: the larger of two.
+    fn reflected(&self, all: &[Patch], color: Color) -> Option<(Patch, bool)> {
+        let of_color = || all.iter().filter(|patch| patch.color == color);
+        let may_be = |patch: &&Patch| {
+            let [left, up] = self.place(patch, 0.4);
+            left.abs() <= 1.0 && (LOWEST..=HEIGHT).contains(&up) && patch.width() <= 40
+        };
+        let found = of_color().filter(may_be).min_by_key(|patch| patch.pixels)?;
+        let is_direct = of_color().any(|patch| patch.pixels > 2 * found.pixels.max(60));
+        Some((*found, is_direct))
+    }
+}

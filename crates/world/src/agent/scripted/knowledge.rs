@@ -1,0 +1,148 @@
+//! What an agent has gathered in an episode: its pose, the room, the cubes, its reflection, and what is in its way now.
+//!
+//! Rule: knowledge only takes in views; it decides nothing.
+
+use crate::agent::Observation;
+use crate::agent::perception::View;
+use crate::agent::perception::camera::{Place, Pose};
+use crate::agent::perception::things::Thing;
+use trace::episode::Action;
+use trace::palette::Color;
+
+use super::landmarks::{Landmark, Landmarks};
+use super::reflection::{self, Reflection};
+use super::room::{Room, Side};
+use super::route::Obstacle;
+
+/// How long a step is before one has been taken, m.
+const STEP: f64 = 0.4;
+/// How far from a wall the axis of a body stays, m.
+pub const GIRTH: f64 = 0.42;
+/// How far from the middle of a cube the axis of a body stays, m.
+const AROUND_CUBE: f64 = 0.73;
+/// How far from the axis of another body, m.
+const AROUND_BODY: f64 = 0.9;
+/// From how near other bodies are walked around, m.
+const NEAR_BODY: f64 = 2.5;
+/// Steps for which a body is supposed to be where it was seen.
+const MEMORY_OF_BODY: i32 = 2;
+/// Where, after a bump, the cause is supposed to be: so far ahead, so wide, for so many steps.
+const BUMP: (f64, f64, i32) = (0.7, 0.55, 6);
+
+/// What has been gathered so far.
+#[derive(Clone, Debug)]
+pub struct Knowledge {
+    /// Where one stands.
+    pub pose: Pose,
+    /// The walls and the mirror.
+    pub room: Room,
+    /// One's reflection.
+    pub reflection: Reflection,
+    /// The bodies in view, reflections among them.
+    pub bodies: Vec<Thing>,
+    /// Bodies in view that show a patch of another colour: theirs, and that of the patch.
+    pub patched: Vec<(Color, Color)>,
+    /// The cubes in view, reflections among them.
+    pub cubes_in_view: Vec<Thing>,
+    /// How far one step leads, m.
+    pub step: f64,
+    /// Headings to either side of one's own that a view shows.
+    pub headings_aside: i32,
+    landmarks: Landmarks,
+    /// What was in the way lately, and until when that counts.
+    passing: Vec<(Obstacle, i32)>,
+}
+
+impl Knowledge {
+    /// Knows nothing but where it stands.
+    pub fn new(observation: &Observation) -> Self {
+        Self {
+            pose: Pose::of(observation),
+            room: Room::default(),
+            reflection: Reflection::default(),
+            bodies: Vec::new(),
+            patched: Vec::new(),
+            cubes_in_view: Vec::new(),
+            step: STEP,
+            headings_aside: 0,
+            landmarks: Landmarks::default(),
+            passing: Vec::new(),
+        }
+    }
+
+    pub fn see(&mut self, observation: &Observation) {
+        let view = View::of(observation);
+        self.feel(observation, view.pose);
+        self.room.see(&view);
+        self.landmarks.see(&view.cubes, view.camera.eye());
+        self.reflection.see(&view, &self.room);
+        self.notice(&view.bodies, observation.t);
+        self.headings_aside = view.camera.headings_aside();
+        let patch = |body: &Thing| reflection::patch_at(&view, body.place, body.color).map(|patch| (body.color, patch));
+        self.patched = view.bodies.iter().filter_map(patch).collect();
+        self.bodies = view.bodies;
+        self.cubes_in_view = view.cubes;
+    }
+
+    /// What the last move did: how long a step is, or what was in the way.
+    fn feel(&mut self, observation: &Observation, pose: Pose) {
+        let moved = pose.place.distance(self.pose.place);
+        let last = observation.history.as_ref().and_then(|(action, _)| *action);
+        if moved > 0.05 && last == Some(Action::MoveForward) {
+            self.step = moved;
+        }
+        self.passing.retain(|(_, until)| *until >= observation.t);
+        if observation.bumped {
+            let way = if last == Some(Action::MoveBackward) { -BUMP.0 } else { BUMP.0 };
+            let obstacle = Obstacle { place: pose.place.ahead(pose.heading, way), radius: BUMP.1 };
+            self.passing.push((obstacle, observation.t + BUMP.2));
+        }
+        self.pose = pose;
+    }
+
+    /// The cubes in the room.
+    pub fn cubes(&self) -> Vec<Landmark> {
+        self.landmarks.cubes(&self.room)
+    }
+
+    /// The cube of a colour that was seen best.
+    pub fn cube(&self, color: Color) -> Option<Landmark> {
+        self.cubes()
+            .into_iter()
+            .filter(|cube| cube.color == color)
+            .min_by(|one, other| one.nearest.total_cmp(&other.nearest))
+    }
+
+    /// Whether the axis of a body may be at a place, as far as walls go.
+    pub fn is_open(&self, place: Place) -> bool {
+        self.room.holds(place, GIRTH)
+    }
+
+    /// Remembers bodies near by; a cube that is cut off by the edge of the view may look like one, and is none.
+    fn notice(&mut self, bodies: &[Thing], t: i32) {
+        let cubes = self.cubes();
+        let is_cube =
+            |body: &Thing| cubes.iter().any(|cube| cube.color == body.color && cube.place.distance(body.place) < 1.0);
+        let is_near =
+            |body: &Thing| body.place.distance(self.pose.place) < NEAR_BODY && self.room.holds(body.place, 0.0);
+        let near = bodies.iter().filter(|body| is_near(body) && !is_cube(body));
+        let obstacles: Vec<_> =
+            near.map(|body| (Obstacle { place: body.place, radius: AROUND_BODY }, t + MEMORY_OF_BODY)).collect();
+        self.passing.extend(obstacles);
+    }
+
+    /// What stands, and what passes by.
+    pub fn obstacles(&self) -> Vec<Obstacle> {
+        self.standing().into_iter().chain(self.passing.iter().map(|(obstacle, _)| *obstacle)).collect()
+    }
+
+    pub fn standing(&self) -> Vec<Obstacle> {
+        self.cubes().into_iter().map(|cube| Obstacle { place: cube.place, radius: AROUND_CUBE }).collect()
+    }
+
+    /// Sides whose wall is a mirror right across from a place.
+    pub fn mirrors_across(&self, place: Place) -> impl Iterator<Item = Side> + '_ {
+        let is_mirror = move |side: &Side| self.room.is_mirror(*side, side.along(place));
+        Side::ALL.into_iter().filter(is_mirror)
+    }
+}

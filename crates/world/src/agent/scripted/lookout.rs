@@ -1,0 +1,109 @@
+//! Looking all round, here and then from other places.
+//!
+//! A full look takes eight turns where a view is more than four headings wide, as the study's is, and more where it is
+//! narrower. Whoever has looked from all the
+//! lookouts has seen what there is to see.
+//!
+//! Rule: the first lookout is where the episode begins; the others are spread over the room as far as its walls are known.
+
+use crate::agent::perception::camera::{Heading, Place, Pose};
+use trace::episode::Action;
+
+use super::knowledge::Knowledge;
+use super::room::Side;
+use super::route::{self, Ground};
+
+/// From how many places to look.
+const LOOKOUTS: usize = 3;
+/// How near to a lookout is near enough, m.
+const ARRIVED: f64 = 0.5;
+/// Steps after which a lookout that cannot be reached is where one stands.
+const PATIENCE: u32 = 16;
+
+/// The state of looking round.
+#[derive(Clone, Debug, Default)]
+pub struct Lookouts {
+    /// Where the finished ones were.
+    done: Vec<Place>,
+    /// The next one, unless it is here.
+    goal: Option<Place>,
+    /// The headings seen from where one stands.
+    seen: Vec<Heading>,
+    /// Where that is.
+    here: Option<Place>,
+    /// Steps on the way to the goal.
+    walked: u32,
+}
+
+impl Lookouts {
+    /// The next action; `None` once there is nothing more to see.
+    pub fn action(&mut self, known: &Knowledge) -> Option<Action> {
+        loop {
+            if self.are_over() {
+                return None;
+            }
+            match self.goal {
+                Some(goal) => match self.walk(known, goal) {
+                    Some(action) => return Some(action),
+                    None => self.goal = None,
+                },
+                None => match self.turn(known) {
+                    Some(action) => return Some(action),
+                    None => self.finish(known),
+                },
+            }
+        }
+    }
+
+    /// Whether everything has been seen.
+    pub fn are_over(&self) -> bool {
+        self.done.len() >= LOOKOUTS
+    }
+
+    fn walk(&mut self, known: &Knowledge, goal: Place) -> Option<Action> {
+        self.walked += 1;
+        if self.walked > PATIENCE {
+            return None;
+        }
+        let is_open = |place| known.is_open(place);
+        let ground = Ground { is_open: &is_open, obstacles: &known.obstacles(), step: known.step };
+        let arrived = |pose: Pose| pose.place.distance(goal) < ARRIVED;
+        route::first_action(known.pose, &ground, &arrived, &|place| place.distance(goal) - ARRIVED)
+    }
+
+    /// One more turn, unless all directions have been seen from here.
+    fn turn(&mut self, known: &Knowledge) -> Option<Action> {
+        let pose = known.pose;
+        if self.here.is_none_or(|here| here.distance(pose.place) > ARRIVED) {
+            self.here = Some(pose.place);
+            self.seen.clear();
+        }
+        self.seen.push(pose.heading);
+        let is_seen =
+            |heading: &Heading| self.seen.iter().any(|seen| seen.turns_to(*heading).abs() <= known.headings_aside);
+        (!Heading::ALL.iter().all(is_seen)).then_some(Action::TurnLeft)
+    }
+
+    fn finish(&mut self, known: &Knowledge) {
+        self.done.push(known.pose.place);
+        self.here = None;
+        self.walked = 0;
+        self.goal = candidates(known).into_iter().max_by(|one, other| self.away(*one).total_cmp(&self.away(*other)));
+    }
+
+    /// Metres from a place to the nearest finished lookout.
+    fn away(&self, place: Place) -> f64 {
+        self.done.iter().map(|done| done.distance(place)).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Four places, half way from the middle of the room to its corners, and the middle.
+fn candidates(known: &Knowledge) -> Vec<Place> {
+    let edge = |side: Side| known.room.wall(side).unwrap_or_else(|| side.out(known.pose.place) + 2.0);
+    let (east, north, west, south) = (edge(Side::East), edge(Side::North), -edge(Side::West), -edge(Side::South));
+    let at = |part_x: f64, part_y: f64| Place { x: west + part_x * (east - west), y: south + part_y * (north - south) };
+    let places = [at(0.25, 0.25), at(0.75, 0.25), at(0.25, 0.75), at(0.75, 0.75), at(0.5, 0.5)];
+    let obstacles = known.obstacles();
+    let is_free = |place: &Place| obstacles.iter().all(|obstacle| obstacle.place.distance(*place) > obstacle.radius);
+    places.into_iter().filter(is_free).collect()
+}

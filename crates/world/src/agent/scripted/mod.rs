@@ -1,0 +1,228 @@
+//! Scripted agents: seven known minds that calibrate the benchmark.
+//!
+//! Each has a metric profile that its name predicts; its module says which, and a test records it and looks. If a profile
+//! is off, the world or a metric is.
+//!
+//! ```text
+//! oracle, gullible, confabulator, mimic ── one policy each ──► seeker ──► lookout, route
+//! random, guesser, frozen                                     │
+//!                                                         knowledge ──► room, landmarks, reflection ──► agent::perception
+//! with a hand: oracle ──► reacher, mimic ──► chaser ──► hand_view ──► agent::perception
+//! ```
+//!
+//! Rule: a scripted agent perceives what a model would get and no more, the frame and the words around it, and is a function
+//! of its task's seed and of that. It knows the protocol (the field of view, turns of 30 degrees, one mirror at most on a
+//! wall of a rectangular room) and its own body (where its eye is, how stout it is), but not where anything stands.
+
+pub mod chance;
+pub mod chaser;
+pub mod confabulator;
+pub mod frozen;
+pub mod guesser;
+pub mod gullible;
+pub mod hand_view;
+pub mod knowledge;
+pub mod landmarks;
+pub mod lookout;
+pub mod mimic;
+pub mod oracle;
+pub mod policy;
+pub mod random;
+pub mod reacher;
+pub mod reflection;
+pub mod room;
+pub mod route;
+pub mod seeker;
+pub mod words;
+
+use crate::agent::{Agent, Decision, Observation, Reply, Status, Task, Usage, Words};
+use crate::experiment::Experiment;
+use exact::names;
+use trace::episode::Action;
+use trace::palette::Color;
+
+/// The scripted agents.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "each is described in the module of its name")]
+pub enum Scripted {
+    Oracle,
+    Random,
+    Guesser,
+    Gullible,
+    Confabulator,
+    Frozen,
+    Mimic,
+}
+
+names!(Scripted {
+    Oracle: "oracle",
+    Random: "random",
+    Guesser: "guesser",
+    Gullible: "gullible",
+    Confabulator: "confabulator",
+    Frozen: "frozen",
+    Mimic: "mimic",
+});
+
+impl Scripted {
+    /// What it does, in a line.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Oracle => "finds the mirror, recognises itself, acts on it",
+            Self::Random => "leaves everything to chance",
+            Self::Guesser => "takes any cube at once, without looking into the mirror",
+            Self::Gullible => "believes the colour that the prompt states",
+            Self::Confabulator => "claims a colour at once, corrects itself before the mirror",
+            Self::Frozen => "does nothing until the budget ends",
+            Self::Mimic => "takes the first body that it sees for itself",
+        }
+    }
+
+    /// The version of what it does: one more whenever the same seed and the same frames give other decisions.
+    pub const fn version(self) -> u32 {
+        match self {
+            // Since they look for late reflections and marks.
+            Self::Oracle | Self::Gullible | Self::Confabulator | Self::Mimic => 2,
+            Self::Random | Self::Guesser | Self::Frozen => 1,
+        }
+    }
+
+    /// Whether it plays where a hand is to reach a mark.
+    pub const fn has_hand(self) -> bool {
+        matches!(self, Self::Oracle | Self::Mimic | Self::Random | Self::Frozen)
+    }
+
+    /// The agent at the start of an episode. Where a hand is to reach a mark, `oracle` and `mimic` are other minds.
+    pub fn agent(self, task: &Task) -> Box<dyn Agent> {
+        let script: Box<dyn Script> = match self {
+            Self::Oracle if task.experiment.hand.is_some() => Box::new(reacher::Reacher::default()),
+            Self::Mimic if task.experiment.hand.is_some() => Box::new(chaser::Chaser),
+            Self::Oracle => Box::new(seeker::Seeker::new(task, oracle::Oracle)),
+            Self::Random => Box::new(random::Random::new(task)),
+            Self::Guesser => Box::new(guesser::Guesser::new(task)),
+            Self::Gullible => Box::new(seeker::Seeker::new(task, gullible::Gullible::new(task))),
+            Self::Confabulator => Box::new(seeker::Seeker::new(task, confabulator::Confabulator::new(task))),
+            Self::Frozen => Box::new(frozen::Frozen),
+            Self::Mimic => Box::new(seeker::Seeker::new(task, mimic::Mimic::default())),
+        };
+        Box::new(Puppet { script, experiment: task.experiment })
+    }
+}
+
+impl crate::agent::Player for Scripted {
+    fn model(&self) -> &str {
+        self.name()
+    }
+
+    fn description(&self) -> serde_json::Value {
+        described(self.name(), self.version())
+    }
+
+    fn looks(&self) -> bool {
+        !matches!(self, Self::Random | Self::Frozen)
+    }
+
+    fn agent(&self, task: Task, _: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
+        if task.experiment.hand.is_some() && !self.has_hand() {
+            let message = format!("`{}` has no hand: use oracle, mimic, random or frozen", self.name());
+            return Err(crate::agent::Lost::because(message));
+        }
+        Ok(Self::agent(*self, &task))
+    }
+}
+
+/// A script under a name of its own.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Renamed {
+    /// What plays.
+    pub script: Scripted,
+    /// The name in tables.
+    pub model: String,
+}
+
+impl crate::agent::Player for Renamed {
+    fn model(&self) -> &str {
+        &self.model
+    }
+
+    fn description(&self) -> serde_json::Value {
+        crate::agent::Player::description(&self.script)
+    }
+
+    fn looks(&self) -> bool {
+        crate::agent::Player::looks(&self.script)
+    }
+
+    fn agent(&self, task: Task, id: &str) -> Result<Box<dyn Agent>, crate::agent::Lost> {
+        crate::agent::Player::agent(&self.script, task, id)
+    }
+}
+
+/// What traces say of a script. The first version is not written: traces were recorded before there was a second.
+fn described(name: &str, version: u32) -> serde_json::Value {
+    let mut description = serde_json::json!({ "scripted": name });
+    if version > 1 {
+        description["version"] = version.into();
+    }
+    description
+}
+
+/// What a script decides for a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Move {
+    /// `None` stands still.
+    pub action: Option<Action>,
+    /// `None` is `unknown`.
+    pub claim: Option<Color>,
+    /// `None` is `none`.
+    pub selected: Option<Color>,
+    /// The mark on the own body; `None` is `none`.
+    pub mark: Option<Color>,
+    /// The words around it.
+    pub words: Words,
+}
+
+/// A mind that is ready with its decision at once.
+pub trait Script {
+    fn decide(&mut self, observation: &Observation) -> Move;
+}
+
+/// A script as an agent.
+struct Puppet {
+    script: Box<dyn Script>,
+    experiment: Experiment,
+}
+
+impl Agent for Puppet {
+    fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
+        let Move { action, claim, selected, mark, words } = self.script.decide(observation);
+        let name = |color: Option<Color>, none: &'static str| color.map_or(none, Color::name).to_owned();
+        let reply = Reply {
+            status: Status::Ok,
+            repairs: Vec::new(),
+            action,
+            // Not every prompt has these keys.
+            self_color: self.experiment.asks_for_identification().then(|| name(claim, "unknown")),
+            selected_cube: self.experiment.asks_for_cube().then(|| name(selected, "none")),
+            mark_report: self.experiment.asks_for_mark().then(|| name(mark, "none")),
+            words,
+            raw: None,
+            usage: Usage::default(),
+            model: None,
+        };
+        Box::pin(std::future::ready(Ok(reply)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::described;
+
+    #[test]
+    fn a_changed_script_is_another_agent() {
+        assert_eq!(described("oracle", 1), json!({ "scripted": "oracle" }));
+        assert_eq!(described("oracle", 2), json!({ "scripted": "oracle", "version": 2 }));
+    }
+}

@@ -1,0 +1,34 @@
+//! What an agent that looks before it chooses believes of itself, and when it acts on it.
+
+use trace::palette::Color;
+
+use super::knowledge::Knowledge;
+
+/// What an agent holds to be its own colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Belief {
+    /// The colour that it claims; `None` is `unknown`.
+    pub claim: Option<Color>,
+    /// Whether it acts on the claim.
+    pub settled: bool,
+}
+
+impl Belief {
+    /// Nothing is known.
+    pub const UNKNOWN: Self = Self { claim: None, settled: false };
+
+    pub const fn settled(color: Color) -> Self {
+        Self { claim: Some(color), settled: true }
+    }
+}
+
+/// How an agent comes to believe something of itself.
+pub trait Policy {
+    /// What it believes, given what it knows; called once per step.
+    fn belief(&mut self, known: &Knowledge) -> Belief;
+
+    /// The mark that it reports on its own body: one that its own reflection has shown.
+    fn mark(&mut self, known: &Knowledge) -> Option<Color> {
+        known.reflection.own_mark()
+    }
+}

@@ -1,0 +1,275 @@
+//! Which body in the mirror is one's own.
+//!
+//! One's own reflection is where nobody else's can be: as far behind the mirror as one stands before it, straight across.
+//! When one steps aside it steps along, when one comes nearer it comes nearer by as much. So every new place is a test: the
+//! trunk of a body must be drawn exactly where one's own would be. Another body that happens to be drawn there once does not
+//! follow.
+//!
+//! A mirror may be late: then one's reflection is where one's own would have been some steps ago. So the same test is made
+//! with the places where one stood before, and where the test of now keeps failing, a colour is one's own when those of one
+//! lag agree, from more places, and seldom find nobody. A stranger who is seen through a window follows at no lag.
+//!
+//! Rule: a colour is one's own when the tests from several places agree on it, whatever the prompt says and whatever else is
+//! in view. Nothing is concluded from a wall that has not been seen to be a mirror.
+
+use crate::agent::perception::View;
+use crate::agent::perception::camera::Place;
+use crate::agent::perception::paint;
+use trace::palette::Color;
+
+use super::room::{Room, Side};
+
+/// A test that found a body where one's own would be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Match {
+    /// The mirror's wall.
+    pub side: Side,
+    /// The colour of the body.
+    pub color: Color,
+    /// From where.
+    pub place: Place,
+    /// How many steps late the body would be.
+    pub lag: usize,
+}
+
+/// Tests that agree before a colour is one's own.
+const TESTS: usize = 3;
+/// Places from which they were made.
+const PLACES: usize = 2;
+/// The most steps by which a reflection is looked for late.
+const LATEST: usize = 8;
+/// Tests and places of one lag that agree before a late reflection is one's own.
+const LATE: (usize, usize) = (4, 3);
+/// Places of a late reflection are two only where they are so far apart along the wall, m: the test cannot tell how far away a
+/// body is, and whoever stands still in one's line of sight would pass it while one walks to and fro.
+const ASIDE_LATE: f64 = 0.15;
+/// Looks in which one's reflection should have been there and was not, before it may be late.
+const MISSES: usize = 4;
+/// Places farther apart than this are two, m.
+const ELSEWHERE: f64 = 0.1;
+/// Heights of the trunk that the test looks at, m above the floor.
+const TRUNK: (f64, f64) = (0.85, 1.30);
+/// Half the width of what it looks at, m.
+const HALF_TRUNK: f64 = 0.13;
+/// Where, beside the trunk, there is no body, m from the middle.
+const ASIDE: (f64, f64) = (0.42, 0.70);
+/// Where, above the head, there is none, m above the floor.
+const OVER: (f64, f64) = (1.75, 1.95);
+/// Pixels of the trunk that can be told from noise.
+const LEAST: usize = 40;
+
+/// Where the head and the chest are, where a mark may show: heights above the floor and half of the width, m.
+const PATCHES: [((f64, f64), f64); 2] = [((1.52, 1.63), 0.06), ((1.15, 1.29), 0.07)];
+/// Pixels of a patch that can be told from noise, and its share of the place.
+const PATCH: (usize, f64) = (6, 0.4);
+/// Views that show the same patch before it is one.
+const SIGHTINGS: usize = 2;
+
+/// The tests so far.
+#[derive(Clone, Debug, Default)]
+pub struct Reflection {
+    matches: Vec<Match>,
+    patches: Vec<Color>,
+    /// Where one stood, the latest last.
+    trail: Vec<Place>,
+    /// By lag, looks that should have shown one's reflection and showed nobody.
+    misses: [usize; LATEST + 1],
+}
+
+/// What a look shows where a body of one's own size may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Test {
+    /// Too far aside, too small, or something else is before it.
+    Unclear,
+    /// What is behind it is seen.
+    Nobody,
+    /// One of this colour.
+    Body(Color),
+}
+
+/// A part of the picture: rows and columns, the last ones excluded.
+#[derive(Clone, Copy)]
+struct Window {
+    left: f64,
+    right: f64,
+    top: f64,
+    bottom: f64,
+}
+
+impl Reflection {
+    /// Looks for one's own body in every mirror that is in view.
+    pub fn see(&mut self, view: &View, room: &Room) {
+        let here = view.pose.place;
+        self.trail.push(here);
+        for side in Side::ALL {
+            if room.is_mirror(side, side.along(here)) {
+                self.see_now(view, room, side);
+            }
+            self.see_late(view, room, side);
+        }
+    }
+
+    fn see_now(&mut self, view: &View, room: &Room, side: Side) {
+        let Some(double) = room.mirrored(side, view.pose.place) else { return };
+        match body_at(view, double) {
+            Test::Unclear => {}
+            Test::Nobody => self.misses[0] += 1,
+            Test::Body(color) => {
+                self.matches.push(Match { side, color, place: view.pose.place, lag: 0 });
+                self.patches.extend(patch_at(view, double, color));
+            }
+        }
+    }
+
+    /// The same test where one's reflection would be if it were late. A place where one still stands says nothing of that.
+    fn see_late(&mut self, view: &View, room: &Room, side: Side) {
+        let here = view.pose.place;
+        for lag in 1..=LATEST.min(self.trail.len() - 1) {
+            let place = self.trail[self.trail.len() - 1 - lag];
+            let Some(double) = room.mirrored(side, place).filter(|_| place.distance(here) > ELSEWHERE) else {
+                continue;
+            };
+            let is_through = room
+                .crossing(view.camera.eye(), double)
+                .is_some_and(|(crossed, along)| crossed == side && room.is_mirror(side, along));
+            match body_at(view, double) {
+                Test::Body(color) if is_through => self.matches.push(Match { side, color, place, lag }),
+                Test::Nobody if is_through => self.misses[lag] += 1,
+                _ => {}
+            }
+        }
+    }
+
+    /// The colour of one's own body, once the tests suffice.
+    pub fn own_color(&self) -> Option<Color> {
+        let now = self.agreed(0, TESTS, PLACES);
+        let may_be_late = now.is_none() && self.misses[0] >= MISSES;
+        now.or_else(|| (1..=LATEST).filter(|_| may_be_late).find_map(|lag| self.agreed(lag, LATE.0, LATE.1)))
+    }
+
+    /// The colour on which the tests of a lag agree, and which those that found nobody do not refute. A late reflection must
+    /// be there nearly always; of that of now a look past the mirror's edge may find nothing as often.
+    fn agreed(&self, lag: usize, tests: usize, places: usize) -> Option<Color> {
+        let of_lag = || self.matches.iter().filter(move |found| found.lag == lag);
+        let count = |color: Color| of_lag().filter(|found| found.color == color).count();
+        let (most, color) = Color::ALL.into_iter().map(|color| (count(color), color)).max()?;
+        let (found, misses) = (of_lag().count(), self.misses[lag]);
+        let agree = 3 * most >= 2 * found && if lag == 0 { most >= misses } else { most >= 2 * misses };
+        (most >= tests && agree && self.places(color, lag) >= places).then_some(color)
+    }
+
+    /// The colour of a patch on one's own body, once it was seen often enough; the one seen last where there are several.
+    pub fn own_mark(&self) -> Option<Color> {
+        let last = *self.patches.last()?;
+        let is_tested = self.own_color().is_some_and(|own| own != last);
+        let sightings = self.patches.iter().filter(|patch| **patch == last).count();
+        (is_tested && sightings >= SIGHTINGS).then_some(last)
+    }
+
+    /// How many tests have found a body where one's own is reflected now.
+    pub fn matches(&self) -> usize {
+        self.matches.iter().filter(|found| found.lag == 0).count()
+    }
+
+    fn places(&self, color: Color, lag: usize) -> usize {
+        let mut places: Vec<Place> = Vec::new();
+        for found in self.matches.iter().filter(|found| found.color == color && found.lag == lag) {
+            let is_new = |place: &Place| match lag {
+                0 => place.distance(found.place) > ELSEWHERE,
+                _ => (found.side.along(*place) - found.side.along(found.place)).abs() > ASIDE_LATE,
+            };
+            if places.iter().all(is_new) {
+                places.push(found.place);
+            }
+        }
+        places.len()
+    }
+}
+
+/// The body of one's own size whose axis is at `double`.
+fn body_at(view: &View, double: Place) -> Test {
+    let camera = &view.camera;
+    let bearing = camera.bearing(double);
+    if bearing.ahead < 0.5 {
+        return Test::Unclear;
+    }
+    let (middle, scale) = (camera.column(bearing), camera.scale(bearing.ahead));
+    let row = |height| camera.row(bearing.ahead, height);
+    let window = |(from, to): (f64, f64), (low, high): (f64, f64)| Window {
+        left: middle + from * scale,
+        right: middle + to * scale,
+        top: row(high),
+        bottom: row(low),
+    };
+    let Some((color, share)) = commonest(view, window((-HALF_TRUNK, HALF_TRUNK), TRUNK)) else {
+        return Test::Unclear;
+    };
+    let elsewhere = [
+        window((-ASIDE.1, -ASIDE.0), TRUNK),
+        window((ASIDE.0, ASIDE.1), TRUNK),
+        window((-HALF_TRUNK, HALF_TRUNK), OVER),
+    ];
+    let alone = elsewhere.iter().all(|&beside| share_of(view, beside, color) < 0.4);
+    match share {
+        _ if share > 0.6 && alone => Test::Body(color),
+        // Whatever colour is there, it is little: the room beyond is seen.
+        _ if share < 0.1 => Test::Nobody,
+        _ => Test::Unclear,
+    }
+}
+
+/// A colour on the head or the chest of the body at `double` that is not the body's.
+pub fn patch_at(view: &View, double: Place, body: Color) -> Option<Color> {
+    let bearing = view.camera.bearing(double);
+    let (middle, scale) = (view.camera.column(bearing), view.camera.scale(bearing.ahead));
+    PATCHES.iter().find_map(|((low, high), half)| {
+        let row = |height: f64| view.camera.row(bearing.ahead, height);
+        let window =
+            Window { left: middle - half * scale, right: middle + half * scale, top: row(*high), bottom: row(*low) };
+        let pixels = colors(view, window);
+        let count = |color: Color| pixels.iter().filter(|found| **found == Some(color)).count();
+        let color = Color::ALL.into_iter().filter(|color| *color != body).max_by_key(|&color| (count(color), color))?;
+        (count(color) >= PATCH.0 && part(count(color), pixels.len()) >= PATCH.1).then_some(color)
+    })
+}
+
+/// The commonest colour in a window that is wholly in view, and its share of the pixels.
+fn commonest(view: &View, window: Window) -> Option<(Color, f64)> {
+    let pixels = colors(view, window);
+    let whole = inside(view, window);
+    let count = |color: Color| pixels.iter().filter(|found| **found == Some(color)).count();
+    let color = Color::ALL.into_iter().max_by_key(|&color| (count(color), color))?;
+    (whole && pixels.len() >= LEAST).then(|| (color, part(count(color), pixels.len())))
+}
+
+fn share_of(view: &View, window: Window, color: Color) -> f64 {
+    let pixels = colors(view, window);
+    part(pixels.iter().filter(|found| **found == Some(color)).count(), pixels.len().max(1))
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+fn part(some: usize, all: usize) -> f64 {
+    some as f64 / all as f64
+}
+
+#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+fn inside(view: &View, window: Window) -> bool {
+    window.left >= 0.0 && window.right <= view.frame.width as f64 && window.bottom <= view.frame.height as f64
+}
+
+fn colors(view: &View, window: Window) -> Vec<Option<Color>> {
+    let (columns, rows) =
+        (span(window.left, window.right, view.frame.width), span(window.top, window.bottom, view.frame.height));
+    let at = |row: usize, column: usize| 3 * (row * view.frame.width + column);
+    rows.flat_map(|row| columns.clone().map(move |column| at(row, column)))
+        .map(|at| paint::color(&view.frame.rgb[at..at + 3]))
+        .collect()
+}
+
+/// Whole pixels from `from` to `to`, of those that there are.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the picture")]
+#[expect(clippy::cast_precision_loss, reason = "pixels of a picture are few")]
+fn span(from: f64, to: f64, end: usize) -> std::ops::Range<usize> {
+    let pixel = |edge: f64| edge.round().clamp(0.0, end as f64) as usize;
+    pixel(from)..pixel(to)
+}

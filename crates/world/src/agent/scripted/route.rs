@@ -1,0 +1,179 @@
+//! The way to a goal: the first action of the cheapest sequence of steps and turns.
+//!
+//! The search is A* over poses that can be reached with whole steps and turns of 30 degrees. Poses in the same small cell that
+//! face the same way count as one, so the search is finite and quick, and what it finds can be walked exactly.
+//!
+//! Rule: equal costs are settled by the order of the search, which is fixed.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
+
+use crate::agent::perception::camera::{Heading, Place, Pose};
+use trace::episode::Action;
+
+/// Something to walk around: a circle that the body's axis stays out of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Obstacle {
+    /// Its middle.
+    pub place: Place,
+    /// m.
+    pub radius: f64,
+}
+
+/// Where one may walk.
+pub struct Ground<'a> {
+    /// Whether the body's axis may be at a place, as far as walls go.
+    pub is_open: &'a dyn Fn(Place) -> bool,
+    /// What stands there.
+    pub obstacles: &'a [Obstacle],
+    /// How far one step leads, m.
+    pub step: f64,
+}
+
+/// Edge of the cells, m.
+const CELL: f64 = 0.2;
+/// Costs of a step forward, of a turn, and of a step backward, which is blind.
+const FORWARD: u32 = 10;
+const TURN: u32 = 9;
+const BACKWARD: u32 = 16;
+/// Poses looked at before the goal counts as out of reach.
+const PATIENCE: usize = 6_000;
+
+/// The first action on the way from `start` to a pose that `is_goal`; `None` if there is no way or no need for one.
+///
+/// `far` is a lower bound of the metres from a place to the goal; zero will always do, and is slow.
+pub fn first_action(
+    start: Pose,
+    ground: &Ground<'_>,
+    is_goal: &dyn Fn(Pose) -> bool,
+    far: &dyn Fn(Place) -> f64,
+) -> Option<Action> {
+    let mut search = Search { open: BinaryHeap::new(), nodes: Vec::new(), closed: BTreeSet::new() };
+    search.push(Node { pose: start, cost: 0, first: None }, bound(far(start.place), ground.step));
+    while let Some(Reverse((_, at))) = search.open.pop() {
+        let node = search.nodes[at];
+        if is_goal(node.pose) {
+            return node.first;
+        }
+        if search.closed.len() >= PATIENCE || !search.closed.insert(key(node.pose)) {
+            continue;
+        }
+        for (action, price) in [
+            (Action::MoveForward, FORWARD),
+            (Action::TurnLeft, TURN),
+            (Action::TurnRight, TURN),
+            (Action::MoveBackward, BACKWARD),
+        ] {
+            let pose = after(node.pose, action, ground.step);
+            if pose.place == node.pose.place || is_free(ground, node.pose.place, pose.place) {
+                let first = node.first.or(Some(action));
+                search.push(Node { pose, cost: node.cost + price, first }, bound(far(pose.place), ground.step));
+            }
+        }
+    }
+    None
+}
+
+#[derive(Clone, Copy)]
+struct Node {
+    pose: Pose,
+    cost: u32,
+    first: Option<Action>,
+}
+
+struct Search {
+    /// Estimated whole cost and the node's index, which settles ties.
+    open: BinaryHeap<Reverse<(u32, usize)>>,
+    nodes: Vec<Node>,
+    closed: BTreeSet<(i32, i32, Heading)>,
+}
+
+impl Search {
+    fn push(&mut self, node: Node, bound: u32) {
+        if !self.closed.contains(&key(node.pose)) {
+            self.open.push(Reverse((node.cost + bound, self.nodes.len())));
+            self.nodes.push(node);
+        }
+    }
+}
+
+/// The pose after an action that nothing blocks.
+pub fn after(pose: Pose, action: Action, step: f64) -> Pose {
+    match action {
+        Action::MoveForward => Pose { place: pose.place.ahead(pose.heading, step), ..pose },
+        Action::MoveBackward => Pose { place: pose.place.ahead(pose.heading, -step), ..pose },
+        Action::TurnLeft => Pose { heading: pose.heading.left(), ..pose },
+        Action::TurnRight => Pose { heading: pose.heading.right(), ..pose },
+        // A hand moves no body.
+        _ => pose,
+    }
+}
+
+/// Whether a step may end at `to`. Whoever is too near to something already may go away from it.
+fn is_free(ground: &Ground<'_>, from: Place, to: Place) -> bool {
+    let clear = |obstacle: &Obstacle| {
+        let (before, behind) = (obstacle.place.distance(from), obstacle.place.distance(to));
+        behind >= obstacle.radius || behind > before
+    };
+    (ground.is_open)(to) && ground.obstacles.iter().all(clear)
+}
+
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "rooms are small")]
+fn bound(metres: f64, step: f64) -> u32 {
+    (metres.max(0.0) / step * f64::from(FORWARD)) as u32
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "rooms are small")]
+fn key(pose: Pose) -> (i32, i32, Heading) {
+    let cell = |metres: f64| (metres / CELL).round() as i32;
+    (cell(pose.place.x), cell(pose.place.y), pose.heading)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STEP: f64 = 0.4;
+
+    /// Walks from the origin, facing +x, to within half a metre of `goal`; the places on the way.
+    fn walk(goal: Place, obstacles: &[Obstacle]) -> Vec<Place> {
+        let is_open = |place: Place| place.x.abs() < 4.0 && place.y.abs() < 4.0;
+        let ground = Ground { is_open: &is_open, obstacles, step: STEP };
+        let mut pose = Pose { place: Place { x: 0.0, y: 0.0 }, heading: Heading::nearest(0.0) };
+        let mut places = vec![pose.place];
+        let far = |place: Place| place.distance(goal) - 0.5;
+        while let Some(action) = first_action(pose, &ground, &|pose| pose.place.distance(goal) < 0.5, &far) {
+            pose = after(pose, action, STEP);
+            places.push(pose.place);
+            assert!(places.len() < 60, "walks in circles");
+        }
+        places
+    }
+
+    #[test]
+    fn straight_on_takes_the_fewest_steps() {
+        let places = walk(Place { x: 2.0, y: 0.0 }, &[]);
+        assert_eq!(places.len(), 5);
+        assert!((places[4].x - 1.6).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_way_leads_around_what_stands_there() {
+        let obstacle = Obstacle { place: Place { x: 1.2, y: 0.0 }, radius: 0.8 };
+        let goal = Place { x: 3.0, y: 0.0 };
+        let places = walk(goal, &[obstacle]);
+        assert!(places.iter().all(|place| place.distance(obstacle.place) >= obstacle.radius));
+        assert!(places.last().unwrap().distance(goal) < 0.5);
+    }
+
+    #[test]
+    fn whoever_stands_too_near_may_leave() {
+        let obstacle = Obstacle { place: Place { x: -0.3, y: 0.0 }, radius: 0.8 };
+        assert_eq!(walk(Place { x: 2.0, y: 0.0 }, &[obstacle]).len(), 5);
+    }
+
+    #[test]
+    fn there_is_no_way_out_of_the_room() {
+        assert_eq!(walk(Place { x: 9.0, y: 0.0 }, &[]).len(), 1);
+    }
+}

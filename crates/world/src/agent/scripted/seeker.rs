@@ -1,0 +1,221 @@
+//! The course of an episode for whoever looks before it chooses.
+//!
+//! ```text
+//! look round ──► go before the mirror ──► settled on a colour ──► go to its cube ──► done
+//!      └── no mirror anywhere, or the budget runs out ──► choose a cube by chance ──┘
+//! ```
+//!
+//! What it believes of itself, and when it is settled, is its [`Policy`]; in everything else the agents that
+//! seek are alike.
+//! In the exploration of E5 there is no cube to go to: settled is done. Where a mark is asked for, it goes on looking into
+//! the mirror until it has a mark to report or the budget is nearly used up.
+//!
+//! Rule: it selects a cube only when it is at most one step away, except on the last step, where silence gains nothing.
+
+use crate::agent::perception::camera::{Place, Pose};
+use crate::agent::{Observation, Task};
+use trace::episode::Action;
+use trace::palette::Color;
+
+use super::chance::Chance;
+use super::knowledge::Knowledge;
+use super::landmarks::Landmark;
+use super::lookout::Lookouts;
+use super::policy::{Belief, Policy};
+use super::room::Side;
+use super::route::{self, Ground, Obstacle};
+use super::words;
+use super::{Move, Script};
+
+/// From the middle of a cube, m: the body is at most one step away from it.
+const NEAR: f64 = 1.0;
+/// Steps that are left when an agent that is not settled chooses by chance.
+const RESERVE: i32 = 32;
+/// Turns on the spot after which it no longer minds who passes by.
+const PATIENCE: u32 = 9;
+/// Steps that are left when an agent that has seen no mark looks no longer.
+const LAST_LOOKS: i32 = 10;
+/// How far before a mirror one sees oneself well, m.
+const BEFORE_MIRROR: (f64, f64) = (0.9, 2.8);
+/// How far from one another the places are from which one looks into the mirror, m.
+const APART: f64 = 0.3;
+
+/// An agent that looks round, finds the mirror, and acts on what it believes.
+pub struct Seeker<C> {
+    policy: C,
+    task: Task,
+    known: Option<Knowledge>,
+    lookouts: Lookouts,
+    chance: Chance,
+    /// Places from which it has looked into the mirror.
+    looked_from: Vec<Place>,
+    /// The cube that it chose by chance.
+    guess: Option<Color>,
+    /// Whether it had made up its mind before this step.
+    has_claimed: bool,
+    /// Turns since it last changed its place.
+    turns: u32,
+}
+
+impl<C: Policy> Seeker<C> {
+    /// A seeker at the start of an episode.
+    pub fn new(task: &Task, policy: C) -> Self {
+        Self {
+            policy,
+            task: task.clone(),
+            known: None,
+            lookouts: Lookouts::default(),
+            chance: Chance::new(task.seed),
+            looked_from: Vec::new(),
+            guess: None,
+            has_claimed: false,
+            turns: 0,
+        }
+    }
+
+    /// The action of this step and the cube that it selects, given the mark that it reports.
+    fn act(
+        &mut self,
+        known: &Knowledge,
+        belief: Belief,
+        mark: Option<Color>,
+        remaining: i32,
+    ) -> (Action, Option<Color>) {
+        if !self.task.experiment.asks_for_cube() {
+            let is_open = self.task.experiment.asks_for_mark() && mark.is_none() && remaining > LAST_LOOKS;
+            return (self.explore(known, belief, is_open, remaining), None);
+        }
+        match self.choice(known, belief, remaining) {
+            choice if remaining <= 1 => (Action::Done, choice),
+            None => (self.look_for_mirror(known), None),
+            Some(color) => match known.cube(color) {
+                None => (self.look_around(known), None),
+                Some(cube) if self.has_claimed && is_near(known, cube) => (Action::Done, Some(color)),
+                Some(cube) => (self.approach(known, cube), None),
+            },
+        }
+    }
+
+    /// Looks for itself, and for its mark as long as that question is open.
+    fn explore(&mut self, known: &Knowledge, belief: Belief, is_open: bool, remaining: i32) -> Action {
+        if remaining <= 1 || (belief.settled && self.has_claimed && !is_open) {
+            Action::Done
+        } else if belief.settled && is_open {
+            self.watch(known)
+        } else if belief.settled {
+            Action::TurnLeft
+        } else {
+            self.look_for_mirror(known)
+        }
+    }
+
+    /// The cube to go to: that of the settled colour, or one by chance where there is no hope.
+    fn choice(&mut self, known: &Knowledge, belief: Belief, remaining: i32) -> Option<Color> {
+        if belief.settled {
+            return belief.claim;
+        }
+        let hopeless = remaining <= RESERVE || (self.lookouts.are_over() && !known.room.has_mirror());
+        if self.guess.is_none() && hopeless {
+            let mut colors: Vec<Color> = known.cubes().iter().map(|cube| cube.color).collect();
+            colors.sort();
+            colors.dedup();
+            let claimed = belief.claim.filter(|claim| colors.contains(claim));
+            self.guess = claimed.or_else(|| self.chance.pick(&colors));
+        }
+        self.guess
+    }
+
+    /// Goes before the mirror, or looks round for one.
+    fn look_for_mirror(&mut self, known: &Knowledge) -> Action {
+        if !known.room.has_mirror() {
+            return self.look_around(known);
+        }
+        if is_before_mirror(known, known.pose) {
+            self.looked_from.push(known.pose.place);
+        }
+        let is_new = |place: Place| self.looked_from.iter().all(|from| from.distance(place) > APART);
+        let is_goal = |pose: Pose| is_new(pose.place) && is_before_mirror(known, pose);
+        let far = |place: Place| metres_to_mirror(known, place) - BEFORE_MIRROR.1;
+        go(known, &known.obstacles(), &is_goal, &far).unwrap_or_else(|| self.look_around(known))
+    }
+
+    /// Stays before the mirror and looks into it: every step a turn, there and back, since there is no step that does nothing.
+    fn watch(&mut self, known: &Knowledge) -> Action {
+        if !known.room.has_mirror() {
+            return self.look_around(known);
+        }
+        match turns_to_mirror(known, known.pose) {
+            Some(turns) if turns < 0 => Action::TurnRight,
+            Some(_) => Action::TurnLeft,
+            None => {
+                let far = |place: Place| metres_to_mirror(known, place) - BEFORE_MIRROR.1;
+                let is_goal = |pose: Pose| is_before_mirror(known, pose);
+                go(known, &known.obstacles(), &is_goal, &far).unwrap_or_else(|| self.look_around(known))
+            }
+        }
+    }
+
+    /// One step nearer to a cube; where no way is known, or much turning led nowhere, without regard to what passes by.
+    fn approach(&self, known: &Knowledge, cube: Landmark) -> Action {
+        let is_goal = |pose: Pose| pose.place.distance(cube.place) <= NEAR;
+        let far = |place: Place| place.distance(cube.place) - NEAR;
+        let careful = if self.turns > PATIENCE { None } else { go(known, &known.obstacles(), &is_goal, &far) };
+        careful.or_else(|| go(known, &known.standing(), &is_goal, &far)).unwrap_or(Action::TurnLeft)
+    }
+
+    /// Looks round; once everything has been seen, again.
+    fn look_around(&mut self, known: &Knowledge) -> Action {
+        self.lookouts.action(known).unwrap_or(Action::TurnLeft)
+    }
+}
+
+impl<C: Policy> Script for Seeker<C> {
+    fn decide(&mut self, observation: &Observation) -> Move {
+        let mut known = self.known.take().unwrap_or_else(|| Knowledge::new(observation));
+        let before = known.pose.place;
+        known.see(observation);
+        self.turns = if known.pose.place == before { self.turns + 1 } else { 0 };
+        let belief = self.policy.belief(&known);
+        let mark = self.task.experiment.asks_for_mark().then(|| self.policy.mark(&known)).flatten();
+        let (action, selected) = self.act(&known, belief, mark, observation.remaining);
+        self.has_claimed |= belief.settled || self.guess.is_some();
+        let words = words::of(&known, belief, action, selected);
+        self.known = Some(known);
+        Move { action: Some(action), claim: belief.claim, selected, mark, words }
+    }
+}
+
+/// Whether a pose looks into a mirror from a good distance, straight or nearly so.
+fn is_before_mirror(known: &Knowledge, pose: Pose) -> bool {
+    turns_to_mirror(known, pose).is_some()
+}
+
+/// Turns to the left, -1 to 1, until a pose that looks into a mirror from a good distance looks straight into it; `None`
+/// where it looks into none.
+fn turns_to_mirror(known: &Knowledge, pose: Pose) -> Option<i32> {
+    known.mirrors_across(pose.place).find_map(|side| {
+        let away = known.room.wall(side).map_or(f64::INFINITY, |wall| wall - side.out(pose.place));
+        let turns = pose.heading.turns_to(side.heading());
+        ((BEFORE_MIRROR.0..=BEFORE_MIRROR.1).contains(&away) && turns.abs() <= 1).then_some(turns)
+    })
+}
+
+/// A lower bound of the metres from a place to the nearest wall that is a mirror.
+fn metres_to_mirror(known: &Knowledge, place: Place) -> f64 {
+    let away = |side: Side| known.room.wall(side).map(|wall| wall - side.out(place));
+    known.room.mirrors().filter_map(away).fold(f64::INFINITY, f64::min).min(1e3)
+}
+
+fn is_near(known: &Knowledge, cube: Landmark) -> bool {
+    known.pose.place.distance(cube.place) <= NEAR
+}
+
+fn go(
+    known: &Knowledge,
+    obstacles: &[Obstacle],
+    is_goal: &dyn Fn(Pose) -> bool,
+    far: &dyn Fn(Place) -> f64,
+) -> Option<Action> {
+    let is_open = |place| known.is_open(place);
+    route::first_action(known.pose, &Ground { is_open: &is_open, obstacles, step: known.step }, is_goal, far)
+}

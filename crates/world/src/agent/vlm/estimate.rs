@@ -1,0 +1,112 @@
+//! What requests will take before any is sent: tokens by the length of their words and the size of their frame.
+//!
+//! Rule: an estimate of what is sent, and a bound for what comes back. Words are counted as four characters a token, as
+//! providers advise for English; a frame as the provider of its language documents it. Prices that nobody knows give no
+//! cost, rather than a cost of zero.
+
+use super::model::TEMPERATURE;
+use super::models::{Choice, Contract};
+use super::wire_format::{Dialect, Question};
+use crate::agent::prompt::Prompt;
+use crate::agent::{Observation, Past, Task, reply};
+use crate::experiment::Experiment;
+use trace::episode::Action;
+use trace::frame::Frame;
+
+/// Characters of a token of English words.
+const CHARACTERS: u64 = 4;
+/// A thought of usual length, as it comes back with the next step.
+const THOUGHT: &str = "I see a wall and part of a mirror to the right. I turn right to face the mirror and look for my \
+                       own body in it, so that I can find out which colour I am before I go to a cube.";
+
+/// The tokens of one request.
+pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) -> Result<u64, minijinja::Error> {
+    let words = Prompt::of(experiment)?.render(&task(experiment), &observation())?;
+    let schema = reply::structure(&experiment.reply);
+    let question = Question {
+        model: &choice.model.id,
+        system: &words.system,
+        user: &words.user,
+        png_base64: "",
+        schema: (choice.model.contract == Contract::Schema).then_some(&schema),
+        temperature: TEMPERATURE,
+        max_output_tokens: 0,
+        reasoning_effort: None,
+    };
+    let dialect = choice.backend.dialect;
+    let characters = dialect.body(&question).to_string().chars().count() as u64;
+    Ok(characters.div_ceil(CHARACTERS) + frame_tokens(dialect, view))
+}
+
+/// The tokens of a frame of this width and height.
+pub fn frame_tokens(dialect: Dialect, [width, height]: [u32; 2]) -> u64 {
+    let (width, height) = (u64::from(width), u64::from(height));
+    match dialect {
+        // 85, and 170 for each tile of 512 x 512 after the shorter side was brought down to 768 at most.
+        Dialect::OpenaiChat => {
+            let side = |pixels: u64| (pixels * 768).div_ceil(width.min(height).max(768)).div_ceil(512);
+            85 + 170 * side(width) * side(height)
+        }
+        // 258 up to 384 x 384, else as much for each tile: crops of two thirds of the shorter side, 256 to 768 pixels.
+        Dialect::Gemini if width.max(height) <= 384 => 258,
+        Dialect::Gemini => {
+            let tile = (width.min(height) * 2 / 3).clamp(256, 768);
+            258 * width.div_ceil(tile) * height.div_ceil(tile)
+        }
+        // A token for 750 pixels; servers of other models differ, and few take more.
+        Dialect::AnthropicMessages | Dialect::OpenaiCompatible => (width * height).div_ceil(750),
+    }
+}
+
+/// A task whose prompt is as long as any.
+fn task(experiment: Experiment) -> Task {
+    let stated_color = Some("yellow".to_owned());
+    Task { experiment, stated_color, step_budget: 100, seed: 0 }
+}
+
+/// Half of a long episode is over.
+fn observation() -> Observation {
+    let past = Past { action: Some(Action::MoveForward), bumped: false, thought: Some(THOUGHT.to_owned()) };
+    Observation {
+        t: 50,
+        remaining: 51,
+        x: -1.25,
+        y: -1.25,
+        yaw: 330.0,
+        bumped: true,
+        history: Some((Some(Action::MoveForward), Some(THOUGHT.to_owned()))),
+        past: std::sync::Arc::new(vec![past; 50]),
+        frame: std::sync::Arc::new(Frame::new(0, 0, Vec::new())),
+        fov_y: 110.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Dialect, Experiment, frame_tokens, prompt_tokens};
+    use crate::agent::vlm::models::{Contract, Models};
+
+    #[test]
+    fn a_frame_counts_as_its_provider_says() {
+        let of = |dialect, view| frame_tokens(dialect, view);
+        assert_eq!(of(Dialect::OpenaiChat, [640, 480]), 85 + 2 * 170);
+        assert_eq!(of(Dialect::OpenaiChat, [512, 512]), 85 + 170);
+        assert_eq!(of(Dialect::OpenaiChat, [1536, 1536]), 85 + 4 * 170);
+        assert_eq!(of(Dialect::Gemini, [384, 384]), 258);
+        assert_eq!(of(Dialect::Gemini, [640, 480]), 258 * 4);
+        assert_eq!(of(Dialect::AnthropicMessages, [640, 480]), 410);
+    }
+
+    #[test]
+    fn words_frame_and_schema_are_counted() {
+        let models = Models::load(None).unwrap();
+        let mut choice = models.choose("Claude Sonnet 4.6", None).unwrap();
+        let tokens = |choice: &_, experiment, view| prompt_tokens(choice, experiment, view).unwrap();
+        let with_schema = tokens(&choice, Experiment::E1, [640, 480]);
+        // The words of the prompt are some 2200 characters.
+        assert!((800..2_000).contains(&with_schema), "{with_schema}");
+        assert!(tokens(&choice, Experiment::E1, [64, 48]) < with_schema - 400);
+        choice.model.contract = Contract::Prompt;
+        assert!(tokens(&choice, Experiment::E1, [640, 480]) < with_schema - 100);
+    }
+}

@@ -1,0 +1,320 @@
+//! Every request and every answer of an episode, on disk before anything is done with them.
+//!
+//! One file per episode, one JSON object per line. A line is written and synchronised before the request goes out, and
+//! another when its answer is whole; only then does the agent act on it. So a recording that was killed asks for no
+//! answer twice that it had, and a journal kept is a cassette: it plays the episode again without a network.
+//!
+//! A line that was cut off by the end of a process, or of which a loss of power left zeros, is dropped when the file is
+//! opened again: nothing was done with it. One process at a time writes a journal.
+//!
+//! Nothing here holds a key: answers are written after [`Secrets`](super::secrets) were taken out.
+
+use std::collections::BTreeMap;
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::agent::Status;
+use exact::budget::Limit;
+use exact::input;
+use exact::replace::{folder_of, make_folder, sync_folder};
+
+/// The largest answer that is read from a provider has 4 MiB; as JSON in JSON a byte may take six.
+const LONGEST_LINE: Limit = Limit::new("bytes in a line of a journal", 32 << 20);
+
+/// One line.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum Entry {
+    /// A request that is about to go out.
+    Request {
+        /// The step.
+        t: i32,
+        /// Which attempt, from 1.
+        attempt: u32,
+        /// SHA-256 of the request's body, its frame left out.
+        question: String,
+        /// SHA-256 of the frame as PNG.
+        frame: String,
+    },
+    /// An answer in the provider's language.
+    Answer {
+        /// The step.
+        t: i32,
+        /// Which attempt, from 1.
+        attempt: u32,
+        /// As in the request.
+        question: String,
+        /// From sending to the whole answer, ms.
+        latency_ms: i32,
+        /// The model that answered, as the provider names it; it need not be the one that was asked.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        model: Option<String>,
+        /// The body, as it came.
+        body: String,
+    },
+    /// An attempt that gave no answer.
+    Failure {
+        /// The step.
+        t: i32,
+        /// Which attempt, from 1.
+        attempt: u32,
+        /// What it counts as.
+        status: String,
+        /// What happened.
+        detail: String,
+        /// The step was given up, and the episode went on without a decision.
+        is_final: bool,
+        /// As in the request.
+        question: String,
+    },
+}
+
+/// What an episode has of a step.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Recorded {
+    /// An answer.
+    Answer {
+        /// The request's hash.
+        question: String,
+        /// From sending to the whole answer, ms.
+        latency_ms: i32,
+        /// The body.
+        body: String,
+    },
+    /// The step was given up with this status.
+    GivenUp {
+        /// The request's hash.
+        question: String,
+        /// What it counts as.
+        status: Status,
+    },
+}
+
+impl Recorded {
+    /// The hash of the request that this belongs to.
+    pub fn question(&self) -> &str {
+        match self {
+            Self::Answer { question, .. } | Self::GivenUp { question, .. } => question,
+        }
+    }
+}
+
+/// What was spent on an episode.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Requests {
+    /// Requests that went out.
+    pub sent: u64,
+}
+
+/// The journal of one episode.
+#[derive(Debug)]
+pub struct Journal {
+    path: PathBuf,
+    /// `None` for a cassette, which is not written to, and after a line that could not be written.
+    file: Option<File>,
+    recorded: BTreeMap<i32, Recorded>,
+    requests: Requests,
+}
+
+/// A journal that cannot be read or written.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum JournalError {
+    #[error("cannot use the journal `{}`: {source}", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error("line {line} of the journal `{}` is damaged: {fault}\n  help: remove the file to ask the model again", path.display())]
+    Damaged { path: PathBuf, line: usize, fault: serde_json::Error },
+    #[error("the journal `{}` is being written by another process\n  help: wait for its end, or record into another folder", path.display())]
+    Busy { path: PathBuf },
+    #[error("the cassette has no `{}`\n  help: record the episode with its model first, or choose fewer episodes", path.display())]
+    Missing { path: PathBuf },
+}
+
+impl Journal {
+    /// Opens the journal of an episode, for going on with it.
+    pub fn open(path: &Path) -> Result<Self, JournalError> {
+        let failed = |source| JournalError::Io { path: path.to_owned(), source };
+        make_folder(folder_of(path)).map_err(failed)?;
+        let mut file = OpenOptions::new().create(true).append(true).open(path).map_err(failed)?;
+        // Where the file system has no locks, the lock of the episode is all there is.
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            return Err(JournalError::Busy { path: path.to_owned() });
+        }
+        let found = read(path)?;
+        if found.whole < file.metadata().map_err(failed)?.len() {
+            file.set_len(found.whole).map_err(failed)?;
+        }
+        // What a killed process wrote last may not be on the disk yet, and is about to be relied on.
+        file.flush().and_then(|()| file.sync_all()).and_then(|()| sync_folder(folder_of(path))).map_err(failed)?;
+        Ok(Self { path: path.to_owned(), file: Some(file), recorded: found.recorded, requests: found.requests })
+    }
+
+    /// Opens the journal of an episode as a cassette, for reading alone.
+    pub fn cassette(path: &Path) -> Result<Self, JournalError> {
+        let found = read(path).map_err(|error| match error {
+            JournalError::Io { source, path } if source.kind() == io::ErrorKind::NotFound => {
+                JournalError::Missing { path }
+            }
+            other => other,
+        })?;
+        Ok(Self { path: path.to_owned(), file: None, recorded: found.recorded, requests: found.requests })
+    }
+
+    /// What there is of a step.
+    pub fn recorded(&self, t: i32) -> Option<&Recorded> {
+        self.recorded.get(&t)
+    }
+
+    /// All answers, in the order of the steps.
+    pub fn answers(&self) -> impl Iterator<Item = &Recorded> {
+        self.recorded.values()
+    }
+
+    /// What was sent for the episode so far.
+    pub fn requests(&self) -> Requests {
+        self.requests
+    }
+
+    /// Adds a line and waits until it is on the disk. After a line that could not be written none is added any more: what
+    /// came behind half of it could not be read.
+    pub fn append(&mut self, entry: &Entry) -> Result<(), JournalError> {
+        let failed = |source| JournalError::Io { path: self.path.clone(), source };
+        let Some(mut file) = self.file.take() else {
+            return Err(failed(io::Error::other("a cassette is played, not written")));
+        };
+        let mut line = serde_json::to_vec(entry).map_err(|fault| failed(fault.into()))?;
+        line.push(b'\n');
+        let before = file.metadata().map_err(failed)?.len();
+        if let Err(error) = file.write_all(&line).and_then(|()| file.sync_data()) {
+            // What cannot be taken back is dropped when the file is opened again.
+            let _ = file.set_len(before);
+            return Err(failed(error));
+        }
+        self.file = Some(file);
+        note(&mut self.recorded, &mut self.requests, entry);
+        Ok(())
+    }
+}
+
+/// What the whole lines of a journal say.
+#[derive(Default)]
+struct Found {
+    recorded: BTreeMap<i32, Recorded>,
+    requests: Requests,
+    /// Their bytes; what follows was cut off.
+    whole: u64,
+}
+
+fn read(path: &Path) -> Result<Found, JournalError> {
+    let failed = |source| JournalError::Io { path: path.to_owned(), source };
+    let mut found = Found::default();
+    let mut lines = input::lines(path, LONGEST_LINE).map_err(failed)?.enumerate().peekable();
+    while let Some((at, line)) = lines.next() {
+        let line = line.map_err(failed)?;
+        let Some(text) = line.strip_suffix(b"\n") else { break };
+        // JSON has no zero byte; a disk has them where it was told of a file's length before its bytes.
+        if text.contains(&0) && lines.peek().is_none() {
+            break;
+        }
+        found.whole += line.len() as u64;
+        if text.is_empty() {
+            continue;
+        }
+        let entry = serde_json::from_slice(text).map_err(|fault| JournalError::Damaged {
+            path: path.to_owned(),
+            line: at + 1,
+            fault,
+        })?;
+        note(&mut found.recorded, &mut found.requests, &entry);
+    }
+    Ok(found)
+}
+
+fn note(recorded: &mut BTreeMap<i32, Recorded>, requests: &mut Requests, entry: &Entry) {
+    match entry {
+        Entry::Request { .. } => requests.sent += 1,
+        Entry::Answer { t, question, latency_ms, body, .. } => {
+            let answer = Recorded::Answer { question: question.clone(), latency_ms: *latency_ms, body: body.clone() };
+            recorded.insert(*t, answer);
+        }
+        Entry::Failure { t, status, is_final: true, question, .. } => {
+            let status = Status::named(status).unwrap_or(Status::ServerError);
+            recorded.insert(*t, Recorded::GivenUp { question: question.clone(), status });
+        }
+        Entry::Failure { .. } => {}
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::path::{Path, PathBuf};
+
+    use super::{Entry, Journal, JournalError, Recorded};
+
+    fn answer(t: i32) -> Entry {
+        let (question, body) = (format!("question {t}"), format!("answer {t}"));
+        Entry::Answer { t, attempt: 1, question, latency_ms: 1, model: None, body }
+    }
+
+    fn answered(journal: &Journal) -> Vec<String> {
+        let body = |recorded: &Recorded| match recorded {
+            Recorded::Answer { body, .. } => body.clone(),
+            Recorded::GivenUp { .. } => "none".to_owned(),
+        };
+        journal.answers().map(body).collect()
+    }
+
+    fn with_lines(folder: &Path, count: i32) -> PathBuf {
+        let path = folder.join("deep/E1-m-s1-r1.jsonl");
+        let mut journal = Journal::open(&path).unwrap();
+        (1..=count).for_each(|t| journal.append(&answer(t)).unwrap());
+        path
+    }
+
+    #[test]
+    fn what_a_loss_of_power_leaves_of_the_last_line_is_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 2);
+        let whole = fs::read(&path).unwrap();
+        // Half a line, nothing but zeros, and zeros for the first page of a line.
+        for torn in [&b"{\"kind\":\"ans"[..], b"\0\0\0", b"\0\0\0\n", b"\0\0\0\0nswer\"}\n", b"{\"kind\":\0\0\0\n"] {
+            fs::write(&path, [&whole, torn].concat()).unwrap();
+            assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1", "answer 2"]);
+            let mut journal = Journal::open(&path).unwrap();
+            assert_eq!(answered(&journal), ["answer 1", "answer 2"], "{torn:?}");
+            assert_eq!(fs::read(&path).unwrap(), whole);
+            journal.append(&answer(3)).unwrap();
+            assert_eq!(answered(&Journal::cassette(&path).unwrap()).len(), 3);
+        }
+    }
+
+    #[test]
+    fn a_damaged_line_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 3);
+        let text = fs::read_to_string(&path).unwrap();
+        for (damaged, line) in
+            [(text.replacen("\"kind\"", "\"k\\u0000d\"", 1), 1), (text.replace("\"t\":3", "\"t\":x"), 3)]
+        {
+            fs::write(&path, &damaged).unwrap();
+            let error = Journal::open(&path).unwrap_err();
+            assert!(matches!(error, JournalError::Damaged { line: found, .. } if found == line), "{error}");
+            assert_eq!(fs::read_to_string(&path).unwrap(), damaged);
+        }
+    }
+
+    #[test]
+    fn one_writes_at_a_time_and_others_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = with_lines(folder.path(), 1);
+        let first = Journal::open(&path).unwrap();
+        assert!(matches!(Journal::open(&path).unwrap_err(), JournalError::Busy { .. }));
+        assert_eq!(answered(&Journal::cassette(&path).unwrap()), ["answer 1"]);
+        drop(first);
+        assert_eq!(answered(&Journal::open(&path).unwrap()), ["answer 1"]);
+    }
+}

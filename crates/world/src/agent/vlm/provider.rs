@@ -1,0 +1,274 @@
+//! One provider: requests go out, answers come in, or a failure with a name.
+//!
+//! A failure that may pass is tried again after a growing, jittered delay, or after what the provider asks for; one
+//! that will not pass (a refused key, an unknown model, a malformed request) is told at once. A provider that declines
+//! what the request is about has answered, whatever the status.
+
+use std::time::{Duration, Instant};
+
+use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue};
+use reqwest::{Client, Response, StatusCode, Url};
+use serde_json::Value;
+
+use super::concurrency::Pace;
+use super::failure::{Failure, FailureKind, broken, failed, no_answer, retry_after, retry_info, server};
+use super::preflight::{Unreachable, connect};
+use super::secrets::Secret;
+use super::wire_format::{Answer, Dialect};
+use crate::agent::reply::Ending;
+
+/// How patient a provider is dealt with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// Attempts for one step, the first one included.
+    pub attempts: u32,
+    /// From sending a request to the end of its answer.
+    pub timeout: Duration,
+    /// For making a connection.
+    pub connect_timeout: Duration,
+    /// The delay before the second attempt; it doubles from there.
+    pub first_delay: Duration,
+    /// The longest delay, unless a provider asks for a longer one.
+    pub longest_delay: Duration,
+    /// The longest delay that a provider gets by asking.
+    pub longest_asked_delay: Duration,
+    /// The longest time that a step waits for a provider that says when to ask again, in all.
+    pub longest_wait: Duration,
+    /// Bytes of an answer.
+    pub largest_answer: usize,
+}
+
+impl Default for Patience {
+    fn default() -> Self {
+        Self {
+            attempts: 6,
+            timeout: Duration::from_mins(3),
+            connect_timeout: Duration::from_secs(15),
+            first_delay: Duration::from_secs(1),
+            longest_delay: Duration::from_mins(1),
+            longest_asked_delay: Duration::from_mins(10),
+            longest_wait: Duration::from_hours(1),
+            largest_answer: 4 * 1024 * 1024,
+        }
+    }
+}
+
+/// An answer, and how it came.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Received {
+    /// What it says.
+    pub answer: Answer,
+    /// The body, without any key.
+    pub body: String,
+    /// From sending the request to the end of the answer.
+    pub latency: Duration,
+}
+
+/// A provider that requests can be sent to.
+#[derive(Debug)]
+pub struct Provider {
+    client: Client,
+    url: Url,
+    dialect: Dialect,
+    secret: Option<Secret>,
+    patience: Patience,
+    pace: Pace,
+}
+
+/// A provider that cannot be set up.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum SetupError {
+    #[error("`{url}` is no base address: {fault}\n  help: it looks like https://host/v1")]
+    Address { url: String, fault: String },
+    #[error("the base address holds a user name or password\n  help: keys come from the environment alone")]
+    Credentials,
+    #[error(
+        "the base address has a query or a fragment\n  help: it looks like https://host/v1; keys come from the environment alone"
+    )]
+    Query,
+    #[error("the key has characters that no header can carry")]
+    Key,
+    #[error("cannot set up HTTP: {0}")]
+    Client(String),
+}
+
+impl SetupError {
+    /// The same without the key, which may stand where an address should.
+    fn without(self, secret: Option<&Secret>) -> Self {
+        match (self, secret) {
+            (Self::Address { url, fault }, Some(secret)) => {
+                Self::Address { url: secret.without(&url), fault: secret.without(&fault) }
+            }
+            (other, _) => other,
+        }
+    }
+}
+
+impl Provider {
+    /// A provider at a base address; without a secret, requests carry no key (servers of one's own).
+    pub fn new(
+        base_url: &str,
+        dialect: Dialect,
+        model: &str,
+        secret: Option<Secret>,
+        patience: Patience,
+        at_once: usize,
+    ) -> Result<Self, SetupError> {
+        let url = address(base_url, &dialect.path(model)).map_err(|fault| fault.without(secret.as_ref()))?;
+        // Fails where the process has one already, which then serves as well.
+        let _ = rustls::crypto::ring::default_provider().install_default();
+        let client = Client::builder()
+            .default_headers(headers(dialect, secret.as_ref())?)
+            .connect_timeout(patience.connect_timeout)
+            .timeout(patience.timeout)
+            .redirect(reqwest::redirect::Policy::none())
+            .user_agent(concat!("mirrorstats/", env!("CARGO_PKG_VERSION")))
+            .build()
+            .map_err(|fault| SetupError::Client(fault.to_string()))?;
+        Ok(Self { client, url, dialect, secret, patience, pace: Pace::new(at_once) })
+    }
+
+    /// Makes a connection to the address and gives it up again; nothing is sent over it.
+    pub fn connect(&self) -> Result<(), Unreachable> {
+        connect(&self.url, self.patience.connect_timeout)
+            .map_err(|Unreachable { address, fault }| Unreachable { address: self.without_secret(&address), fault })
+    }
+
+    pub fn dialect(&self) -> Dialect {
+        self.dialect
+    }
+
+    /// How patient it is dealt with.
+    pub fn patience(&self) -> Patience {
+        self.patience
+    }
+
+    /// How many requests may be out now.
+    pub fn at_once(&self) -> usize {
+        self.pace.limit()
+    }
+
+    /// The text without the key.
+    pub fn without_secret(&self, text: &str) -> String {
+        self.secret.as_ref().map_or_else(|| text.to_owned(), |secret| secret.without(text))
+    }
+
+    /// Sends a request once, when its turn comes.
+    pub async fn ask(&self, body: &Value) -> Result<Received, Failure> {
+        let turn = self.pace.turn().await;
+        let result = self.exchange(body).await;
+        drop(turn);
+        match &result {
+            Ok(_) => self.pace.good(),
+            Err(failure) if failure.kind == FailureKind::RateLimited => self.pace.too_many(),
+            Err(_) => {}
+        }
+        result.map_err(|failure| Failure { detail: self.without_secret(&failure.detail), ..failure })
+    }
+
+    async fn exchange(&self, body: &Value) -> Result<Received, Failure> {
+        let start = Instant::now();
+        let response = self.client.post(self.url.clone()).json(body).send().await.map_err(broken)?;
+        let (status, after) = (response.status(), retry_after(response.headers()));
+        let kind =
+            response.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or("none").to_owned();
+        if !status.is_success() {
+            // The status stands, whatever becomes of the words beside it.
+            let said = self.whole(response).await.unwrap_or_default();
+            let said = String::from_utf8_lossy(&said).into_owned();
+            return match self.declined(status, &said) {
+                Some(answer) => Ok(self.received(answer, said, start.elapsed())),
+                None => Err(failed(status, after.or_else(|| retry_info(&said)), &self.without_secret(&said))),
+            };
+        }
+        let bytes = self.whole(response).await?;
+        let latency = start.elapsed();
+        // A paid answer counts whatever its content type says, or if it says none.
+        let text = String::from_utf8(bytes).map_err(|fault| server(format!("the answer is not UTF-8: {fault}")))?;
+        let answer = self.dialect.read(&text).map_err(|fault| {
+            server(format!("expected an answer in JSON, found the content type {kind} and: {fault}"))
+        })?;
+        let answer = answer.ok_or_else(|| no_answer(&self.without_secret(&text)))?;
+        Ok(self.received(answer, text, latency))
+    }
+
+    /// The refusal in an error that is about what the request holds. Providers send it as a bad request, routers also as a
+    /// forbidden one.
+    fn declined(&self, status: StatusCode, said: &str) -> Option<Answer> {
+        const ABOUT_CONTENT: [StatusCode; 3] =
+            [StatusCode::BAD_REQUEST, StatusCode::FORBIDDEN, StatusCode::UNPROCESSABLE_ENTITY];
+        if !ABOUT_CONTENT.contains(&status) {
+            return None;
+        }
+        let answer = self.dialect.read(said).ok()??;
+        (answer.ending == Ending::Refused).then_some(answer)
+    }
+
+    /// An answer without the key.
+    fn received(&self, answer: Answer, body: String, latency: Duration) -> Received {
+        let kept = |text: String| match &self.secret {
+            Some(secret) => secret.without_in_answer(&text),
+            None => text,
+        };
+        let answer = Answer { text: kept(answer.text), model: answer.model.map(kept), ..answer };
+        Received { answer, body: kept(body), latency }
+    }
+
+    /// The body, up to the limit.
+    async fn whole(&self, mut response: Response) -> Result<Vec<u8>, Failure> {
+        let mut bytes = Vec::new();
+        while let Some(chunk) = response.chunk().await.map_err(broken)? {
+            if bytes.len() + chunk.len() > self.patience.largest_answer {
+                return Err(server(format!("the answer is larger than {} bytes", self.patience.largest_answer)));
+            }
+            bytes.extend_from_slice(&chunk);
+        }
+        Ok(bytes)
+    }
+}
+
+fn address(base_url: &str, path: &str) -> Result<Url, SetupError> {
+    let fault = |fault: String| SetupError::Address { url: base_url.to_owned(), fault };
+    // An address that may hold credentials is not repeated in a message.
+    if base_url.contains('@') {
+        return Err(SetupError::Credentials);
+    }
+    if base_url.contains(['?', '#']) {
+        return Err(SetupError::Query);
+    }
+    let base = base_url.trim_end_matches('/');
+    let url = Url::parse(&format!("{base}/{path}"));
+    match url {
+        Ok(url) if !matches!(url.scheme(), "http" | "https") => Err(fault(format!("the scheme is {}", url.scheme()))),
+        Ok(url) => Ok(url),
+        Err(error) => Err(fault(error.to_string())),
+    }
+}
+
+fn headers(dialect: Dialect, secret: Option<&Secret>) -> Result<HeaderMap, SetupError> {
+    let mut headers = HeaderMap::new();
+    for (name, value) in dialect.headers() {
+        headers.insert(HeaderName::from_static(name), HeaderValue::from_static(value));
+    }
+    if let Some(secret) = secret {
+        let (name, prefix) = dialect.key_header();
+        headers.insert(HeaderName::from_static(name), secret.header(prefix).ok_or(SetupError::Key)?);
+    }
+    Ok(headers)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SetupError, address};
+
+    #[test]
+    fn addresses_take_paths_and_refuse_credentials() {
+        assert_eq!(address("http://host:8/v1/", "a/b").unwrap().as_str(), "http://host:8/v1/a/b");
+        assert!(matches!(address("https://me:secret@host/v1", "a"), Err(SetupError::Credentials)));
+        assert!(matches!(address("me:secret@host", "a"), Err(SetupError::Credentials)));
+        assert!(matches!(address("host/v1", "a"), Err(SetupError::Address { .. })));
+        assert!(matches!(address("ftp://host/v1", "a"), Err(SetupError::Address { .. })));
+        assert!(matches!(address("http://host/v1?key=secret", "a"), Err(SetupError::Query)));
+    }
+}

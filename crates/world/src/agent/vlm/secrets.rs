@@ -1,0 +1,111 @@
+//! A key, and the words without it.
+//!
+//! A provider may say a key back, in an error or a header. Everything that is written, printed or kept goes through
+//! [`Secret::without`] first.
+
+use secrecy::{ExposeSecret as _, SecretString};
+
+/// What stands where a key stood.
+const PLACEHOLDER: &str = "[key]";
+
+/// A key from the environment; it does not print.
+#[derive(Clone, Debug)]
+pub struct Secret(SecretString);
+
+/// A key that is not there.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the environment variable {0} is not set; it holds the key of the provider\n  help: export {0}=... and run the command again"
+)]
+pub struct NoKey(pub String);
+
+impl Secret {
+    /// The key in an environment variable.
+    pub fn from_environment(variable: &str) -> Result<Self, NoKey> {
+        let value = std::env::var(variable).unwrap_or_default();
+        let value = value.trim();
+        if value.is_empty() { Err(NoKey(variable.to_owned())) } else { Ok(Self(value.to_owned().into())) }
+    }
+
+    pub fn new(key: String) -> Self {
+        Self(key.into())
+    }
+
+    /// The text without the key, plain or percent-encoded.
+    pub fn without(&self, text: &str) -> String {
+        let key = self.0.expose_secret();
+        if key.is_empty() {
+            return text.to_owned();
+        }
+        let encoded: String = key
+            .bytes()
+            .map(|byte| match byte {
+                b'A'..=b'Z' | b'a'..=b'z' | b'0'..=b'9' | b'-' | b'.' | b'_' | b'~' => char::from(byte).to_string(),
+                other => format!("%{other:02X}"),
+            })
+            .collect();
+        let escaped = serde_json::Value::from(key).to_string();
+        [key, escaped.trim_matches('"'), &encoded]
+            .iter()
+            .fold(text.to_owned(), |text, form| text.replace(form, PLACEHOLDER))
+    }
+
+    /// The text of an answer without the key. Servers that ask for no key get words such as `EMPTY` or `none` in its
+    /// place; these are no secrets, and taking them out would change what a model said.
+    pub fn without_in_answer(&self, text: &str) -> String {
+        const SHORTEST_KEY: usize = 6;
+        if self.0.expose_secret().len() < SHORTEST_KEY { text.to_owned() } else { self.without(text) }
+    }
+
+    /// The value of a header that carries the key; marked so that no client prints it.
+    pub(super) fn header(&self, prefix: &str) -> Option<reqwest::header::HeaderValue> {
+        let value = format!("{prefix}{}", self.0.expose_secret());
+        let mut value = reqwest::header::HeaderValue::from_str(&value).ok()?;
+        value.set_sensitive(true);
+        Some(value)
+    }
+}
+
+/// The values of every variable of the environment whose name says that it holds a key: for what a program says that
+/// inherits them. Values too short for a key are left alone, or words that happen to be one would be taken out.
+pub fn from_every_key_variable() -> Vec<Secret> {
+    const SHORTEST: usize = 8;
+    let held = std::env::vars_os().filter(|(name, _)| names_a_key(&name.to_string_lossy()));
+    let values = held.filter_map(|(_, value)| value.into_string().ok()).map(|value| value.trim().to_owned());
+    values.filter(|value| value.len() >= SHORTEST).map(Secret::new).collect()
+}
+
+fn names_a_key(variable: &str) -> bool {
+    let last = variable.rsplit('_').next().unwrap_or_default().to_ascii_uppercase();
+    ["KEY", "APIKEY", "TOKEN", "SECRET", "PASSWORD", "PASSPHRASE"].contains(&last.as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Secret, names_a_key};
+
+    #[test]
+    fn variables_with_keys_are_known_by_their_names() {
+        for name in ["OPENAI_API_KEY", "hf_token", "KEY", "DB_PASSWORD"] {
+            assert!(names_a_key(name), "{name}");
+        }
+        for name in ["PATH", "KEYBOARD", "TOKENIZERS_PARALLELISM", "KEY_FILE_PATH", ""] {
+            assert!(!names_a_key(name), "{name}");
+        }
+    }
+
+    #[test]
+    fn no_form_of_a_key_stays() {
+        let secret = Secret::new("sk/a+\"b".to_owned());
+        let said = r#"got sk/a+"b, as "sk/a+\"b", as sk%2Fa%2B%22b"#;
+        assert_eq!(secret.without(said), r#"got [key], as "[key]", as [key]"#);
+        assert_eq!(secret.without_in_answer("sk/a+\"b"), "[key]");
+        assert!(!format!("{secret:?}").contains("sk/a"));
+    }
+
+    #[test]
+    fn a_word_in_place_of_a_key_changes_no_answer() {
+        let answer = r#"{"selected_cube": "none"}"#;
+        assert_eq!(Secret::new("none".to_owned()).without_in_answer(answer), answer);
+    }
+}

@@ -1,0 +1,180 @@
+//! One step's question: asked, journaled, asked again, and given up.
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use backon::{ExponentialBuilder, Retryable as _};
+use serde_json::Value;
+
+use super::failure::{Failure, FailureKind};
+use super::journal::{Entry, Journal, Recorded};
+use super::limits::Reached;
+use super::model::{OnOutage, Vlm, tokens};
+use super::provider::Provider;
+use crate::agent::Lost;
+
+/// What helps where a model takes no images.
+const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
+                    for images (llama.cpp: --mmproj FILE)";
+
+/// What helps where a day's quota is used up.
+const TOMORROW: &str = "\n  help: the same command continues when the quota is renewed, or with a higher one; what was \
+                        answered is not asked again";
+
+/// Journals stay usable when a thread that held one ended badly: every line in them is whole.
+pub(super) fn locked(journal: &Mutex<Journal>) -> MutexGuard<'_, Journal> {
+    journal.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// One step's question, on its way.
+pub(super) struct Step {
+    pub(super) vlm: Arc<Vlm>,
+    pub(super) journal: Arc<Mutex<Journal>>,
+    pub(super) t: i32,
+    pub(super) frame: String,
+    pub(super) body: Value,
+    pub(super) question: String,
+}
+
+/// Why an attempt ended without an answer.
+enum Ended {
+    Failed(Failure),
+    Stopped(Lost),
+}
+
+impl Step {
+    /// Asks until there is an answer, the attempts are used up, or there is no point in asking.
+    pub(super) async fn ask(self) -> Result<Recorded, Lost> {
+        let Some(provider) = &self.vlm.provider else {
+            return Err(Lost::because("nothing is sent from a cassette".to_owned()));
+        };
+        let patience = provider.patience();
+        let backoff = ExponentialBuilder::default()
+            .with_min_delay(patience.first_delay)
+            .with_max_delay(patience.longest_delay)
+            .with_max_times(patience.attempts.saturating_sub(1) as usize)
+            .with_jitter();
+        let mut attempt = 0;
+        let asked = (|| {
+            attempt += 1;
+            self.attempt_in_turn(provider, attempt)
+        })
+        .retry(backoff)
+        .when(|ended| matches!(ended, Ended::Failed(failure) if failure.kind.may_pass()))
+        .adjust(|ended, delay| match ended {
+            Ended::Failed(Failure { after: Some(after), .. }) => {
+                delay.map(|_| (*after).min(patience.longest_asked_delay))
+            }
+            _ => delay,
+        })
+        .await;
+        match asked {
+            Ok(recorded) => Ok(recorded),
+            Err(Ended::Stopped(lost)) => Err(lost),
+            Err(Ended::Failed(failure)) if failure.kind.may_pass() => self.give_up(attempt, &failure),
+            Err(Ended::Failed(failure)) => Err(self.rejected(&failure)),
+        }
+    }
+
+    /// A request that the provider will not take costs its episode if the model has taken others; else no request of this
+    /// recording is as it should be.
+    fn rejected(&self, failure: &Failure) -> Lost {
+        if failure.kind == FailureKind::Rejected && self.vlm.has_answered.load(Ordering::Relaxed) {
+            return Lost::because(format!("step {}: the provider rejects this request: {}", self.t, failure.detail));
+        }
+        let reason = match failure.kind {
+            FailureKind::NoImages => {
+                format!("the model, or the server that runs it, takes no images: {}{SEES}", failure.detail)
+            }
+            FailureKind::DailyQuota => {
+                format!("the provider's quota of the day is used up: {}{TOMORROW}", failure.detail)
+            }
+            _ => format!("the provider refuses the request: {}", failure.detail),
+        };
+        self.vlm.halt(Lost::because(reason))
+    }
+
+    /// An attempt, made again when the provider says when: a rate limit is no fault, and uses up no attempts.
+    async fn attempt_in_turn(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
+        let patience = provider.patience();
+        let mut waited = Duration::ZERO;
+        loop {
+            let ended = self.attempt(provider, attempt).await;
+            let Err(Ended::Failed(Failure { kind: FailureKind::RateLimited, after: Some(after), .. })) = &ended else {
+                return ended;
+            };
+            let is_over = waited + *after > patience.longest_wait || *after > patience.longest_asked_delay;
+            if after.is_zero() || is_over {
+                return ended;
+            }
+            tokio::time::sleep(*after).await;
+            waited += *after;
+        }
+    }
+
+    async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
+        let first = self.vlm.turn_of_first().await;
+        let ended = self.exchange(provider, attempt).await;
+        self.vlm.note_known();
+        drop(first);
+        ended
+    }
+
+    async fn exchange(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
+        if let Some(lost) = self.vlm.end() {
+            return Err(Ended::Stopped(lost));
+        }
+        let over = |reached: Reached| Ended::Stopped(self.vlm.halt(Lost::by_limit(reached.to_string())));
+        self.vlm.account.request().map_err(over)?;
+        let (t, question) = (self.t, self.question.clone());
+        self.write(&Entry::Request { t, attempt, question: question.clone(), frame: self.frame.clone() })?;
+        match provider.ask(&self.body).await {
+            Ok(received) => {
+                let cost = self.vlm.read(&received.body).and_then(|(_, cost)| cost);
+                self.vlm.account.answer(tokens(&received.answer), cost);
+                let latency_ms = i32::try_from(received.latency.as_millis()).unwrap_or(i32::MAX);
+                let (body, model, answered) = (received.body, received.answer.model, question.clone());
+                let other = model.clone();
+                self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body: body.clone() })?;
+                self.vlm.note_answered();
+                self.vlm.check_model(other.as_deref()).map_err(Ended::Stopped)?;
+                Ok(Recorded::Answer { question: answered, latency_ms, body })
+            }
+            Err(failure) => {
+                let status = failure.kind.status().name().to_owned();
+                let detail = failure.detail.clone();
+                self.write(&Entry::Failure { t, attempt, status, detail, is_final: false, question })?;
+                Err(Ended::Failed(failure))
+            }
+        }
+    }
+
+    fn give_up(&self, attempt: u32, failure: &Failure) -> Result<Recorded, Lost> {
+        let status = failure.kind.status();
+        if self.vlm.on_outage == OnOutage::Lose {
+            let name = status.name();
+            let cause = format!("step {}: {name} after {attempt} attempts: {}", self.t, failure.detail);
+            return Err(Lost::counted_as(status, cause));
+        }
+        let entry = Entry::Failure {
+            t: self.t,
+            attempt,
+            status: status.name().to_owned(),
+            detail: failure.detail.clone(),
+            is_final: true,
+            question: self.question.clone(),
+        };
+        match self.write(&entry) {
+            Ok(()) => Ok(Recorded::GivenUp { question: self.question.clone(), status }),
+            Err(Ended::Stopped(lost)) => Err(lost),
+            Err(Ended::Failed(failure)) => Err(Lost::because(failure.detail)),
+        }
+    }
+
+    /// A journal that cannot be written ends the run: going on would ask, and pay, twice.
+    fn write(&self, entry: &Entry) -> Result<(), Ended> {
+        let written = tokio::task::block_in_place(|| locked(&self.journal).append(entry));
+        written.map_err(|error| Ended::Stopped(self.vlm.halt(Lost::because(error.to_string()))))
+    }
+}

@@ -1,0 +1,52 @@
+//! The experiments that come with the program, one file each.
+
+use super::Known;
+use super::file;
+use metric::fault::Source;
+
+macro_rules! files {
+    ($($name:literal),+ $(,)?) => {
+        /// By name, the paper's five first; a later one may have the scenes of an earlier one.
+        const FILES: [(&str, &str); [$($name),+].len()] =
+            [$(($name, include_str!(concat!("../../../../assets/experiments/", $name, ".toml")))),+];
+    };
+}
+
+files!(
+    "E1",
+    "E2",
+    "E3",
+    "E4",
+    "E5",
+    "two-mirrors",
+    "delayed",
+    "decoy",
+    "window",
+    "mark",
+    "reach-scheme",
+    "reach-mirror",
+    "reach-hand",
+    "reach-bare",
+    "reach-no-mirror",
+    "reach-decoy",
+    "reach-late",
+);
+
+/// The names of the built-in experiments, in their order.
+pub fn built_in_names() -> Vec<&'static str> {
+    FILES.iter().map(|(name, _)| *name).collect()
+}
+
+/// The file of the built-in experiment of this name.
+pub fn built_in(name: &str) -> Option<&'static str> {
+    FILES.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+}
+
+/// Every built-in experiment, read as one text, so that one may have the scenes of another.
+pub(super) fn all() -> Vec<Known> {
+    let text: String = FILES.iter().map(|(_, text)| *text).collect::<Vec<_>>().join("\n");
+    let source = Source { name: "built-in experiments".to_owned(), text };
+    let entries =
+        file::read(source, None, &[]).unwrap_or_else(|faults| panic!("the built-in experiments are tested:\n{faults}"));
+    entries.into_iter().map(|entry| entry.known).collect()
+}

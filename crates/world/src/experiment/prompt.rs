@@ -1,0 +1,157 @@
+//! Prompts as folders of templates.
+//!
+//! | file | what it says | values |
+//! |---|---|---|
+//! | `system.txt` | the system prompt | `stated_color` |
+//! | `user.txt` | the user prompt | `history_text`, `position_text`, `bumped`, `warning_if_bumped_wall`, `remaining`, `budget` |
+//! | `history.txt` | the step before, or all of them | `first`, `action`, `thought`, `steps` |
+//! | `position.txt` | pose and budget | `x`, `y`, `yaw`, `remaining`, `budget` |
+//! | `warning.txt` | the last move was stopped | none |
+//!
+//! Each of `steps`, the first one first, has `action`, `name`, `bumped` and `thought`.
+//!
+//! The first two are a prompt's own; the other three are shared by all, unless a folder has its own.
+//! The templates of the paper's two prompts are word for word (appendix, "Prompt Templates"). The three of the dynamic
+//! context are ours, since the paper says what they hold but not how they read.
+//!
+//! The paper's user prompt of E5 has no `<warning_if_bumped_wall>`, that of E1 to E4 has it. Ours has it in both: a body
+//! that was stopped is told so by one rule, and where nothing was hit the words of E5 are the paper's.
+
+use std::fs;
+use std::path::{Component, Path};
+
+use minijinja::Environment;
+
+use exact::budget::Limit;
+use exact::hash;
+use exact::input;
+
+/// The most bytes of a template.
+const LARGEST: Limit = Limit::new("bytes of a prompt", 256 * 1024);
+
+/// A template: the name of its file without the ending, and its text.
+pub type Template = (String, String);
+
+/// The names of the templates, and the values that each may use.
+const NAMES: [(&str, &[&str]); 5] = [
+    ("system", &["stated_color"]),
+    ("user", &["history_text", "position_text", "bumped", "warning_if_bumped_wall", "remaining", "budget"]),
+    ("history", &["first", "action", "thought", "steps"]),
+    ("position", &["x", "y", "yaw", "remaining", "budget"]),
+    ("warning", &[]),
+];
+
+/// The templates that every folder has; the others have a text where it has none.
+const OWN: [&str; 2] = ["system", "user"];
+
+macro_rules! folder {
+    ($name:literal: $($template:literal),+) => {
+        ($name, &[$(($template, include_str!(concat!("../../../../assets/prompts/", $name, "/", $template, ".txt")))),+])
+    };
+}
+
+/// The built-in folders, with the templates that are their own.
+const BUILT_IN: [(&str, &[(&str, &str)]); 7] = [
+    folder!("cube-selection": "system", "user"),
+    folder!("exploration": "system", "user"),
+    folder!("mark": "system", "user"),
+    folder!("reach-scheme": "system", "user", "history"),
+    folder!("reach-mirror": "system", "user", "history"),
+    folder!("reach-hand": "system", "user", "history"),
+    folder!("reach-bare": "system", "user", "history"),
+];
+
+/// The three that they share.
+const SHARED: [(&str, &str); 3] = [
+    ("history", include_str!("../../../../assets/prompts/history.txt")),
+    ("position", include_str!("../../../../assets/prompts/position.txt")),
+    ("warning", include_str!("../../../../assets/prompts/warning.txt")),
+];
+
+/// The templates of a prompt.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Templates {
+    /// `system`, `user`, `history`, `position`, `warning`, in this order; empty where only the hash is known.
+    pub all: Vec<Template>,
+}
+
+impl Templates {
+    /// SHA-256 of names and texts, 64 hexadecimal digits.
+    pub fn hash(&self) -> String {
+        let text: String = self.all.iter().flat_map(|(name, text)| [name, "\n", text.as_str()]).collect();
+        hash::of_bytes(text.as_bytes())
+    }
+
+    /// The built-in prompt of this name.
+    pub fn built_in(name: &str) -> Option<Self> {
+        let (_, own) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
+        let own: Vec<Template> = own.iter().map(|(name, text)| ((*name).to_owned(), (*text).to_owned())).collect();
+        Some(Self::of(&own))
+    }
+
+    /// The names of the built-in prompts.
+    pub fn built_in_names() -> Vec<&'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name).collect()
+    }
+
+    /// The prompt of a folder `name` inside `folder`.
+    pub fn read(folder: &Path, name: &str) -> Result<Self, String> {
+        let relative = Path::new(name);
+        if !relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir)) {
+            return Err("the prompt is a folder beside the experiment file or below it, and no other path".to_owned());
+        }
+        let place = folder.join(relative);
+        let unreadable = |path: &Path, error: &std::io::Error| format!("cannot read `{}`: {error}", path.display());
+        let real = fs::canonicalize(&place).map_err(|error| unreadable(&place, &error))?;
+        let root = fs::canonicalize(folder).map_err(|error| unreadable(folder, &error))?;
+        if !real.starts_with(&root) {
+            return Err(format!("`{}` is a link that leads out of the folder of the experiment file", place.display()));
+        }
+        let mut own = Vec::new();
+        for (name, _) in NAMES {
+            let path = real.join(format!("{name}.txt"));
+            let is_needed = OWN.contains(&name);
+            if is_needed || path.exists() {
+                let is_inside = fs::canonicalize(&path).map_err(|error| unreadable(&path, &error))?.starts_with(&root);
+                if !is_inside {
+                    return Err(format!("`{}` is a link that leads out of the folder", path.display()));
+                }
+                own.push((name.to_owned(), text_of(&path)?));
+            }
+        }
+        let templates = Self::of(&own);
+        templates.check()?;
+        Ok(templates)
+    }
+
+    /// Own templates, and the shared ones for the rest.
+    fn of(own: &[Template]) -> Self {
+        let shared = |name: &str| SHARED.iter().find(|(known, _)| *known == name).map(|(_, text)| (*text).to_owned());
+        let text = |name: &str| own.iter().find(|(known, _)| known == name).map(|(_, text)| text.clone());
+        let all = NAMES.iter().filter_map(|(name, _)| Some(((*name).to_owned(), text(name).or_else(|| shared(name))?)));
+        Self { all: all.collect() }
+    }
+
+    /// Whether every template parses and uses only what it is given.
+    fn check(&self) -> Result<(), String> {
+        for ((name, text), (_, values)) in self.all.iter().zip(NAMES) {
+            let mut environment = Environment::new();
+            environment
+                .add_template(name, text)
+                .map_err(|error| format!("the template {name}.txt does not parse: {error}"))?;
+            let used = environment.get_template(name).map_err(|error| error.to_string())?.undeclared_variables(false);
+            let mut unknown: Vec<&String> = used.iter().filter(|value| !values.contains(&value.as_str())).collect();
+            unknown.sort();
+            if let Some(value) = unknown.first() {
+                let known = if values.is_empty() { "nothing".to_owned() } else { values.join(", ") };
+                return Err(format!("the template {name}.txt uses `{value}`; it is given {known}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn text_of(path: &Path) -> Result<String, String> {
+    let unreadable = |error: std::io::Error| format!("cannot read `{}`: {error}", path.display());
+    input::text(path, LARGEST).map_err(unreadable)
+}

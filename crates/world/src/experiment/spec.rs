@@ -1,0 +1,421 @@
+//! What an experiment is, checked: every value is in its range and fits the others.
+
+mod marks;
+mod panes;
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use exact::names;
+use trace::palette::Color;
+
+pub use marks::{Mark, MarkColor, Part, Wearer};
+pub use panes::{BodyShown, Paint, Pane, PaneKind};
+
+/// The most glass panes (mirrors and windows) in a room.
+pub const MOST_PANES: usize = 4;
+
+/// The most marks in a world.
+pub const MOST_MARKS: usize = 4;
+
+/// An experiment: what its world shows, what its agent is asked, and how the answer is decided.
+///
+/// Whole in the footer of every trace, under `mirrorstats.recording.experiment`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[schemars(rename = "Experiment")]
+pub struct Spec {
+    /// Its name in traces, files and tables: letters, digits, `-` and `_`.
+    pub name: String,
+    /// The heading of its group in tables, without its name.
+    pub title: String,
+    /// Its position among experiments; after those that have one if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<i64>,
+    /// Chance levels by metric: a fraction such as `1/3`, or `none`.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub chance: IndexMap<String, String>,
+    /// What blind strategies would reach, by metric, where no chance level applies.
+    #[serde(default, skip_serializing_if = "IndexMap::is_empty")]
+    pub reference: IndexMap<String, Vec<String>>,
+    /// The experiment whose scenes it has: its own name, or that of the one with which it makes pairs.
+    pub scenes: String,
+    /// What is drawn, shared by all experiments with these scenes.
+    pub layout: Layout,
+    /// The folder of its prompt: built in, or beside its file.
+    pub prompt: String,
+    /// SHA-256 of the prompt's templates, 64 hexadecimal digits.
+    pub prompt_hash: String,
+    /// The keys of a reply, in the order of the prompt.
+    pub reply: Vec<ReplyKey>,
+    /// The definitions that score it: a built-in name, or a path relative to its file; the default ones if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub definitions: Option<String>,
+    /// SHA-256 of the definition file, 64 hexadecimal digits; absent for built-in definitions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub definitions_hash: Option<String>,
+    /// The column that holds the decision.
+    pub decision: Decision,
+    /// The column that holds what the decision should name.
+    pub truth: Truth,
+    /// What the prompt states of the body's colour.
+    pub stated_color: Stated,
+    /// What the agent can do.
+    pub actions: Actions,
+    /// What the agent sees with.
+    pub camera: Camera,
+    /// Steps after which an episode ends by itself; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub steps: Option<u32>,
+    /// The length of the agent's own steps, mm; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub step_length_mm: Option<u32>,
+    /// Mirrors and windows, the first of which is where the layout has its own; none is a bare wall.
+    #[serde(default, rename = "mirror", skip_serializing_if = "Vec::is_empty")]
+    pub panes: Vec<Pane>,
+    /// Marks on bodies.
+    #[serde(default, rename = "mark", skip_serializing_if = "Vec::is_empty")]
+    pub marks: Vec<Mark>,
+    /// The hand that moves in place of the body, where the task is to reach the mark on its front.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hand: Option<Hand>,
+    /// The size and the angle of the picture; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub view: Option<Picture>,
+    /// Columns that have no meaning for the task: its traces have none.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub absent: Vec<AbsentColumn>,
+}
+
+/// A column that traces have unless their experiments say that it has no meaning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AbsentColumn {
+    /// The self-attribution: where no reply says who the agent takes itself for.
+    SelfColor,
+    /// The cube that is chosen: where there is none to choose.
+    SelectedCube,
+}
+
+names!(AbsentColumn { SelfColor: "self_color", SelectedCube: "selected_cube" });
+
+impl AbsentColumn {
+    /// The key of a reply that would fill it.
+    pub const fn key(self) -> ReplyKey {
+        match self {
+            Self::SelfColor => ReplyKey::Identification,
+            Self::SelectedCube => ReplyKey::SelectedCube,
+        }
+    }
+}
+
+/// A hand that floats freely, a step at a time, and what it takes to reach the mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Hand {
+    /// The length of its steps, mm.
+    pub step_mm: u32,
+    /// Steps from the mark at the start at least, along the three directions together.
+    pub least: u32,
+    /// The same at most.
+    pub most: u32,
+    /// Steps from the mark at which it is reached.
+    pub within: u32,
+    /// The steps of an episode beyond those from the start to the mark.
+    pub extra_steps: u32,
+}
+
+/// The size and the angle of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Picture {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The vertical field of view, degrees.
+    pub fovy: u32,
+}
+
+/// What is drawn from seed and run, the same for all experiments that share scenes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Layout {
+    /// How the body's colour is drawn.
+    pub colors: Colors,
+    /// The colours of bodies and cubes.
+    pub palette: Vec<Color>,
+    /// The cubes.
+    pub cubes: Cubes,
+    /// The other agents.
+    pub others: Others,
+    /// How the agent stands at the start.
+    pub start: Start,
+    /// The wall of the first pane.
+    pub wall: Wall,
+}
+
+/// How the body's colour is drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Colors {
+    /// Each colour equally often over the seeds and runs of a study, or once more.
+    #[default]
+    Balanced,
+    /// Each by itself.
+    Random,
+}
+
+names!(Colors { Balanced: "balanced", Random: "random" });
+
+/// The cubes of a world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "snake_case", tag = "kind")]
+pub enum Cubes {
+    /// No cube.
+    None,
+    /// Cubes of different colours, one of them the body's.
+    Candidates {
+        /// How many.
+        count: u32,
+    },
+    /// Cubes of any colours, some of them before the first pane.
+    Clutter {
+        /// How many at least; the world's if absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        least: Option<u32>,
+        /// How many at most; the world's if absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        most: Option<u32>,
+        /// Of a hundred places before the first pane, those from which it hides half of the body or more, at least; the
+        /// world's if absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        hides: Option<u32>,
+    },
+}
+
+/// The other agents of a world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Others {
+    /// How many at least; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub least: Option<u32>,
+    /// How many at most; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub most: Option<u32>,
+    /// What they do.
+    pub behavior: Behavior,
+    /// Of a hundred episodes, those where one of them has the colour of the agent's own body; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub twin_percent: Option<u32>,
+}
+
+/// What other agents do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Behavior {
+    /// They walk about.
+    #[default]
+    Walk,
+    /// They stand where they are.
+    Stand,
+}
+
+names!(Behavior { Walk: "walk", Stand: "stand" });
+
+/// How the agent stands at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Start {
+    /// With the place of the first pane out of view.
+    #[default]
+    FacingAway,
+    /// Anyhow.
+    Any,
+    /// Two metres before the middle of the first pane, or of its place, facing it.
+    BeforeMirror,
+}
+
+names!(Start { FacingAway: "facing_away", Any: "any", BeforeMirror: "before_mirror" });
+
+/// A wall of the room.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Wall {
+    /// Drawn.
+    #[default]
+    Random,
+    /// Across from the first pane.
+    Opposite,
+    /// At +x.
+    East,
+    /// At +y.
+    North,
+    /// At -x.
+    West,
+    /// At -y.
+    South,
+}
+
+names!(Wall { Random: "random", Opposite: "opposite", East: "east", North: "north", West: "west", South: "south" });
+
+impl Wall {
+    /// Quarter turns counter-clockwise from the wall at +x; `None` where it is drawn.
+    pub const fn quarter(self) -> Option<u8> {
+        match self {
+            Self::Random | Self::Opposite => None,
+            Self::East => Some(0),
+            Self::North => Some(1),
+            Self::West => Some(2),
+            Self::South => Some(3),
+        }
+    }
+}
+
+/// A key of a reply; its value is a text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+pub enum ReplyKey {
+    /// What the image shows.
+    #[serde(rename = "view-description")]
+    ViewDescription,
+    /// Why this action.
+    #[serde(rename = "reasoning")]
+    Reasoning,
+    /// What to do.
+    #[serde(rename = "action")]
+    Action,
+    /// What comes back as the history of the next step.
+    #[serde(rename = "summary")]
+    Summary,
+    /// The cube: a colour, or `none`.
+    #[serde(rename = "selected_cube")]
+    SelectedCube,
+    /// The own body's colour in words.
+    #[serde(rename = "identification")]
+    Identification,
+    /// The mark on the own body: a colour, or `none`.
+    #[serde(rename = "mark")]
+    Mark,
+}
+
+names!(ReplyKey {
+    ViewDescription: "view-description",
+    Reasoning: "reasoning",
+    Action: "action",
+    Summary: "summary",
+    SelectedCube: "selected_cube",
+    Identification: "identification",
+    Mark: "mark",
+});
+
+/// The column that holds the decision.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Decision {
+    /// The cube that the reply selects.
+    SelectedCube,
+    /// The colour that the reply gives the own body.
+    SelfColor,
+    /// The mark that the reply reports on the own body.
+    MarkReport,
+    /// Where the hand is: no reply names it.
+    TargetDistance,
+}
+
+names!(Decision {
+    SelectedCube: "selected_cube",
+    SelfColor: "self_color",
+    MarkReport: "mark_report",
+    TargetDistance: "target_distance",
+});
+
+impl Decision {
+    /// The key of a reply that fills the column.
+    pub const fn key(self) -> ReplyKey {
+        match self {
+            Self::SelectedCube => ReplyKey::SelectedCube,
+            Self::SelfColor => ReplyKey::Identification,
+            Self::MarkReport => ReplyKey::Mark,
+            Self::TargetDistance => ReplyKey::Action,
+        }
+    }
+}
+
+/// The column that holds what the decision should name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Truth {
+    /// The colour of the own body.
+    BodyColor,
+    /// The colour of the mark on the own body, `none` where there is none.
+    MarkColor,
+    /// Where the hand starts: the way that it should leave behind.
+    StartDistance,
+}
+
+names!(Truth { BodyColor: "body_color", MarkColor: "mark_color", StartDistance: "start_distance" });
+
+/// What the prompt states of the body's colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Stated {
+    /// Nothing.
+    #[default]
+    None,
+    /// The colour of another candidate: false.
+    Candidate,
+    /// Any other colour of the palette: false.
+    Random,
+}
+
+names!(Stated { None: "none", Candidate: "candidate", Random: "random" });
+
+/// What the agent can do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Actions {
+    /// Steps forward and back, turns by 30 degrees, and `done`.
+    #[default]
+    Walk,
+    /// Steps of a hand: up, down, left, right, away from the camera and towards it. The body stands still.
+    Hand,
+}
+
+names!(Actions { Walk: "walk", Hand: "hand" });
+
+/// What the agent sees with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Camera {
+    /// Its own eye, before its face.
+    #[default]
+    Eye,
+    /// A camera behind the body and above it, which looks over its head: 1.1 m behind, 2.0 m high, aimed at a point 1.7 m
+    /// above where the body stands.
+    Behind,
+}
+
+names!(Camera { Eye: "eye", Behind: "behind" });
+
+impl Spec {
+    /// Whether there are cubes of which one is to be selected.
+    pub const fn has_candidates(&self) -> bool {
+        matches!(self.layout.cubes, Cubes::Candidates { .. })
+    }
+
+    /// Whether a reply names a cube.
+    pub fn asks_for_cube(&self) -> bool {
+        self.reply.contains(&ReplyKey::SelectedCube)
+    }
+
+    /// Whether a reply says how the agent knows itself.
+    pub fn asks_for_identification(&self) -> bool {
+        self.reply.contains(&ReplyKey::Identification)
+    }
+
+    /// Whether a reply names a mark.
+    pub fn asks_for_mark(&self) -> bool {
+        self.reply.contains(&ReplyKey::Mark)
+    }
+}

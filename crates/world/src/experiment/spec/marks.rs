@@ -1,0 +1,64 @@
+//! Marks on bodies.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use exact::names;
+use trace::palette::Color;
+
+/// A mark on a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Mark {
+    /// Where on the body.
+    pub part: Part,
+    /// Of its paint.
+    pub color: MarkColor,
+    /// The first step that shows it.
+    pub from_t: u32,
+    /// Who wears it.
+    #[serde(default)]
+    pub on: Wearer,
+}
+
+/// Where on a body a mark is. No direct view reaches any of these on one's own body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Part {
+    /// The top of the head.
+    Head,
+    /// Between the shoulders, behind.
+    Back,
+    /// The chest.
+    Chest,
+    /// A square patch somewhere on the front, of a body that stands still; its place and its size are drawn.
+    Front,
+}
+
+names!(Part { Head: "head", Back: "back", Chest: "chest", Front: "front" });
+
+/// The colour of a mark.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MarkColor {
+    /// Drawn: never that of its wearer.
+    Random,
+    /// This one; another one where its wearer has this colour.
+    #[serde(untagged)]
+    Named(Color),
+}
+
+/// Who wears a mark.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Wearer {
+    /// The agent itself: to be reported.
+    #[default]
+    #[serde(rename = "self")]
+    Own,
+    /// The first of the others: not to be reported.
+    #[serde(rename = "other")]
+    Other,
+}
+
+names!(Wearer { Own: "self", Other: "other" });

@@ -1,0 +1,99 @@
+//! Mirrors and windows.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::Wall;
+use exact::names;
+use trace::palette::Color;
+
+/// A mirror, or something in a mirror's place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pane {
+    /// What it shows.
+    pub kind: PaneKind,
+    /// Steps by which it is late.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub delay: u32,
+    /// The colour of the body that it shows.
+    #[serde(default, skip_serializing_if = "Paint::is_own")]
+    pub color: Paint,
+    /// Whose motion the body that it shows has.
+    #[serde(default, skip_serializing_if = "BodyShown::is_own")]
+    pub body: BodyShown,
+    /// Where it hangs.
+    #[serde(default)]
+    pub wall: Wall,
+    /// Along the wall, mm; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub width_mm: Option<u32>,
+    /// mm; the world's if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height_mm: Option<u32>,
+    /// Its lower edge above the floor, mm; about the world's height of centres if absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub bottom_mm: Option<u32>,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+const fn is_zero(value: &u32) -> bool {
+    *value == 0
+}
+
+/// What a pane shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum PaneKind {
+    /// The room, as it is.
+    Mirror,
+    /// The room, as it was some steps ago.
+    Delayed,
+    /// The room, with the own body in another colour or with another body in its place.
+    Decoy,
+    /// A second room like the first, without cubes and others, where one body walks about.
+    Window,
+}
+
+names!(PaneKind { Mirror: "mirror", Delayed: "delayed", Decoy: "decoy", Window: "window" });
+
+/// The colour of something, in terms of the own body.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Paint {
+    /// The own body's.
+    #[default]
+    Own,
+    /// Another: that of another candidate where there are candidates.
+    Other,
+    /// This one.
+    #[serde(untagged)]
+    Named(Color),
+}
+
+impl Paint {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    const fn is_own(&self) -> bool {
+        matches!(self, Self::Own)
+    }
+}
+
+/// Whose motion a body has that a decoy shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum BodyShown {
+    /// The agent's own.
+    #[default]
+    Own,
+    /// Its own: it walks about, whatever the agent does.
+    Independent,
+}
+
+names!(BodyShown { Own: "own", Independent: "independent" });
+
+impl BodyShown {
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde asks for")]
+    const fn is_own(&self) -> bool {
+        matches!(self, Self::Own)
+    }
+}

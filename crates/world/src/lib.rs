@@ -1,0 +1,21 @@
+//! The world of the study: experiments, the MuJoCo simulation, agents, recordings and replays.
+//!
+//! | module | contents |
+//! |---|---|
+//! | [`experiment`] | what a world shows, what an agent is asked, how the answer is decided: built-in files or the user's |
+//! | `sim` | the MuJoCo world: scene, bodies, camera, visibility by ray casts (feature `sim`) |
+//! | [`agent`] | scripted agents, models behind a provider, programs, people |
+//! | `record` | runs episodes and writes a trace and a log (feature `sim`) |
+//! | [`replay`] | a recorded episode simulated again, as frames or a film strip |
+//!
+//! Rule: nothing here knows a metric.
+
+#![warn(clippy::print_stdout, clippy::print_stderr)]
+
+pub mod agent;
+pub mod experiment;
+#[cfg(feature = "sim")]
+pub mod record;
+pub mod replay;
+#[cfg(feature = "sim")]
+pub mod sim;

@@ -1,0 +1,91 @@
+//! Why the folder of a recording cannot be used, and why an episode did not come to its end.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::metadata::{Difference, VERSION_KEY};
+use crate::agent::Lost;
+use trace::error::TraceError;
+use trace::log::LogError;
+
+/// Why the folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages say it")]
+pub enum StoreError {
+    #[error("cannot {doing} `{}`: {source}\n  help: is the folder writable, and the disk not full?", path.display())]
+    Io { doing: &'static str, path: PathBuf, source: io::Error },
+    #[error(
+        "`{}` was recorded with another {what}: expected {expected}, found {found}\n  \
+         help: record into another folder, or remove the file to record it anew",
+        path.display()
+    )]
+    Different { path: PathBuf, what: String, expected: String, found: String },
+    #[error(
+        "the program's files changed since `{}` was recorded (agent.files: expected {expected}, found {found})\n  \
+         help: put the files back as they were, or record into another folder; a file that the program writes itself is \
+         named within a word, such as --log=FILE",
+        path.display()
+    )]
+    Files { path: PathBuf, expected: String, found: String },
+    #[error(
+        "`{}` is a recording of version {found}, and this mirrorstats records version {expected}\n  \
+         help: go on with the mirrorstats that began it, or record into another folder",
+        path.display()
+    )]
+    Version { path: PathBuf, expected: String, found: String },
+    #[error("the log `{}` does not belong to this recording: {fault}\n  help: {help}", path.display())]
+    ForeignLog { path: PathBuf, fault: String, help: String },
+    #[error(
+        "the log `{}` is damaged: {fault}\n  \
+         help: remove it and `{}`; the same command records the episode again",
+        path.display(),
+        path.with_extension("parquet").display()
+    )]
+    DamagedPart { path: PathBuf, fault: String },
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    #[error(transparent)]
+    Log(#[from] LogError),
+}
+
+impl StoreError {
+    /// The file at `path` was recorded differently.
+    pub(super) fn different(path: &Path, Difference { what, expected, found }: Difference) -> Self {
+        let path = path.to_owned();
+        match what.as_str() {
+            VERSION_KEY if found.parse::<u64>().is_ok() => Self::Version { path, expected, found },
+            "agent.files" => Self::Files { path, expected, found },
+            _ => Self::Different { path, what, expected, found },
+        }
+    }
+
+    pub(super) fn io(doing: &'static str, path: &Path) -> impl FnOnce(io::Error) -> Self {
+        move |source| Self::Io { doing, path: path.to_owned(), source }
+    }
+}
+
+/// Why an episode did not come to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The recording is being stopped.
+    #[error("stopped")]
+    Stopped,
+    /// The agent's infrastructure failed.
+    #[error("{lost}")]
+    Lost {
+        /// The step that got no reply; `None` before the first.
+        step: Option<i32>,
+        /// What failed.
+        lost: Lost,
+    },
+    /// The world, the camera or the disk failed, as they would for any episode.
+    #[error(transparent)]
+    Fatal(Box<dyn std::error::Error + Send + Sync>),
+}
+
+impl RecordError {
+    /// A failure that every episode would meet.
+    pub fn fatal(error: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> Self {
+        Self::Fatal(error.into())
+    }
+}

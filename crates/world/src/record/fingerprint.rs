@@ -1,0 +1,124 @@
+//! What an episode was recorded with, in a few hashes: episodes with another fingerprint are not of one sample.
+//!
+//! Rule: equal recordings have equal fingerprints, and whatever can change what an agent does is in one of the parts.
+
+use serde_json::{Map, Value, json};
+
+use exact::hash;
+
+/// Digits of a fingerprint's name: enough for all recordings of a study, and short in a table.
+const DIGITS: usize = 16;
+/// What an experiment is called, scored by and held against, which changes no episode.
+const WORDS: [&str; 6] = ["title", "order", "chance", "reference", "definitions", "definitions_hash"];
+/// The keys of an agent's description that are parts of their own.
+const SAMPLING: [&str; 3] = ["temperature", "max_output_tokens", "reasoning_effort"];
+
+/// A name, and what it stands for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fingerprint {
+    /// The value of the column `fingerprint`: the beginning of the hash of the parts.
+    pub id: String,
+    /// SHA-256 of `world`, `prompts`, `reply_schema`, `agent` and `sampling`, and the `model` that answered; null where
+    /// there is no such thing.
+    pub parts: Value,
+}
+
+impl Fingerprint {
+    /// The fingerprint of an episode, from what its trace says of the recording, and the id of the model as the provider
+    /// returned it.
+    pub fn of(recording: &Value, model: Option<&str>) -> Self {
+        let mut agent = recording["agent"].as_object().cloned().unwrap_or_default();
+        let mut experiment = recording["experiment"].clone();
+        if let Some(experiment) = experiment.as_object_mut() {
+            experiment.retain(|key, _| !WORDS.contains(&key.as_str()));
+        }
+        let prompts =
+            experiment.as_object_mut().and_then(|experiment| experiment.remove("prompt_hash")).unwrap_or_default();
+        // Scripts read neither.
+        let reads = !agent.contains_key("scripted");
+        let given = |value: &Value| (reads && !value.is_null()).then(|| hash_of(value));
+        let taken = SAMPLING.iter().filter_map(|key| Some(((*key).to_owned(), agent.remove(*key)?)));
+        let sampling: Map<String, Value> = taken.collect();
+        let world = json!([recording["world_hash"], recording["scene_version"], experiment]);
+        let parts = json!({
+            "world": hash_of(&world),
+            "prompts": given(&prompts),
+            "reply_schema": given(&recording["reply_schema_hash"]),
+            "agent": hash_of(&Value::Object(agent)),
+            "sampling": (!sampling.is_empty()).then(|| hash_of(&Value::Object(sampling))),
+            "model": model,
+        });
+        let mut id = hash_of(&parts);
+        id.truncate(DIGITS);
+        Self { id, parts }
+    }
+}
+
+/// The hash of a value; keys of objects are in order.
+fn hash_of(value: &Value) -> String {
+    hash::of_bytes(sorted(value).to_string().as_bytes())
+}
+
+/// The same value with the keys of its objects in the order of their bytes.
+fn sorted(value: &Value) -> Value {
+    match value {
+        Value::Object(members) => {
+            let mut members: Vec<_> = members.iter().map(|(key, value)| (key.clone(), sorted(value))).collect();
+            members.sort_by(|(a, _), (b, _)| a.cmp(b));
+            members.into_iter().collect()
+        }
+        Value::Array(values) => values.iter().map(sorted).collect(),
+        other => other.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::{Value, json};
+
+    use super::Fingerprint;
+
+    fn recording() -> Value {
+        json!({
+            "world_hash": "w", "scene_version": 1, "reply_schema_hash": "r",
+            "experiment": { "name": "E1", "title": "One", "prompt_hash": "p", "steps": 7 },
+            "agent": { "id": "x", "temperature": 0.2 },
+        })
+    }
+
+    #[test]
+    fn each_part_changes_alone() {
+        let base = Fingerprint::of(&recording(), Some("x-1"));
+        let changed = |change: &dyn Fn(&mut Value), model| {
+            let mut other = recording();
+            change(&mut other);
+            let other = Fingerprint::of(&other, model);
+            assert_ne!(base.id, other.id);
+            let (a, b) = (base.parts.as_object().unwrap(), other.parts.as_object().unwrap());
+            let keys: Vec<&String> = a.keys().filter(|key| a[*key] != b[*key]).collect();
+            assert_eq!(keys.len(), 1, "{keys:?}");
+            keys[0].clone()
+        };
+        let same = |_: &mut Value| {};
+        assert_eq!(changed(&|value| value["world_hash"] = json!("v"), Some("x-1")), "world");
+        assert_eq!(changed(&|value| value["scene_version"] = json!(2), Some("x-1")), "world");
+        assert_eq!(changed(&|value| value["experiment"]["steps"] = json!(8), Some("x-1")), "world");
+        assert_eq!(changed(&|value| value["experiment"]["prompt_hash"] = json!("q"), Some("x-1")), "prompts");
+        assert_eq!(changed(&|value| value["reply_schema_hash"] = json!("s"), Some("x-1")), "reply_schema");
+        assert_eq!(changed(&|value| value["agent"]["id"] = json!("y"), Some("x-1")), "agent");
+        assert_eq!(changed(&|value| value["agent"]["temperature"] = json!(0.7), Some("x-1")), "sampling");
+        assert_eq!(changed(&same, Some("x-2")), "model");
+        assert_eq!(changed(&same, None), "model");
+        let mut retitled = recording();
+        retitled["experiment"]["title"] = json!("Another title");
+        assert_eq!(Fingerprint::of(&retitled, Some("x-1")), base);
+    }
+
+    #[test]
+    fn the_order_of_keys_is_nothing() {
+        let [one, other] = [r#"{"agent":{"a":1,"b":2}}"#, r#"{"agent":{"b":2,"a":1}}"#];
+        let of = |text: &str| Fingerprint::of(&serde_json::from_str(text).unwrap(), None);
+        assert_eq!(of(one), of(other));
+        assert_eq!(of(one).id.len(), 16);
+    }
+}

@@ -1,0 +1,123 @@
+//! What a trace says of how it was recorded: all that replay needs, and nothing that two recordings of the same differ in.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use crate::agent::{Player, reply};
+use crate::experiment::{Experiment, Spec};
+use crate::sim::config::WorldConfig;
+use crate::sim::scene::SCENE_VERSION;
+use trace::declared::Registration;
+use trace::palette::Color;
+
+/// A key that grows with the recording's episodes.
+pub(super) const SEEDS: &str = "seeds";
+/// A key that grows with the recording's episodes: what they were recorded with, by fingerprint.
+pub(super) const FINGERPRINTS: &str = "fingerprints";
+
+/// The key of the version of this object's shape.
+pub(super) const VERSION_KEY: &str = "version";
+
+/// The version of this object's shape: 2 since it declares a palette, a design and fingerprints, 3 since it has the whole
+/// experiment. A recording of another version is not continued, since its episodes were not held against the same rules.
+const VERSION: u32 = 3;
+
+/// What the traces of several experiments say of how they were recorded.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recordings(BTreeMap<Experiment, Value>);
+
+impl Recordings {
+    /// Those of some experiments; `condition` is absent for the default one.
+    pub fn new(
+        experiments: &[Experiment],
+        config: &WorldConfig,
+        player: &dyn Player,
+        condition: Option<&str>,
+        registration: Option<&Registration>,
+    ) -> Self {
+        let of = |experiment: &Experiment| recording(*experiment, config, player, condition, registration);
+        Self(experiments.iter().map(|experiment| (*experiment, of(experiment))).collect())
+    }
+
+    /// That of an experiment; null for one that is not recorded.
+    pub fn of(&self, experiment: Experiment) -> &Value {
+        self.0.get(&experiment).unwrap_or(&Value::Null)
+    }
+}
+
+/// The value of `mirrorstats.recording`; the store adds the seeds and fingerprints.
+///
+/// Episodes with equal scenes are pairs. A seed is no cluster: each of its runs has a room of its own.
+fn recording(
+    experiment: Experiment,
+    config: &WorldConfig,
+    player: &dyn Player,
+    condition: Option<&str>,
+    registration: Option<&Registration>,
+) -> Value {
+    let config = &config.of(experiment);
+    let spec: &Spec = &experiment;
+    let mut recording = json!({
+        VERSION_KEY: VERSION,
+        "kind": "recording",
+        "design": { "pairs": "scene", "cluster": null },
+        "condition": condition.unwrap_or("default"),
+        "scene_version": SCENE_VERSION,
+        "experiment": spec,
+        "reply_schema_hash": reply::structure_hash(&experiment.reply),
+        "palette": Color::ALL.map(Color::name),
+        "agent": player.description(),
+        "view": { "width": config.eye.width, "height": config.eye.height_px, "fov_y": config.eye.fovy },
+        "visibility_threshold_px": config.evidence.mirror_self_px,
+        "world": config,
+        "world_hash": config.hash(),
+    });
+    if let Some(registration) = registration {
+        recording["registration"] = json!(registration);
+    }
+    recording
+}
+
+/// Where two recordings differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Difference {
+    /// The key of the metadata.
+    pub what: String,
+    /// What this recording has.
+    pub expected: String,
+    /// What the other one has.
+    pub found: String,
+}
+
+/// The first key in which the metadata of two recordings differ, but for those that grow with the episodes.
+pub(super) fn difference(ours: &Value, theirs: &Value) -> Option<Difference> {
+    // Which definitions score an experiment changes no episode.
+    let recorded = |value: &Value| {
+        let mut value = value.clone();
+        if let Some(experiment) = value.get_mut("experiment").and_then(Value::as_object_mut) {
+            experiment.retain(|key, _| !["definitions", "definitions_hash"].contains(&key.as_str()));
+        }
+        value
+    };
+    let (ours, theirs) = (&recorded(ours), &recorded(theirs));
+    let keys = |value: &Value| -> Vec<String> {
+        value.as_object().map(|object| object.keys().cloned().collect()).unwrap_or_default()
+    };
+    let grows = |name: &String| [SEEDS, FINGERPRINTS].contains(&name.as_str());
+    let mut names = keys(ours).into_iter().chain(keys(theirs)).filter(|name| !grows(name));
+    let name = names.find(|name| ours.get(name) != theirs.get(name))?;
+    Some(first_difference(&name, ours.get(&name), theirs.get(&name)))
+}
+
+/// The innermost key in which two values differ, and both sides of it.
+fn first_difference(name: &str, ours: Option<&Value>, theirs: Option<&Value>) -> Difference {
+    if let (Some(Value::Object(a)), Some(Value::Object(b))) = (ours, theirs) {
+        let inner = a.keys().chain(b.keys()).find(|key| a.get(*key) != b.get(*key));
+        if let Some(key) = inner {
+            return first_difference(&format!("{name}.{key}"), a.get(key), b.get(key));
+        }
+    }
+    let text = |value: Option<&Value>| value.map_or_else(|| "nothing".to_owned(), Value::to_string);
+    Difference { what: name.to_owned(), expected: text(ours), found: text(theirs) }
+}

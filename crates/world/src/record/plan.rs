@@ -1,0 +1,289 @@
+//! Which episodes a recording has.
+
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use crate::experiment::{Experiment, built_in_names};
+
+/// Seeds and runs begin at 1, as in the paper.
+const FIRST: i32 = 1;
+
+/// Experiments, seeds and runs; every combination is an episode.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Plan {
+    /// The experiments, each once, in their order.
+    pub experiments: Vec<Experiment>,
+    /// Seeds 1 to this (3 in the paper).
+    pub seeds: i32,
+    /// Runs 1 to this for each seed (7 in the paper).
+    pub runs: i32,
+    /// How often each scene is played.
+    pub repeats: i32,
+    /// The share that this process records.
+    pub shard: Shard,
+}
+
+/// What tells an episode from the others of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Key {
+    /// Of which experiment.
+    pub experiment: Experiment,
+    /// The block of runs.
+    pub seed: i32,
+    /// The run within it.
+    pub run: i32,
+    /// Which time its scene is played, from 1.
+    pub repetition: i32,
+}
+
+/// Whose episodes they are: a model, under a condition where one is named.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Subject {
+    /// The name shown in tables.
+    pub model: String,
+    /// What the study varies besides the model; the default one if absent.
+    pub condition: Option<String>,
+}
+
+impl Subject {
+    /// A model under the default condition.
+    pub fn of(model: &str) -> Self {
+        Self { model: model.to_owned(), condition: None }
+    }
+
+    /// The subject as part of a file's name: `oracle`, `oracle@near`. No model's own name has an `@` in it there.
+    pub fn slug(&self) -> String {
+        match &self.condition {
+            None => slug(&self.model),
+            Some(condition) => format!("{}@{}", slug(&self.model), slug(condition)),
+        }
+    }
+}
+
+impl Key {
+    /// The first time that a scene is played.
+    pub const fn first(experiment: Experiment, seed: i32, run: i32) -> Self {
+        Self { experiment, seed, run, repetition: FIRST }
+    }
+
+    /// The episode's id: `E1/oracle/s1/r3`, under a condition `E1/oracle@near/s1/r3`, the second time `E1/oracle/s1/r3/x2`.
+    pub fn episode_id(self, subject: &Subject) -> String {
+        let Self { experiment, seed, run, repetition } = self;
+        let again = if repetition > FIRST { format!("/x{repetition}") } else { String::new() };
+        format!("{}/{}/s{seed}/r{run}{again}", experiment.name(), subject.slug())
+    }
+
+    /// The name of a file of the episode, without its ending: `E1-oracle-s1-r3`.
+    pub fn file_stem(self, subject: &Subject) -> String {
+        self.episode_id(subject).replace('/', "-")
+    }
+
+    /// A number for the agent's chances: differs between episodes, and from what the world is drawn by.
+    pub fn agent_seed(self) -> u64 {
+        let part = |value: i32| u64::from(value.unsigned_abs());
+        // Turned, not shifted: the number of a lab's own experiment has all bits.
+        let experiment = self.experiment.number().rotate_left(56);
+        let again = part(self.repetition - FIRST) << 10;
+        experiment ^ (part(self.seed) << 24) ^ again ^ part(self.run) ^ 0x6d69_7272_6f72
+    }
+}
+
+/// A model's name as part of a file's name: lower case, everything but letters and digits as `-`.
+pub fn slug(model: &str) -> String {
+    let mut slug = String::new();
+    for c in model.chars().flat_map(char::to_lowercase) {
+        match c {
+            c if c.is_ascii_alphanumeric() => slug.push(c),
+            _ if slug.is_empty() || slug.ends_with('-') => {}
+            _ => slug.push('-'),
+        }
+    }
+    let slug = slug.trim_end_matches('-');
+    if slug.is_empty() { "agent".to_owned() } else { slug.to_owned() }
+}
+
+impl Plan {
+    /// The episodes of this share, by experiment, seed, run and repetition.
+    pub fn keys(&self) -> Vec<Key> {
+        let (seeds, runs, repeats) = (self.seeds, self.runs, self.repeats);
+        let all = self.experiments.iter().flat_map(move |experiment| {
+            let scenes = (FIRST..=seeds).flat_map(move |seed| (FIRST..=runs).map(move |run| (seed, run)));
+            scenes.flat_map(move |(seed, run)| {
+                (FIRST..=repeats).map(move |repetition| Key { experiment: *experiment, seed, run, repetition })
+            })
+        });
+        all.enumerate().filter(|(at, _)| self.shard.has(*at)).map(|(_, key)| key).collect()
+    }
+}
+
+/// One of several equal shares of the episodes, as `3/16`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    index: usize,
+    count: usize,
+}
+
+impl Shard {
+    /// All of it.
+    pub const WHOLE: Self = Self { index: 1, count: 1 };
+
+    const fn has(self, at: usize) -> bool {
+        at % self.count == self.index - 1
+    }
+}
+
+/// A text that names no share, or no experiments.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("expected {expected}, found `{found}`")]
+pub struct NotAPlan {
+    expected: &'static str,
+    found: String,
+}
+
+impl FromStr for Shard {
+    type Err = NotAPlan;
+
+    fn from_str(text: &str) -> Result<Self, NotAPlan> {
+        let numbers = text.split_once('/').and_then(|(index, count)| Some((index.parse().ok()?, count.parse().ok()?)));
+        match numbers {
+            Some((index, count)) if 1 <= index && index <= count => Ok(Self { index, count }),
+            _ => Err(NotAPlan { expected: "a share such as 3/16, from 1/16 to 16/16", found: text.to_owned() }),
+        }
+    }
+}
+
+/// Experiments as typed: `E1`, `E1..E5`, `E1,E3`, a file such as `mine.toml`, or several of these with commas; each once,
+/// in their order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Experiments(pub Vec<Named>);
+
+/// One of several experiments as typed.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Named {
+    /// Built in.
+    BuiltIn(Experiment),
+    /// All of a file.
+    File(PathBuf),
+}
+
+impl Experiments {
+    /// As typed, where the name of a file may have any bytes.
+    #[cfg(unix)]
+    pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
+        use std::os::unix::ffi::OsStrExt as _;
+        let mut found = BTreeSet::new();
+        for part in typed.as_bytes().split(|byte| *byte == b',').map(OsStr::from_bytes) {
+            match part.to_str() {
+                Some(text) => found.extend(text.parse::<Self>()?.0),
+                None if is_file(part) => found.extend([Named::File(part.into())]),
+                None => return Err(NotAPlan { expected: EXPECTED, found: part.to_string_lossy().into_owned() }),
+            }
+        }
+        Ok(Self(found.into_iter().collect()))
+    }
+
+    #[cfg(not(unix))]
+    pub fn of(typed: &OsStr) -> Result<Self, NotAPlan> {
+        typed.to_string_lossy().parse()
+    }
+}
+
+const EXPECTED: &str = "experiments such as E1, E1..E5, E1,E3 or mine.toml";
+
+fn is_file(name: impl AsRef<Path>) -> bool {
+    name.as_ref().extension().is_some_and(|ending| ending == "toml")
+}
+
+impl FromStr for Experiments {
+    type Err = NotAPlan;
+
+    fn from_str(text: &str) -> Result<Self, NotAPlan> {
+        let fault = || NotAPlan { expected: EXPECTED, found: text.to_owned() };
+        let experiment = |name: &str| Experiment::parse(name.trim()).map_err(|_| fault());
+        let mut found = BTreeSet::new();
+        for part in text.split(',') {
+            match part.split_once("..") {
+                _ if is_file(part.trim()) => {
+                    found.insert(Named::File(PathBuf::from(part.trim())));
+                }
+                None => {
+                    found.insert(Named::BuiltIn(experiment(part)?));
+                }
+                Some((first, last)) => {
+                    let (first, last) = (experiment(first)?, experiment(last)?);
+                    let known: Vec<Experiment> = built_in_names().iter().copied().flat_map(Experiment::parse).collect();
+                    let range: Vec<Experiment> = known.into_iter().filter(|one| (first..=last).contains(one)).collect();
+                    if range.is_empty() {
+                        return Err(fault());
+                    }
+                    found.extend(range.into_iter().map(Named::BuiltIn));
+                }
+            }
+        }
+        Ok(Self(found.into_iter().collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Experiment, Experiments, Key, Named, Plan, Shard, Subject, slug};
+
+    const E1: Experiment = Experiment::E1;
+    const E2: Experiment = Experiment::E2;
+    const E3: Experiment = Experiment::E3;
+    const E5: Experiment = Experiment::E5;
+
+    #[test]
+    fn experiments_come_as_names_ranges_and_lists() {
+        let read = |text: &str| text.parse::<Experiments>().map(|list| list.0);
+        assert_eq!(read("E1").unwrap(), [E1].map(Named::BuiltIn));
+        assert_eq!(read("E1..E3").unwrap(), [E1, E2, E3].map(Named::BuiltIn));
+        assert_eq!(read("E5,E1, E1").unwrap(), [E1, E5].map(Named::BuiltIn));
+        assert_eq!(read("labs/../mine.toml").unwrap(), [Named::File("labs/../mine.toml".into())]);
+        for wrong in ["", "E6", "E3..E1", "E1..", "E1;E2"] {
+            assert!(read(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn shards_share_all_episodes_and_no_episode_twice() {
+        let plan = |shard: &str| {
+            let shard = shard.parse().unwrap();
+            Plan { experiments: vec![E1, E5], seeds: 3, runs: 7, repeats: 1, shard }.keys()
+        };
+        let mut parts: Vec<_> = (1..=4).flat_map(|at| plan(&format!("{at}/4"))).collect();
+        parts.sort_unstable();
+        assert_eq!(parts, plan("1/1"));
+        assert_eq!(parts.len(), 42);
+        for wrong in ["0/4", "5/4", "1", "a/b", "1/0"] {
+            assert!(wrong.parse::<Shard>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_first_time_has_the_name_and_the_chances_that_it_always_had() {
+        let first = Key::first(E1, 1, 3);
+        let again = Key { repetition: 2, ..first };
+        let subject = Subject::of("oracle");
+        assert_eq!(
+            (first.episode_id(&subject), again.episode_id(&subject)),
+            ("E1/oracle/s1/r3".into(), "E1/oracle/s1/r3/x2".into())
+        );
+        assert_eq!(first.agent_seed(), (1 << 56) ^ (1 << 24) ^ 3 ^ 0x6d69_7272_6f72);
+        let keys = Plan { experiments: vec![E1], seeds: 2, runs: 999, repeats: 99, shard: Shard::WHOLE }.keys();
+        let mut seeds: Vec<u64> = keys.iter().map(|key| key.agent_seed()).collect();
+        seeds.sort_unstable();
+        seeds.dedup();
+        assert_eq!(seeds.len(), keys.len());
+    }
+
+    #[test]
+    fn names_of_models_become_names_of_files() {
+        assert_eq!(slug("Claude Sonnet 4.6"), "claude-sonnet-4-6");
+        assert_eq!(slug("google/gemma-4-31b-it:nitro"), "google-gemma-4-31b-it-nitro");
+        assert_eq!(slug("../../x"), "x");
+        assert_eq!(slug("?"), "agent");
+    }
+}

@@ -1,0 +1,144 @@
+//! The replies of a recording under way: how many gave no decision, and what the first of those says.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::plan::{Key, Subject};
+use exact::escape::visible;
+use trace::episode::Step;
+use trace::replies::ReplyCounts;
+
+/// Characters of a reply that are shown.
+const SHOWN: usize = 200;
+
+/// Replies as they come, from any thread.
+#[derive(Debug, Default)]
+pub struct Replies(Mutex<Found>);
+
+#[derive(Debug, Default)]
+struct Found {
+    counts: ReplyCounts,
+    /// The first by experiment, seed, run and step, whatever came first in time.
+    first: Option<(Key, i32, UnreadableReply)>,
+}
+
+/// The replies of one start of a recording.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RepliesAnswer {
+    /// How many there are; replies of episodes that did not come to their end are among them.
+    #[serde(flatten)]
+    pub counts: ReplyCounts,
+    /// The first one that gave no decision, by experiment, seed, run and step; null if all gave one.
+    pub first_unreadable: Option<UnreadableReply>,
+}
+
+/// A reply that gave no decision.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct UnreadableReply {
+    /// The episode.
+    pub episode_id: String,
+    /// The step, from 1.
+    pub step: i32,
+    /// The status, by the names of the trace's column `reply_status`.
+    pub status: String,
+    /// The beginning of what was replied, characters that act on a terminal escaped; null if there is no text.
+    pub text: Option<String>,
+}
+
+impl Replies {
+    /// Adds the reply of a step. Gives the reply back if it is the first one that came and gave no decision.
+    pub fn add(&self, subject: &Subject, key: Key, step: i32, row: &Step) -> Option<UnreadableReply> {
+        let status = row.extra.reply_status.as_deref()?;
+        let mut found = self.found();
+        found.counts.add(status, 1);
+        let comes_before = |(first, at, _): &(Key, i32, UnreadableReply)| (key, step) < (*first, *at);
+        if ReplyCounts::is_read(status) || !found.first.as_ref().is_none_or(comes_before) {
+            return None;
+        }
+        let is_first_in_time = found.first.is_none();
+        let reply = UnreadableReply::of(subject, key, step, row, status);
+        found.first = Some((key, step, reply.clone()));
+        is_first_in_time.then_some(reply)
+    }
+
+    /// How many there are so far.
+    pub fn counts(&self) -> ReplyCounts {
+        self.found().counts.clone()
+    }
+
+    /// What there is to say of them.
+    pub fn answer(&self) -> RepliesAnswer {
+        let found = self.found();
+        RepliesAnswer {
+            counts: found.counts.clone(),
+            first_unreadable: found.first.as_ref().map(|(_, _, reply)| reply.clone()),
+        }
+    }
+
+    fn found(&self) -> MutexGuard<'_, Found> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl UnreadableReply {
+    /// The reply of a step, which has this status.
+    pub(super) fn of(subject: &Subject, key: Key, step: i32, row: &Step, status: &str) -> Self {
+        let text = row.extra.reply.as_deref().filter(|text| !text.trim().is_empty()).map(beginning);
+        Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text }
+    }
+}
+
+/// The beginning of a text, on one line.
+fn beginning(text: &str) -> String {
+    let mut shown = String::new();
+    for c in text.trim().chars() {
+        let piece = visible(c.encode_utf8(&mut [0; 4]));
+        if shown.chars().count() + piece.chars().count() > SHOWN {
+            shown.push_str("...");
+            break;
+        }
+        shown.push_str(&piece);
+    }
+    shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Replies, SHOWN, beginning};
+    use crate::record::plan::{Key, Subject};
+    use crate::sim::Experiment;
+    use trace::episode::{Extra, Step};
+
+    fn row(status: &str, reply: Option<&str>) -> Step {
+        let extra =
+            Extra { reply_status: Some(status.to_owned()), reply: reply.map(str::to_owned), ..Extra::default() };
+        Step { action: None, self_color: None, selected_cube: None, mirror_visible: false, extra }
+    }
+
+    #[test]
+    fn the_first_is_so_by_its_place_and_told_once() {
+        let replies = Replies::default();
+        let key = |run| Key::first(Experiment::E1, 1, run);
+        assert_eq!(replies.add(&Subject::of("m"), key(2), 1, &row("ok", None)), None);
+        assert_eq!(replies.answer().first_unreadable, None);
+        let told = replies.add(&Subject::of("m"), key(2), 3, &row("parse_failed", Some("later"))).unwrap();
+        assert_eq!((told.step, told.text.as_deref()), (3, Some("later")));
+        assert_eq!(replies.add(&Subject::of("m"), key(1), 9, &row("refusal", Some(" \n"))), None);
+        assert_eq!(replies.add(&Subject::of("m"), key(1), 10, &row("parse_failed", None)), None);
+        let answer = replies.answer();
+        let first = answer.first_unreadable.unwrap();
+        assert_eq!((first.episode_id.as_str(), first.step, first.text), ("E1/m/s1/r1", 9, None));
+        assert_eq!((answer.counts.replies, answer.counts.to_string().as_str()), (4, "parse_failed 2, refusal 1"));
+    }
+
+    #[test]
+    fn a_text_is_shown_on_one_line_and_cut() {
+        assert_eq!(beginning(" I go\n\u{1b}[31mon. "), "I go\\u{a}\\u{1b}[31mon.");
+        let long = beginning(&"\u{e9}".repeat(SHOWN + 1));
+        assert_eq!((long.chars().count(), long.ends_with("...")), (SHOWN + 3, true));
+        assert!(beginning(&"\u{1b}".repeat(1_000)).len() <= SHOWN + 3);
+        assert!(!beginning(&"x".repeat(SHOWN)).ends_with("..."));
+    }
+}

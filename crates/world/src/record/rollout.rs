@@ -1,0 +1,229 @@
+//! One episode, from the first frame to the last step.
+//!
+//! Row t of the trace is what was in view before step t, and what was then decided; `bumped` says whether that decision
+//! was stopped, and the agent hears of it at t + 1.
+
+use std::cell::RefCell;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::error::RecordError;
+use super::plan::{Key, Subject};
+use super::shares::Shares;
+use crate::agent::reply::Repair;
+use crate::agent::{Agent, Observation, Past, Reply, Task};
+use crate::replay::log::{Seen, frame_time};
+use crate::sim::camera::Camera;
+use crate::sim::config::WorldConfig;
+use crate::sim::scene::Scene;
+use crate::sim::visibility::Visibility;
+use crate::sim::world::World;
+use trace::episode::{Episode, Extra, Step};
+use trace::frame::Frame;
+use trace::palette::Color;
+
+/// Who looks on while an episode is played: writes a log, counts steps.
+pub trait Observer {
+    /// Something was seen, and nothing is done yet.
+    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError>;
+
+    /// The step was decided and done; this is its row.
+    fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError>;
+}
+
+/// Looks on where nothing is kept.
+#[derive(Clone, Copy, Debug)]
+pub struct Nobody;
+
+impl Observer for Nobody {
+    fn seen(&mut self, _: &Seen<'_>) -> Result<(), RecordError> {
+        Ok(())
+    }
+
+    fn done(&mut self, _: i32, _: &Step) -> Result<(), RecordError> {
+        Ok(())
+    }
+}
+
+/// What an episode is played with, besides its key.
+#[derive(Debug)]
+pub struct Stage<'a> {
+    /// The world's configuration.
+    pub config: &'a WorldConfig,
+    /// The thread's eye; `None` where nobody looks at pictures.
+    pub eye: Option<&'a RefCell<Camera>>,
+    /// The recording is to stop.
+    pub stop: &'a AtomicBool,
+    /// Where the time goes.
+    pub shares: &'a Shares,
+}
+
+/// What the agent of a scene is told.
+pub fn task(config: &WorldConfig, scene: &Scene, key: Key) -> Task {
+    Task {
+        experiment: scene.experiment,
+        stated_color: scene.stated_color.map(|color| color.name().to_owned()),
+        step_budget: i32::try_from(scene.budget(config)).unwrap_or(i32::MAX),
+        seed: key.agent_seed(),
+    }
+}
+
+/// The episode of a key as it begins: its constants, without steps.
+pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) -> Episode {
+    Episode {
+        episode_id: key.episode_id(subject),
+        model: subject.model.clone(),
+        condition: Some(subject.condition.clone().unwrap_or_else(|| "default".to_owned())),
+        scene: Some(scene.fingerprint(config)),
+        decision: Some(scene.experiment.decision.name().to_owned()),
+        experiment: key.experiment.name().to_owned(),
+        seed: key.seed,
+        run: key.run,
+        repetition: Some(key.repetition),
+        body_color: scene.body_color.name().to_owned(),
+        stated_color: scene.stated_color.map(|color| color.name().to_owned()),
+        shown_color: scene.shown_color().map(|color| color.name().to_owned()),
+        start_distance: scene.start_distance(),
+        distractors: Some(i8::try_from(scene.others.len()).unwrap_or(i8::MAX)),
+        ..Episode::default()
+    }
+}
+
+/// An episode that was played to its end.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Played {
+    /// Its rows.
+    pub episode: Episode,
+    /// The id of the model as the provider returned it with the first answer; `None` where nothing is returned.
+    pub model: Option<String>,
+    /// Another id that came later in the episode, and the step of its first answer.
+    pub other_model: Option<(i32, String)>,
+    /// Whether a hand has reached its mark, which ends an episode.
+    pub is_reached: bool,
+}
+
+/// Plays an episode to its end: `done`, a mark that is reached, or the last step of the budget.
+pub async fn play(
+    stage: &Stage<'_>,
+    world: &mut World,
+    agent: &mut dyn Agent,
+    key: Key,
+    mut episode: Episode,
+    observer: &mut dyn Observer,
+) -> Result<Played, RecordError> {
+    let budget = i32::try_from(world.scene().budget(world.config())).unwrap_or(i32::MAX);
+    let (mut bumped, mut history, mut thought) = (false, None, None);
+    let mut past: Arc<Vec<Past>> = Arc::default();
+    let (mut model, mut other_model): (Option<String>, _) = (None, None);
+    for t in 1..=budget {
+        if stage.stop.load(Ordering::Relaxed) {
+            return Err(RecordError::Stopped);
+        }
+        let frame = look(stage, world)?;
+        let observation = Observation {
+            t,
+            remaining: budget - t + 1,
+            x: narrowed(world.pose().x),
+            y: narrowed(world.pose().y),
+            yaw: narrowed(world.pose().heading.degrees()),
+            bumped,
+            history: history.take(),
+            past: Arc::clone(&past),
+            frame: frame.clone().unwrap_or_else(nothing),
+            fov_y: world.config().eye.fovy,
+        };
+        let start = Instant::now();
+        let visibility = world.visibility();
+        stage.shares.visibility(start);
+        let reply =
+            agent.decide(&observation).await.map_err(|lost| RecordError::Lost { step: lost.step.or(Some(t)), lost })?;
+        let action = reply.action;
+        if let Some(answering) = &reply.model {
+            let first = model.get_or_insert_with(|| answering.clone());
+            if first != answering && other_model.is_none() {
+                other_model = Some((t, answering.clone()));
+            }
+        }
+        // A reply without a decision has no thought to take the place of the last one.
+        if action.is_some() {
+            thought.clone_from(&reply.words.summary);
+        }
+        history = Some((action, thought.clone()));
+        let own_thought = reply.words.summary.clone();
+        let mut row = row(world, key, t, &visibility, reply);
+        observer.seen(&Seen { t, world, frame: frame.as_ref(), visibility: &visibility })?;
+        let start = Instant::now();
+        bumped = world.act(action).bumped;
+        stage.shares.visibility(start);
+        // The observation is gone, so that nothing is copied.
+        drop(observation);
+        Arc::make_mut(&mut past).push(Past { action, bumped, thought: own_thought });
+        row.extra.bumped = Some(bumped);
+        row.extra.target_distance = world.target_distance();
+        observer.done(t, &row)?;
+        episode.steps.push(row);
+        if action == Some(trace::episode::Action::Done) || world.is_reached() {
+            break;
+        }
+    }
+    Ok(Played { episode, model, other_model, is_reached: world.is_reached() })
+}
+
+fn look(stage: &Stage<'_>, world: &World) -> Result<Option<Arc<Frame>>, RecordError> {
+    let Some(eye) = stage.eye else { return Ok(None) };
+    let start = Instant::now();
+    let frame = eye.borrow_mut().frame(world).map_err(RecordError::fatal)?;
+    stage.shares.rendering(start);
+    Ok(Some(Arc::new(frame)))
+}
+
+fn nothing() -> Arc<Frame> {
+    Arc::new(Frame::new(0, 0, Vec::new()))
+}
+
+/// The row of a step, `bumped` left open.
+fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -> Step {
+    let px = |count: u32| Some(i32::try_from(count).unwrap_or(i32::MAX));
+    let cube = reply.selected_cube.as_deref().and_then(Color::named);
+    let pose = world.pose();
+    let extra = Extra {
+        mirror_self_px: px(visibility.self_px),
+        mirror_other_px: px(visibility.other_px),
+        mirror_px: px(visibility.mirror_px),
+        direct_other_px: px(visibility.direct_other_px),
+        pose_x: Some(narrowed(pose.x)),
+        pose_y: Some(narrowed(pose.y)),
+        pose_yaw: Some(narrowed(pose.heading.degrees())),
+        cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
+        reply_status: Some(reply.status.name().to_owned()),
+        reply_repair: Repair::joined(&reply.repairs),
+        view_description: reply.words.view_description,
+        reasoning: reply.words.reasoning,
+        summary: reply.words.summary,
+        identification: reply.words.identification,
+        mark_color: world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned()),
+        mark_report: reply.mark_report,
+        mirror_mark_px: world.has_own_mark().then(|| px(visibility.mark_px)).flatten(),
+        reply: reply.raw,
+        latency_ms: reply.usage.latency_ms,
+        prompt_tokens: reply.usage.prompt_tokens,
+        completion_tokens: reply.usage.completion_tokens,
+        cost_usd: reply.usage.cost_usd,
+        frame_time: Some(frame_time(key.seed, key.run, key.repetition, t)),
+        ..Extra::default()
+    };
+    Step {
+        action: reply.action,
+        self_color: reply.self_color,
+        selected_cube: reply.selected_cube,
+        mirror_visible: world.is_mirror_visible(visibility),
+        extra,
+    }
+}
+
+/// As traces store lengths and angles.
+#[expect(clippy::cast_possible_truncation, reason = "seven digits of a room's metres are micrometres")]
+fn narrowed(value: f64) -> f32 {
+    value as f32
+}

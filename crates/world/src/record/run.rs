@@ -1,0 +1,399 @@
+//! Threads, and the episodes each has under way.
+//!
+//! A thread has one eye and one queue of its own; where agents wait for a network or a program, several of its episodes
+//! are under way, and the eye serves whichever is ready. A scripted agent never waits, so that its episode runs to its
+//! end in one go. An agent that cannot answer stops the recording, as Ctrl-C does.
+
+use std::cell::RefCell;
+use std::io;
+use std::num::{NonZeroU32, NonZeroUsize};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use futures_util::stream::{FuturesUnordered, StreamExt as _};
+
+use super::error::RecordError;
+use super::eyes::Eyes;
+use super::failures::{LostEpisode, lost_episode};
+use super::lock::EpisodeLock;
+use super::plan::{Key, Subject};
+use super::queue::{Complete, Held, Next, Queue};
+use super::rollout::{self, Nobody, Observer, Played, Stage};
+use super::shares::Shares;
+use super::store::Store;
+use super::unusable::{GivenUp, Unusable};
+use crate::agent::{Agent, Ended, Player};
+use crate::replay::log::{Log, Seen};
+use crate::sim::camera::Camera;
+use crate::sim::config::WorldConfig;
+use crate::sim::scene::Scene;
+use crate::sim::world::World;
+use trace::diagnostic::MORE_FILES;
+use trace::episode::{Action, Episode, Step};
+use trace::episode_hash;
+
+/// What happens while a recording runs; called from its threads.
+pub trait Progress: Sync {
+    /// A step of an episode was played: its number, from 1, and its row.
+    fn step(&self, episode: Key, t: i32, row: &Step);
+    fn episode(&self, key: Key, id: &str, steps: usize);
+    /// A provider answered in the name of another model from this step on; the episode keeps the first one.
+    fn model_changed(&self, id: &str, t: i32, before: &str, after: &str);
+    /// An episode is lost, for this reason.
+    fn lost(&self, id: &str, reason: &str);
+    /// Nothing is left to do but episodes that other processes have; this one is among them. Told again and again.
+    fn waiting(&self, id: &str, held: Held);
+}
+
+/// The seed of what is practised; those of recordings are smaller.
+const PRACTICE_SEED: i32 = 9_000;
+
+/// The time between two looks at episodes that other processes have.
+const AGAIN: Duration = Duration::from_millis(50);
+
+/// How a recording is run.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Threads, each with an eye of its own.
+    pub threads: NonZeroUsize,
+    /// Episodes under way at once, over all threads.
+    pub in_flight: NonZeroUsize,
+    /// Whether frames are drawn for agents that do not look, and are kept in the log.
+    pub frames: bool,
+    /// Whether a log is written.
+    pub log: bool,
+    /// Replies in a row without a decision that end the recording; `None` for no number.
+    pub max_unusable: Option<NonZeroU32>,
+}
+
+/// What became of the episodes.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Episodes that were recorded now.
+    pub recorded: Vec<Key>,
+    /// Their steps.
+    pub steps: u64,
+    /// Episodes that were lost, and why.
+    pub lost: Vec<(Key, LostEpisode)>,
+    /// Episodes that were under way when the recording was stopped.
+    pub under_way: Vec<Key>,
+    /// A limit of what may be spent stopped it.
+    pub by_limit: bool,
+    /// Episodes that other processes recorded meanwhile.
+    pub elsewhere: Vec<Key>,
+    /// The recording was stopped before its end.
+    pub stopped: bool,
+    /// Why it was, if the agent could not answer.
+    pub given_up: Option<GivenUp>,
+}
+
+/// One recording under way: what its threads share.
+pub struct Recording<'a> {
+    /// The world's configuration.
+    pub config: &'a WorldConfig,
+    /// Who plays.
+    pub player: &'a dyn Player,
+    /// Whose episodes they are.
+    pub subject: &'a Subject,
+    /// Where it goes.
+    pub store: &'a Store,
+    /// Told of everything.
+    pub progress: &'a dyn Progress,
+    /// The recording is to stop.
+    pub stop: &'a AtomicBool,
+    /// Where the time goes.
+    pub shares: &'a Shares,
+    /// How it is run.
+    pub settings: Settings,
+}
+
+/// Makes sure that the process may open the files which a recording needs: where it may not, libraries panic.
+fn check_descriptors(threads: usize, in_flight: usize) -> io::Result<()> {
+    /// Of libraries, and of each thread and episode under way, at least.
+    const LIBRARIES: usize = 16;
+    let needed = LIBRARIES + 8 * threads + 2 * in_flight;
+    match open_file_limit() {
+        Some(limit) if limit < needed as u64 => Err(io::Error::other(format!(
+            "Too many open files: a recording needs {needed} at once, and the limit is {limit}\n  help: {MORE_FILES}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// The limit of open files of this process; `None` where it is not known.
+fn open_file_limit() -> Option<u64> {
+    #[cfg(unix)]
+    return nix::sys::resource::getrlimit(nix::sys::resource::Resource::RLIMIT_NOFILE).ok().map(|(soft, _)| soft);
+    #[cfg(not(unix))]
+    None
+}
+
+impl Recording<'_> {
+    pub fn run(&self, keys: &[Key]) -> Result<Tally, RecordError> {
+        let queue = Queue::new(self.store, keys);
+        let unusable = Unusable::new(self.settings.max_unusable);
+        let in_flight = self.settings.in_flight.get();
+        let threads = self.settings.threads.get().min(in_flight).min(keys.len().max(1));
+        check_descriptors(threads, in_flight.min(keys.len())).map_err(RecordError::fatal)?;
+        let results = std::thread::scope(|scope| {
+            let (queue, unusable) = (&queue, &unusable);
+            let share = |at| in_flight / threads + usize::from(at < in_flight % threads);
+            let workers: Vec<_> =
+                (0..threads).map(|at| scope.spawn(move || self.thread(queue, unusable, share(at)))).collect();
+            workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(panicked()))).collect::<Vec<_>>()
+        });
+        let (elsewhere, given_up) = (queue.elsewhere(), unusable.given_up());
+        let mut tally = Tally { elsewhere, given_up, stopped: queue.has_more(), ..Tally::default() };
+        for result in results {
+            let part = result?;
+            tally.recorded.extend(part.recorded);
+            tally.steps += part.steps;
+            tally.lost.extend(part.lost);
+            tally.under_way.extend(part.under_way);
+            tally.by_limit |= part.by_limit;
+            tally.stopped |= part.stopped;
+        }
+        tally.recorded.sort_unstable();
+        tally.lost.sort_by_key(|(key, _)| *key);
+        tally.under_way.sort_unstable();
+        Ok(tally)
+    }
+
+    /// One thread: its eye, and up to `each` episodes under way.
+    fn thread(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
+        let start = Instant::now();
+        let result = self.episodes(queue, unusable, each);
+        self.shares.thread(start);
+        if result.is_err() {
+            self.stop.store(true, Ordering::Relaxed);
+        }
+        result
+    }
+
+    fn episodes(&self, queue: &Queue<'_>, unusable: &Unusable, each: usize) -> Result<Tally, RecordError> {
+        let is_needed = self.settings.frames || self.player.looks();
+        let start = Instant::now();
+        let eyes =
+            is_needed.then(|| Eyes::of(self.config, queue.experiments())).transpose().map_err(RecordError::fatal)?;
+        self.shares.rendering(start);
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(RecordError::fatal)?;
+        let mut tally = Tally::default();
+        runtime.block_on(async {
+            let play = |key: Key, lock| {
+                let eye = eyes.as_ref().map(|eyes| eyes.eye(self.config, key.experiment));
+                async move { (key, self.episode(key, lock, eye, unusable).await) }
+            };
+            let mut under_way = FuturesUnordered::new();
+            loop {
+                let held = self.take_up(queue, each, &mut under_way, play)?;
+                self.assemble(queue);
+                let ended = match held {
+                    None => under_way.next().await,
+                    Some(held) if under_way.is_empty() => self.wait(held).await,
+                    Some(_) => tokio::time::timeout(AGAIN, under_way.next()).await.unwrap_or_default(),
+                };
+                match ended {
+                    Some((key, result)) => self.note(queue, key, result, &mut tally)?,
+                    None if held.is_none() => break,
+                    None => {}
+                }
+            }
+            Ok::<(), RecordError>(())
+        })?;
+        Ok(tally)
+    }
+
+    /// Puts together the experiments that have become complete, so that they can be looked at while others are played.
+    fn assemble(&self, queue: &Queue<'_>) {
+        for Complete { experiment, recorded, lost } in queue.complete() {
+            // What fails here is tried again at the end of the recording, and told there; no episode need be lost for it.
+            let _ = self.store.note_lost(&recorded, lost);
+            let _ = self.store.assemble(experiment);
+        }
+    }
+
+    /// Takes episodes until so many are under way. Gives one that another process has, if other processes have all that
+    /// are left.
+    fn take_up<F>(
+        &self,
+        queue: &Queue<'_>,
+        each: usize,
+        under_way: &mut FuturesUnordered<F>,
+        play: impl Fn(Key, EpisodeLock) -> F,
+    ) -> Result<Option<Held>, RecordError> {
+        while under_way.len() < each && !self.stop.load(Ordering::Relaxed) {
+            match queue.next().map_err(RecordError::fatal)? {
+                Next::Play(key, lock) => under_way.push(play(key, lock)),
+                Next::Held(held) => return Ok(Some(held)),
+                Next::Nothing => break,
+            }
+        }
+        Ok(None)
+    }
+
+    /// Waits for a moment, with nothing to do but what other processes are doing.
+    async fn wait<T>(&self, held: Held) -> Option<T> {
+        self.progress.waiting(&held.key.episode_id(self.subject), held);
+        tokio::time::sleep(AGAIN).await;
+        None
+    }
+
+    /// One episode, from its scene to its commit.
+    async fn episode(
+        &self,
+        key: Key,
+        _lock: EpisodeLock,
+        eye: Option<&RefCell<Camera>>,
+        unusable: &Unusable,
+    ) -> Result<usize, RecordError> {
+        let start = Instant::now();
+        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
+        let mut episode = rollout::head(self.config, &scene, key, self.subject);
+        let task = rollout::task(self.config, &scene, key);
+        let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
+        self.shares.visibility(start);
+        let agent = self.player.agent(task, &episode.episode_id);
+        let mut agent = agent.map_err(|lost| RecordError::Lost { step: None, lost })?;
+        episode.participant = agent.participant().map(str::to_owned);
+        let stage = Stage { config: self.config, eye, stop: self.stop, shares: self.shares };
+        if agent.wants_practice() {
+            self.practise(&stage, agent.as_mut(), key).await?;
+        }
+        let log = if self.settings.log {
+            Some(Log::begin(&self.store.log_part(key), &episode).map_err(RecordError::fatal)?)
+        } else {
+            None
+        };
+        let mut observer = Observers { key, recording: self, unusable, in_a_row: 0, log };
+        let played = rollout::play(&stage, &mut world, agent.as_mut(), key, episode, &mut observer).await;
+        let committed = match &played {
+            Ok(played) => self.commit(key, played, observer.log),
+            Err(_) => Ok(()),
+        };
+        if let Some(ended) = ended(&played) {
+            agent.end(ended).await;
+        }
+        committed.and(played).map(|played| played.episode.steps.len())
+    }
+
+    /// An episode of a scene that no recording has, of which nothing is kept.
+    async fn practise(&self, stage: &Stage<'_>, agent: &mut dyn Agent, key: Key) -> Result<(), RecordError> {
+        let key = Key::first(key.experiment, PRACTICE_SEED, 1);
+        let scene = Scene::draw(self.config, key.experiment, key.seed, key.run).map_err(RecordError::fatal)?;
+        let head = rollout::head(self.config, &scene, key, self.subject);
+        agent.practise(Some(rollout::task(self.config, &scene, key)));
+        let mut world = World::new(self.config, scene).map_err(RecordError::fatal)?;
+        rollout::play(stage, &mut world, agent, key, head, &mut Nobody).await?;
+        agent.practise(None);
+        Ok(())
+    }
+
+    /// Makes an episode whole on the disk, its trace last.
+    fn commit(&self, key: Key, played: &Played, log: Option<Log>) -> Result<(), RecordError> {
+        let start = Instant::now();
+        let fingerprint = self.store.fingerprint(key, played.model.as_deref());
+        let episode = Episode { fingerprint: Some(fingerprint.id.clone()), ..played.episode.clone() };
+        let episode = Episode { episode_hash: Some(episode_hash::of(&episode)), ..episode };
+        if let Some(log) = log {
+            log.end(&episode).map_err(RecordError::fatal)?;
+        }
+        self.store.commit(key, &episode, &fingerprint).map_err(RecordError::fatal)?;
+        if let (Some(before), Some((t, after))) = (&played.model, &played.other_model) {
+            self.progress.model_changed(&episode.episode_id, *t, before, after);
+        }
+        self.shares.writing(start);
+        Ok(())
+    }
+
+    /// Counts what became of an episode.
+    fn note(
+        &self,
+        queue: &Queue<'_>,
+        key: Key,
+        result: Result<usize, RecordError>,
+        tally: &mut Tally,
+    ) -> Result<(), RecordError> {
+        let id = key.episode_id(self.subject);
+        match result {
+            Ok(steps) => {
+                tally.recorded.push(key);
+                tally.steps += steps as u64;
+                self.progress.episode(key, &id, steps);
+                queue.ended(key, None);
+            }
+            Err(RecordError::Stopped) => {
+                tally.under_way.push(key);
+                tally.stopped = true;
+            }
+            Err(RecordError::Lost { lost, .. }) if lost.by_limit => {
+                tally.under_way.push(key);
+                (tally.stopped, tally.by_limit) = (true, true);
+                self.stop.store(true, Ordering::Relaxed);
+            }
+            Err(RecordError::Lost { step, lost }) => {
+                self.progress.lost(&id, &lost.cause);
+                let lost = lost_episode(key, self.subject, step, lost);
+                queue.ended(key, Some(lost.clone()));
+                tally.lost.push((key, lost));
+                if self.player.stopped().is_some() {
+                    self.stop.store(true, Ordering::Relaxed);
+                }
+            }
+            Err(fatal @ RecordError::Fatal(_)) => return Err(fatal),
+        }
+        Ok(())
+    }
+}
+
+/// What the agent is told of the end; nothing where it, or everything, has failed.
+fn ended(played: &Result<Played, RecordError>) -> Option<Ended> {
+    match played {
+        Ok(played @ Played { episode, .. }) => {
+            let is_done = episode.steps.last().is_some_and(|step| step.action == Some(Action::Done));
+            Some(if is_done || played.is_reached { Ended::Done } else { Ended::Budget })
+        }
+        Err(RecordError::Stopped) => Some(Ended::Stopped),
+        Err(RecordError::Lost { .. } | RecordError::Fatal(_)) => None,
+    }
+}
+
+fn panicked() -> RecordError {
+    RecordError::fatal("a thread of the recording gave up; this is a fault of mirrorstats")
+}
+
+/// Counts steps and unusable replies, and writes the log if there is one.
+struct Observers<'a> {
+    key: Key,
+    recording: &'a Recording<'a>,
+    unusable: &'a Unusable,
+    /// The episode's unusable replies in a row so far.
+    in_a_row: u32,
+    log: Option<Log>,
+}
+
+impl Observer for Observers<'_> {
+    fn seen(&mut self, seen: &Seen<'_>) -> Result<(), RecordError> {
+        let start = Instant::now();
+        if let Some(log) = &mut self.log {
+            let frame = seen.frame.filter(|_| self.recording.settings.frames);
+            log.seen(&Seen { frame, ..*seen }).map_err(RecordError::fatal)?;
+        }
+        self.recording.shares.writing(start);
+        Ok(())
+    }
+
+    fn done(&mut self, t: i32, row: &Step) -> Result<(), RecordError> {
+        let Recording { subject, progress, shares, stop, .. } = self.recording;
+        progress.step(self.key, t, row);
+        if self.unusable.add(subject, self.key, t, row, &mut self.in_a_row) {
+            stop.store(true, Ordering::Relaxed);
+            return Err(RecordError::Stopped);
+        }
+        let start = Instant::now();
+        if let Some(log) = &mut self.log {
+            log.done(t, row).map_err(RecordError::fatal)?;
+        }
+        shares.writing(start);
+        Ok(())
+    }
+}

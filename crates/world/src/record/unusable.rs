@@ -1,0 +1,145 @@
+//! Ends the recording of an agent that cannot answer: a model that declines everything, a program that prints no JSON.
+//!
+//! Rule: a reply without a decision is unusable. So many of them in a row stop the recording: in a row within one episode,
+//! or in a row over the recording as they come. With one episode under way the second holds the first. With several,
+//! the first does not depend on what happens elsewhere, and which episodes are whole by the time of the second does.
+
+use std::fmt;
+use std::num::NonZeroU32;
+use std::sync::{Mutex, PoisonError};
+
+use super::plan::{Key, Subject};
+use super::replies::UnreadableReply;
+use exact::escape::visible;
+use trace::episode::Step;
+use trace::replies::ReplyCounts;
+
+/// Why a recording was given up: so many replies in a row were unusable.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GivenUp {
+    /// The model's name as shown in tables.
+    pub model: String,
+    /// How many replies in a row gave no decision.
+    pub in_a_row: u32,
+    /// The last of them.
+    pub last: UnreadableReply,
+}
+
+impl fmt::Display for GivenUp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { model, in_a_row, last } = self;
+        let text = last.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
+        write!(
+            f,
+            "the agent `{}` gave {in_a_row} replies in a row without a decision; the last: {}: {text} ({}, step {})\n  \
+             help: --max-unusable N allows more in a row, --keep-going any number; whole episodes stay, and the same \
+             command continues",
+            visible(model),
+            last.status,
+            visible(&last.episode_id),
+            last.step
+        )
+    }
+}
+
+/// The unusable replies in a row over a recording.
+#[derive(Debug)]
+pub(super) struct Unusable {
+    /// How many in a row end the recording; `None` for no number.
+    most: Option<NonZeroU32>,
+    found: Mutex<Found>,
+}
+
+#[derive(Debug, Default)]
+struct Found {
+    in_a_row: u32,
+    given_up: Option<GivenUp>,
+}
+
+impl Unusable {
+    /// Nothing is counted yet; `most` in a row end the recording.
+    pub(super) fn new(most: Option<NonZeroU32>) -> Self {
+        Self { most, found: Mutex::default() }
+    }
+
+    /// Counts the reply of a step; `in_episode` are those in a row of its episode before it. Says whether the recording
+    /// is to stop for it.
+    pub(super) fn add(&self, subject: &Subject, key: Key, t: i32, row: &Step, in_episode: &mut u32) -> bool {
+        let Some(status) = row.extra.reply_status.as_deref() else { return false };
+        let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
+        if ReplyCounts::is_read(status) {
+            (*in_episode, found.in_a_row) = (0, 0);
+            return false;
+        }
+        *in_episode = in_episode.saturating_add(1);
+        found.in_a_row = found.in_a_row.saturating_add(1);
+        let in_a_row = found.in_a_row.max(*in_episode);
+        let is_over = self.most.is_some_and(|most| in_a_row >= most.get());
+        if is_over && found.given_up.is_none() {
+            let last = UnreadableReply::of(subject, key, t, row, status);
+            found.given_up = Some(GivenUp { model: subject.model.clone(), in_a_row, last });
+        }
+        is_over
+    }
+
+    /// Why the recording was given up, if it was.
+    pub(super) fn given_up(&self) -> Option<GivenUp> {
+        self.found.lock().unwrap_or_else(PoisonError::into_inner).given_up.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::num::NonZeroU32;
+
+    use super::Unusable;
+    use crate::record::plan::{Key, Subject};
+    use crate::sim::Experiment;
+    use trace::episode::{Extra, Step};
+
+    fn row(status: &str) -> Step {
+        let reply = Some("I go \u{1b}on.".to_owned());
+        Step { extra: Extra { reply_status: Some(status.to_owned()), reply, ..Extra::default() }, ..Step::default() }
+    }
+
+    /// Gives replies of these episodes and statuses, and says after how many the recording stops.
+    fn stops_after(most: u32, replies: &[(i32, &str)]) -> (Option<usize>, Unusable) {
+        let unusable = Unusable::new(NonZeroU32::new(most));
+        let mut in_episodes = [0; 4];
+        let add = |(run, status): &(i32, &str)| {
+            let key = Key::first(Experiment::E1, 1, *run);
+            unusable.add(&Subject::of("m"), key, 7, &row(status), &mut in_episodes[usize::try_from(*run).unwrap()])
+        };
+        let at = replies.iter().position(add);
+        (at.map(|at| at + 1), unusable)
+    }
+
+    #[test]
+    fn so_many_in_a_row_of_an_episode_or_of_all_end_it() {
+        let bad = |run| (run, "parse_failed");
+        let good = |run| (run, "ok");
+        for (replies, expected) in [
+            (vec![bad(1), bad(1), bad(1), bad(1)], Some(3)),
+            (vec![bad(1), bad(1), good(1), bad(1), bad(1)], None),
+            (vec![bad(1), bad(1), (1, "repaired"), bad(1), (1, "refusal"), (1, "empty")], Some(6)),
+            // Over episodes one after the other.
+            (vec![good(1), bad(1), bad(2), bad(3)], Some(4)),
+            // One episode among others that are well.
+            (vec![bad(1), good(2), bad(1), good(2), bad(1)], Some(5)),
+            (vec![bad(1), good(2), bad(2), good(1), bad(1), good(2), bad(2)], None),
+        ] {
+            assert_eq!(stops_after(3, &replies).0, expected, "{replies:?}");
+            assert_eq!(stops_after(0, &replies).0, None, "no number ends it");
+        }
+    }
+
+    #[test]
+    fn the_sentence_says_who_how_many_and_what_was_replied() {
+        let (_, unusable) = stops_after(2, &[(1, "parse_failed"), (2, "refusal")]);
+        let words = unusable.given_up().unwrap().to_string();
+        let expected = "the agent `m` gave 2 replies in a row without a decision; the last: refusal: `I go \\u{1b}on.` \
+                        (E1/m/s1/r2, step 7)\n  help: --max-unusable N";
+        assert!(words.starts_with(expected), "{words}");
+        assert_eq!(stops_after(2, &[(1, "refusal")]).1.given_up(), None);
+    }
+}

@@ -1,0 +1,178 @@
+//! A trace's worlds built anew, and its actions repeated in them.
+
+use serde_json::Value;
+
+use super::divergence::Divergence;
+use super::error::ReplayError;
+use crate::experiment::{Experiment, Spec};
+use crate::sim::config::WorldConfig;
+use crate::sim::scene::{SCENE_VERSION, Scene};
+use crate::sim::visibility::Visibility;
+use crate::sim::world::World;
+use trace::episode::{Episode, Step};
+use trace::palette::Color;
+
+/// The most rays in a row and in a column of the grid that pixels are counted with.
+pub const MOST_RAYS: u32 = 4096;
+
+/// What a trace says of how it was recorded, as far as a replay needs it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Recipe {
+    /// The experiment, as the trace has it.
+    pub experiment: Experiment,
+    /// The world's configuration.
+    pub config: WorldConfig,
+    /// The same with the grid and the threshold that the trace's pixels were counted with: the recorded ones, unless they
+    /// were counted anew since.
+    pub eye: WorldConfig,
+}
+
+impl Recipe {
+    /// Reads the value of `mirrorstats.recording`.
+    pub fn of(recording: Option<&Value>) -> Result<Self, ReplayError> {
+        let recording = recording.ok_or(ReplayError::NoRecipe)?;
+        // First: a world of another version may lack what this one has.
+        let version = recording.get("scene_version").ok_or(ReplayError::NoRecipe)?;
+        if *version != SCENE_VERSION {
+            return Err(ReplayError::Scenes { found: version.to_string() });
+        }
+        let world = recording.get("world").ok_or(ReplayError::NoRecipe)?;
+        let config: WorldConfig =
+            serde_json::from_value(world.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
+        let expected = recording.get("world_hash").and_then(Value::as_str).unwrap_or_default();
+        if config.hash() != expected {
+            return Err(ReplayError::Changed { expected: expected.to_owned(), found: config.hash() });
+        }
+        let spec = recording.get("experiment").ok_or(ReplayError::NoRecipe)?;
+        let spec: Spec =
+            serde_json::from_value(spec.clone()).map_err(|fault| ReplayError::Recipe(fault.to_string()))?;
+        let experiment = Experiment::of_footer(spec).map_err(ReplayError::other)?;
+        let eye = counted_with(&config, recording);
+        Ok(Self { experiment, config, eye })
+    }
+
+    /// The world of an episode at its start, seen by an eye of this configuration.
+    pub fn world(&self, episode: &Episode, eye: &WorldConfig) -> Result<World, ReplayError> {
+        let fault = |fault: String| ReplayError::World { episode: episode.episode_id.clone(), fault };
+        let name = self.experiment.name();
+        if episode.experiment != name {
+            return Err(fault(format!(
+                "it is of the experiment `{}`, and the trace declares `{name}`",
+                episode.experiment
+            )));
+        }
+        let scene = Scene::draw(&self.config, self.experiment, episode.seed, episode.run)
+            .map_err(|error| fault(error.to_string()))?;
+        World::new(eye, scene).map_err(|error| fault(error.to_string()))
+    }
+}
+
+/// The configuration with the recorded grid and threshold for visibility.
+fn counted_with(config: &WorldConfig, recording: &Value) -> WorldConfig {
+    let number = |value: Option<&Value>| u32::try_from(value?.as_u64()?).ok();
+    let grid = |side: &str| {
+        let side = number(recording.get("visibility_grid").and_then(|grid| grid.get(side)));
+        side.filter(|side| (1..=MOST_RAYS).contains(side))
+    };
+    let mut eye = config.clone();
+    eye.eye.width = grid("width").unwrap_or(eye.eye.width);
+    eye.eye.height_px = grid("height").unwrap_or(eye.eye.height_px);
+    let threshold = number(recording.get("visibility_threshold_px"));
+    eye.evidence.mirror_self_px = threshold.unwrap_or(eye.evidence.mirror_self_px);
+    eye
+}
+
+/// Repeats an episode's actions; `look` is called before each step with the world and what can be seen.
+pub fn again<E: From<ReplayError>>(
+    recipe: &Recipe,
+    eye: &WorldConfig,
+    episode: &Episode,
+    mut look: impl FnMut(i32, &World, &Visibility, &Step) -> Result<(), E>,
+) -> Result<Option<Divergence>, E> {
+    let mut world = recipe.world(episode, eye)?;
+    let is_same_eye = *eye == recipe.eye;
+    let mut parted = differs(episode, 0, &constants(episode, world.scene()));
+    for (t, step) in (1..).zip(&episode.steps) {
+        let visibility = world.visibility();
+        look(t, &world, &visibility, step)?;
+        let mut columns = poses(step, &world);
+        if is_same_eye {
+            columns.extend(counts(step, &world, &visibility));
+        }
+        let bumped = world.act(step.action).bumped;
+        let distance = world.target_distance().map_or("none".to_owned(), |distance| distance.to_string());
+        columns.extend(step.extra.target_distance.map(|own| ("target_distance", own.to_string(), distance)));
+        columns.extend(step.extra.bumped.map(|own| ("bumped", own.to_string(), bumped.to_string())));
+        parted = parted.or_else(|| differs(episode, t, &columns));
+    }
+    Ok(parted)
+}
+
+/// A column, what the trace has, and what the replay gives.
+type Compared = (&'static str, String, String);
+
+fn differs(episode: &Episode, t: i32, columns: &[Compared]) -> Option<Divergence> {
+    let (column, expected, found) = columns.iter().find(|(_, expected, found)| expected != found)?;
+    Some(Divergence {
+        episode_id: episode.episode_id.clone(),
+        t,
+        column: (*column).to_owned(),
+        expected: expected.clone(),
+        found: found.clone(),
+    })
+}
+
+fn constants(episode: &Episode, scene: &Scene) -> Vec<Compared> {
+    let mut columns = vec![("body_color", episode.body_color.clone(), scene.body_color.name().to_owned())];
+    let stated = scene.stated_color.map_or("none", |color| color.name());
+    let own = episode.stated_color.as_deref().unwrap_or("none");
+    columns.push(("stated_color", own.to_owned(), stated.to_owned()));
+    let shown = scene.shown_color().map(|color| color.name().to_owned());
+    columns.extend(
+        episode.shown_color.clone().map(|own| ("shown_color", own, shown.unwrap_or_else(|| "none".to_owned()))),
+    );
+    let distance = scene.start_distance().map_or("none".to_owned(), |distance| distance.to_string());
+    columns.extend(episode.start_distance.map(|own| ("start_distance", own.to_string(), distance)));
+    columns.extend(episode.distractors.map(|own| ("distractors", own.to_string(), scene.others.len().to_string())));
+    columns
+}
+
+/// Compared as the trace stores them: single precision.
+fn poses(step: &Step, world: &World) -> Vec<Compared> {
+    #[expect(clippy::cast_possible_truncation, reason = "what the trace stores")]
+    let stored = |value: f64| (value as f32).to_string();
+    let pose = world.pose();
+    let cube = step.selected_cube.as_deref().and_then(Color::named);
+    let distance = cube.and_then(|color| world.distance_to_cube(color)).map_or("none".to_owned(), stored);
+    let mark = world.scene().own_mark_at(world.t()).map(|color| color.name().to_owned());
+    let own = step.extra.mark_color.clone();
+    let marks = (world.has_own_mark() && own != mark).then(|| {
+        let shown = |mark: Option<String>| mark.unwrap_or_else(|| "none".to_owned());
+        ("mark_color", shown(own), shown(mark))
+    });
+    let compared = [
+        ("pose_x", step.extra.pose_x, stored(pose.x)),
+        ("pose_y", step.extra.pose_y, stored(pose.y)),
+        ("pose_yaw", step.extra.pose_yaw, stored(pose.heading.degrees())),
+        ("cube_distance", step.extra.cube_distance, distance),
+    ];
+    let poses = compared.into_iter().filter_map(|(name, own, found)| Some((name, own?.to_string(), found)));
+    poses.chain(marks).collect()
+}
+
+fn counts(step: &Step, world: &World, visibility: &Visibility) -> Vec<Compared> {
+    let compared = [
+        ("mirror_self_px", step.extra.mirror_self_px, visibility.self_px),
+        ("mirror_other_px", step.extra.mirror_other_px, visibility.other_px),
+        ("mirror_px", step.extra.mirror_px, visibility.mirror_px),
+        ("direct_other_px", step.extra.direct_other_px, visibility.direct_other_px),
+        ("mirror_mark_px", step.extra.mirror_mark_px, visibility.mark_px),
+    ];
+    let mut columns: Vec<Compared> = compared
+        .into_iter()
+        .filter_map(|(name, own, found)| Some((name, own?.to_string(), found.to_string())))
+        .collect();
+    let visible = world.is_mirror_visible(visibility);
+    columns.push(("mirror_visible", step.mirror_visible.to_string(), visible.to_string()));
+    columns
+}

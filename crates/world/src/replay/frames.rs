@@ -1,0 +1,63 @@
+//! Frames of an episode rendered again, where no log has them.
+
+use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
+
+use serde_json::Value;
+
+use super::again::{Recipe, again};
+use super::error::ReplayError;
+use crate::sim::camera::Camera;
+use trace::episode::Episode;
+
+/// The rows of rays that visibility is counted with here, where nobody reads the counts: counting is what most of a replay's
+/// time goes to.
+const RAYS: u32 = 24;
+
+/// Why a replay goes no further.
+enum Halt {
+    /// All wanted frames are there.
+    Done,
+    /// Something is wrong.
+    Fault(ReplayError),
+}
+
+impl From<ReplayError> for Halt {
+    fn from(error: ReplayError) -> Self {
+        Self::Fault(error)
+    }
+}
+
+/// The frames of these steps, PNG, by t; `recording` is what the trace says of how it was recorded.
+pub fn frames(
+    recording: Option<&Value>,
+    episode: &Episode,
+    steps: &RangeInclusive<i32>,
+) -> Result<BTreeMap<i32, Vec<u8>>, ReplayError> {
+    let recipe = Recipe::of(recording)?;
+    let mut camera = Camera::new(&recipe.config).map_err(ReplayError::other)?;
+    let mut frames = BTreeMap::new();
+    let mut eye = recipe.eye.clone();
+    let columns = eye.eye.width * RAYS / eye.eye.height_px.max(1);
+    (eye.eye.width, eye.eye.height_px) = (columns.max(1), RAYS);
+    let ended = again(&recipe, &eye, episode, |t, world, _, _| {
+        if t > *steps.end() {
+            return Err(Halt::Done);
+        }
+        if steps.contains(&t) {
+            let frame = camera.frame(world).map_err(ReplayError::other)?;
+            frames.insert(t, frame.to_png().map_err(ReplayError::other)?.to_vec());
+        }
+        Ok(())
+    });
+    match ended {
+        Ok(Some(parted)) => Err(ReplayError::Diverged(parted)),
+        Ok(None) | Err(Halt::Done) => Ok(frames),
+        Err(Halt::Fault(error)) => Err(error),
+    }
+}
+
+/// Whether a trace says how its world was made, and this program can make it.
+pub fn is_recipe(recording: Option<&Value>) -> bool {
+    Recipe::of(recording).is_ok()
+}

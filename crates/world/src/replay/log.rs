@@ -1,0 +1,109 @@
+//! What an episode's log is told, by a recording or a replay: the world as shapes, the frame, the counts, the row.
+
+use std::path::Path;
+use std::sync::{Arc, LazyLock};
+
+use schemars::schema_for;
+use serde_json::Value;
+
+use crate::sim::snapshot::{self, Shape};
+use crate::sim::visibility::Visibility;
+use crate::sim::world::World;
+use trace::episode::{Episode, Step};
+use trace::frame::Frame;
+use trace::log::message::Decision;
+use trace::log::write::{EpisodeLog, Form, Placed, Solid, View};
+
+static CENSUS: LazyLock<Value> = LazyLock::new(|| schema_for!(Visibility).to_value());
+
+/// A step as whoever looks on sees it.
+#[derive(Debug)]
+pub struct Seen<'a> {
+    /// The timestep, from 1.
+    pub t: i32,
+    /// The world before the action.
+    pub world: &'a World,
+    /// The picture, where one was drawn.
+    pub frame: Option<&'a Arc<Frame>>,
+    /// What could be seen.
+    pub visibility: &'a Visibility,
+}
+
+/// Why a log cannot be written.
+pub type LogFault = Box<dyn std::error::Error + Send + Sync>;
+
+/// The log of an episode under way.
+pub struct Log {
+    seed: i32,
+    run: i32,
+    repetition: i32,
+    file: EpisodeLog,
+}
+
+impl Log {
+    /// Begins the log of an episode that will be at `path`.
+    pub fn begin(path: &Path, episode: &Episode) -> Result<Self, LogFault> {
+        let (seed, run, repetition) = (episode.seed, episode.run, episode.repetition.unwrap_or(1));
+        let file = EpisodeLog::create(path, episode, &CENSUS, time(seed, run, repetition, 0))?;
+        Ok(Self { seed, run, repetition, file })
+    }
+
+    /// The same for a log that nobody reads before it has ended: it takes less room.
+    #[must_use]
+    pub fn in_large_chunks(self) -> Self {
+        Self { file: self.file.in_large_chunks(), ..self }
+    }
+
+    /// Adds what is seen before a step.
+    pub fn seen(&mut self, seen: &Seen<'_>) -> Result<(), LogFault> {
+        let png = seen.frame.map(|frame| frame.to_png()).transpose()?;
+        let snapshot = seen.world.snapshot();
+        let placed: Vec<Placed> = snapshot.frames.iter().map(placed).collect();
+        let solids: Vec<Solid> = snapshot.solids.iter().map(solid).collect();
+        let view = View { png, placed: &placed, solids: &solids, census: seen.visibility };
+        Ok(self.file.seen(self.time(seen.t), &view)?)
+    }
+
+    /// Adds the row of a step.
+    pub fn done(&mut self, t: i32, row: &Step) -> Result<(), LogFault> {
+        Ok(self.file.decided(self.time(t), &Decision::of(t, row))?)
+    }
+
+    pub fn end(self, episode: &Episode) -> Result<(), LogFault> {
+        let last = i32::try_from(episode.steps.len()).unwrap_or(i32::MAX);
+        let time = self.time(last);
+        Ok(self.file.end(time, episode)?)
+    }
+
+    fn time(&self, t: i32) -> u64 {
+        time(self.seed, self.run, self.repetition, t)
+    }
+}
+
+/// When a step's frame was seen, ns: no clock, but a place of its own on the time line of the log. Another time of the same
+/// scene comes some thousandths of a second later.
+pub fn frame_time(seed: i32, run: i32, repetition: i32, t: i32) -> i64 {
+    const SECOND: i64 = 1_000_000_000;
+    const MILLISECOND: i64 = 1_000_000;
+    let episode = i64::from(seed) * 1_000 + i64::from(run);
+    (episode * 1_000 + i64::from(t)) * SECOND + i64::from(repetition - 1) * MILLISECOND
+}
+
+/// The time of a step in the log, which never lies before 0.
+fn time(seed: i32, run: i32, repetition: i32, t: i32) -> u64 {
+    u64::try_from(frame_time(seed, run, repetition, t)).unwrap_or(0)
+}
+
+fn placed(placed: &snapshot::Placed) -> Placed {
+    Placed { name: placed.name.clone(), position: placed.position, rotation: placed.rotation }
+}
+
+fn solid(solid: &snapshot::Solid) -> Solid {
+    let form = match solid.shape {
+        Shape::Plane([x, y]) => Form::Box([x, y, 0.0]),
+        Shape::Sphere(radius) => Form::Sphere(radius),
+        Shape::Capsule { radius, length } => Form::Capsule { radius, length },
+        Shape::Box(edges) => Form::Box(edges),
+    };
+    Solid { name: solid.name.clone(), form, position: solid.position, rotation: solid.rotation, rgba: solid.rgba }
+}

@@ -1,0 +1,226 @@
+//! Traces replayed and held against what was recorded; frames, logs and counts anew on the way.
+
+use std::fmt::Display;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use arrow::array::{ArrayRef, BooleanArray, Int32Array};
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::again::{Recipe, again};
+use super::divergence::Divergence;
+use super::error::ReplayError;
+use super::log::{Log, Seen};
+use crate::sim::camera::Camera;
+use crate::sim::config::WorldConfig;
+use crate::sim::visibility::Visibility;
+use exact::replace::TemporaryFolder;
+use trace::episode::Episode;
+use trace::inputs::Input;
+use trace::log::assemble;
+use trace::merge::{self, EpisodeRows};
+use trace::open::TraceSet;
+use trace::schema::RECORDING_KEY;
+
+/// One trace to replay.
+pub struct Recorded {
+    /// Its file.
+    pub path: PathBuf,
+    /// The episodes to replay.
+    pub rows: Vec<EpisodeRows>,
+    recording: Option<Value>,
+    recipe: Recipe,
+}
+
+/// What a replay writes.
+#[derive(Clone, Debug, Default)]
+pub struct Outputs {
+    /// The folder for the frame of every step.
+    pub frames: Option<PathBuf>,
+    /// The log.
+    pub log: Option<PathBuf>,
+    /// The trace with its visibility decided anew.
+    pub recount: Option<Recount>,
+}
+
+/// How visibility is decided anew.
+#[derive(Clone, Debug)]
+pub struct Recount {
+    /// The trace to write.
+    pub out: PathBuf,
+    /// The threshold, pixels of the grid; the recorded one, scaled to the grid, where there is none.
+    pub threshold: Option<u32>,
+    /// The grid of rays, width and height; the size of the view where there is none.
+    pub grid: Option<(u32, u32)>,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ReplayAnswer {
+    /// Episodes that were replayed.
+    pub episodes: usize,
+    /// Their steps.
+    pub steps: usize,
+    /// The first divergence of each episode that has one.
+    pub divergences: Vec<Divergence>,
+    /// Steps whose `mirror_visible` is another than before, with `--recompute-visibility`.
+    pub flipped: Option<usize>,
+}
+
+impl Recorded {
+    /// Reads traces, or one of their episodes.
+    pub fn open(files: &[Input], episode: Option<&str>) -> Result<Vec<Self>, ReplayError> {
+        let set = TraceSet::open(files).map_err(ReplayError::other)?;
+        let mut traces = Vec::new();
+        for (input, file) in files.iter().zip(set.files()) {
+            let recording = file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok());
+            let named = |fault| ReplayError::InTrace { trace: file.name().to_owned(), fault: Box::new(fault) };
+            let recipe = Recipe::of(recording.as_ref()).map_err(named)?;
+            let mut rows = merge::read(&input.path).map_err(ReplayError::other)?;
+            rows.retain(|rows| episode.is_none_or(|id| rows.episode_id == id));
+            traces.push(Self { path: input.path.clone(), rows, recording, recipe });
+        }
+        if traces.iter().all(|trace| trace.rows.is_empty()) {
+            return Err(ReplayError::NoEpisode(episode.unwrap_or_default().to_owned()));
+        }
+        Ok(traces)
+    }
+
+    /// Replays the episodes and adds to `answer`; `save` writes a frame, PNG.
+    pub fn replay<E: From<ReplayError>>(
+        &self,
+        outputs: &Outputs,
+        answer: &mut ReplayAnswer,
+        mut save: impl FnMut(&Path, &[u8]) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let eye = outputs.recount.as_ref().map_or_else(|| self.recipe.eye.clone(), |recount| recount.eye(&self.recipe));
+        let draws = outputs.frames.is_some() || outputs.log.is_some();
+        let camera = draws.then(|| Camera::new(&self.recipe.config)).transpose().map_err(ReplayError::other)?;
+        let parts = TemporaryFolder::private("replay").map_err(ReplayError::other)?;
+        let mut player = Player { trace: self, outputs, eye: &eye, camera };
+        let (mut logs, mut rewritten) = (Vec::new(), Vec::new());
+        for rows in &self.rows {
+            let episode = rows.episode().map_err(ReplayError::other)?;
+            let part = parts.path().join(format!("{}.mcap", logs.len()));
+            let (divergence, counts) = player.episode(&episode, &part, &mut save)?;
+            answer.episodes += 1;
+            answer.steps += episode.steps.len();
+            answer.divergences.extend(divergence);
+            logs.push((assemble::place(&episode), part));
+            if outputs.recount.is_some() {
+                *answer.flipped.get_or_insert(0) += counts.flipped(&episode);
+                rewritten.push(rows.with_columns(&counts.columns()).map_err(ReplayError::other)?);
+            }
+        }
+        if let Some(path) = &outputs.log {
+            let recording = self.recording.clone().unwrap_or(Value::Null);
+            assemble::write(path, &logs, &recording).map_err(ReplayError::other)?;
+        }
+        if let Some(recount) = &outputs.recount {
+            let recording = recounted(self.recording.as_ref(), &eye);
+            merge::write(&recount.out, Some(&recording), &rewritten).map_err(ReplayError::other)?;
+        }
+        Ok(())
+    }
+}
+
+impl Recount {
+    /// The configuration of the eye: the recorded one, but for what was asked for.
+    fn eye(&self, recipe: &Recipe) -> WorldConfig {
+        let mut config = recipe.eye.clone();
+        if let Some((width, height)) = self.grid {
+            let recorded = u64::from(config.eye.width) * u64::from(config.eye.height_px);
+            let scaled = u64::from(config.evidence.mirror_self_px) * u64::from(width) * u64::from(height);
+            config.evidence.mirror_self_px = u32::try_from(scaled.div_ceil(recorded.max(1))).unwrap_or(u32::MAX);
+            (config.eye.width, config.eye.height_px) = (width, height);
+        }
+        config.evidence.mirror_self_px = self.threshold.unwrap_or(config.evidence.mirror_self_px);
+        config
+    }
+}
+
+/// What the episodes of a trace are replayed with.
+struct Player<'a> {
+    trace: &'a Recorded,
+    outputs: &'a Outputs,
+    eye: &'a WorldConfig,
+    camera: Option<Camera>,
+}
+
+impl Player<'_> {
+    /// One episode, its log at `part`.
+    fn episode<E: From<ReplayError>>(
+        &mut self,
+        episode: &Episode,
+        part: &Path,
+        save: &mut impl FnMut(&Path, &[u8]) -> Result<(), E>,
+    ) -> Result<(Option<Divergence>, Counts), E> {
+        let unwritten = |fault: super::log::LogFault| ReplayError::other(fault.to_string());
+        let log = self.outputs.log.as_ref().map(|_| Log::begin(part, episode).map(Log::in_large_chunks));
+        let mut log = log.transpose().map_err(unwritten)?;
+        let mut counts = Counts::default();
+        let divergence = again(&self.trace.recipe, self.eye, episode, |t, world, visibility, step| {
+            counts.add(visibility, world.is_mirror_visible(visibility));
+            let frame = self.camera.as_mut().map(|camera| camera.frame(world)).transpose();
+            let frame = frame.map_err(ReplayError::other)?.map(Arc::new);
+            if let (Some(folder), Some(frame)) = (&self.outputs.frames, &frame) {
+                let png = frame.to_png().map_err(ReplayError::other)?;
+                save(&frame_path(folder, &episode.episode_id, t), png)?;
+            }
+            if let Some(log) = &mut log {
+                let seen = Seen { t, world, frame: frame.as_ref(), visibility };
+                log.seen(&seen).and_then(|()| log.done(t, step)).map_err(unwritten)?;
+            }
+            Ok::<(), E>(())
+        })?;
+        if let Some(log) = log {
+            log.end(episode).map_err(unwritten)?;
+        }
+        Ok((divergence, counts))
+    }
+}
+
+/// What was counted anew, a value per step.
+#[derive(Default)]
+struct Counts {
+    px: [Vec<i32>; 4],
+    visible: Vec<bool>,
+}
+
+impl Counts {
+    /// The columns of the counts.
+    const COLUMNS: [&str; 4] = ["mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px"];
+
+    fn add(&mut self, seen: &Visibility, visible: bool) {
+        let counts = [seen.self_px, seen.other_px, seen.mirror_px, seen.direct_other_px];
+        for (column, count) in self.px.iter_mut().zip(counts) {
+            column.push(i32::try_from(count).unwrap_or(i32::MAX));
+        }
+        self.visible.push(visible);
+    }
+
+    fn flipped(&self, episode: &Episode) -> usize {
+        episode.steps.iter().zip(&self.visible).filter(|(step, visible)| step.mirror_visible != **visible).count()
+    }
+
+    fn columns(self) -> Vec<(&'static str, ArrayRef)> {
+        let px = self.px.map(|values| -> ArrayRef { Arc::new(Int32Array::from(values)) });
+        let visible: ArrayRef = Arc::new(BooleanArray::from(self.visible));
+        Self::COLUMNS.into_iter().zip(px).chain([("mirror_visible", visible)]).collect()
+    }
+}
+
+/// The metadata of a trace whose visibility was decided anew. The world stays: it is what a replay builds.
+fn recounted(recording: Option<&Value>, eye: &WorldConfig) -> Value {
+    let mut recording = recording.cloned().unwrap_or_else(|| json!({}));
+    recording["visibility_threshold_px"] = json!(eye.evidence.mirror_self_px);
+    recording["visibility_grid"] = json!({ "width": eye.eye.width, "height": eye.eye.height_px });
+    recording
+}
+
+/// Where the frame of a step goes.
+pub fn frame_path(folder: &Path, episode_id: &str, t: impl Display) -> PathBuf {
+    folder.join(episode_id.replace('/', "-")).join(format!("t{t:0>3}.png"))
+}

@@ -1,0 +1,132 @@
+//! A humanoid in a room: where it stands, where it faces, and where its limbs are.
+//!
+//! Rule: a body is upright and moves as a cylinder; its limbs have three positions, standing and the two halves of a
+//! stride, and none of them shows in one's own view.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::angle::{Heading, Quaternion};
+use super::config::BodyConfig;
+use exact::names;
+
+/// Where a body stands and faces.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// m, from the centre of the room.
+    pub x: f64,
+    /// m, from the centre of the room.
+    pub y: f64,
+    /// Steps of 30 degrees counter-clockwise from +x.
+    pub heading: Heading,
+}
+
+impl Pose {
+    /// Where the axis of the body is.
+    pub const fn spot(self) -> [f64; 2] {
+        [self.x, self.y]
+    }
+
+    /// Where it would be `length` ahead, or back where negative.
+    #[must_use]
+    pub fn ahead(self, length: f64) -> Self {
+        let [x, y] = self.heading.direction();
+        Self { x: self.x + length * x, y: self.y + length * y, heading: self.heading }
+    }
+}
+
+/// Where the limbs are: in the picture after a step the body is in the middle of a stride.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Stride {
+    /// All limbs hang down.
+    #[default]
+    Standing,
+    /// The left leg and the right arm are ahead.
+    Left,
+    /// The right leg and the left arm are ahead.
+    Right,
+}
+
+/// A body as it is at one moment.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Figure {
+    /// Where it stands and faces.
+    pub pose: Pose,
+    /// Where its limbs are.
+    pub stride: Stride,
+    /// Steps that it has taken, of which the next stride follows.
+    pub steps: u32,
+}
+
+impl Figure {
+    /// A body that has just been put there.
+    pub const fn standing(pose: Pose) -> Self {
+        Self { pose, stride: Stride::Standing, steps: 0 }
+    }
+
+    /// Goes there, with the next half of a stride.
+    pub const fn step_to(&mut self, pose: Pose) {
+        self.steps = self.steps.wrapping_add(1);
+        self.stride = if self.steps % 2 == 1 { Stride::Left } else { Stride::Right };
+        self.pose = pose;
+    }
+
+    /// Turns on the spot, its limbs down.
+    pub fn turn(&mut self, thirties: i8) {
+        self.stride = Stride::Standing;
+        self.pose.heading = self.pose.heading.turned(thirties);
+    }
+
+    pub const fn stand(&mut self) {
+        self.stride = Stride::Standing;
+    }
+}
+
+/// A piece of the humanoid that moves as one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[expect(missing_docs, reason = "each is the piece of its name")]
+pub enum Piece {
+    Trunk,
+    LeftArm,
+    RightArm,
+    LeftLeg,
+    RightLeg,
+}
+
+// Every humanoid has one of each; the names are those of `assets/world/humanoid.xml`.
+names!(Piece {
+    Trunk: "trunk",
+    LeftArm: "left_arm",
+    RightArm: "right_arm",
+    LeftLeg: "left_leg",
+    RightLeg: "right_leg",
+});
+
+impl Piece {
+    /// How far forward it is swung, degrees.
+    fn swing(self, stride: Stride, config: &BodyConfig) -> f64 {
+        let side = match stride {
+            Stride::Standing => return 0.0,
+            Stride::Left => 1.0,
+            Stride::Right => -1.0,
+        };
+        match self {
+            Self::Trunk => 0.0,
+            Self::LeftArm => -side * config.arm_swing,
+            Self::RightArm => side * config.arm_swing,
+            Self::LeftLeg => side * config.leg_swing,
+            Self::RightLeg => -side * config.leg_swing,
+        }
+    }
+
+    /// Where it is in the room: its origin, which in the body's own frame is `joint`, and its rotation.
+    pub fn place(self, figure: &Figure, joint: [f64; 3], config: &BodyConfig) -> ([f64; 3], Quaternion) {
+        let Pose { x, y, heading } = figure.pose;
+        let [cosine, sine] = heading.direction();
+        let origin = [x + cosine * joint[0] - sine * joint[1], y + sine * joint[0] + cosine * joint[1], joint[2]];
+        let swing = Quaternion::about_y(-self.swing(figure.stride, config));
+        (origin, heading.rotation().after(swing))
+    }
+}

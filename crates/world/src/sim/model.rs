@@ -1,0 +1,440 @@
+//! The world as MuJoCo has it: one model for all experiments, dressed for a scene and posed for a moment.
+//!
+//! Every world has seven humanoids, twelve cubes, and for each of four panes a place and a humanoid that only it shows.
+//! Those that a scene lacks are hidden: in a group that neither picture nor rays include. So all models have one layout,
+//! and a renderer goes from world to world at no cost.
+//!
+//! A scene has several stages: the room as the eye sees it directly, where panes are blank, and what is seen through each
+//! pane: the same room without the wall that the look comes through, with bodies where and how that pane shows them.
+//! MuJoCo itself draws one mirror at most; a stage per pane gives any number, late ones and false ones.
+//! Rule: the sizes of planes never change after compiling, because a renderer keeps them as they were; panes are boxes.
+
+mod dress;
+
+pub(super) use dress::{Labelled, labelled};
+
+use std::sync::Arc;
+
+use mujoco_rs::prelude::{Attach, MjData, MjEditError, MjModel, MjSpec, MjtGeomBase, MjtObjBase, SpecItem};
+
+use super::angle::{Heading, Quaternion, sine_cosine};
+use super::body::{Figure, Piece, Pose};
+use super::config::{LightsConfig, WorldConfig};
+use super::scene::{MOST_CUBES, MOST_OTHERS, Scene};
+use crate::experiment::spec::{MOST_MARKS, MOST_PANES, Part};
+
+/// Humanoids of a room: the agent's own body, then the others.
+pub const AGENTS: usize = 1 + MOST_OTHERS;
+
+/// Humanoids in every model: those of the room, then one for each pane, which only that pane shows.
+pub const BODIES: usize = AGENTS + MOST_PANES;
+
+/// The camera that is the agent's eye.
+pub const EYE_CAMERA: &str = "eye";
+
+/// The camera that sees through a pane: the eye's mirror image, or the eye in the second room.
+pub const BEYOND_CAMERA: &str = "beyond";
+
+/// The body that is the hand, and the beginning of the names of its shapes.
+pub const HAND: &str = "hand";
+
+/// The square mark on the front of a body that stands still.
+pub const PATCH: &str = "patch";
+
+/// The camera that sees the room from above.
+pub const TOP_CAMERA: &str = "top";
+
+/// Groups that MuJoCo's pictures and rays tell apart.
+pub mod group {
+    /// Walls, floor and panes.
+    pub const ROOM: i32 = 0;
+    /// Cubes and other agents.
+    pub const THINGS: i32 = 1;
+    /// The agent's own body.
+    pub const EGO: i32 = 2;
+    /// The ceiling, through which the view from above looks.
+    pub const CEILING: i32 = 3;
+    /// What a scene has not; by MuJoCo's default not drawn.
+    pub const HIDDEN: i32 = 5;
+}
+
+/// Slices and stacks of round parts, and divisions of flat ones, in pictures of labels.
+const LABELLED_PARTS: [u32; 3] = [40, 24, 2];
+
+const ROOM: &str = include_str!("../../../../assets/world/room.xml");
+const HUMANOID: &str = include_str!("../../../../assets/world/humanoid.xml");
+
+/// How a model is painted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paint {
+    /// As the agent sees it: lit.
+    Lit,
+    /// Every pixel exactly the colour of what it shows: no light, no shade, no smoothing.
+    Labels,
+}
+
+/// What a geom is part of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Item {
+    /// The surface of a mirror or window of the scene.
+    Pane(usize),
+    /// Walls, floor or ceiling.
+    Room,
+    /// A humanoid of the room: 0 is the agent's own body.
+    Agent(usize),
+    /// The humanoid that only one pane shows.
+    Double,
+    /// A cube of the scene.
+    Cube(usize),
+    /// A mark of the scene.
+    Mark(usize),
+    /// The hand of a reaching task.
+    Hand,
+}
+
+/// What a stage is seen by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Look {
+    /// By the eye: panes are blank.
+    Direct,
+    /// Through the pane of this number.
+    Through(usize),
+}
+
+/// What moves, at one moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// The step that comes next, from 1: which marks there are.
+    pub t: u32,
+    /// The humanoids by their number; `None` for those that are not there.
+    pub bodies: [Option<Figure>; BODIES],
+    /// Where the camera beyond a pane is and faces.
+    pub beyond: Option<Pose>,
+    /// Where the hand is, m, where there is one.
+    pub hand: Option<[f64; 3]>,
+}
+
+/// Why MuJoCo could not build the world.
+#[derive(Debug, thiserror::Error)]
+#[error("mujoco cannot build the world: {0}; the configuration or the library is at fault")]
+pub struct ModelError(#[from] MjEditError);
+
+/// A model dressed for a scene, and its state.
+pub struct Stage {
+    /// MuJoCo's state.
+    pub(super) data: MjData<Arc<MjModel>>,
+    /// The model of that state, shared with whoever draws it.
+    model: Arc<MjModel>,
+    items: Vec<Item>,
+    /// Of each body and piece: its index among the bodies that are moved from outside, and its joint.
+    pieces: Vec<(usize, [f64; 3])>,
+    look: Look,
+    /// The index of the camera beyond panes among the bodies that are moved from outside.
+    beyond: usize,
+    /// The index of the hand among them.
+    hand: usize,
+    /// The step whose marks are shown.
+    marks_at: u32,
+}
+
+impl std::fmt::Debug for Stage {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Stage").field("geoms", &self.items.len()).finish_non_exhaustive()
+    }
+}
+
+impl Stage {
+    /// The stages of a scene, for pictures of the configured size: what the eye sees directly, then what it sees through
+    /// each pane.
+    pub fn all(config: &WorldConfig, paint: Paint, scene: &Scene) -> Result<(Self, Vec<Self>), ModelError> {
+        let model = compile(config, paint, [config.eye.width as usize, config.eye.height_px as usize])?;
+        let stage = |look| Self::of(model.clone(), config, paint, scene, look);
+        Ok((stage(Look::Direct), (0..scene.panes.len()).map(|pane| stage(Look::Through(pane))).collect()))
+    }
+
+    /// A compiled model dressed for a scene as it is at the first step.
+    fn of(mut model: MjModel, config: &WorldConfig, paint: Paint, scene: &Scene, look: Look) -> Self {
+        let items: Vec<Item> = (0..model.geom_group().len()).map(|geom| item(&model, geom, scene)).collect();
+        dress::dress(&mut model, &items, config, scene, look);
+        dress::show_marks(&mut model, &items, scene, 1, look);
+        if paint == Paint::Labels {
+            dress::label(&mut model, &items);
+        }
+        let pieces = (0..BODIES)
+            .flat_map(|body| Piece::ALL.map(|piece| format!("{}_{}", body_name(body), piece.name())))
+            .map(|name| {
+                let body = model.name_to_id(MjtObjBase::mjOBJ_BODY, &name).expect("the humanoid has this piece");
+                let mocap = usize::try_from(model.body_mocapid()[body]).expect("each piece is moved from outside");
+                (mocap, model.body_pos()[body])
+            })
+            .collect();
+        let moved = |name: &str| {
+            let body = model.name_to_id(MjtObjBase::mjOBJ_BODY, name).expect("the room has this body");
+            usize::try_from(model.body_mocapid()[body]).expect("it is moved from outside")
+        };
+        let (beyond, hand) = (moved(BEYOND_CAMERA), moved(HAND));
+        let model = Arc::new(model);
+        Self { data: MjData::new(Arc::clone(&model)), model, items, pieces, look, beyond, hand, marks_at: 1 }
+    }
+
+    /// Shows the marks that are there at a step.
+    fn show_marks(&mut self, scene: &Scene, t: u32) {
+        let shown = |t| scene.marks_at(t).count();
+        if shown(t) != shown(self.marks_at) {
+            let mut model = MjModel::clone(&self.model);
+            dress::show_marks(&mut model, &self.items, scene, t, self.look);
+            self.model = Arc::new(model);
+            self.data.swap_model(Arc::clone(&self.model));
+        }
+        self.marks_at = t;
+    }
+
+    /// What it is seen by.
+    pub const fn look(&self) -> Look {
+        self.look
+    }
+
+    /// What each geom is part of.
+    pub fn items(&self) -> &[Item] {
+        &self.items
+    }
+
+    /// MuJoCo's model, to draw with.
+    pub(super) const fn shared_model(&self) -> &Arc<MjModel> {
+        &self.model
+    }
+
+    pub fn model(&self) -> &MjModel {
+        self.data.model()
+    }
+
+    /// A geom's name, such as `mirror`, `cube3` or `agent0_head`.
+    pub fn geom_name(&self, geom: usize) -> &str {
+        self.data.model().id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default()
+    }
+
+    /// Whether a geom is in the scene.
+    pub fn is_shown(&self, geom: usize) -> bool {
+        self.data.model().geom_group()[geom] != group::HIDDEN
+    }
+
+    /// Shows a moment of the scene.
+    pub fn show(&mut self, config: &WorldConfig, scene: &Scene, moment: &Moment) {
+        self.show_marks(scene, moment.t);
+        self.pose(config, moment);
+    }
+
+    /// Puts the humanoids where they are; those that are not there far below the floor.
+    fn pose(&mut self, config: &WorldConfig, moment: &Moment) {
+        const FAR_BELOW: f64 = -100.0;
+        for (body, figure) in moment.bodies.iter().enumerate() {
+            for (at, piece) in Piece::ALL.into_iter().enumerate() {
+                let (mocap, joint) = self.pieces[body * Piece::ALL.len() + at];
+                let (origin, rotation) = match figure {
+                    Some(figure) => piece.place(figure, joint, &config.body),
+                    None => ([joint[0], joint[1], FAR_BELOW], Quaternion([1.0, 0.0, 0.0, 0.0])),
+                };
+                self.data.mocap_pos_mut()[mocap] = origin;
+                self.data.mocap_quat_mut()[mocap] = rotation.0;
+            }
+        }
+        if let Some(pose) = moment.beyond {
+            self.data.mocap_pos_mut()[self.beyond] = [pose.x, pose.y, config.eye.height];
+            self.data.mocap_quat_mut()[self.beyond] = pose.heading.rotation().0;
+        }
+        self.data.mocap_pos_mut()[self.hand] = moment.hand.unwrap_or([0.0, 0.0, FAR_BELOW]);
+        self.data.forward();
+    }
+
+    /// Where every shown geom is: its number, centre and rotation.
+    pub fn placed(&self) -> Vec<(usize, [f64; 3], [f64; 9])> {
+        let shown = (0..self.items.len()).filter(|geom| self.is_shown(*geom));
+        shown.map(|geom| (geom, self.data.geom_xpos()[geom], self.data.geom_xmat()[geom])).collect()
+    }
+
+    /// Where a piece is: its number is that of its agent times five, plus its own.
+    pub(super) fn piece_place(&self, number: usize) -> ([f64; 3], [f64; 4]) {
+        let (mocap, _) = self.pieces[number];
+        (self.data.mocap_pos()[mocap], self.data.mocap_quat()[mocap])
+    }
+}
+
+/// The name of a humanoid, by its number.
+fn body_name(body: usize) -> String {
+    body.checked_sub(AGENTS).map_or_else(|| format!("agent{body}"), |pane| format!("double{pane}"))
+}
+
+/// What a geom's name says that it is part of.
+fn item(model: &MjModel, geom: usize, scene: &Scene) -> Item {
+    let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+    let numbered = |prefix: &str| {
+        let digits = name.strip_prefix(prefix)?.split('_').next()?;
+        digits.parse::<usize>().ok()
+    };
+    let marked = |wearer: usize| {
+        let part = name.split_once("_mark_")?.1;
+        scene.marks.iter().position(|mark| mark.wearer == wearer && mark.part.name() == part)
+    };
+    let front = || scene.marks.iter().position(|mark| mark.part == Part::Front);
+    if let Some(pane) = numbered("pane") {
+        Item::Pane(pane)
+    } else if name == PATCH {
+        Item::Mark(front().unwrap_or(MOST_MARKS - 1))
+    } else if name.starts_with(HAND) {
+        Item::Hand
+    } else if let Some(agent) = numbered("agent") {
+        marked(agent).map_or(Item::Agent(agent), Item::Mark)
+    } else if numbered("double").is_some() {
+        Item::Double
+    } else {
+        numbered("cube").map_or(Item::Room, Item::Cube)
+    }
+}
+
+/// A model for pictures of some size, everything in it and nothing dressed.
+pub(super) fn compile(config: &WorldConfig, paint: Paint, size: [usize; 2]) -> Result<MjModel, ModelError> {
+    let mut spec = MjSpec::from_xml_string(ROOM)?;
+    build_room(&mut spec, config, paint);
+    let largest = config.clutter.edges.iter().copied().fold(config.cubes.edge, f64::max);
+    build_boxes(&mut spec, "cube", MOST_CUBES, largest, paint);
+    build_boxes(&mut spec, "pane", MOST_PANES, config.room.size, paint);
+    for body in 0..BODIES {
+        let mut humanoid = MjSpec::from_xml_string(HUMANOID)?;
+        let prefix = format!("{}_", body_name(body));
+        spec.world_body_mut().attach_by_deep_copy(&mut humanoid, &prefix, "")?;
+    }
+    add_eyes(&mut spec, config);
+    set_picture(&mut spec, config, paint, size);
+    match paint {
+        Paint::Lit => light(&mut spec, &config.lights),
+        Paint::Labels => unlight(&mut spec),
+    }
+    Ok(spec.compile()?)
+}
+
+fn build_room(spec: &mut MjSpec, config: &WorldConfig, paint: Paint) {
+    let room = &config.room;
+    let [half, middle] = [room.size / 2.0, room.height / 2.0];
+    let floor = [half, half, 1.0];
+    let wall = [middle, half, 1.0];
+    let planes = [
+        ("floor", floor, [0.0; 3], [1.0; 3]),
+        ("ceiling", floor, [0.0, 0.0, room.height], room.ceiling_color),
+        ("wall_east", wall, [half, 0.0, middle], room.wall_color),
+        ("wall_north", wall, [0.0, half, middle], room.side_wall_color),
+        ("wall_west", wall, [-half, 0.0, middle], room.wall_color),
+        ("wall_south", wall, [0.0, -half, middle], room.side_wall_color),
+    ];
+    for (name, size, place, color) in planes {
+        let geom = spec.geom_mut(name).expect("the room has this plane");
+        *geom.size_mut() = size;
+        *geom.pos_mut() = place;
+        if name == "ceiling" {
+            geom.set_group(group::CEILING);
+        }
+        *geom.rgba_mut() = rgba(color);
+    }
+    let tiles = spec.texture_mut("tiles").expect("the room has this texture");
+    *tiles.rgb1_mut() = room.floor_color;
+    *tiles.rgb2_mut() = room.tile_color;
+    let material = spec.material_mut("floor").expect("the room has this material");
+    // MuJoCo lays a texture of two by two tiles over twice this size.
+    #[expect(clippy::cast_possible_truncation, reason = "a size of the room")]
+    let repeats = (1.0 / room.tile_size) as f32;
+    *material.texrepeat_mut() = [repeats, repeats];
+    if paint == Paint::Labels {
+        spec.geom_mut("floor").expect("the room has this plane").set_material("");
+    }
+}
+
+fn rgba(color: [f64; 3]) -> [f32; 4] {
+    #[expect(clippy::cast_possible_truncation, reason = "a part of a colour")]
+    let [red, green, blue] = color.map(|part| part as f32);
+    [red, green, blue, 1.0]
+}
+
+/// Boxes of at most this edge, m, which a scene sizes and places.
+fn build_boxes(spec: &mut MjSpec, name: &str, count: usize, largest: f64, paint: Paint) {
+    for at in 0..count {
+        let geom = spec.world_body_mut().add_geom();
+        geom.set_name(&format!("{name}{at}")).expect("names of boxes differ");
+        geom.set_type(MjtGeomBase::mjGEOM_BOX);
+        *geom.size_mut() = [largest / 2.0; 3];
+        *geom.pos_mut() = [0.0, 0.0, -50.0];
+        // MuJoCo ignores what a scene says of a rotation that is none when compiled.
+        let quarter = std::f64::consts::FRAC_1_SQRT_2;
+        *geom.quat_mut() = [quarter, 0.0, -quarter, 0.0];
+        geom.set_contype(1);
+        geom.set_conaffinity(0);
+        if paint == Paint::Lit {
+            geom.set_material("matte");
+        }
+    }
+}
+
+fn add_eyes(spec: &mut MjSpec, config: &WorldConfig) {
+    let eye = &config.eye;
+    let places =
+        [(EYE_CAMERA, "agent0_trunk", [eye.forward, 0.0, eye.height]), (BEYOND_CAMERA, BEYOND_CAMERA, [0.0; 3])];
+    for (name, body, place) in places {
+        let camera = spec.body_mut(body).expect("every model has this body").add_camera();
+        camera.set_name(name).expect("no other camera has this name");
+        *camera.pos_mut() = place;
+        // Right is -y, up is z; then down by its pitch, about y.
+        let level = Quaternion([0.5, 0.5, -0.5, -0.5]);
+        *camera.quat_mut() = if eye.pitch > 0.0 { Quaternion::about_y(eye.pitch).after(level).0 } else { level.0 };
+        camera.set_fovy(eye.fovy);
+    }
+    let top = spec.world_body_mut().add_camera();
+    top.set_name(TOP_CAMERA).expect("no other camera has this name");
+    *top.pos_mut() = [0.0, 0.0, config.room.height + 10.0];
+    top.set_fovy(45.0);
+}
+
+fn set_picture(spec: &mut MjSpec, config: &WorldConfig, paint: Paint, size: [usize; 2]) {
+    let visual = spec.visual_mut();
+    let [width, height] = size.map(|pixels| i32::try_from(pixels).unwrap_or(i32::MAX));
+    (visual.global.offwidth, visual.global.offheight) = (width, height);
+    let samples = if paint == Paint::Lit { config.eye.samples } else { 0 };
+    visual.quality.offsamples = i32::try_from(samples).unwrap_or(0);
+    // Drawing takes its time by the triangles of round parts; a body is some hundred pixels high at most. Labels are what
+    // the rays are held against, and are as round as it gets.
+    let parts = match paint {
+        Paint::Lit => [config.eye.slices, config.eye.stacks, config.eye.quads],
+        Paint::Labels => LABELLED_PARTS,
+    };
+    [visual.quality.numslices, visual.quality.numstacks, visual.quality.numquads] =
+        parts.map(|count| i32::try_from(count).unwrap_or(i32::MAX));
+}
+
+/// Four equal lamps, one towards each wall, so that no wall is lit otherwise than another; one from below.
+fn light(spec: &mut MjSpec, config: &LightsConfig) {
+    #[expect(clippy::cast_possible_truncation, reason = "a part of a colour")]
+    let [ambient, diffuse, lamp, floor] =
+        [config.head_ambient, config.head_diffuse, config.lamp_diffuse, config.floor_diffuse]
+            .map(|part| [part as f32; 3]);
+    let head = &mut spec.visual_mut().headlight;
+    (head.ambient, head.diffuse, head.specular) = (ambient, diffuse, [0.0; 3]);
+    let (down, ahead) = sine_cosine(config.lamp_slope);
+    let lamps = (0..4).map(|wall| {
+        // A little off the walls' own directions, so that corners of cubes show.
+        let [x, y] = Heading::new(3 * wall + 1).direction();
+        ([ahead * x, ahead * y, -down], lamp)
+    });
+    for (direction, diffuse) in lamps.chain([([0.0, 0.0, 1.0], floor)]) {
+        let light = spec.world_body_mut().add_light();
+        light.set_type(mujoco_rs::prelude::MjtLightType::mjLIGHT_DIRECTIONAL);
+        *light.dir_mut() = direction;
+        *light.diffuse_mut() = diffuse;
+        *light.specular_mut() = [0.0; 3];
+        *light.ambient_mut() = [0.0; 3];
+        light.set_castshadow(false);
+    }
+}
+
+/// Everything in its own colour.
+fn unlight(spec: &mut MjSpec) {
+    let visual = spec.visual_mut();
+    let head = &mut visual.headlight;
+    (head.ambient, head.diffuse, head.specular) = ([1.0; 3], [0.0; 3], [0.0; 3]);
+}

@@ -1,0 +1,252 @@
+//! What a scene changes in the model: where panes hang, which cubes, bodies and marks there are, and all colours.
+
+use mujoco_rs::prelude::MjModel;
+use mujoco_rs::prelude::MjtObjBase;
+
+use super::super::angle::{Heading, Quaternion};
+use super::super::config::WorldConfig;
+use super::super::scene::{Cube, HandShape, HandStart, HungPane, Scene, WornMark};
+use super::{AGENTS, Item, Look, group};
+use crate::experiment::spec::{MOST_MARKS, PaneKind};
+use crate::sim::scene::MOST_CUBES;
+use trace::palette::Color;
+
+/// Parts of the humanoid that keep their own colour.
+const NEUTRAL_PARTS: [&str; 3] = ["head", "face", "neck"];
+
+/// Half the depth of a pane, m.
+const HALF_DEPTH: f64 = 0.000_05;
+
+/// The paint of a pane, over which what is seen in it is laid; it shows at most at the edges of what stands before it.
+const BLANK: [u8; 3] = [128, 132, 138];
+
+/// Walls by their quarter turns from +x.
+const WALLS: [&str; 4] = ["wall_east", "wall_north", "wall_west", "wall_south"];
+
+/// Puts a scene's panes, cubes and colours in, and hides what it has not, or what is not in view so. Marks are hidden.
+pub(super) fn dress(model: &mut MjModel, items: &[Item], config: &WorldConfig, scene: &Scene, look: Look) {
+    let pane = match look {
+        Look::Direct => None,
+        Look::Through(at) => Some((at, &scene.panes[at])),
+    };
+    let is_window = pane.is_some_and(|(_, pane)| pane.kind == PaneKind::Window);
+    for (geom, item) in items.iter().enumerate() {
+        match *item {
+            Item::Room => hide_wall(model, geom, pane.map(|(_, pane)| pane)),
+            Item::Pane(at) => hang(model, geom, scene.panes.get(at).filter(|_| pane.is_none()), config),
+            Item::Cube(at) => put_cube(model, geom, scene.cubes.get(at).filter(|_| !is_window)),
+            Item::Agent(agent) => {
+                let color = agent_color(agent, scene, pane.map(|(_, pane)| pane));
+                paint_body(model, geom, color, if agent == 0 { group::EGO } else { group::THINGS });
+            }
+            Item::Double => {
+                let own = pane.filter(|(at, _)| is_of_double(model, geom, *at));
+                let color = own.and_then(|(_, pane)| pane.double).map(|double| double.color);
+                paint_body(model, geom, color, group::THINGS);
+            }
+            Item::Mark(at) => {
+                model.geom_group_mut()[geom] = group::HIDDEN;
+                if let Some(mark) = scene.marks.get(at) {
+                    put_patch(model, geom, scene, mark);
+                }
+            }
+            Item::Hand => put_hand(model, geom, scene.hand.as_ref().filter(|_| !is_window)),
+        }
+    }
+}
+
+/// Shows the marks that are there at a step, on bodies that are in view.
+pub(super) fn show_marks(model: &mut MjModel, items: &[Item], scene: &Scene, t: u32, look: Look) {
+    let pane = match look {
+        Look::Direct => None,
+        Look::Through(at) => Some(&scene.panes[at]),
+    };
+    for (geom, item) in items.iter().enumerate() {
+        let Item::Mark(at) = *item else { continue };
+        let Some(mark) = scene.marks.get(at) else { continue };
+        let is_there = mark.from_t <= t && agent_color(mark.wearer, scene, pane).is_some();
+        model.geom_group_mut()[geom] = match (is_there, mark.wearer) {
+            (false, _) => group::HIDDEN,
+            (true, 0) => group::EGO,
+            (true, _) => group::THINGS,
+        };
+        if model.geom_rgba()[geom][1] != LABEL_GREEN {
+            model.geom_rgba_mut()[geom] = paint(mark.color.rgb());
+        }
+    }
+}
+
+/// The colour that an agent of the room is seen in; `None` where it is not seen so.
+fn agent_color(agent: usize, scene: &Scene, pane: Option<&HungPane>) -> Option<Color> {
+    let is_window = pane.is_some_and(|pane| pane.kind == PaneKind::Window);
+    match (agent.checked_sub(1), pane) {
+        _ if is_window => None,
+        (None, None) => Some(scene.body_color),
+        (None, Some(pane)) if pane.double.is_some() => None,
+        (None, Some(pane)) => Some(pane.paint.unwrap_or(scene.body_color)),
+        (Some(other), _) => scene.others.get(other).map(|other| other.color),
+    }
+}
+
+/// Gives every part the colour that names what it is of.
+pub(super) fn label(model: &mut MjModel, items: &[Item]) {
+    for (geom, item) in items.iter().enumerate() {
+        model.geom_rgba_mut()[geom] = match *item {
+            Item::Pane(pane) => paint([0, step(pane + 1), 0]),
+            item => {
+                let [red, green, blue, opacity] = paint([step(number(item)), 0, 0]);
+                // So that a mark that appears keeps its label.
+                [red, if matches!(item, Item::Mark(_)) { LABEL_GREEN } else { green }, blue, opacity]
+            }
+        };
+    }
+}
+
+const STEP: usize = 8;
+
+/// Too little green to show in eight bits.
+const LABEL_GREEN: f32 = 0.001;
+
+fn step(number: usize) -> u8 {
+    u8::try_from(STEP * number).expect("a world holds fewer than 30 things")
+}
+
+fn number(item: Item) -> usize {
+    match item {
+        Item::Room | Item::Pane(_) => 0,
+        Item::Agent(agent) => 1 + agent,
+        Item::Cube(cube) => 1 + AGENTS + cube,
+        Item::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
+        Item::Hand => 1 + AGENTS + MOST_CUBES + MOST_MARKS,
+        Item::Double => 2 + AGENTS + MOST_CUBES + MOST_MARKS,
+    }
+}
+
+/// What a label's colour names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Labelled {
+    /// Something that is seen itself.
+    Item(Item),
+    /// A pane, whatever is seen in it.
+    Pane(usize),
+}
+
+/// What the label with this red and green names; `None` where none does.
+pub fn labelled([red, green]: [u8; 2]) -> Option<Labelled> {
+    let number = |part: u8| (usize::from(part) % STEP == 0).then_some(usize::from(part) / STEP);
+    let (red, green) = (number(red)?, number(green)?);
+    if let Some(pane) = green.checked_sub(1) {
+        return (red == 0).then_some(Labelled::Pane(pane));
+    }
+    let Some(at) = red.checked_sub(1) else { return Some(Labelled::Item(Item::Room)) };
+    Some(Labelled::Item(match at {
+        _ if at < AGENTS => Item::Agent(at),
+        _ if at < AGENTS + MOST_CUBES => Item::Cube(at - AGENTS),
+        _ if at < AGENTS + MOST_CUBES + MOST_MARKS => Item::Mark(at - AGENTS - MOST_CUBES),
+        _ if at == AGENTS + MOST_CUBES + MOST_MARKS => Item::Hand,
+        _ => Item::Double,
+    }))
+}
+
+/// Hides the wall that the look through a pane comes through.
+fn hide_wall(model: &mut MjModel, geom: usize, pane: Option<&HungPane>) {
+    let Some(pane) = pane else { return };
+    // The second room is the first one moved by its size: the look enters by the wall across.
+    let across = if pane.kind == PaneKind::Window { 2 } else { 0 };
+    let wall = WALLS[usize::from((pane.place.wall + across) % 4)];
+    if model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom) == Some(wall) {
+        model.geom_group_mut()[geom] = group::HIDDEN;
+    }
+}
+
+fn hang(model: &mut MjModel, geom: usize, pane: Option<&HungPane>, config: &WorldConfig) {
+    let Some(pane) = pane else {
+        model.geom_group_mut()[geom] = group::HIDDEN;
+        return;
+    };
+    let [x, y] = pane.place.center(config);
+    let [out_x, out_y] = pane.place.heading().direction();
+    let half = [pane.height / 2.0, pane.width / 2.0, HALF_DEPTH];
+    // Its face, not its middle, is where a pane hangs.
+    model.geom_pos_mut()[geom] = [x + HALF_DEPTH * out_x, y + HALF_DEPTH * out_y, pane.center_height];
+    model.geom_quat_mut()[geom] = facing_inwards(pane.place.heading()).0;
+    model.geom_group_mut()[geom] = group::ROOM;
+    model.geom_size_mut()[geom] = half;
+    model.geom_rbound_mut()[geom] = half.iter().sum();
+    model.geom_rgba_mut()[geom] = paint(BLANK);
+}
+
+/// The rotation of a box on the wall of that heading: its face into the room, its x axis up.
+fn facing_inwards(heading: Heading) -> Quaternion {
+    let quarter = std::f64::consts::FRAC_1_SQRT_2;
+    heading.rotation().after(Quaternion([quarter, 0.0, -quarter, 0.0]))
+}
+
+fn put_cube(model: &mut MjModel, geom: usize, cube: Option<&Cube>) {
+    let Some(cube) = cube else {
+        model.geom_group_mut()[geom] = group::HIDDEN;
+        return;
+    };
+    let half = cube.edge / 2.0;
+    model.geom_group_mut()[geom] = group::THINGS;
+    model.geom_pos_mut()[geom] = [cube.x, cube.y, cube.base + half];
+    model.geom_quat_mut()[geom] = [1.0, 0.0, 0.0, 0.0];
+    model.geom_size_mut()[geom] = [half; 3];
+    // Of the sphere about it, by which a renderer leaves out what is not in view.
+    model.geom_rbound_mut()[geom] = half * 2.0;
+    model.geom_rgba_mut()[geom] = paint(cube.color.rgb());
+}
+
+/// Half of the depth of a patch, m.
+const HALF_PATCH: f64 = 0.004;
+
+/// Puts the mark on the front of the body that stands still; other marks are where the body's are.
+fn put_patch(model: &mut MjModel, geom: usize, scene: &Scene, mark: &WornMark) {
+    let Some(patch) = mark.patch else { return };
+    let half = f64::from(patch.edge_mm) / 2000.0;
+    model.geom_pos_mut()[geom] = patch.center(scene.start);
+    model.geom_quat_mut()[geom] = scene.start.heading.rotation().0;
+    model.geom_size_mut()[geom] = [HALF_PATCH, half, half];
+    model.geom_rbound_mut()[geom] = half * 2.0;
+}
+
+/// Shows the shape of the scene's hand.
+fn put_hand(model: &mut MjModel, geom: usize, hand: Option<&HandStart>) {
+    let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+    let Some(hand) = hand.filter(|hand| name.ends_with(hand.shape.name())) else {
+        model.geom_group_mut()[geom] = group::HIDDEN;
+        return;
+    };
+    let half = hand.half();
+    model.geom_group_mut()[geom] = group::THINGS;
+    model.geom_size_mut()[geom] = match hand.shape {
+        HandShape::Ball => [half, 0.0, 0.0],
+        HandShape::Block => [half; 3],
+    };
+    model.geom_rbound_mut()[geom] = half * 2.0;
+    model.geom_rgba_mut()[geom] = paint(hand.color.rgb());
+}
+
+/// Shows a part of a body in a colour; places for marks that the scene has not stay hidden.
+fn paint_body(model: &mut MjModel, geom: usize, color: Option<Color>, shown: i32) {
+    let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+    let part = name.split_once('_').map_or("", |(_, part)| part);
+    let (is_neutral, is_mark) = (NEUTRAL_PARTS.contains(&part), part.starts_with("mark_"));
+    model.geom_group_mut()[geom] = if color.is_some() && !is_mark { shown } else { group::HIDDEN };
+    if let (Some(color), false) = (color, is_neutral) {
+        model.geom_rgba_mut()[geom] = paint(color.rgb());
+    }
+}
+
+/// Whether a geom is of the body that a pane alone shows.
+fn is_of_double(model: &MjModel, geom: usize, pane: usize) -> bool {
+    let name = model.id_to_name(MjtObjBase::mjOBJ_GEOM, geom).unwrap_or_default();
+    name.strip_prefix("double")
+        .and_then(|rest| rest.strip_prefix(&pane.to_string()))
+        .is_some_and(|rest| rest.starts_with('_'))
+}
+
+fn paint(rgb: [u8; 3]) -> [f32; 4] {
+    let [red, green, blue] = rgb.map(|part| f32::from(part) / 255.0);
+    [red, green, blue, 1.0]
+}

@@ -1,0 +1,213 @@
+//! Where mirrors and windows hang, what they show, and which marks bodies wear.
+//!
+//! Rule: all of this is drawn from a stream of its own after the layout, so that experiments that differ in it alone have
+//! the same layout, and from the name of their scenes, so that what two of them have in common is drawn alike.
+
+use super::super::angle::{HEADINGS, Heading};
+use super::super::body::Pose;
+use super::super::config::{WorldConfig, metres};
+use super::super::hand::Place;
+use super::super::rng::Rng;
+use super::super::scene::{Cube, HandShape, HandStart, HungPane, MirrorPlace, Other, Patch, WornMark, floor_plan};
+use super::{Drawing, is_in_view};
+use crate::experiment::Experiment;
+use crate::experiment::spec::{BodyShown, Hand, Mark, MarkColor, Paint, Pane, PaneKind, Part, Stated, Wall, Wearer};
+use trace::palette::Color;
+
+/// Places that are drawn for a pane until one is out of view at the start.
+const PLACES: u32 = 40;
+
+/// Places that are drawn for a hand until one is free and as far from the mark as asked for.
+const STARTS: u32 = 2000;
+
+/// Apart from the layout's stream.
+const PURPOSE: u64 = 0x7061_6e65_7300;
+
+/// The layout that panes and marks come to.
+pub(super) struct Layout<'a> {
+    pub config: &'a WorldConfig,
+    pub experiment: Experiment,
+    pub mirror: MirrorPlace,
+    pub body_color: Color,
+    pub cubes: &'a [Cube],
+    pub others: &'a [Other],
+    pub start: Pose,
+}
+
+/// What is drawn besides the layout.
+#[derive(Debug, Default)]
+pub(super) struct Extras {
+    pub stated_color: Option<Color>,
+    pub panes: Vec<HungPane>,
+    pub marks: Vec<WornMark>,
+    pub hand: Option<HandStart>,
+}
+
+impl Layout<'_> {
+    /// Draws the rest of a scene.
+    pub(super) fn extras(&self, purpose: u64, seed: i32, run: i32) -> Extras {
+        let stream = |at: u64| Rng::of(purpose ^ (PURPOSE + at), seed, run);
+        // A stream each, so that one that is not needed changes no other.
+        let mut marks: Vec<WornMark> = Vec::new();
+        for (at, mark) in (16_u64..).zip(&self.experiment.marks) {
+            marks.extend(self.worn(*mark, &marks, &mut stream(at)));
+        }
+        let hand = self.experiment.hand.and_then(|hand| self.hand(hand, &marks, &mut stream(32)));
+        let mut others = stream(0);
+        let another = match hand {
+            Some(hand) => self.color_beside(hand, &marks, &mut others),
+            None => self.another_color(&mut others),
+        };
+        let any = self.any_other_color(&mut others);
+        let stated_color = match self.experiment.stated_color {
+            Stated::None => None,
+            Stated::Candidate => Some(another),
+            Stated::Random => Some(any),
+        };
+        let mut panes = Vec::new();
+        for (at, pane) in (1_u64..).zip(&self.experiment.panes) {
+            let mut chance = stream(at);
+            let place = if panes.is_empty() { self.mirror } else { self.place(pane, &panes, &mut chance) };
+            panes.push(self.hung(pane, place, another, &mut chance));
+        }
+        Extras { stated_color, panes, marks, hand }
+    }
+
+    /// A hand that is neither of the body's colour nor of its mark's, and starts on the near side of the mirror, free of
+    /// the body; `None` where no such place is as far from the mark as asked for.
+    fn hand(&self, task: Hand, marks: &[WornMark], chance: &mut Rng) -> Option<HandStart> {
+        let taken = |color: Color| color == self.body_color || marks.iter().any(|mark| mark.color == color);
+        let palette = &self.experiment.layout.palette;
+        let free: Vec<Color> = palette.iter().copied().filter(|color| !taken(*color)).collect();
+        let color = if free.is_empty() { chance.one_of(palette) } else { chance.one_of(&free) };
+        let shape = chance.one_of(&HandShape::ALL);
+        let half_mm = 10 * chance.between(4, 5);
+        let patch = marks.iter().find_map(|mark| mark.patch)?;
+        let draw = |chance: &mut Rng| HandStart {
+            color,
+            shape,
+            half_mm,
+            from_mark: [chance.between(2, 6), chance.between(-5, 5), chance.between(-4, 5)],
+        };
+        let fits = |hand: &HandStart| {
+            let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
+            let is_there = Place { task, patch, hand: *hand, config: self.config, body: self.start };
+            (task.least..=task.most).contains(&steps) && is_there.is_free(hand.from_mark)
+        };
+        (0..STARTS).map(|_| draw(chance)).find(fits)
+    }
+
+    /// Another colour than the body's, and than that of mark and hand, which would not show on a body that has it.
+    fn color_beside(&self, hand: HandStart, marks: &[WornMark], chance: &mut Rng) -> Color {
+        let taken = |color: Color| {
+            color == self.body_color || color == hand.color || marks.iter().any(|mark| mark.color == color)
+        };
+        let palette = &self.experiment.layout.palette;
+        let free: Vec<Color> = palette.iter().copied().filter(|color| !taken(*color)).collect();
+        if free.is_empty() { self.any_other_color(chance) } else { chance.one_of(&free) }
+    }
+
+    /// The colour of another candidate; any other one where there is none.
+    fn another_color(&self, chance: &mut Rng) -> Color {
+        let candidates = if self.experiment.has_candidates() { self.cubes } else { &[] };
+        let colors: Vec<Color> = candidates.iter().map(|cube| cube.color).filter(|c| *c != self.body_color).collect();
+        if colors.is_empty() { self.any_other_color(chance) } else { chance.one_of(&colors) }
+    }
+
+    fn any_other_color(&self, chance: &mut Rng) -> Color {
+        let palette = &self.experiment.layout.palette;
+        let colors: Vec<Color> = palette.iter().copied().filter(|color| *color != self.body_color).collect();
+        chance.one_of(&colors)
+    }
+
+    /// A place on a wall that has no pane yet, out of view at the start where there is one.
+    fn place(&self, pane: &Pane, before: &[HungPane], chance: &mut Rng) -> MirrorPlace {
+        let first = before[0].place.wall;
+        let fixed = if pane.wall == Wall::Opposite { Some((first + 2) % 4) } else { pane.wall.quarter() };
+        let free: Vec<u8> = (0..4).filter(|wall| before.iter().all(|other| other.place.wall != *wall)).collect();
+        let config = self.config;
+        let width = pane.width_mm.map_or(config.mirror.width, metres);
+        let slack = (config.room.size / 2.0 - width / 2.0 - config.placement.wall_margin).max(0.0);
+        let mut draw = || {
+            let wall = fixed.unwrap_or_else(|| chance.one_of(&free));
+            MirrorPlace { wall, offset: Drawing { config, chance }.length(-slack, slack) }
+        };
+        let last = draw();
+        let unseen = |place: &MirrorPlace| !is_in_view(config, *place, self.start);
+        if unseen(&last) { last } else { (0..PLACES).map(|_| draw()).find(unseen).unwrap_or(last) }
+    }
+
+    fn hung(&self, pane: &Pane, place: MirrorPlace, another: Color, chance: &mut Rng) -> HungPane {
+        let mirror = &self.config.mirror;
+        let room = &self.config.room;
+        let width = pane.width_mm.map_or(mirror.width, metres);
+        let height = pane.height_mm.map_or(mirror.height, metres).min(room.height);
+        // A wide pane moves towards the middle of its wall, a high one to where it fits.
+        let slack = (room.size / 2.0 - width / 2.0).max(0.0);
+        let place = MirrorPlace { offset: place.offset.clamp(-slack, slack), ..place };
+        let center_height = pane.bottom_mm.map_or(mirror.center_height, |bottom| metres(bottom) + height / 2.0);
+        let center_height = center_height.clamp(height / 2.0, room.height - height / 2.0);
+        let color = match pane.color {
+            Paint::Own => self.body_color,
+            Paint::Other => another,
+            Paint::Named(color) => color,
+        };
+        let is_independent = pane.kind == PaneKind::Window || pane.body == BodyShown::Independent;
+        HungPane {
+            kind: pane.kind,
+            place,
+            width,
+            height,
+            center_height,
+            delay: pane.delay,
+            paint: (!is_independent && color != self.body_color).then_some(color),
+            double: is_independent.then(|| self.double(pane, place, color, chance)),
+        }
+    }
+
+    /// A body that walks about by itself, at first in view of whoever stands before the pane.
+    fn double(&self, pane: &Pane, place: MirrorPlace, color: Color, chance: &mut Rng) -> Other {
+        let [out_x, out_y] = place.heading().direction();
+        // The second room is the first one moved: its opening is in the wall across.
+        let (side, cubes) = if pane.kind == PaneKind::Window { (-1.0, &[][..]) } else { (1.0, self.cubes) };
+        let plan = floor_plan(self.config, cubes);
+        let half = self.config.room.size / 2.0;
+        let mut draw = || {
+            let away = Drawing { config: self.config, chance }.length(1.2, 2.6);
+            let aside = Drawing { config: self.config, chance }.length(-0.8, 0.8) + place.offset;
+            let depth = side * (half - away);
+            [depth * out_x - aside * out_y, depth * out_y + aside * out_x]
+        };
+        let last = draw();
+        let is_clear = |spot: &[f64; 2]| plan.admits(*spot, 0.05);
+        let spot = if is_clear(&last) { last } else { (0..PLACES).map(|_| draw()).find(is_clear).unwrap_or(last) };
+        let heading = Heading::new(u8::try_from(chance.below(u32::from(HEADINGS))).unwrap_or(0));
+        let habit = u32::try_from(chance.number() >> 32).unwrap_or(0);
+        Other { color, start: Pose { x: spot[0], y: spot[1], heading }, habit }
+    }
+
+    /// A mark on a body, in a colour that neither its wearer nor a mark before it has.
+    fn worn(&self, mark: Mark, before: &[WornMark], chance: &mut Rng) -> Option<WornMark> {
+        let (wearer, body) = match mark.on {
+            Wearer::Own => (0, self.body_color),
+            Wearer::Other => (1, self.others.first()?.color),
+        };
+        let is_free = |color: Color| color != body && color != self.body_color;
+        let palette = &self.experiment.layout.palette;
+        let free: Vec<Color> = palette.iter().copied().filter(|color| is_free(*color)).collect();
+        let unused: Vec<Color> =
+            free.iter().copied().filter(|color| before.iter().all(|other| other.color != *color)).collect();
+        let drawn = if unused.is_empty() { &free } else { &unused };
+        let color = match mark.color {
+            MarkColor::Named(color) if is_free(color) => color,
+            MarkColor::Named(_) | MarkColor::Random if drawn.is_empty() => return None,
+            MarkColor::Named(_) | MarkColor::Random => chance.one_of(drawn),
+        };
+        let patch = (mark.part == Part::Front).then(|| Patch {
+            aside_mm: 20 * chance.between(-2, 2),
+            height_mm: 50 * chance.between(19, 23),
+            edge_mm: 20 * chance.between(5, 8),
+        });
+        Some(WornMark { part: mark.part, color, from_t: mark.from_t, wearer, patch })
+    }
+}

@@ -1,0 +1,309 @@
+//! What an episode's world is at its start, as plain data.
+//!
+//! Rule: a scene is drawn from its configuration, experiment, seed and run alone. Experiments that share scenes draw the
+//! same layout from the same seed and run, as E1, E2 and E3 do: E2 leaves the mirror out, E3 adds a false statement, so
+//! that they compare in pairs.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::Experiment;
+use super::angle::Heading;
+use super::body::Pose;
+use super::config::WorldConfig;
+use super::floor::{FloorPlan, Square};
+use crate::experiment::spec::{PaneKind, Part};
+use exact::hash;
+use exact::names;
+use trace::palette::Color;
+
+/// Changes whenever the same configuration and seeds give other scenes or other motion than before.
+///
+/// 2: body colours are balanced, clutter hides more, faces are marked, lamps are fixed in the room.
+pub const SCENE_VERSION: u32 = 2;
+
+/// Digits of the fingerprint of a scene: enough for any study.
+const FINGERPRINT_DIGITS: usize = 16;
+
+/// How far from the mirror one stands who starts before it, m.
+pub(super) const BEFORE_MIRROR: f64 = 2.0;
+
+/// The most other agents that a world holds.
+pub const MOST_OTHERS: usize = 6;
+
+/// The most cubes that a world holds.
+pub const MOST_CUBES: usize = 12;
+
+/// What an episode's world is at its start.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct Scene {
+    /// By its name.
+    #[schemars(with = "String")]
+    pub experiment: Experiment,
+    /// The block of runs.
+    pub seed: i32,
+    /// The run within it.
+    pub run: i32,
+    /// The colour of the agent's own body.
+    pub body_color: Color,
+    /// The false colour that the prompt states, as in E3.
+    pub stated_color: Option<Color>,
+    /// Where the layout has its mirror; in E2 where it would be.
+    pub mirror: MirrorPlace,
+    /// Mirrors and windows, the first of them at `mirror`.
+    pub panes: Vec<HungPane>,
+    /// Marks on bodies.
+    pub marks: Vec<WornMark>,
+    /// Where the agent starts.
+    pub start: Pose,
+    /// The candidates, or the clutter, as in E5.
+    pub cubes: Vec<Cube>,
+    /// The other agents.
+    pub others: Vec<Other>,
+    /// The hand that is to reach the mark on the front, where the task is that.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub hand: Option<HandStart>,
+}
+
+/// A mirror or window on a wall.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct HungPane {
+    /// What it shows.
+    pub kind: PaneKind,
+    /// Where it hangs.
+    pub place: MirrorPlace,
+    /// Along the wall, m.
+    pub width: f64,
+    /// m.
+    pub height: f64,
+    /// The height of its centre, m.
+    pub center_height: f64,
+    /// Steps by which it is late.
+    pub delay: u32,
+    /// The colour in which it shows the own body, where that is another.
+    pub paint: Option<Color>,
+    /// The body that is seen in it alone: in place of the own one, or behind the window.
+    pub double: Option<Other>,
+}
+
+/// A mark on a body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct WornMark {
+    /// Where on the body.
+    pub part: Part,
+    /// Of its paint; never that of the body.
+    pub color: Color,
+    /// The first step that shows it.
+    pub from_t: u32,
+    /// Whose body: 0 is the agent's own, 1 the first of the others.
+    pub wearer: usize,
+    /// Where on the front, where it is a patch there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub patch: Option<Patch>,
+}
+
+/// A square on the front of a body that stands still.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct Patch {
+    /// Of its middle from that of the body, to the left of the body where positive, mm.
+    pub aside_mm: i32,
+    /// Of its middle above the floor, mm.
+    pub height_mm: i32,
+    /// Of its sides, mm.
+    pub edge_mm: i32,
+}
+
+/// How a hand looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+#[expect(missing_docs, reason = "the names say it")]
+pub enum HandShape {
+    Ball,
+    Block,
+}
+
+names!(HandShape { Ball: "ball", Block: "block" });
+
+/// A hand at the start of an episode. Its places are whole steps from the mark, so that distances are exact.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct HandStart {
+    /// Of its paint.
+    pub color: Color,
+    /// How it looks.
+    pub shape: HandShape,
+    /// Half of its width, mm.
+    pub half_mm: i32,
+    /// From the mark, in steps: away from the camera, to the left of the picture, up.
+    pub from_mark: [i32; 3],
+}
+
+/// Where the mirror hangs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MirrorPlace {
+    /// Quarter turns counter-clockwise from the wall at +x to its wall, 0 to 3.
+    #[schemars(range(max = 3))]
+    pub wall: u8,
+    /// Of its centre from that of the wall, m; counter-clockwise seen from above where positive.
+    pub offset: f64,
+}
+
+/// A cube with its sides along the walls.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cube {
+    /// Of its paint.
+    pub color: Color,
+    /// Of its centre, m.
+    pub x: f64,
+    /// Of its centre, m.
+    pub y: f64,
+    /// Under it, m: the floor, or the cube that it stands on.
+    pub base: f64,
+    /// m.
+    pub edge: f64,
+}
+
+/// Another agent.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Other {
+    /// Of its body.
+    pub color: Color,
+    /// Where it starts.
+    pub start: Pose,
+    /// What its walk is drawn from.
+    pub habit: u32,
+}
+
+impl MirrorPlace {
+    /// The heading of one who faces it squarely.
+    pub const fn heading(self) -> Heading {
+        Heading::new(self.wall % 4 * 3)
+    }
+
+    /// The middle of its face, m.
+    pub fn center(self, config: &WorldConfig) -> [f64; 2] {
+        let [out_x, out_y] = self.heading().direction();
+        let depth = config.room.size / 2.0 - config.mirror.gap;
+        [depth * out_x - self.offset * out_y, depth * out_y + self.offset * out_x]
+    }
+
+    /// How far a point is from its face, m.
+    pub fn distance(self, spot: [f64; 2], config: &WorldConfig) -> f64 {
+        let [out_x, out_y] = self.heading().direction();
+        config.room.size / 2.0 - config.mirror.gap - (spot[0] * out_x + spot[1] * out_y)
+    }
+
+    /// How far a point is, along the wall, from its centre, m; signed as `offset`.
+    pub fn aside(self, spot: [f64; 2]) -> f64 {
+        let [out_x, out_y] = self.heading().direction();
+        spot[1] * out_x - spot[0] * out_y - self.offset
+    }
+}
+
+/// How far before the axis of a body the middle of a patch is, mm.
+const FRONT_MM: i32 = 125;
+
+impl Patch {
+    /// Its middle in the frame of a body: ahead, to the left, up; m.
+    pub fn place(self) -> [f64; 3] {
+        [FRONT_MM, self.aside_mm, self.height_mm].map(|length| f64::from(length) / 1000.0)
+    }
+
+    /// Its middle in the room, on the front of a body that stands there, m.
+    pub fn center(self, body: Pose) -> [f64; 3] {
+        in_room(body, self.place())
+    }
+}
+
+/// A place in the frame of a body (ahead, to the left, up) as one of the room, m.
+pub(super) fn in_room(body: Pose, [ahead, left, up]: [f64; 3]) -> [f64; 3] {
+    let [x, y] = body.heading.direction();
+    [body.x + ahead * x - left * y, body.y + ahead * y + left * x, up]
+}
+
+impl HandStart {
+    /// Half of its width, m.
+    pub fn half(self) -> f64 {
+        f64::from(self.half_mm) / 1000.0
+    }
+}
+
+impl Cube {
+    /// What it covers of the floor.
+    pub fn square(&self) -> Square {
+        Square { center: [self.x, self.y], half: self.edge / 2.0 }
+    }
+
+    pub fn top(&self) -> f64 {
+        self.base + self.edge
+    }
+}
+
+impl Scene {
+    /// The marks that are there at a step, counted from 1.
+    pub fn marks_at(&self, t: u32) -> impl Iterator<Item = (usize, &WornMark)> {
+        self.marks.iter().enumerate().filter(move |(_, mark)| mark.from_t <= t)
+    }
+
+    /// The colour of the first mark on the own body at a step.
+    pub fn own_mark_at(&self, t: u32) -> Option<Color> {
+        self.marks_at(t).find(|(_, mark)| mark.wearer == 0).map(|(_, mark)| mark.color)
+    }
+
+    /// The colour in which a mirror or window shows a body that is not the own body's: a decoy's paint, or that of a body
+    /// that it alone shows; of the first such pane. `None` where there is none.
+    pub fn shown_color(&self) -> Option<Color> {
+        let shown = |pane: &HungPane| pane.paint.or_else(|| pane.double.map(|double| double.color));
+        self.panes.iter().filter_map(shown).find(|color| *color != self.body_color)
+    }
+
+    /// What two episodes share that are a pair: the room, the body, the cubes, the start and the others. What they are
+    /// compared in is not part of it: the mirror, and what is stated.
+    pub fn fingerprint(&self, config: &WorldConfig) -> String {
+        let Self { body_color, start, cubes, others, .. } = self;
+        let mut parts = json!([SCENE_VERSION, config.room, body_color, start, cubes, others]);
+        if let (Some(hand), Some(parts)) = (self.hand, parts.as_array_mut()) {
+            // The mark to be reached is what the hand's place is told from.
+            parts.extend([json!(hand), json!(self.marks)]);
+        }
+        let mut hash = hash::of_bytes(parts.to_string().as_bytes());
+        hash.truncate(FINGERPRINT_DIGITS);
+        hash
+    }
+
+    /// The Manhattan distance from the hand to the mark at the start, mm; `None` where there is no hand.
+    pub fn start_distance(&self) -> Option<i32> {
+        let (task, hand) = (self.experiment.hand?, self.hand?);
+        let steps: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
+        i32::try_from(steps * task.step_mm).ok()
+    }
+
+    /// Steps after which an episode ends by itself: those of the way to the mark and some more, at most as many as the
+    /// experiment says, where there is a hand; else the configuration's.
+    pub fn budget(&self, config: &WorldConfig) -> u32 {
+        match (self.experiment.hand, self.hand) {
+            (Some(task), Some(hand)) => {
+                let way: u32 = hand.from_mark.iter().map(|steps| steps.unsigned_abs()).sum();
+                (way + task.extra_steps).min(self.experiment.steps.unwrap_or(u32::MAX))
+            }
+            _ => config.of(self.experiment).episode.steps,
+        }
+    }
+
+    /// What does not move, as a plan.
+    pub fn floor_plan(&self, config: &WorldConfig) -> FloorPlan {
+        floor_plan(config, &self.cubes)
+    }
+}
+
+/// The plan of a room with these cubes.
+pub(super) fn floor_plan(config: &WorldConfig, cubes: &[Cube]) -> FloorPlan {
+    FloorPlan {
+        reach: config.room.size / 2.0 - config.mirror.gap - config.body.radius,
+        radius: config.body.radius,
+        squares: cubes.iter().filter(|cube| cube.base <= 0.0).map(Cube::square).collect(),
+    }
+}

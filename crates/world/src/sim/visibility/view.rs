@@ -1,0 +1,226 @@
+//! The eye as a point and three directions, and what a ray from it may meet.
+
+use super::super::angle::sine_cosine;
+use super::super::label_image::LabelImage;
+use super::super::model::{AGENTS, Item, Stage, group};
+use super::super::passage;
+use super::super::scene::{HungPane, MOST_CUBES};
+use super::super::world::World;
+use crate::experiment::spec::{MOST_MARKS, PaneKind};
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Shown {
+    /// Something that the eye sees directly: the room, a body, a cube, a mark.
+    Direct(Item),
+    /// The same through the pane of this number.
+    Through(usize, Item),
+}
+
+/// Codes of what is seen directly, and of what is seen through each pane: the room, then bodies, cubes, marks, the hand, the
+/// double.
+const CODES: usize = 1 + AGENTS + MOST_CUBES + MOST_MARKS + 2;
+
+impl Shown {
+    pub fn code(self) -> u8 {
+        let code = match self {
+            Self::Direct(Item::Pane(pane)) => CODES * (1 + pane),
+            Self::Direct(item) => index(item),
+            Self::Through(pane, item) => CODES * (1 + pane) + index(item),
+        };
+        u8::try_from(code).expect("a world holds fewer than 256 things to be seen")
+    }
+
+    /// What a byte of [`Shown::code`] stands for.
+    pub fn of_code(code: u8) -> Self {
+        let (look, at) = (usize::from(code) / CODES, usize::from(code) % CODES);
+        look.checked_sub(1).map_or(Self::Direct(of_index(at)), |pane| Self::Through(pane, of_index(at)))
+    }
+
+    /// The pane through which it is seen.
+    pub const fn pane(self) -> Option<usize> {
+        match self {
+            Self::Direct(_) => None,
+            Self::Through(pane, _) => Some(pane),
+        }
+    }
+}
+
+const fn index(item: Item) -> usize {
+    match item {
+        Item::Room | Item::Pane(_) => 0,
+        Item::Agent(agent) => 1 + agent,
+        Item::Cube(cube) => 1 + AGENTS + cube,
+        Item::Mark(mark) => 1 + AGENTS + MOST_CUBES + mark,
+        Item::Hand => CODES - 2,
+        Item::Double => CODES - 1,
+    }
+}
+
+const fn of_index(at: usize) -> Item {
+    match at {
+        0 => Item::Room,
+        _ if at < 1 + AGENTS => Item::Agent(at - 1),
+        _ if at < 1 + AGENTS + MOST_CUBES => Item::Cube(at - 1 - AGENTS),
+        _ if at < CODES - 2 => Item::Mark(at - 1 - AGENTS - MOST_CUBES),
+        _ if at == CODES - 2 => Item::Hand,
+        _ => Item::Double,
+    }
+}
+
+pub(super) type Vector = [f64; 3];
+
+pub(super) fn dot(a: Vector, b: Vector) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(super) fn minus(a: Vector, b: Vector) -> Vector {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+/// `a + times * b`
+pub(super) fn plus(a: Vector, times: f64, b: Vector) -> Vector {
+    [a[0] + times * b[0], a[1] + times * b[1], a[2] + times * b[2]]
+}
+
+/// A pinhole camera: the ray of a pixel is `forward + u right + v up`, with u and v from -1 to 1.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    pub origin: Vector,
+    pub forward: Vector,
+    /// As long as half of the view is wide, one metre ahead.
+    pub right: Vector,
+    /// As long as half of the view is high, one metre ahead.
+    pub up: Vector,
+    pub width: usize,
+    pub height: usize,
+}
+
+/// The middle of a pixel among `count` of them, from -1 to 1.
+pub(super) fn middle(at: usize, count: usize) -> f64 {
+    #[expect(clippy::cast_precision_loss, reason = "a number of pixels")]
+    let [at, count] = [at as f64, count as f64];
+    2.0 * (at + 0.5) / count - 1.0
+}
+
+impl View {
+    /// The agent's eye, with a view of some size of the same shape.
+    pub fn of_eye(world: &World, width: usize, height: usize) -> Self {
+        let eye = &world.config().eye;
+        let pose = world.pose();
+        let [x, y] = pose.heading.direction();
+        let ahead = pose.ahead(eye.forward);
+        let (sine, cosine) = sine_cosine(eye.fovy / 2.0);
+        let tangent = sine / cosine;
+        let wide = tangent * f64::from(eye.width) / f64::from(eye.height_px);
+        let (down, level) = if eye.pitch > 0.0 { sine_cosine(eye.pitch) } else { (0.0, 1.0) };
+        Self {
+            origin: [ahead.x, ahead.y, eye.height],
+            forward: [level * x, level * y, -down],
+            right: [wide * y, -wide * x, 0.0],
+            up: [tangent * down * x, tangent * down * y, tangent * level],
+            width,
+            height,
+        }
+    }
+
+    /// The view through a pane: from behind a mirror, that of the eye's mirror image; through a window, that of an eye as
+    /// far back as the second room is away.
+    pub fn through(&self, world: &World, pane: &HungPane) -> Self {
+        let [out_x, out_y] = pane.place.heading().direction();
+        let [x, y] = pane.place.center(world.config());
+        if pane.kind == PaneKind::Window {
+            let back = [-out_x, -out_y, 0.0];
+            return Self { origin: plus(self.origin, passage::shift(world.config()), back), ..*self };
+        }
+        self.reflected([x, y, pane.center_height], [-out_x, -out_y, 0.0])
+    }
+
+    /// The view from behind a mirror: that of the eye's mirror image.
+    fn reflected(&self, point: Vector, normal: Vector) -> Self {
+        let turn = |direction: Vector| plus(direction, -2.0 * dot(direction, normal), normal);
+        let away = dot(minus(self.origin, point), normal);
+        Self {
+            origin: plus(self.origin, -2.0 * away, normal),
+            forward: turn(self.forward),
+            right: turn(self.right),
+            up: turn(self.up),
+            ..*self
+        }
+    }
+
+    pub fn ray(&self, x: usize, y: usize) -> Vector {
+        let [u, v] = [middle(x, self.width), -middle(y, self.height)];
+        plus(plus(self.forward, u, self.right), v, self.up)
+    }
+}
+
+/// Labels by MuJoCo's own rays, through a pane by a second ray from where the first met it.
+pub(super) fn by_mujoco(world: &World, stages: &mut (Stage, Vec<Stage>), width: usize, height: usize) -> LabelImage {
+    let view = View::of_eye(world, width, height);
+    let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
+    let (stage, beyond) = stages;
+    let mut codes = Vec::with_capacity(width * height);
+    for y in 0..height {
+        for x in 0..width {
+            let ray = view.ray(x, y);
+            let (geom, distance) = stage.data.ray(&view.origin, &ray, Some(&all), true, None, None);
+            let shown = match geom.map_or(Item::Room, |geom| stage.items()[geom]) {
+                Item::Pane(pane) => {
+                    let met = plus(view.origin, distance, ray);
+                    Shown::Through(pane, onwards(world, &mut beyond[pane], pane, met, ray))
+                }
+                item => Shown::Direct(item),
+            };
+            codes.push(shown.code());
+        }
+    }
+    LabelImage { width, height, codes }
+}
+
+/// What a ray meets that has met a pane.
+fn onwards(world: &World, stage: &mut Stage, pane: usize, met: Vector, ray: Vector) -> Item {
+    let hung = &world.scene().panes[pane];
+    let [out_x, out_y] = hung.place.heading().direction();
+    let out = [out_x, out_y, 0.0];
+    let (from, ray) = match hung.kind {
+        PaneKind::Window => (plus(met, -passage::shift(world.config()), out), ray),
+        _ => (met, plus(ray, -2.0 * dot(ray, out), out)),
+    };
+    let all = groups(&[group::ROOM, group::CEILING, group::THINGS, group::EGO]);
+    let from = plus(from, 1e-9, ray);
+    let (geom, _) = stage.data.ray(&from, &ray, Some(&all), true, None, None);
+    geom.map_or(Item::Room, |geom| stage.items()[geom])
+}
+
+fn groups(shown: &[i32]) -> [u8; 6] {
+    let mut groups = [0; 6];
+    for group in shown {
+        groups[usize::try_from(*group).expect("groups are 0 to 5")] = 1;
+    }
+    groups
+}
+
+impl LabelImage {
+    pub fn at(&self, x: usize, y: usize) -> Shown {
+        Shown::of_code(self.codes[y * self.width + x])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::scene::MOST_CUBES;
+    use super::{AGENTS, Item, MOST_MARKS, Shown};
+    use crate::experiment::spec::MOST_PANES;
+
+    #[test]
+    fn every_code_comes_back() {
+        let bodies = (0..AGENTS).map(Item::Agent).chain([Item::Room, Item::Hand, Item::Double]);
+        let items: Vec<Item> =
+            bodies.chain((0..MOST_CUBES).map(Item::Cube)).chain((0..MOST_MARKS).map(Item::Mark)).collect();
+        let through = (0..MOST_PANES).flat_map(|pane| items.iter().map(move |item| Shown::Through(pane, *item)));
+        for shown in items.iter().map(|item| Shown::Direct(*item)).chain(through) {
+            assert_eq!(Shown::of_code(shown.code()), shown);
+        }
+    }
+}

@@ -16,7 +16,8 @@ fmt:
 # Once as most people build it, and once with everything: Polars, and the world on MuJoCo's library.
 lint:
 	scripts/get-mujoco.sh
-	cargo clippy --all-targets -- -D warnings
+	cargo clippy --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --exclude mirrorstats-view \
+		--all-targets -- -D warnings
 	cargo clippy --workspace --all-targets --all-features -- -D warnings
 
 # What the tests need, each script says what it cannot get.
@@ -34,7 +35,7 @@ unit: needed
 
 ## The campaigns that are too long for CI, with their full numbers of rounds: benches/SOAK.md.
 soak: needed
-	cargo test --all-features --no-fail-fast -- --ignored soak
+	cargo test --workspace --all-features --no-fail-fast -- --ignored soak
 
 ## Every fuzz target guided by coverage, MINUTES in all; what is found is kept, and the exit code is not 0: benches/FUZZ.md.
 MINUTES = 10
@@ -42,7 +43,7 @@ fuzz:
 	scripts/fuzz.sh $(MINUTES)
 
 docs:
-	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --all-features --quiet
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --workspace --exclude mirrorstats-fuzz --exclude mirrorstats-python --all-features --quiet
 
 ## The main job from outside: the committed report again byte for byte, the published tables cell by cell.
 end-to-end:
@@ -58,7 +59,7 @@ test-wheel: needed
 
 ## Write generated files anew: JSON Schemas, snapshots, the committed report.
 bless: needed
-	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --all-features --no-fail-fast
+	MIRRORSTATS_WRITE_SCHEMAS=1 INSTA_UPDATE=always cargo test --workspace --all-features --no-fail-fast
 	cargo run --quiet -- report fixtures/paper --style paper --out reports/paper
 	cd reports/paper && sha256sum report.html >../report.html.sha256
 

@@ -6,12 +6,14 @@ use std::path::Path;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
 use super::outcome::Failure;
-use metric::fault::{Fault, Faults};
-#[cfg(feature = "sim")]
-use world::experiment::Experiment;
 use world::experiment::load::{self, FileError, Loaded};
-use world::record::plan::{Experiments, Named};
-use world::sim::{config::WorldConfig, placement};
+#[cfg(feature = "sim")]
+use {
+    metric::fault::{Fault, Faults},
+    world::experiment::Experiment,
+    world::record::plan::{Experiments, Named},
+    world::sim::{config::WorldConfig, placement},
+};
 
 /// Reads experiments as they are typed; the name of a file may have any bytes.
 #[cfg(feature = "sim")]

@@ -83,6 +83,12 @@ pub(super) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
     Failure::input(format!("{found}\n  help: ask for each by itself:\n    {}", commands(typed, groups).join("\n    ")))
 }
 
+/// A word of a command line for a shell; a plain option stays as it is.
+fn as_typed(word: &str) -> String {
+    let name = word.trim_start_matches('-');
+    if name.len() < word.len() && html::word(name) == name { word.to_owned() } else { html::word(word) }
+}
+
 /// A command line for the episodes of each group alone.
 pub(super) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String> {
     let (mut kept, mut filter, mut words) = (Vec::new(), None, typed.iter().skip(1).map(|word| word.to_string_lossy()));
@@ -90,10 +96,10 @@ pub(super) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String
         match word.strip_prefix("--where") {
             Some("") => filter = words.next().map(Cow::into_owned),
             Some(rest) => filter = rest.strip_prefix('=').map(str::to_owned),
-            None => kept.push(html::word(&word)),
+            None => kept.push(as_typed(&word)),
         }
     }
-    let has_out = kept.iter().any(|word| word.starts_with("--out") || word.starts_with("-o"));
+    let has_out = typed.iter().any(|word| ["--out", "-o"].iter().any(|out| word.to_string_lossy().starts_with(out)));
     let command = |group: &ScoredAlike| {
         let condition =
             filter.as_ref().map_or_else(String::new, |filter| format!("({filter}) and ")) + &group.condition;

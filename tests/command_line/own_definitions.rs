@@ -152,6 +152,11 @@ fn another_mixture_is_refused_with_commands_that_work() {
     }
     assert!(named.iter().all(|command| command.contains("(seed = 1) and experiment in (")), "{refused}");
     assert!(at.join("reports/battery/report.html").is_file() && at.join("reports/reach/report.html").is_file());
+    let words = ["report", "mark.parquet", "reach.parquet", "--no-figures", "--out", "my report"];
+    for command in commands(&run(at, &words).refused()) {
+        assert!(command.contains(" --no-figures --out 'my report' --where "), "{command}");
+        typed(at, command);
+    }
     let told = run(at, &["stats", "mark.parquet", "reach.parquet", "--errors", "json"]).ends(2);
     let told: Value = serde_json::from_str(&told.stderr).unwrap();
     assert_eq!(commands(told["error"].as_str().unwrap()).len(), 2, "{told}");

@@ -137,7 +137,6 @@ fn file() -> Result<Option<PathBuf>, Failure> {
     Ok(None)
 }
 
-/// Every option of every command.
 fn choices<'a>(command: &'a Command, path: &str) -> Vec<Choice<'a>> {
     let mut all = Vec::new();
     for inner in command.get_subcommands() {

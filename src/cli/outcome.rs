@@ -156,7 +156,6 @@ fn words(failure: &Failure, colored: bool) -> String {
     text
 }
 
-/// Whether standard error shows colours.
 fn colored() -> bool {
     io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
 }

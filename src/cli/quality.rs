@@ -23,7 +23,6 @@ pub struct CellAnswer {
     pub latency_95_ms: Option<i64>,
 }
 
-/// Every cell, for a program.
 pub(super) fn answers(cells: &QualityByCell) -> Vec<CellAnswer> {
     let answer = |(key, quality): (&CellKey, &Quality)| CellAnswer {
         key: key.clone(),

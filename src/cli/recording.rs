@@ -103,7 +103,6 @@ impl<'a> Bar<'a> {
         bar
     }
 
-    /// Takes it off the terminal.
     pub(super) fn clear(&self) {
         self.line.finish_and_clear();
     }
@@ -212,7 +211,6 @@ fn quoted(reply: &UnreadableReply) -> String {
     format!("{words} ({}, step {})", visible(&reply.episode_id), reply.step)
 }
 
-/// What was spent, in words.
 fn spent(spend: &Spend) -> String {
     let (requests, answers) = (counted(spend.requests, "request"), counted(spend.uncosted, "answer"));
     let known = match (spend.uncosted, spend.cost_usd > 0.0) {

@@ -203,7 +203,6 @@ impl Player for VlmPlayer {
         Ok(Box::new(agent.map_err(|error| Lost::because(error.to_string()))?))
     }
 
-    /// A cassette plays at once.
     fn waits(&self) -> bool {
         self.network.is_some()
     }

@@ -143,7 +143,6 @@ impl Columns {
 }
 
 impl<N: Into<String>> FromIterator<(N, Column)> for Columns {
-    /// The columns of a schema.
     fn from_iter<I: IntoIterator<Item = (N, Column)>>(columns: I) -> Self {
         let schema = columns.into_iter().map(|(name, column)| (name.into(), column)).collect();
         Self { schema, ..Self::default() }

@@ -220,7 +220,6 @@ fn relation(op: BinaryOp, left: &Expr) -> &'static str {
     }
 }
 
-/// An expression as a value.
 fn value(expr: &Expr) -> String {
     match &expr.kind {
         ExprKind::Name(name) => name.clone(),

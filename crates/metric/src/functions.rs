@@ -58,7 +58,6 @@ const fn entry(function: Function, name: &'static str, usage: &'static str, arit
     Entry { function, name, usage, arity }
 }
 
-/// The entry of this name.
 pub(super) fn find(name: &str) -> Option<&'static Entry> {
     FUNCTIONS.iter().find(|entry| entry.name == name)
 }

@@ -82,7 +82,6 @@ pub(super) fn arithmetic(op: Arithmetic, (a, b): Range, (c, d): Range) -> Range 
     }
 }
 
-/// The smallest range around some.
 pub(super) fn hull(ranges: impl IntoIterator<Item = Range>) -> Range {
     ranges.into_iter().reduce(|(a, b), (c, d)| (a.min(c), b.max(d))).unwrap_or((0, 0))
 }

@@ -87,7 +87,6 @@ impl TableBuilder {
     }
 }
 
-/// Key columns under way.
 #[derive(Debug, Default)]
 pub(super) struct KeyBuilder {
     experiment: TextBuilder,
@@ -168,7 +167,6 @@ impl TextBuilder {
         (0..rows).for_each(|_| self.codes.append_option(code));
     }
 
-    /// Looks each text up once.
     fn extend_coded(&mut self, column: &DictionaryArray<Int32Type>, null: Option<&str>) {
         let null = null.filter(|_| column.null_count() > 0).map(|text| self.code(text));
         let texts = column.values().as_string::<i32>();
@@ -180,7 +178,6 @@ impl TextBuilder {
         }
     }
 
-    /// The code of a text.
     pub(super) fn code(&mut self, text: &str) -> u32 {
         if let Some(code) = self.known.get(text) {
             return *code;
@@ -255,7 +252,6 @@ impl Default for MetricBuilder {
 }
 
 impl MetricBuilder {
-    /// Adds truth values or integers.
     pub(super) fn extend(&mut self, column: &ArrayRef) {
         match (column.as_boolean_opt(), &mut self.values) {
             (Some(more), Values::Bools(bools)) => bools.append_buffer(more.values()),

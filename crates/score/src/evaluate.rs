@@ -94,7 +94,6 @@ impl Evaluated {
         }
     }
 
-    /// The vector of a step.
     pub(super) fn of(&self, id: StepId) -> &Vector {
         &self.vectors[id.index()]
     }

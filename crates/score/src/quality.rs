@@ -296,7 +296,6 @@ fn named<'a>(column: Option<&'a Coded<'a>>, counts: &[u64]) -> Vec<(&'a str, u64
     all.filter_map(|(code, count)| Some((texts?.value(code), *count))).collect()
 }
 
-/// The columns of a batch.
 struct Columns<'a> {
     status: Option<Coded<'a>>,
     repair: Option<Coded<'a>>,

@@ -49,7 +49,6 @@ impl<'a> Segments<'a> {
         as_t(self.offsets[episode + 1] - self.offsets[episode])
     }
 
-    /// The lengths T; never null.
     pub(super) fn lengths(self) -> Int64Array {
         self.each().map(|(_, length)| as_t(length)).collect::<Vec<_>>().into()
     }
@@ -113,7 +112,6 @@ impl<'a> Segments<'a> {
         BooleanArray::new(rows.finish(), self.spread_nulls(moments.nulls()))
     }
 
-    /// All rows of each episode.
     pub(super) fn whole(self) -> impl Iterator<Item = Stretch> + use<'a> {
         self.each().map(|(start, length)| (start, 0..length))
     }

@@ -93,7 +93,6 @@ pub struct MetricColumn {
     pub(super) values: MetricValues,
 }
 
-/// One value per episode.
 #[derive(Clone, Debug)]
 pub(super) enum MetricValues {
     /// Truth values, for 0 and 1.

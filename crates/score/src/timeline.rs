@@ -35,7 +35,6 @@ pub struct Timeline {
     pub answered: bool,
 }
 
-/// What timelines are read from.
 struct Moments<T> {
     visible: T,
     sight: T,
@@ -128,7 +127,6 @@ impl Moments<StepId> {
     }
 }
 
-/// Timesteps as runs of neighbours.
 fn runs(timesteps: &[i64]) -> Vec<RangeInclusive<u32>> {
     let mut runs: Vec<RangeInclusive<u32>> = Vec::new();
     for t in timesteps.iter().map(|&t| as_step(t)) {

@@ -126,7 +126,6 @@ impl Keys {
 }
 
 impl Keyed {
-    /// The symbols of all rows.
     pub(super) fn symbols(&self) -> UInt32Array {
         match &self.keys {
             Keys::Narrow(keys) => self.symbols_of(keys),
@@ -232,7 +231,6 @@ pub(super) struct Symbols {
 }
 
 impl Symbols {
-    /// The number of a text.
     pub(super) fn intern(&mut self, text: &str) -> u32 {
         if let Some(number) = self.numbers.get(text) {
             return *number;
@@ -244,7 +242,6 @@ impl Symbols {
         number
     }
 
-    /// The text of a number.
     pub(super) fn text(&self, number: u32) -> &str {
         &self.texts[number as usize]
     }

@@ -84,7 +84,6 @@ pub fn clustered_rate(clusters: &[Moments], confidence: f64) -> Option<Clustered
 /// A design effect up to this is zero but for rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Exact sums over all clusters.
 struct Whole {
     n: i128,
     sum: i128,

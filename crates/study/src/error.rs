@@ -3,8 +3,8 @@
 use std::error::Error;
 use std::io;
 
-use super::own_definitions::ScoredAlike;
 use super::provenance::ProvenanceError;
+use super::scored_alike::ScoredAlike;
 use engines::spark::SparkError;
 use exact::budget::Exceeded;
 use exact::moments::MomentOverflow;

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::error::StudyError;
+use super::scored_alike::ScoredAlike;
 use super::{DEFAULT_DEFINITIONS, Question, Study};
 use metric::columns::Columns;
 use metric::definitions::Definitions;
@@ -17,25 +18,6 @@ use trace::open::{TraceFile, TraceSet};
 
 /// The definitions of reaching, whose traces have no colours.
 const WITHOUT_COLORS: &str = "reach";
-
-/// Experiments that the same definitions score.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ScoredAlike {
-    /// The definitions, by name or by the path that their file had.
-    pub definitions: String,
-    /// SHA-256 of a definition file that is not built in.
-    pub hash: Option<String>,
-    /// The experiments by name; those that no footer names are not among them.
-    pub experiments: BTreeSet<String>,
-    /// A condition that keeps their episodes and no others.
-    pub condition: String,
-}
-
-impl ScoredAlike {
-    fn is_built_in(&self) -> bool {
-        self.hash.is_none() && file::built_in(&self.definitions).is_some()
-    }
-}
 
 /// The definitions that an experiment names, and the hash of a file; `None` for the default ones.
 fn own(declared: &DeclaredExperiment) -> Option<(String, Option<String>)> {

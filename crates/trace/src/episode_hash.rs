@@ -39,7 +39,6 @@ pub(super) fn columns() -> impl Iterator<Item = &'static str> {
     names.into_iter()
 }
 
-/// The lines that are hashed.
 pub(super) struct Form {
     hasher: Sha256,
     /// Those of the column under way.

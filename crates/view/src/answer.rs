@@ -6,7 +6,6 @@ use super::snapshot::Snapshot;
 use super::{View, changes, compare, episode, list, map, overview};
 use study::Part;
 
-/// What an answer is.
 pub(super) enum Answer {
     /// JSON.
     Json(Vec<u8>),
@@ -40,7 +39,6 @@ pub(super) fn answer(view: &View, name: &str, query: &Query) -> Option<Result<An
     Some(told.map(|value| Answer::Json(value.to_string().into_bytes())))
 }
 
-/// The frame of a step.
 fn frame(snapshot: &Snapshot, query: &Query) -> Result<Vec<u8>, ViewError> {
     let opened = snapshot.episode(required(query, "id")?)?;
     let t = number(query, "t")?.unwrap_or(1);

@@ -30,7 +30,6 @@ pub(super) fn required<'q>(query: &'q Query, key: &str) -> Result<&'q str, ViewE
     value(query, key).ok_or_else(|| ViewError::Request(format!("expected `{key}` in the request")))
 }
 
-/// Which episodes are wanted.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Filter {
     /// Chosen values of key columns; nothing chosen is everything.

@@ -15,7 +15,6 @@ use trace::log::frames;
 /// Where a recording keeps whole episodes that are not in the trace yet, and what it is writing.
 const PARTS: &str = ".parts";
 
-/// The files of some arguments.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Found {
     /// Traces, each once.

@@ -17,7 +17,6 @@ const KEPT: usize = 16;
 
 type Block = BTreeMap<i32, Vec<u8>>;
 
-/// What was rendered last.
 #[derive(Debug, Default)]
 pub(super) struct Rendered(Mutex<BTreeMap<(String, usize), Block>>);
 

@@ -41,7 +41,6 @@ pub(super) struct Snapshot {
     rendered: Arc<super::rendered::Rendered>,
 }
 
-/// Episodes with their scores.
 #[derive(Debug)]
 pub(super) struct Scored {
     /// The traces, opened.
@@ -55,7 +54,6 @@ pub(super) struct Scored {
     places: HashMap<String, EpisodePlace>,
 }
 
-/// An episode under way.
 #[derive(Clone, Debug)]
 pub(super) struct Running {
     /// Its log.

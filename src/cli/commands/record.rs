@@ -320,7 +320,6 @@ fn files(plan: &Plan, path: impl Fn(Experiment) -> PathBuf) -> Vec<String> {
     paths.filter(|path| path.exists()).map(|path| path.display().to_string()).collect()
 }
 
-/// The agent of this name.
 fn scripted(name: &str) -> Result<Scripted, Failure> {
     if let Some(scripted) = Scripted::named(name) {
         return Ok(scripted);

@@ -54,7 +54,6 @@ impl FrameColumn {
         }
     }
 
-    /// The column of one file.
     fn of(&self, file: &TraceFile) -> Expr {
         let present = file.column(&self.name).is_some_and(|column| column.kind.is_some());
         let values = if present { col(self.name.as_str()) } else { lit(NULL) };

@@ -80,7 +80,6 @@ pub(super) fn on_deep_stack<R: Send>(run: impl FnOnce() -> Result<R, PolarsError
     })
 }
 
-/// The rows of a frame.
 pub(super) fn collect(frame: LazyFrame) -> Result<DataFrame, PolarsError> {
     let run = || frame.collect_with_engine(Engine::Streaming);
     Ok(contained_on_all_threads(run).map_err(PolarsError::Failed)??.unwrap_single())

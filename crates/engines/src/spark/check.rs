@@ -16,7 +16,6 @@ use trace::palette::Color;
 pub use trace::schema::rules::{Known, Requirement, rules_of};
 use trace::schema::{self, Column, Kind};
 
-/// One rule for one column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Rule {
     pub code: Code,

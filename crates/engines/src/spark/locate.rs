@@ -7,7 +7,6 @@ use std::process::{Command, Stdio};
 
 use super::SparkError;
 
-/// A Spark to submit with.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Spark {
     /// The program `spark-submit`.

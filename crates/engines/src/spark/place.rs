@@ -31,7 +31,6 @@ impl Place {
         self.0.path().join("log")
     }
 
-    /// Writes a file into it.
     pub(super) fn file(&self, name: &str, bytes: &[u8]) -> Result<PathBuf, SparkError> {
         let path = self.0.path().join(name);
         fs::write(&path, bytes)

@@ -37,7 +37,6 @@ impl Setting {
         &self.key
     }
 
-    /// Its value, for Spark alone.
     pub(super) fn value(&self) -> &str {
         &self.value
     }

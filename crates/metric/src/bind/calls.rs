@@ -54,7 +54,6 @@ impl Scope<'_, '_> {
         }
     }
 
-    /// An aggregate over a condition.
     pub(super) fn predicate(
         &mut self,
         aggregate: Aggregate,

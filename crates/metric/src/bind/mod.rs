@@ -23,7 +23,6 @@ use super::syntax;
 use crate::catalog::Kind;
 use exact::escape::visible;
 
-/// What an expression came to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bound {
     pub(super) node: NodeId,
@@ -186,7 +185,6 @@ impl Binder<'_> {
         self.condition(written, "a filter of episodes").map(|bound| bound.node)
     }
 
-    /// One truth value per episode.
     fn condition(&mut self, written: &Written, what: &str) -> Option<Bound> {
         let bound = self.written(written)?;
         let place = written.everywhere();

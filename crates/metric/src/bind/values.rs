@@ -97,7 +97,6 @@ impl Possible {
         }
     }
 
-    /// What may have been meant.
     fn instead(&self, text: &str) -> String {
         match nearest(text, self.texts.iter().map(String::as_str)) {
             Some(near) => format!("did you mean '{near}'?"),

@@ -15,7 +15,6 @@ const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
 
 const TRUTHS: Range = (0, 1);
 
-/// What a node can be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Possible {
     /// The values; `None` where there never is one.
@@ -84,7 +83,6 @@ fn hull_of(ranges: impl Iterator<Item = Range>) -> Option<Range> {
 /// The most moments that are taken apart into those that are and those that are not.
 const MOST_MOMENTS: usize = 6;
 
-/// What all evaluations go by.
 #[derive(Clone, Copy)]
 pub(super) struct Traces<'p> {
     pub(super) plan: &'p Plan,

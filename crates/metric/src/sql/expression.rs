@@ -37,7 +37,6 @@ impl Layout<'_> {
         }
     }
 
-    /// The timestep that is read.
     fn time(&self) -> String {
         match self.lag.get() {
             0 => "s.t".to_owned(),
@@ -54,7 +53,6 @@ impl Layout<'_> {
         format!("CASE WHEN {time} IS NOT NULL THEN {value} END")
     }
 
-    /// An aggregate of a pass.
     pub(super) fn aggregate(&self, id: NodeId) -> String {
         let node = self.plan.node(id);
         match &node.op {

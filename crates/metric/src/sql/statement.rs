@@ -155,7 +155,6 @@ impl<'l, 'p> Statement<'l, 'p> {
         self.check_length()
     }
 
-    /// All passes side by side.
     pub(super) fn join(&mut self) {
         self.text.push_str("\nFROM e1");
         for pass in 2..=self.passes {

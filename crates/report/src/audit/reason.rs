@@ -11,7 +11,6 @@ use metric::implied::Defined;
 use statistics::feasible::attain::Search;
 use statistics::feasible::{Print, Sample};
 
-/// Why a cell is refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Reason {
     /// What of the cell is at fault.

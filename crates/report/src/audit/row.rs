@@ -21,7 +21,6 @@ use statistics::feasible::{Print, Sample};
 /// digits: a value is at most n standard errors from the mean.
 pub(super) const LARGEST_VALUE: i64 = 3_000_000_000_000;
 
-/// What all rows go by.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Definitions<'d> {
     pub(super) catalog: &'d Catalog,
@@ -67,7 +66,6 @@ pub(super) struct Refused {
     pub(super) worlds: Vec<World>,
 }
 
-/// What became of a row.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Solved {
     pub(super) refused: Vec<Refused>,

@@ -78,7 +78,6 @@ pub(super) fn flips(flips: &[Flip], limit: Limit, width: Option<usize>) -> Optio
     List { header, names: 4, rows, count: flips.len() }.render(limit, width)
 }
 
-/// A list under its header.
 struct List<R> {
     header: Vec<String>,
     /// How many of the first columns name a row.

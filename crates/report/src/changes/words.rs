@@ -44,7 +44,6 @@ pub(super) fn key(value: &KeyValue) -> String {
     }
 }
 
-/// What an episode's value is.
 pub(super) fn value(value: Option<i64>) -> String {
     value.map_or_else(|| UNDEFINED.to_owned(), |value| value.to_string())
 }

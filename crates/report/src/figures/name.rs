@@ -58,7 +58,6 @@ impl FigureName {
         self.texts()[2]
     }
 
-    /// Name, title and caption.
     const fn texts(self) -> [&'static str; 3] {
         match self {
             Self::Spider => [

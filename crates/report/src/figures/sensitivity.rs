@@ -58,7 +58,6 @@ pub fn draw(input: &Input<'_>) -> Result<Figure, FigureError> {
     Ok(Figure::new(sheet, height, TITLE, CAPTION))
 }
 
-/// Everything that the panels share.
 struct Field<'a> {
     input: &'a Input<'a>,
     /// The cells of each stage that has episodes.
@@ -131,7 +130,6 @@ impl<'a> Field<'a> {
         top
     }
 
-    /// What stands below a threshold.
     fn label(&self, stage: &Stage<'_>) -> String {
         stage.px.map_or_else(|| short(self.input.reference), |px| px.to_string())
     }
@@ -170,7 +168,6 @@ fn id<'m>(matrix: &Matrix<'m>, name: &str) -> Option<MetricId<'m>> {
     matrix.metrics().into_iter().find(|metric| metric.name == name)
 }
 
-/// One metric in one experiment.
 struct Panel<'f, 'a> {
     field: &'f Field<'a>,
     experiment: &'a str,

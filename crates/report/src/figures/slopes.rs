@@ -61,7 +61,6 @@ fn axis(sheet: &mut Sheet, plot: &Plot, column: usize, title: &str) {
     plot.y_axis(sheet, &ticks);
 }
 
-/// Two experiments beside each other.
 struct Pair<'a> {
     scene: Scene<'a>,
     metric: MetricId<'a>,
@@ -86,7 +85,6 @@ impl Pair<'_> {
         }
     }
 
-    /// Where the two experiments stand.
     fn columns(&self) -> [f64; 2] {
         let frame = self.plot.frame;
         [frame.left + frame.width * 0.22, frame.left + frame.width * 0.78]

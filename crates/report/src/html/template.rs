@@ -46,7 +46,6 @@ const SCRIPT: &str = concat!(
     "})();\n",
 );
 
-/// The page with this content.
 pub(super) fn render(content: Value) -> Result<String, Error> {
     environment()?.get_template(PAGE)?.render(context! {
         style => markup(STYLE),

@@ -79,7 +79,6 @@ pub(super) fn answer(request: &PlanRequest, test: &PlannedTest) -> String {
     }
 }
 
-/// What a plan rests on.
 pub(super) fn assumptions(request: &PlanRequest) -> Vec<String> {
     let rates = match (request.given, request.baseline) {
         (Given::Difference(difference), baseline) => Rates::apart(difference, baseline)

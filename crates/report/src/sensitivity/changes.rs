@@ -51,7 +51,6 @@ pub struct Says {
     pub says: String,
 }
 
-/// What a conclusion is about.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Subject {
     question: Question,
@@ -111,7 +110,6 @@ fn place(run: &[Says], starts: bool, ends: bool) -> String {
     }
 }
 
-/// How nothing shown is said.
 const fn nothing(question: Question) -> &'static str {
     match question {
         Question::Chance => "not told apart from it",
@@ -120,7 +118,6 @@ const fn nothing(question: Question) -> &'static str {
     }
 }
 
-/// All conclusions about some metrics.
 fn conclusions(statistics: &Statistics, catalog: &Catalog, metrics: &[String]) -> Vec<(Subject, Shown)> {
     let is_asked = |metric: &String| metrics.contains(metric);
     let ahead = |metric: &str| {

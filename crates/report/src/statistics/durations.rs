@@ -68,7 +68,6 @@ pub(super) fn decided(study: &Study, column: &MetricColumn, row: usize) -> Optio
     Some(Ending { outcome, ..ending })
 }
 
-/// The end of an episode.
 fn ending(study: &Study, column: &MetricColumn, row: usize) -> Option<Ending> {
     let finished = CENSORED.iter().find(|(duration, _)| *duration == column.name).map(|(_, finished)| *finished)?;
     let outcome = match study.column(finished)?.get(row) {

@@ -24,7 +24,6 @@ pub(super) struct Study<'a> {
     ranges: BTreeMap<&'a str, Interval>,
 }
 
-/// The blocks of one experiment.
 pub(super) struct Experiment<'a> {
     pub name: &'a str,
     pub blocks: Vec<Block<'a>>,
@@ -148,7 +147,6 @@ impl<'a> Block<'a> {
     }
 }
 
-/// A model under a condition.
 pub(super) fn named(model: &str, condition: Option<&str>) -> String {
     condition.map_or_else(|| model.to_owned(), |condition| format!("{model} [{condition}]"))
 }

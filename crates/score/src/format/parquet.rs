@@ -363,7 +363,6 @@ mod tests {
         assert_eq!(read(file, &partition).unwrap(), table());
     }
 
-    /// Takes so many bytes.
     struct Full(usize);
 
     impl Write for Full {

@@ -107,7 +107,6 @@ const fn sign(equal: bool) -> &'static str {
     if equal { "=" } else { "<>" }
 }
 
-/// Windows as text.
 struct Windows<'a>(&'a [(Comparison, StepId)]);
 
 impl fmt::Display for Windows<'_> {

@@ -92,7 +92,6 @@ impl<W: Write> Write for Held<W> {
         Ok(bytes.len())
     }
 
-    /// What is held stays held.
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use exact::escape::visible;
 
-/// A line of a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     pub(super) file: Arc<str>,
@@ -60,7 +59,6 @@ impl Fault {
         Self { key: Some(key.to_owned()), ..self }
     }
 
-    /// A fault without its place.
     pub(super) fn new(expected: impl Into<String>, found: impl Into<String>, help: impl Into<String>) -> Self {
         Self { expected: expected.into(), found: found.into(), help: help.into(), ..Self::default() }
     }

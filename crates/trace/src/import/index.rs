@@ -9,7 +9,6 @@ use super::text::Line;
 use crate::schema::{COLUMNS, Column};
 use exact::escape::visible;
 
-/// Where a step lies.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
     /// Which episode, in the order of their first lines.
@@ -30,7 +29,6 @@ struct Head {
     constants: Vec<Value>,
 }
 
-/// The steps so far.
 #[derive(Debug, Default)]
 pub(super) struct Index {
     heads: Vec<Head>,

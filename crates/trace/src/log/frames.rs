@@ -275,7 +275,6 @@ struct Entity {
     cylinders: Vec<Cylinder>,
 }
 
-/// A cube or a sphere.
 #[derive(Clone, PartialEq, prost::Message)]
 struct Solid {
     #[prost(message, optional, tag = "1")]

@@ -11,7 +11,6 @@ pub(super) const LONGEST: usize = 1 << 30;
 /// Of an opcode and a length.
 pub(super) const FRAME: usize = 9;
 
-/// The record of this body.
 pub(super) fn parsed(opcode: u8, body: &[u8]) -> Result<Record<'_>, String> {
     check_texts(opcode, body).ok_or("a text or a map in it is longer than the record")?;
     mcap::parse_record(opcode, body).map_err(|fault| fault.to_string())

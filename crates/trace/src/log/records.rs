@@ -27,7 +27,6 @@ pub(super) enum Piece {
     Cut(String, Vec<u8>),
 }
 
-/// The records of a file.
 pub(super) struct Records<R> {
     bytes: R,
     at: u64,
@@ -117,12 +116,10 @@ impl<R: Read + Seek> Records<R> {
         self.checksum
     }
 
-    /// The size of the log.
     pub(super) fn bytes(&self) -> u64 {
         self.end
     }
 
-    /// How much may be unpacked.
     pub(super) fn budgets(&self) -> &Budgets {
         &self.budgets
     }
@@ -198,7 +195,6 @@ impl<R: Read + Seek> Records<R> {
         Ok(frame.filter(|frame| frame.is_plausible(behind)))
     }
 
-    /// A record with its frame.
     fn whole(&mut self, at: u64, frame: Frame) -> io::Result<Vec<u8>> {
         self.read(at, FRAME + usize::try_from(frame.length).unwrap_or(LONGEST))
     }

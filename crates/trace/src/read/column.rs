@@ -15,7 +15,6 @@ use arrow::compute::{concat, take};
 use arrow::datatypes::{ArrowNativeType as _, DataType, Int32Type, Int64Type};
 use arrow::error::ArrowError;
 
-/// The values of some rows.
 #[derive(Clone, Debug)]
 pub(crate) enum Column {
     /// One value per row.
@@ -26,7 +25,6 @@ pub(crate) enum Column {
     Keys(Keys),
 }
 
-/// Rows as keys into values.
 #[derive(Clone, Debug)]
 pub(crate) struct Keys {
     keys: UInt8Array,
@@ -214,7 +212,6 @@ impl Keys {
         self.keys.is_valid(row).then(|| self.keys.value(row).into())
     }
 
-    /// The values of some keys.
     fn of(&self, keys: &UInt8Array) -> Result<ArrayRef, ArrowError> {
         if *self.values.data_type() != DataType::Utf8 {
             return take(&self.values, keys, None);

@@ -73,7 +73,6 @@ impl Episodes {
     }
 }
 
-/// What a pass meets.
 pub(crate) enum Event<T> {
     /// The result of the work on some whole episodes.
     Whole(T),
@@ -178,7 +177,6 @@ struct Splitter<'a, T, W> {
     headed: bool,
 }
 
-/// The receiver has stopped listening.
 struct Abandoned;
 
 impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
@@ -248,7 +246,6 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
         Ok(())
     }
 
-    /// The open episode is over.
     fn close(&mut self) -> Result<(), Abandoned> {
         let open = std::mem::take(&mut self.open);
         if open.is_empty() {
@@ -275,7 +272,6 @@ impl<T, W: Fn(Episodes) -> T> Splitter<'_, T, W> {
     }
 }
 
-/// A row group under way.
 struct Started<T> {
     job: Job,
     parts: Receiver<Part<T>>,
@@ -357,7 +353,6 @@ impl<T, E: From<TraceError>, W: Fn(Episodes) -> T, R: FnMut(usize, Event<T>) -> 
         (self.receive)(self.file, Event::Fault(finding))
     }
 
-    /// The open episode is over.
     fn close(&mut self) -> Result<(), E> {
         let open = std::mem::take(&mut self.open);
         if open.is_empty() {
@@ -386,7 +381,6 @@ fn too_many(file: &TraceFile, episodes: &Episodes) -> Option<Box<Finding>> {
     Some(Box::new(Finding::over_budget(file.name(), &exceeded).in_row_group(piece.row_group)))
 }
 
-/// One episode of these rows.
 fn join(file: usize, parts: &[Rows]) -> Result<Episodes, String> {
     let (mut pieces, mut at) = (Vec::with_capacity(parts.len()), 0);
     for rows in parts {

@@ -15,7 +15,6 @@ pub(crate) struct Layout {
     pub(crate) columns: Vec<LayoutColumn>,
 }
 
-/// One column of a pass.
 #[derive(Clone, Debug)]
 pub(crate) struct LayoutColumn {
     pub(crate) name: String,

@@ -47,7 +47,6 @@ struct Pending {
     expansion: Arc<Expansion>,
 }
 
-/// The rows of one file.
 struct Reader {
     name: String,
     rows: ParquetRecordBatchReader,

@@ -8,7 +8,6 @@
 
 use std::fmt;
 
-/// How a value is encoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wire {
     True,
@@ -54,7 +53,6 @@ pub(crate) struct Field {
     pub(crate) wire: Wire,
 }
 
-/// A place in some bytes.
 pub(crate) struct Compact<'a> {
     data: &'a [u8],
     at: usize,

@@ -134,7 +134,6 @@ pub(crate) struct Ids {
     seen: HashMap<String, (usize, usize)>,
 }
 
-/// The start of an episode.
 pub(crate) struct Start {
     pub(crate) id: String,
     pub(crate) row: usize,

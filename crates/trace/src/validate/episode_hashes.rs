@@ -52,7 +52,6 @@ pub(crate) fn check(file: &TraceFile, layout: &Layout, episodes: &Episodes) -> V
     found
 }
 
-/// The hash of some rows.
 fn hash(held: &[(&str, ArrayRef)], rows: std::ops::Range<usize>) -> String {
     let identification = held.iter().find(|(name, _)| *name == IDENTIFICATION).map(|(_, values)| values);
     let mut form = Form::new();

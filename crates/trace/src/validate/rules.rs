@@ -21,7 +21,6 @@ pub(crate) struct Located {
     pub(crate) finding: Finding,
 }
 
-/// The rules for one pass.
 pub(crate) struct Rules<'a> {
     pub(crate) layout: &'a Layout,
     /// The experiments that the definitions know; any if `None`.
@@ -266,7 +265,6 @@ fn same(values: &ArrayRef, one: usize, other: usize) -> bool {
     values.as_boolean_opt().is_some_and(|bools| bools.value(one) == bools.value(other))
 }
 
-/// A value for a message.
 fn shown(values: &ArrayRef, row: usize) -> String {
     if values.is_null(row) {
         return "null".into();

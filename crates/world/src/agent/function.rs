@@ -85,7 +85,6 @@ impl Player for FunctionPlayer {
     }
 }
 
-/// A function in one episode.
 struct FunctionAgent {
     conversation: Conversation,
     listener: Listener,

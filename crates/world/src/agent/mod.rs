@@ -244,14 +244,12 @@ pub enum Ended {
 
 /// Who plays: makes the agent of each episode.
 pub trait Player: Send + Sync {
-    /// The name shown in tables.
     fn model(&self) -> &str;
 
     /// What goes into recordings: everything that shapes the agent's decisions, and nothing that differs from one start of
     /// the same recording to the next.
     fn description(&self) -> serde_json::Value;
 
-    /// The agent of one episode.
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost>;
 
     /// Whether the agent looks at frames; one that does not may be given empty ones.

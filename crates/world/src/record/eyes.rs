@@ -15,7 +15,6 @@ fn size(config: &WorldConfig, experiment: Experiment) -> [u32; 2] {
 }
 
 impl Eyes {
-    /// Those that some experiments need.
     pub(super) fn of(
         config: &WorldConfig,
         experiments: impl IntoIterator<Item = Experiment>,

@@ -79,7 +79,6 @@ fn recording(
     recording
 }
 
-/// Where two recordings differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Difference {
     /// The key of the metadata.

@@ -199,7 +199,6 @@ impl Stage {
         &self.items
     }
 
-    /// MuJoCo's model, to draw with.
     pub(super) const fn shared_model(&self) -> &Arc<MjModel> {
         &self.model
     }
@@ -432,7 +431,6 @@ fn light(spec: &mut MjSpec, config: &LightsConfig) {
     }
 }
 
-/// Everything in its own colour.
 fn unlight(spec: &mut MjSpec) {
     let visual = spec.visual_mut();
     let head = &mut visual.headlight;

@@ -133,7 +133,6 @@ fn shuffle(colors: &mut [Color], chance: &mut Rng) {
     }
 }
 
-/// One attempt at a scene.
 struct Drawing<'a> {
     config: &'a WorldConfig,
     chance: &'a mut Rng,

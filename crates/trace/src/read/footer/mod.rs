@@ -44,7 +44,6 @@ impl Extent {
     }
 }
 
-/// The footer of a file.
 pub(crate) struct Footer {
     /// The size of the file.
     pub(crate) bytes: u64,

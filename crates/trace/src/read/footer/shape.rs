@@ -13,7 +13,6 @@ use crate::read::thrift::{Compact, Fault, Wire};
 /// The fields of a structure, that of number 1 first.
 type Shape = &'static [Value];
 
-/// How a field is encoded.
 enum Value {
     /// It is not listed in the format: skipped by both.
     Other,

@@ -192,7 +192,6 @@ impl Contents {
         }
     }
 
-    /// Keys of so many values.
     fn dictionary(&mut self, values: &Bytes, count: usize) -> Result<(), Fault> {
         let fault = |found: &str| ("keys within the dictionary, one for each value", found.to_owned());
         let keys = self.keys.ok_or_else(|| fault("no dictionary"))?;

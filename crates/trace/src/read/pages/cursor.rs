@@ -58,7 +58,6 @@ enum Stored {
     Bits(Bytes, usize),
 }
 
-/// Runs in the making.
 #[derive(Default)]
 struct Stretches {
     /// One key per run.
@@ -331,7 +330,6 @@ impl Stored {
 }
 
 impl Stretches {
-    /// Adds rows of one key.
     fn add(&mut self, key: i32, count: usize) -> Result<(), Unsupported> {
         let count = u32::try_from(count).map_err(|_| Unsupported)?;
         match (self.keys.last(), self.ends.last_mut()) {

@@ -18,7 +18,6 @@ pub(super) enum Dictionary {
 }
 
 impl Dictionary {
-    /// Texts, each after its length.
     pub(super) fn texts(mut data: &[u8], count: usize) -> Result<Self, Unsupported> {
         let mut texts = StringBuilder::with_capacity(count.min(data.len()), data.len());
         for _ in 0..count {

@@ -7,7 +7,6 @@ use parquet::basic::{Compression, Type as Physical};
 
 use crate::read::thrift::{Compact, Fault, Field, Wire};
 
-/// The header of a page.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Header {
     /// How long it is itself, in bytes.
@@ -27,7 +26,6 @@ pub(super) struct Header {
     is_plain: bool,
 }
 
-/// What a page is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Kind {
     #[default]

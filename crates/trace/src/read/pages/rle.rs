@@ -34,7 +34,6 @@ pub(super) enum Span<'a> {
     Packed(Packed<'a>),
 }
 
-/// Packed numbers.
 pub(super) struct Packed<'a> {
     data: &'a [u8],
     bit: usize,
@@ -165,7 +164,6 @@ pub(super) fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unsupported> {
 }
 
 impl Span<'_> {
-    /// How many numbers it has.
     pub(super) fn count(&self) -> usize {
         match self {
             Self::Same { count, .. } => *count,

@@ -81,7 +81,6 @@ pub struct Exec {
     shared: Arc<Shared>,
 }
 
-/// What the episodes share.
 #[derive(Debug)]
 struct Shared {
     settings: Settings,
@@ -144,7 +143,6 @@ impl Player for Exec {
     }
 }
 
-/// A program in one episode.
 #[derive(Debug)]
 struct ExecAgent {
     shared: Arc<Shared>,

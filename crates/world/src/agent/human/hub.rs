@@ -52,7 +52,6 @@ pub struct Hub {
     codes: Vec<String>,
 }
 
-/// One person.
 #[derive(Debug, Default)]
 struct Seat {
     /// The episode that is theirs.
@@ -127,7 +126,6 @@ impl Hub {
         self.codes[seat].clone()
     }
 
-    /// Whose link has this token.
     pub(super) fn seat_of(&self, token: &str) -> Option<usize> {
         self.tokens.iter().position(|own| own == token)
     }
@@ -166,7 +164,6 @@ impl Hub {
         self.locked(seat).is_ready = true;
     }
 
-    /// A person begins what counts.
     pub(super) fn begin(&self, seat: usize) {
         let mut own = self.locked(seat);
         if !std::mem::take(&mut own.is_ready) {

@@ -96,7 +96,6 @@ impl Player for Human {
     }
 }
 
-/// A person in one episode.
 #[derive(Debug)]
 struct HumanAgent {
     hub: Arc<Hub>,

@@ -8,7 +8,6 @@
 const OPENING: &str = "<think>";
 const CLOSING: &str = "</think>";
 
-/// A text by its thoughts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Thoughts<'a> {
     /// There are none.

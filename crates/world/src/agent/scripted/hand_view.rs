@@ -61,7 +61,6 @@ fn is_small(all: &[Patch], color: Color) -> bool {
     (1..=MOST).contains(&pixels)
 }
 
-/// The camera's picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Eye {
     size: [f64; 2],

@@ -187,7 +187,6 @@ pub trait Script {
     fn decide(&mut self, observation: &Observation) -> Move;
 }
 
-/// A script as an agent.
 struct Puppet {
     script: Box<dyn Script>,
     experiment: Experiment,

@@ -54,7 +54,6 @@ impl FailureKind {
     }
 }
 
-/// What came is no answer.
 pub(super) fn server(detail: String) -> Failure {
     Failure { kind: FailureKind::Server, detail, after: None }
 }

@@ -205,7 +205,6 @@ impl Provider {
         (answer.ending == Ending::Refused).then_some(answer)
     }
 
-    /// An answer without the key.
     fn received(&self, answer: Answer, body: String, latency: Duration) -> Received {
         let kept = |text: String| match &self.secret {
             Some(secret) => secret.without_in_answer(&text),

@@ -70,7 +70,6 @@ fn ranges(config: &WorldConfig) -> Vec<Limit> {
     limits
 }
 
-/// Values that bound one another.
 fn relations(config: &WorldConfig) -> Vec<Limit> {
     let WorldConfig { room, mirror, cubes, others, clutter, placement, .. } = config;
     let above = room.height - mirror.height / 2.0;

@@ -134,7 +134,6 @@ impl Counts<'_> {
         marks.map(|(at, _)| Item::Mark(at))
     }
 
-    /// A body with its marks.
     fn body(&self, agent: usize, color: Color) -> Sighting {
         let parts = self.marks(agent).chain([Item::Agent(agent)]).map(|item| self.sighting(item, color));
         parts.fold(Sighting { color, direct_px: 0, mirror_px: 0 }, |sum, part| Sighting {

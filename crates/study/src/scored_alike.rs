@@ -1,0 +1,24 @@
+//! Experiments by the definitions that score them.
+
+use std::collections::BTreeSet;
+
+use metric::file;
+
+/// Experiments that the same definitions score.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ScoredAlike {
+    /// The definitions, by name or by the path that their file had.
+    pub definitions: String,
+    /// SHA-256 of a definition file that is not built in.
+    pub hash: Option<String>,
+    /// The experiments by name; those that no footer names are not among them.
+    pub experiments: BTreeSet<String>,
+    /// A condition that keeps their episodes and no others.
+    pub condition: String,
+}
+
+impl ScoredAlike {
+    pub(crate) fn is_built_in(&self) -> bool {
+        self.hash.is_none() && file::built_in(&self.definitions).is_some()
+    }
+}

@@ -3,32 +3,15 @@
 //! `args` is what was typed and what several verbs share; `commands/<verb>.rs` is one thin file per verb;
 //! `outcome` maps what happened to an exit code, in one place.
 
-pub mod args;
 pub mod commands;
 pub mod config;
-#[cfg(feature = "sim")]
-pub mod dry_run;
-#[cfg(feature = "sim")]
-pub mod exec;
-mod experiments;
 mod features;
 mod help;
-#[cfg(all(feature = "sim", feature = "view"))]
-mod human;
-pub mod outcome;
-pub mod output;
-pub mod quality;
+pub mod printed;
 #[cfg(feature = "sim")]
 pub mod recording;
-#[cfg(feature = "sim")]
-mod registration;
-pub mod scoring;
-pub mod spark;
-mod terminal;
-mod text_table;
+pub mod typed;
 mod usage;
-#[cfg(feature = "sim")]
-pub mod vlm;
 
 use std::ffi::OsString;
 use std::io::{self, Write as _};
@@ -40,6 +23,12 @@ use commands::Command;
 use exact::budget;
 use exact::escape::visible;
 use outcome::{ErrorFormat, Failure, Outcome};
+pub use printed::{outcome, output, quality, terminal, text_table};
+#[cfg(all(feature = "sim", feature = "view"))]
+use recording::human;
+#[cfg(feature = "sim")]
+pub use recording::{dry_run, exec, registration, vlm};
+pub use typed::{args, experiments, scoring, spark};
 
 pub(crate) const NAME: &str = "mirrorstats";
 

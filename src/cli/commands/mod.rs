@@ -1,45 +1,27 @@
 //! The verbs: one file each.
 
-pub mod audit;
-pub mod check;
-pub mod compare;
-pub mod completions;
-pub mod config;
 pub mod definitions;
-pub mod diff;
 pub mod experiments;
-pub mod figure;
-#[cfg(feature = "sim")]
-pub mod filmstrip;
-pub mod import;
-pub mod info;
-pub mod man;
 #[cfg(all(feature = "sim", feature = "view"))]
 pub mod participants;
-pub mod plan;
-pub mod query;
-#[cfg(feature = "sim")]
-pub mod record;
-pub mod recover;
-pub mod renormalize;
-#[cfg(feature = "sim")]
-pub mod replay;
-pub mod report;
-pub mod rescore;
-pub mod schema;
-pub mod score;
-pub mod sensitivity;
-pub mod sql;
-pub mod stats;
+pub mod setup;
+pub mod study;
 pub mod style;
-pub mod validate;
-pub mod verify;
-#[cfg(feature = "view")]
-pub mod view;
+pub mod table;
+pub mod trace;
 #[cfg(feature = "sim")]
 pub mod world;
 
 use super::outcome::{Failure, Outcome};
+pub use definitions::{sensitivity, sql};
+pub use setup::{completions, config, man};
+#[cfg(feature = "view")]
+pub use study::view;
+pub use study::{diff, figure, plan, query, report, score, stats};
+pub use table::{audit, compare, rescore, verify};
+pub use trace::{check, import, info, recover, renormalize, schema, validate};
+#[cfg(feature = "sim")]
+pub use world::{filmstrip, record, replay};
 
 /// What to do.
 #[derive(Debug, clap::Subcommand)]

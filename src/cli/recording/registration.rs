@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::outcome::Failure;
+use crate::cli::outcome::Failure;
 use exact::budget::Limit;
 use exact::input;
 use report::plan::register::{NamedHash, RegisteredPlan};
@@ -13,17 +13,17 @@ use world::sim::config::WorldConfig;
 /// The largest plan that is read, bytes.
 const LARGEST: Limit = Limit::new("bytes of a plan", 1 << 20);
 /// The name of the world among the experiments of a plan.
-pub(super) const WORLD: &str = "world";
+pub(crate) const WORLD: &str = "world";
 
 /// The hashes of this program's prompts.
-pub(super) fn prompts() -> Vec<NamedHash> {
+pub(crate) fn prompts() -> Vec<NamedHash> {
     let hashes = prompt::hashes();
     let named = hashes.as_object().into_iter().flatten();
     named.filter_map(|(name, hash)| Some(NamedHash { name: name.clone(), sha256: hash.as_str()?.to_owned() })).collect()
 }
 
 /// The plan in a file, for the footers of a recording with this world.
-pub(super) fn registration(file: &Path, config: &WorldConfig) -> Result<Registration, Failure> {
+pub(crate) fn registration(file: &Path, config: &WorldConfig) -> Result<Registration, Failure> {
     let shown = file.display();
     let text = input::text(file, LARGEST)
         .map_err(|error| Failure::input(format!("{shown}: cannot read the plan: {error}")))?;

@@ -1,5 +1,12 @@
 //! What `record` tells while it runs and when it has ended, on standard error: progress, and where the time went.
 
+pub mod dry_run;
+pub mod exec;
+#[cfg(feature = "view")]
+pub mod human;
+pub mod registration;
+pub mod vlm;
+
 use std::collections::BTreeMap;
 use std::io::{self, IsTerminal as _, Write as _};
 use std::path::Path;
@@ -11,9 +18,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::NAME;
-use super::scoring::commands;
-use super::text_table::counted;
+use crate::cli::NAME;
+use crate::cli::scoring::commands;
+use crate::cli::text_table::counted;
 use exact::escape::{visible, visible_lines};
 use exact::format::fixed;
 use exact::number::Decimal;
@@ -68,7 +75,7 @@ const BETWEEN_LINES: Duration = Duration::from_secs(10);
 
 /// The progress: a bar where a terminal shows it, else a line now and then for agents that wait for a provider or a program,
 /// or whose replies cannot be read.
-pub(super) struct Bar<'a> {
+pub(crate) struct Bar<'a> {
     line: ProgressBar,
     player: &'a dyn Player,
     subject: &'a Subject,
@@ -86,7 +93,7 @@ pub(super) struct Bar<'a> {
 
 impl<'a> Bar<'a> {
     /// A bar for some episodes in this world.
-    pub(super) fn new(player: &'a dyn Player, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
+    pub(crate) fn new(player: &'a dyn Player, subject: &'a Subject, todo: &[Key], world: &WorldConfig) -> Self {
         let budget: BTreeMap<Experiment, u64> =
             todo.iter().map(|key| (key.experiment, u64::from(world.of(key.experiment).episode.steps))).collect();
         let steps = todo.iter().filter_map(|key| budget.get(&key.experiment)).sum();
@@ -103,11 +110,11 @@ impl<'a> Bar<'a> {
         bar
     }
 
-    pub(super) fn clear(&self) {
+    pub(crate) fn clear(&self) {
         self.line.finish_and_clear();
     }
 
-    pub(super) fn replies(&self) -> RepliesAnswer {
+    pub(crate) fn replies(&self) -> RepliesAnswer {
         self.replies.answer()
     }
 
@@ -222,14 +229,14 @@ fn spent(spend: &Spend) -> String {
 }
 
 /// An amount to the cent, smaller ones to two digits that count.
-pub(super) fn dollars(value: f64) -> String {
+pub(crate) fn dollars(value: f64) -> String {
     let places = if value >= 1.0 || value == 0.0 { 2 } else { 4 };
     let number = Decimal::of_float(value, places);
     number.map_or_else(|| "an unknown number of US dollars".to_owned(), |number| format!("{number} US dollars"))
 }
 
 /// Says what became of the episodes, where those that were lost are listed, and where the time went.
-pub(super) fn say(
+pub(crate) fn say(
     answer: &RecordAnswer,
     (folder, lost_list): (&Path, &Path),
     files: &[&Path],

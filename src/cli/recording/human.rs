@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::outcome::Failure;
-use super::output;
+use crate::cli::outcome::Failure;
+use crate::cli::output;
 use exact::budget::Limit;
 use exact::input;
 use web::{self, Guard};

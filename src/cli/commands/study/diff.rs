@@ -4,9 +4,9 @@ use std::ffi::OsString;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
-use super::super::args::ThreadArgs;
-use super::super::outcome::{Failure, Outcome};
-use super::super::{output, terminal};
+use crate::cli::args::ThreadArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{output, terminal};
 use report::cells::diff::Changes;
 use report::cells::group::DEFAULT_BY;
 use report::changes::{self, Limit};

@@ -3,10 +3,10 @@
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
-use super::super::args::{Engine, EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
-use super::super::outcome::{Failure, Outcome};
-use super::super::text_table::counted;
-use super::super::{output, spark};
+use crate::cli::args::{Engine, EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::text_table::counted;
+use crate::cli::{output, spark};
 use exact::replace::is_stream;
 use score::format::Format;
 use score::table::EpisodeTable;

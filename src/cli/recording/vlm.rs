@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use tokio::runtime::Runtime;
 
-use super::outcome::Failure;
+use crate::cli::outcome::Failure;
 use trace::model_id::OWN_SERVER;
 use world::agent::vlm::limits::{Account, Limits, Spend};
 use world::agent::vlm::models::{Choice, Contract, Models};

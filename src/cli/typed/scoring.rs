@@ -4,10 +4,10 @@ use std::borrow::Cow;
 use std::ffi::OsString;
 use std::io;
 
-use super::NAME;
-use super::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
-use super::outcome::Failure;
-use super::output;
+use crate::cli::NAME;
+use crate::cli::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
+use crate::cli::outcome::Failure;
+use crate::cli::output;
 use exact::escape::visible;
 use metric::fault::Faults;
 use report::html;
@@ -75,7 +75,7 @@ impl From<StudyError> for Failure {
 }
 
 /// A refusal of experiments that need different definitions, with what to type in place of what was typed.
-pub(super) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
+pub(crate) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
     let Failure::Input(error) = &failure else { return failure };
     let Some(StudyError::DefinitionsDiffer { groups }) = error.downcast_ref() else { return failure };
     let words = error.to_string();
@@ -90,7 +90,7 @@ fn as_typed(word: &str) -> String {
 }
 
 /// A command line for the episodes of each group alone.
-pub(super) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String> {
+pub(crate) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String> {
     let (mut kept, mut filter, mut words) = (Vec::new(), None, typed.iter().skip(1).map(|word| word.to_string_lossy()));
     while let Some(word) = words.next() {
         match word.strip_prefix("--where") {

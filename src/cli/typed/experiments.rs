@@ -5,7 +5,7 @@ use std::path::Path;
 #[cfg(feature = "sim")]
 use clap::builder::{OsStringValueParser, TypedValueParser};
 
-use super::outcome::Failure;
+use crate::cli::outcome::Failure;
 use world::experiment::load::{self, FileError, Loaded};
 #[cfg(feature = "sim")]
 use {

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
-use super::super::outcome::{Failure, Outcome};
-use super::super::output;
-use super::super::text_table::counted;
+use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::text_table::counted;
 use report::bundle::Manifest;
 use report::tables::terminal;
 use study::{Report, ReportOptions, WrittenReport};
@@ -77,11 +77,11 @@ impl ReportArgs {
     fn print(&self, report: &Report) -> Result<Outcome, Failure> {
         let mut out = io::stdout().lock();
         if let Some(table) = report.main_table() {
-            out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
+            out.write_all(terminal::render(table, crate::cli::terminal::now()).as_bytes())?;
         }
         if let Some(table) = report.other_table() {
             writeln!(out, "\n{}: what the style names nowhere", table.title)?;
-            out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
+            out.write_all(terminal::render(table, crate::cli::terminal::now()).as_bytes())?;
         }
         if let Some(replies) = &report.replies {
             writeln!(out, "\n{replies}")?;

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::text_table::listing;
+use crate::cli::text_table::listing;
 use report::quality::QualityTable;
 use report::tables::fit::fitted;
 use score::quality::{CellKey, Quality, QualityByCell};
@@ -23,7 +23,7 @@ pub struct CellAnswer {
     pub latency_95_ms: Option<i64>,
 }
 
-pub(super) fn answers(cells: &QualityByCell) -> Vec<CellAnswer> {
+pub(crate) fn answers(cells: &QualityByCell) -> Vec<CellAnswer> {
     let answer = |(key, quality): (&CellKey, &Quality)| CellAnswer {
         key: key.clone(),
         quality: quality.clone(),
@@ -34,7 +34,7 @@ pub(super) fn answers(cells: &QualityByCell) -> Vec<CellAnswer> {
 }
 
 /// The table, no wider than the terminal; empty without a cell.
-pub(super) fn text(cells: &QualityByCell, width: Option<usize>) -> String {
+pub(crate) fn text(cells: &QualityByCell, width: Option<usize>) -> String {
     let Some(table) = QualityTable::of(cells) else { return String::new() };
     let keys = if cells.has_conditions() { 3 } else { 2 };
     let mut lines = listing(table.header);

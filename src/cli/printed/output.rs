@@ -9,7 +9,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::outcome::{Failure, Outcome};
+use crate::cli::outcome::{Failure, Outcome};
 use exact::escape::visible_lines;
 use exact::replace::{self, Content, FolderFiles, NewFile, TemporaryFolder};
 use trace::checksums::stale_note;

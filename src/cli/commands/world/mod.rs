@@ -1,5 +1,9 @@
 //! `mirrorstats world`: what the experiments are made of, without running any.
 
+pub mod filmstrip;
+pub mod record;
+pub mod replay;
+
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 

@@ -3,8 +3,8 @@
 use std::ffi::OsString;
 use std::io::{self, Write as _};
 
-use super::super::args::{GroupingArgs, ScoringArgs};
-use super::super::outcome::{Failure, Outcome};
+use crate::cli::args::{GroupingArgs, ScoringArgs};
+use crate::cli::outcome::{Failure, Outcome};
 use metric::sql::{self, Dialect};
 use score::score_traces::{schema_columns, trace_columns};
 use study::Study;

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use super::super::args::{ScoringArgs, TraceArgs};
-use super::super::outcome::{Failure, Outcome};
+use crate::cli::args::{ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
 
 /// Ask traces anything: one SELECT over the tables steps, episodes and cells
 ///

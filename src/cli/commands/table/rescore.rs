@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::args::ThreadArgs;
-use super::super::outcome::{Failure, Outcome};
-use super::super::text_table::counted;
-use super::super::{output, terminal};
+use crate::cli::args::ThreadArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::text_table::counted;
+use crate::cli::{output, terminal};
 use report::bundle::Manifest;
 use report::cells::diff::Changes;
 use report::changes::{self, Limit};

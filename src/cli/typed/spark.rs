@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::args::{Engine, EngineArgs, SparkArgs};
-use super::outcome::Failure;
+use crate::cli::args::{Engine, EngineArgs, SparkArgs};
+use crate::cli::outcome::Failure;
 use engines::spark::Cluster;
 use engines::spark::source::is_uri;
 use exact::replace::is_stream;

@@ -1,5 +1,8 @@
 //! `definitions`: check a definition file, explain a metric, list and show the built-in files.
 
+pub mod sensitivity;
+pub mod sql;
+
 use std::ffi::OsString;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -7,8 +10,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::outcome::{Failure, Outcome};
-use super::super::output;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
 use exact::escape::visible;
 use exact::suggest::nearest;
 use metric::definitions::{Definitions, UnknownMetric};

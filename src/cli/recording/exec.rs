@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::time::Duration;
 
-use super::outcome::Failure;
+use crate::cli::outcome::Failure;
 use world::agent::exec::{Exec, Images, Settings};
 use world::record::folder_lock::parts_of;
 

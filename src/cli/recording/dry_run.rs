@@ -5,9 +5,9 @@ use std::io::{self, Write as _};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::recording::dollars;
-use super::text_table::counted;
-use super::vlm::VlmPlayer;
+use crate::cli::recording::dollars;
+use crate::cli::text_table::counted;
+use crate::cli::vlm::VlmPlayer;
 use exact::escape::visible;
 use world::agent::vlm::estimate;
 use world::record::plan::{Key, Subject};
@@ -101,7 +101,7 @@ impl RequestForecast {
 }
 
 /// Prints what would be recorded, for people.
-pub(super) fn print(answer: &ForecastAnswer) -> io::Result<()> {
+pub(crate) fn print(answer: &ForecastAnswer) -> io::Result<()> {
     let mut out = io::stdout().lock();
     let (to_do, steps) = (counted(answer.episodes.len() as u64, "episode"), counted(answer.steps_at_most, "step"));
     write!(out, "{}: would record {to_do}, at most {steps}", visible(&answer.model))?;

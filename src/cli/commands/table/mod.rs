@@ -1,0 +1,6 @@
+//! Published tables and reports that are already written.
+
+pub mod audit;
+pub mod compare;
+pub mod rescore;
+pub mod verify;

@@ -7,6 +7,7 @@ pub mod commands;
 pub mod config;
 mod features;
 mod help;
+mod names;
 pub mod printed;
 #[cfg(feature = "sim")]
 pub mod recording;
@@ -32,7 +33,7 @@ pub use typed::{args, experiments, scoring, spark};
 
 pub(crate) const NAME: &str = "mirrorstats";
 
-/// Score mirror self-recognition episodes: step traces in, exact metrics, tables and reports out.
+/// Score mirror self-recognition episodes: traces in, exact metrics and reports out.
 #[derive(Debug, Parser)]
 #[command(name = NAME, version, long_version = long_version(), propagate_version = true, max_term_width = 100)]
 struct Cli {
@@ -62,7 +63,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 /// As [`run`]; gives the code as a number, for a process that is not ours to end.
 pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = names::current(arguments.into_iter().collect());
     let format = ErrorFormat::asked_for(&arguments);
     let answer = execute(arguments.clone()).map_err(|failure| scoring::with_commands(failure, &arguments));
     let code = outcome::exit_code(answer.and_then(flushed), format);

@@ -22,7 +22,7 @@ use study::StudyError;
 use trace::inputs;
 use trace::open::TraceSet;
 
-/// Check, explain and show metric definitions
+/// Check, explain and show metrics, their SQL, their sensitivity
 #[derive(Clone, Debug, clap::Args)]
 pub struct DefinitionsArgs {
     /// What to do.
@@ -63,6 +63,10 @@ pub enum Action {
         #[arg(value_name = "NAME", default_value = "paper")]
         name: String,
     },
+    #[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
+    Sql(sql::SqlArgs),
+    #[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
+    Sensitivity(sensitivity::SensitivityArgs),
 }
 
 /// The answer of `check` for a program.
@@ -84,6 +88,8 @@ impl DefinitionsArgs {
             Action::Check { file, traces, json } => check(&file, &traces, json),
             Action::Explain { metric, definitions, json } => explain(&metric, &definitions, json),
             Action::Show { name } => show(&name),
+            Action::Sql(args) => args.run(),
+            Action::Sensitivity(args) => args.run(),
         }
     }
 }

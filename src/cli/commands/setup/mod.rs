@@ -1,5 +1,26 @@
-//! This program: settings, completions, manual pages.
+//! `setup`: settings, completions and manual pages of this program.
 
 pub mod completions;
 pub mod config;
 pub mod man;
+
+use crate::cli::outcome::{Failure, Outcome};
+
+/// Show settings, write completions of a shell and manual pages
+#[derive(Debug, clap::Subcommand)]
+#[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
+pub enum SetupCommand {
+    Config(config::ConfigArgs),
+    Completions(completions::CompletionsArgs),
+    Man(man::ManArgs),
+}
+
+impl SetupCommand {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self {
+            Self::Config(args) => args.run(),
+            Self::Completions(args) => args.run(),
+            Self::Man(args) => args.run(),
+        }
+    }
+}

@@ -12,7 +12,7 @@ use report::cells::group::DEFAULT_BY;
 use report::changes::{self, Limit};
 use study::{DiffRequest, Side, diff, resolve};
 
-/// Tell which cells and episodes change between two sets of definitions, or of scores
+/// Show which cells and episodes change under other definitions: two sets of definitions, or of scores
 #[derive(Clone, Debug, clap::Args)]
 pub struct DiffArgs {
     /// The definitions before: `paper`, `extended`, or a TOML file; or a file of scores, or a report's folder

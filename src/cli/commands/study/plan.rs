@@ -17,7 +17,7 @@ use study::StudyError;
 #[cfg(feature = "sim")]
 use world::sim::config::WorldConfig;
 
-/// Plan a study: episodes for a wanted difference, or the difference that given episodes can show
+/// Plan how many episodes a study needs: for a wanted difference, or the difference that given episodes can show
 #[derive(Clone, Debug, clap::Args)]
 #[command(group(clap::ArgGroup::new("given").required(true).args(["difference", "episodes", "runs"])))]
 pub struct PlanArgs {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use crate::cli::args::{ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 
-/// Ask traces anything: one SELECT over the tables steps, episodes and cells
+/// Run a SELECT over the tables steps, episodes and cells
 ///
 /// `steps` has one row per step, with every column of the traces as it is; a column that one file lacks is null there.
 /// `episodes` is what `score` writes, `cells` what `report` writes as cells.csv. Rows come in no fixed order unless the

@@ -14,7 +14,7 @@ use report::bundle::Manifest;
 use report::tables::terminal;
 use study::{Report, ReportOptions, WrittenReport};
 
-/// Compute the tables and figures of traces, print the main table, write all of them
+/// Compute tables and figures of traces: print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
 pub struct ReportArgs {
     /// Traces, or files of scores in their place.

@@ -21,7 +21,7 @@ use trace::import::{self, Limits, Text};
 use trace::inputs::Input;
 use trace::schema::Kind;
 
-/// Make a trace of JSON lines of steps, so that episodes of any harness can be scored
+/// Make a trace of JSON lines of steps: episodes of any harness can be scored
 ///
 /// One line is one step: an object with the columns of the schema as keys, as `mirrorstats schema step` prints them.
 /// Other keys become columns of their own. Lines of an episode may be in any order and in several files. The trace holds

@@ -17,7 +17,7 @@ use world::sim::config::WorldConfig;
 use world::sim::contact_sheet;
 use world::sim::scene::Scene;
 
-/// Show what worlds are made of: the configuration, a scene, a contact sheet of pictures
+/// Replay episodes, draw film strips, show scenes and configurations
 #[derive(Clone, Debug, clap::Args)]
 pub struct WorldArgs {
     #[command(subcommand)]
@@ -27,6 +27,8 @@ pub struct WorldArgs {
 /// What to show.
 #[derive(Clone, Debug, clap::Subcommand)]
 enum WorldVerb {
+    Replay(replay::ReplayArgs),
+    Filmstrip(filmstrip::FilmstripArgs),
     /// Print the built-in configuration: every size, speed, light and threshold, as TOML for --config
     Config,
     /// Print the scene of one episode as JSON, a scene for each experiment
@@ -78,6 +80,8 @@ fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
 impl WorldArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         match self.verb {
+            WorldVerb::Replay(args) => return args.run(),
+            WorldVerb::Filmstrip(args) => return args.run(),
             WorldVerb::Config => io::stdout().lock().write_all(WorldConfig::default_text().as_bytes())?,
             WorldVerb::Scene(args) => {
                 let config = configured(args.config.as_ref())?;

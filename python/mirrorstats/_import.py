@@ -28,7 +28,7 @@ def import_steps(
     """Makes a trace of steps, so that episodes of any harness can be scored.
 
     Args:
-        rows: one row per step, with the columns of the schema (`mirrorstats schema step`): an iterable of dicts, or a
+        rows: one row per step, with the columns of the schema (`mirrorstats trace schema step`): an iterable of dicts, or a
             data frame of any library that gives Arrow streams (`__arrow_c_stream__`: Polars, pandas, pyarrow, DuckDB).
             None and null stand for a value that is not there. Other columns are kept. Rows may be in any order.
         out: the trace to write, a name that ends in .parquet. Where none is given, the trace is a temporary file until

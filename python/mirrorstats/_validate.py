@@ -10,7 +10,7 @@ from ._paths import Path, Paths, texts
 
 
 def validate(paths: Paths, *, definitions: Path = "paper", threads: int | None = None) -> Answer:
-    """Checks traces against every rule of the schema, as `mirrorstats validate --json`.
+    """Checks traces against every rule of the schema, as `mirrorstats trace validate --json`.
 
     Args:
         paths: files, folders or globs, one or several.

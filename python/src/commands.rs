@@ -23,7 +23,7 @@ pub fn run(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| cli::run_to_code(arguments))
 }
 
-/// All findings of `mirrorstats validate` with these options.
+/// All findings of `mirrorstats trace validate` with these options.
 #[pyfunction]
 pub fn validate(py: Python<'_>, options: Vec<OsString>) -> PyResult<Answer> {
     let found = py.detach(|| {

@@ -343,7 +343,7 @@ fn names_of(command: &str) -> impl Iterator<Item = &str> {
 
 fn refused(variable: &str, why: &str) -> Failure {
     Failure::input(format!(
-        "the environment variable {}: {why}\n  help: unset it, or see `mirrorstats config --help`",
+        "the environment variable {}: {why}\n  help: unset it, or see `mirrorstats setup config --help`",
         visible(variable)
     ))
 }

@@ -149,7 +149,7 @@ pub fn with_help(command: Command) -> Command {
     let template = format!(
         "{{about-with-newline}}{{usage-heading}} {{usage}}\n\n{}\n{}",
         first_page(&command),
-        "Options: --errors text|json, --help, --version; `help COMMAND` describes a command\n"
+        "Options: --errors text|json, --help, --version; `help COMMAND` for the rest\n"
     );
     with_examples_alone(command.help_template(template))
 }

@@ -68,7 +68,7 @@ pub enum StudyError {
     /// Traces that do not record what a threshold is of.
     #[error(
         "expected traces with the column `{column}`, to which a threshold applies: {problem}\n  \
-         help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats info` lists the columns"
+         help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats trace info` lists the columns"
     )]
     NoPixels {
         /// The column.

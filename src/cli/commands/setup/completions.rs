@@ -1,4 +1,4 @@
-//! `mirrorstats completions`: what a shell needs to complete command lines.
+//! `mirrorstats setup completions`: what a shell needs to complete command lines.
 
 use std::io::{self, Write as _};
 

@@ -1,4 +1,4 @@
-//! `mirrorstats config`: the defaults that hold here.
+//! `mirrorstats setup config`: the defaults that hold here.
 
 use std::io::{self, Write as _};
 

@@ -1,4 +1,4 @@
-//! `mirrorstats man`: manual pages, one per command.
+//! `mirrorstats setup man`: manual pages, one per command.
 
 use std::path::{Path, PathBuf};
 

@@ -71,7 +71,7 @@ impl ViewArgs {
         })?;
         if let Some(id) = self.episode.as_ref().filter(|id| !view.has_episode(id)) {
             return Err(Failure::input(format!(
-                "--episode: expected the id of an episode in these recordings, found `{}`\n  help: `mirrorstats info --episodes` lists them",
+                "--episode: expected the id of an episode in these recordings, found `{}`\n  help: `mirrorstats trace info --episodes` lists them",
                 visible(id)
             )));
         }

@@ -1,4 +1,4 @@
-//! `mirrorstats verify`: whether a report's files are still those that were written.
+//! `mirrorstats table verify`: whether a report's files are still those that were written.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! `mirrorstats check`: whether the replies in traces are good enough, for CI and before a report.
+//! `mirrorstats trace check`: whether the replies in traces are good enough, for CI and before a report.
 
 use std::io::{self, Write as _};
 

@@ -23,9 +23,9 @@ use trace::schema::Kind;
 
 /// Make a trace of JSON lines of steps: episodes of any harness can be scored
 ///
-/// One line is one step: an object with the columns of the schema as keys, as `mirrorstats schema step` prints them.
+/// One line is one step: an object with the columns of the schema as keys, as `mirrorstats trace schema step` prints them.
 /// Other keys become columns of their own. Lines of an episode may be in any order and in several files. The trace holds
-/// every line and keeps every rule of `mirrorstats validate`, or nothing is written.
+/// every line and keeps every rule of `mirrorstats trace validate`, or nothing is written.
 #[derive(Clone, Debug, clap::Args)]
 pub struct ImportArgs {
     /// Files of JSON lines, `-` for standard input

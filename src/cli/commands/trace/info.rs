@@ -1,4 +1,4 @@
-//! `mirrorstats info`: what traces hold.
+//! `mirrorstats trace info`: what traces hold.
 
 use std::fmt::Display;
 use std::io::{self, Write};

@@ -1,4 +1,4 @@
-//! `mirrorstats recover`: a trace out of a log, also of a cut one.
+//! `mirrorstats trace recover`: a trace out of a log, also of a cut one.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;

@@ -1,4 +1,4 @@
-//! `mirrorstats renormalize`: the attributions of old traces by the rule of this program.
+//! `mirrorstats trace renormalize`: the attributions of old traces by the rule of this program.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! `mirrorstats schema`: what a trace is, and the JSON Schemas of what others write for this program.
+//! `mirrorstats trace schema`: what a trace is, and the JSON Schemas of what others write for this program.
 
 use std::io::{self, Write};
 
@@ -99,7 +99,7 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
     for name in Name::value_variants().iter().filter(|name| **name != Name::Trace) {
         if let Some(value) = name.to_possible_value() {
             let of = value.get_help().map(ToString::to_string).unwrap_or_default();
-            others.add_row([format!("mirrorstats schema {}", value.get_name()), of]);
+            others.add_row([format!("mirrorstats trace schema {}", value.get_name()), of]);
         }
     }
     writeln!(out, "\n{}", others.trim_fmt())

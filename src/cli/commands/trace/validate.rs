@@ -1,4 +1,4 @@
-//! `mirrorstats validate`: every rule of the schema, all findings.
+//! `mirrorstats trace validate`: every rule of the schema, all findings.
 
 use std::io::{self, Write};
 use std::path::PathBuf;

@@ -1,4 +1,4 @@
-//! `mirrorstats filmstrip`: one episode as a row of frames.
+//! `mirrorstats world filmstrip`: one episode as a row of frames.
 
 use std::ffi::OsString;
 use std::io;
@@ -68,7 +68,7 @@ impl FilmstripArgs {
             return Ok(figure);
         }
         Err(Failure::input(format!(
-            "no log or trace in {} has the episode `{}`; `mirrorstats info --episodes` lists those of traces",
+            "no log or trace in {} has the episode `{}`; `mirrorstats trace info --episodes` lists those of traces",
             self.recordings.iter().map(|named| named.to_string_lossy()).collect::<Vec<_>>().join(", "),
             self.episode
         )))

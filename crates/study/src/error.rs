@@ -25,6 +25,7 @@ use score::format::FormatError;
 use score::score_traces::ScoreError;
 use score::select::SelectError;
 use trace::error::TraceError;
+use trace::import::ImportError;
 use trace::lost::LostListError;
 
 /// Why a study gives no answer. Each message says what, where, expected, found, and what to do.
@@ -275,6 +276,17 @@ pub enum StudyError {
         /// The option or the command.
         what: &'static str,
     },
+    /// The colours of an import cannot be taken.
+    #[error("--palette {typed}: {words}")]
+    Palette {
+        /// As typed.
+        typed: String,
+        /// What is wrong, and a remedy.
+        words: String,
+    },
+    /// Lines of steps are not as they must be.
+    #[error(transparent)]
+    Import(#[from] ImportError),
     /// The traces are not as they must be.
     #[error(transparent)]
     Trace(#[from] TraceError),

@@ -18,7 +18,7 @@ use study::view;
 use study::{diff, figure, plan, query, score, stats};
 
 pub use self::table::rescore;
-pub use self::trace::{check, import, recover, renormalize, schema, validate};
+pub use self::trace::{import, recover, schema};
 #[cfg(feature = "sim")]
 pub use self::world::record;
 use super::outcome::{Failure, Outcome};

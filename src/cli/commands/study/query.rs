@@ -61,24 +61,19 @@ impl QueryArgs {
 /// From a query as typed to its rows on standard output or in a file.
 #[cfg(feature = "polars")]
 mod rows {
-    use std::fs::File;
-    use std::io::{self, BufWriter, Write};
+    use std::io::{self, Write as _};
     use std::path::Path;
-    use std::sync::{Arc, Mutex, PoisonError};
-
-    use polars::prelude::LazyFrame;
 
     use super::{AnswerFormat, Failure, Outcome, QueryArgs};
     use crate::cli::args::GroupingArgs;
     use crate::cli::text_table::listing;
     use crate::cli::{output, terminal};
-    use engines::polars::answer::{Excerpt, Format, QueryError, excerpt, plan, write};
+    use engines::polars::answer::{Excerpt, Format, excerpt, write};
     use engines::polars::run::PolarsError;
-    use engines::polars::statement::{self, Checked, Table};
-    use engines::polars::tables;
+    use engines::polars::shared_file::{WriteError, write_file};
+    use engines::polars::statement;
     use exact::escape::visible;
     use exact::replace::is_stream;
-    use metric::fault::Faults;
     use report::tables::fit::fitted;
     use study::StudyError;
 
@@ -88,29 +83,33 @@ mod rows {
     pub(super) fn answer(args: &QueryArgs) -> Result<Outcome, Failure> {
         let format = format(args)?;
         // A slip in the query should not cost a look at the traces.
-        let query = statement::check(&args.query).map_err(|found| faults(&found))?;
-        let frame = plan(&query, load(args, &query)?).map_err(|error| match error {
-            QueryError::Faults(found) => faults(&found),
-            QueryError::Polars(error) => failed(error),
-        })?;
-        let Some(format) = format else {
-            let most = (args.rows > 0).then_some(args.rows);
-            let excerpt = excerpt(frame, most).map_err(failed)?;
-            match &args.output {
-                Some(path) => output::write_file(path, render(&excerpt, None).as_bytes())?,
-                None => io::stdout().lock().write_all(render(&excerpt, terminal::width()).as_bytes())?,
+        let query = statement::check(&args.query).map_err(|found| Failure::of_faults(&found))?;
+        let study = args.traces.study(&args.scoring, &GroupingArgs::default())?;
+        if let Some(path) = &args.output {
+            output::check_target(path, study.files_read(None))?;
+        }
+        let (frame, note) = study.query(&query)?;
+        output::notes(note.as_slice());
+        match (format, &args.output) {
+            (None, path) => {
+                let excerpt = excerpt(frame, (args.rows > 0).then_some(args.rows)).map_err(failed)?;
+                match path {
+                    Some(path) => output::write_file(path, render(&excerpt, None).as_bytes())?,
+                    None => io::stdout().lock().write_all(render(&excerpt, terminal::width()).as_bytes())?,
+                }
             }
-            return Ok(Outcome::Done);
-        };
-        match &args.output {
-            Some(path) => write_file(frame, format, path)?,
-            None => write(frame, format, io::stdout()).map_err(failed)?,
+            (Some(format), None) => write(frame, format, io::stdout()).map_err(failed)?,
+            (Some(format), Some(path)) => {
+                let file = output::create(path)?;
+                let out = file.as_file().try_clone().map_err(|error| output::unwritable(path, error))?;
+                write_file(frame, format, out).map_err(|error| match error {
+                    WriteError::Output(error) => output::unwritable(path, error),
+                    WriteError::Polars(error) => failed(error),
+                })?;
+                output::commit(file, path)?;
+            }
         }
         Ok(Outcome::Done)
-    }
-
-    fn faults(faults: &Faults) -> Failure {
-        Failure::of_faults(faults)
     }
 
     fn failed(error: PolarsError) -> Failure {
@@ -142,81 +141,6 @@ mod rows {
                 "error: Parquet is no text for standard output\n  help: name a file with -o".to_owned(),
             )),
             AnswerFormat::Parquet => Ok(Some(Format::Parquet)),
-        }
-    }
-
-    /// The tables that the query names; the others are not computed.
-    fn load(args: &QueryArgs, query: &Checked) -> Result<Vec<(Table, LazyFrame)>, Failure> {
-        let study = args.traces.study(&args.scoring, &GroupingArgs::default())?;
-        if let Some(path) = &args.output {
-            output::check_target(path, study.files_read(None))?;
-        }
-        let mut loaded = Vec::new();
-        if query.tables.contains(&Table::Steps) {
-            loaded.push((Table::Steps, tables::steps(study.traces()?).map_err(failed)?));
-        }
-        if query.tables.contains(&Table::Episodes) || query.tables.contains(&Table::Cells) {
-            let scores = study.score()?.episodes;
-            if let Some(words) = study.empty_filter(scores.len())? {
-                output::note(&words);
-            }
-            loaded.push((Table::Episodes, tables::episodes(&scores).map_err(failed)?));
-            if query.tables.contains(&Table::Cells) {
-                let cells = study.cells_of(&scores)?;
-                loaded.push((Table::Cells, tables::cells(&cells).map_err(failed)?));
-            }
-        }
-        Ok(loaded)
-    }
-
-    /// Replaces a file by one of these rows.
-    fn write_file(frame: LazyFrame, format: Format, path: &Path) -> Result<(), Failure> {
-        let file = output::create(path)?;
-        let out = file.as_file().try_clone().map_err(|error| output::unwritable(path, error))?;
-        let out = SharedFile::new(out);
-        let written = write(frame, format, out.clone());
-        // Polars drops its writers without a word about what they had not written yet.
-        out.finish().map_err(|error| output::unwritable(path, error))?;
-        written.map_err(failed)?;
-        output::commit(file, path)
-    }
-
-    /// A file that is written by whoever has a copy of this, and that keeps the first error.
-    #[derive(Clone)]
-    struct SharedFile(Arc<Mutex<Shared>>);
-
-    struct Shared {
-        out: BufWriter<File>,
-        fault: Option<io::Error>,
-    }
-
-    impl SharedFile {
-        fn new(file: File) -> Self {
-            Self(Arc::new(Mutex::new(Shared { out: BufWriter::new(file), fault: None })))
-        }
-
-        fn finish(&self) -> io::Result<()> {
-            let mut shared = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            shared.fault.take().map_or_else(|| shared.out.flush(), Err)
-        }
-
-        fn with<T>(&self, work: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>) -> io::Result<T> {
-            let mut shared = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-            work(&mut shared.out).map_err(|error| {
-                let kind = error.kind();
-                shared.fault.get_or_insert(error);
-                kind.into()
-            })
-        }
-    }
-
-    impl Write for SharedFile {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.with(|out| out.write(bytes))
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            self.with(Write::flush)
         }
     }
 

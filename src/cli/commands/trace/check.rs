@@ -2,17 +2,14 @@
 
 use std::io::{self, Write as _};
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::quality::{self, CellAnswer};
+use crate::cli::quality;
 use exact::escape::visible;
 use exact::format::fixed;
-use score::quality::{CellKey, Quality, QualityByCell};
-use statistics::losses::INFRASTRUCTURE;
+use score::quality::{CellKey, QualityByCell};
+use study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 
 /// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
 ///
@@ -47,59 +44,21 @@ pub struct CheckArgs {
     pub json: bool,
 }
 
-/// The result of the check.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct QualityCheckAnswer {
-    /// Whether every limit could be checked and none is exceeded.
-    pub holds: bool,
-    /// The limits that are exceeded.
-    pub violations: Vec<Violation>,
-    /// The limits that could not be checked.
-    pub not_recorded: Vec<NotRecorded>,
-    /// Every cell.
-    pub cells: Vec<CellAnswer>,
-}
-
-/// A limit that is exceeded.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Violation {
-    /// The cell; null for a limit over all cells.
-    pub cell: Option<CellKey>,
-    /// The option, without its dashes.
-    pub limit: &'static str,
-    /// The largest that was allowed.
-    pub expected: f64,
-    /// The value in the traces.
-    pub found: f64,
-}
-
-/// A limit on a quantity that the traces do not record for every step of a cell.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct NotRecorded {
-    /// The cell.
-    pub cell: CellKey,
-    /// The option, without its dashes.
-    pub limit: &'static str,
-    /// The steps of the cell without it.
-    pub missing: u64,
-    /// All steps of the cell.
-    pub steps: u64,
-}
-
 impl CheckArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
-        let limits = [self.max_unreadable, self.max_refused, self.max_truncated, self.max_repaired];
-        if limits.iter().all(Option::is_none) && self.max_lost.is_none() && self.max_latency.is_none() {
+        let limits = QualityLimits {
+            max_unreadable: self.max_unreadable,
+            max_refused: self.max_refused,
+            max_truncated: self.max_truncated,
+            max_repaired: self.max_repaired,
+            max_lost: self.max_lost,
+            max_latency: self.max_latency,
+        };
+        if limits.is_empty() {
             let words = "expected a limit to check, found none\n  help: name one, such as --max-unreadable 0.05";
             return Err(Failure::input(words));
         }
-        let cells = self.traces.open()?.quality()?;
-        let (violations, not_recorded) = (self.violations(&cells), self.not_recorded(&cells));
-        let holds = violations.is_empty() && not_recorded.is_empty();
-        let answer = QualityCheckAnswer { holds, violations, not_recorded, cells: quality::answers(&cells) };
+        let (answer, cells) = self.traces.open()?.check_quality(&limits)?;
         if self.json {
             output::print_json(&answer)?;
         } else {
@@ -107,63 +66,6 @@ impl CheckArgs {
         }
         Ok(if answer.holds { Outcome::Done } else { Outcome::CheckFailed })
     }
-
-    fn violations(&self, cells: &QualityByCell) -> Vec<Violation> {
-        let of_cell = |(key, quality)| self.found(quality).map(|found| exceeded(Some(key), found));
-        let lost = ("max-lost", self.max_lost.map(real), cells.whole().lost.map(real));
-        cells.0.iter().flat_map(of_cell).chain([exceeded(None, lost)]).flatten().collect()
-    }
-
-    fn not_recorded(&self, cells: &QualityByCell) -> Vec<NotRecorded> {
-        let missing = |quality: &Quality| {
-            let replies = quality.steps.saturating_sub(quality.replies());
-            // What the infrastructure ended came with no reply, which would have taken some time.
-            let ended: u64 = INFRASTRUCTURE.iter().map(|status| quality.of_status(status)).sum();
-            let timed = quality.latencies.values().sum::<u64>() + ended;
-            [
-                ("max-unreadable", self.max_unreadable.is_some(), replies),
-                ("max-refused", self.max_refused.is_some(), replies),
-                ("max-truncated", self.max_truncated.is_some(), replies),
-                ("max-repaired", self.max_repaired.is_some(), replies),
-                ("max-latency", self.max_latency.is_some(), quality.steps.saturating_sub(timed)),
-                ("max-lost", self.max_lost.is_some(), if quality.lost.is_none() { quality.steps } else { replies }),
-            ]
-        };
-        let mut found = Vec::new();
-        for (cell, quality) in &cells.0 {
-            let asked = missing(quality).into_iter().filter(|(_, is_asked, missing)| *is_asked && *missing > 0);
-            let of = |(limit, _, missing)| NotRecorded { cell: cell.clone(), limit, missing, steps: quality.steps };
-            found.extend(asked.map(of));
-        }
-        found
-    }
-
-    /// Each limit of a cell, what it allows, and what was found.
-    fn found(&self, quality: &Quality) -> [Limit; 5] {
-        let of = |count: u64| (quality.replies() > 0).then(|| real(count) / real(quality.replies()));
-        #[expect(clippy::cast_precision_loss, reason = "milliseconds are far below 2^53")]
-        let ms = |ms: i64| ms as f64;
-        [
-            ("max-unreadable", self.max_unreadable, of(quality.unusable())),
-            ("max-refused", self.max_refused, of(quality.of_status("refusal"))),
-            ("max-truncated", self.max_truncated, of(quality.of_status("truncated"))),
-            ("max-repaired", self.max_repaired, of(quality.of_status("repaired"))),
-            ("max-latency", self.max_latency.map(ms), quality.latency(0.95).map(ms)),
-        ]
-    }
-}
-
-/// An option, the largest value that it allows, and the value in the traces.
-type Limit = (&'static str, Option<f64>, Option<f64>);
-
-#[expect(clippy::cast_precision_loss, reason = "counts of replies are far below 2^53")]
-fn real(count: u64) -> f64 {
-    count as f64
-}
-
-fn exceeded(cell: Option<&CellKey>, (limit, expected, found): Limit) -> Option<Violation> {
-    let (expected, found) = expected.zip(found)?;
-    (found > expected).then(|| Violation { cell: cell.cloned(), limit, expected, found })
 }
 
 fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {

@@ -1,25 +1,13 @@
 //! `mirrorstats import`: JSON lines of steps, of whatever harness, as a trace.
 
-use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use schemars::JsonSchema;
-use serde::Serialize;
-
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::text_table::counted;
-use exact::budget::Limit;
-use exact::escape::visible;
-use exact::input;
 use exact::replace;
-use study::known_experiments;
-use trace::colors::palette::Palette;
-use trace::declared::Cluster;
-use trace::import::{self, Limits, Text};
-use trace::inputs::Input;
-use trace::schema::Kind;
+use study::ImportRequest;
+use trace::import::Text;
 
 /// Make a trace of JSON lines of steps: episodes of any harness can be scored
 ///
@@ -61,57 +49,18 @@ pub enum ClusterArg {
     Seed,
 }
 
-/// What was written.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct ImportAnswer {
-    /// The trace, as typed.
-    pub out: String,
-    /// How many episodes it has.
-    pub episodes: usize,
-    /// How many rows it has, one per line.
-    pub steps: usize,
-    /// Columns of the schema that it has.
-    pub columns: Vec<String>,
-    /// Columns that the schema does not know.
-    pub own_columns: Vec<OwnColumn>,
-}
-
-/// A column that the schema does not know.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct OwnColumn {
-    /// Its name, the key of the lines.
-    pub name: String,
-    /// What it holds; null where every line says null.
-    #[serde(rename = "type")]
-    pub kind: Option<Kind>,
-}
-
 impl ImportArgs {
     pub fn run(&self) -> Result<Outcome, Failure> {
         self.check_places()?;
         let texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
-        output::print(&self.import(texts)?, self.json)
-    }
-
-    /// Makes a trace of the steps in these texts, wherever they are from.
-    pub fn import(&self, mut texts: Vec<Text>) -> Result<ImportAnswer, Failure> {
-        let experiments = known_experiments(&self.definitions)?;
-        let palette = self.palette.as_deref().map(palette).transpose()?;
-        let limits = Limits {
-            experiments: experiments.as_deref(),
-            palette: palette.as_ref(),
-            cluster: self.cluster.map(|ClusterArg::Seed| Cluster::Seed),
-            is_reconstruction: self.reconstruction,
+        let request = ImportRequest {
+            out: self.out.clone(),
+            definitions: self.definitions.clone(),
+            palette: self.palette.clone(),
+            clusters_by_seed: self.cluster.is_some(),
+            reconstruction: self.reconstruction,
         };
-        let imported = import::import(&mut texts, &self.out, limits).map_err(Failure::input)?;
-        let own = imported.own.into_iter().map(|own| OwnColumn { name: own.name, kind: own.kind });
-        Ok(ImportAnswer {
-            out: Input::new(&self.out).name,
-            episodes: imported.episodes,
-            steps: imported.steps,
-            columns: imported.columns.into_iter().map(str::to_owned).collect(),
-            own_columns: own.collect(),
-        })
+        output::print(&study::import(texts, &request)?, self.json)
     }
 
     /// Standard input is there once, and no file is written over its own lines.
@@ -125,27 +74,6 @@ impl ImportArgs {
     }
 }
 
-/// A colour takes some bytes.
-const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
-
-/// The palette that is typed, or in the file that is named. A text with a comma is no name of a file.
-fn palette(path: &Path) -> Result<Palette, Failure> {
-    let typed = path.to_string_lossy();
-    if typed == "default" {
-        return Ok(Palette::of_study());
-    }
-    let is_file = !typed.contains(',') && (typed.contains(['/', '\\', '.']) || path.is_file());
-    let names = if is_file {
-        input::text(path, LARGEST)
-            .map_err(|error| Failure::input(format!("--palette {typed}: cannot read it: {error}")))?
-    } else {
-        typed.clone().into_owned()
-    };
-    let names = names.split([',', '\n']).map(str::trim).filter(|name| !name.is_empty());
-    let help = "name the colours with commas between them, or in a file one per line; or `default`";
-    Palette::of_names(names).map_err(|fault| Failure::input(format!("--palette {typed}: {fault}\n  help: {help}")))
-}
-
 fn text(path: &Path) -> Result<Text, Failure> {
     let text = if is_standard_input(path) { Text::spool("standard input", io::stdin()) } else { Text::open(path) };
     text.map_err(Failure::input)
@@ -153,17 +81,4 @@ fn text(path: &Path) -> Result<Text, Failure> {
 
 fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == "-"
-}
-
-impl fmt::Display for ImportAnswer {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (episodes, steps) = (counted(self.episodes as u64, "episode"), counted(self.steps as u64, "step"));
-        writeln!(f, "imported {episodes}, {steps} into {}", self.out)?;
-        if self.own_columns.is_empty() {
-            return Ok(());
-        }
-        let kind = |column: &OwnColumn| column.kind.map_or("null in every line", Kind::name);
-        let own = self.own_columns.iter().map(|column| format!("{} ({})", visible(&column.name), kind(column)));
-        writeln!(f, "columns that the schema does not know: {}", own.collect::<Vec<_>>().join(", "))
-    }
 }

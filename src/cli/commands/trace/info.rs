@@ -10,12 +10,13 @@ use serde::Serialize;
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
-use crate::cli::quality::{self, CellAnswer};
+use crate::cli::quality;
 use crate::cli::terminal;
 use crate::cli::text_table::{aligned_right, counted, listing};
 use exact::escape::visible;
 use report::tables::fit::{fitted, wrapped};
 use score::quality::QualityByCell;
+use study::CellAnswer;
 use trace::answered::by_others;
 use trace::checksums::Checksums;
 use trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
@@ -57,7 +58,7 @@ impl InfoCommand {
         let quality = if study.has_quality()? { study.quality()? } else { QualityByCell::default() };
         let mut out = io::stdout().lock();
         if self.json {
-            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: quality::answers(&quality) }))?;
+            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: CellAnswer::of_all(&quality) }))?;
         } else {
             print(&mut out, &info, terminal::width())?;
             let text = quality::text(&quality, terminal::width());

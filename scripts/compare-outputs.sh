@@ -27,8 +27,8 @@ run() {
 for side in old new; do
   rm -rf "${work:?}/$side"
   mkdir -p "$work/$side/printed"
-  ln -s "$root/fixtures" "$work/$side/fixtures"
-  ln -s "$root/assets" "$work/$side/assets"
+  cp -r "$root/fixtures" "$root/assets" "$work/$side"
+  sed 's/\[experiment\.E3/[experiment.MINE/' "$root/assets/experiments/E3.toml" > "$work/$side/experiment.toml"
   cat > "$work/$side/mine.toml" <<'TOML'
 include = ["paper"]
 [metric.TURNS]
@@ -36,8 +36,8 @@ title = "Turns before the decision"
 value = "count(action in ('turn_left', 'turn_right') and t < finish)"
 TOML
   cat > "$work/$side/steps.jsonl" <<'JSON'
-{"episode_id":"a","model":"m","experiment":"E1","seed":1,"run":1,"t":1,"action":"turn_left","body_color":"red"}
-{"episode_id":"a","model":"m","experiment":"E1","seed":1,"run":1,"t":2,"action":"done","body_color":"red","selected_cube":"red"}
+{"episode_id":"a","model":"m","experiment":"E1","seed":1,"run":1,"t":1,"action":"turn_left","body_color":"red","self_color":null,"selected_cube":null,"mirror_visible":true,"mirror_self_visible":false}
+{"episode_id":"a","model":"m","experiment":"E1","seed":1,"run":1,"t":2,"action":"done","body_color":"red","self_color":"red","selected_cube":"red","mirror_visible":true,"mirror_self_visible":true}
 JSON
   head -c 200000 "$root/fixtures/recorded/E1-guesser.mcap" > "$work/$side/cut.mcap"
 done
@@ -67,7 +67,7 @@ for name in spider heatmap scatter completion-gap e5-outcomes intervals slopes d
   run figure-$name-recorded figure $name $recorded
 done
 run stats stats $paper
-run stats-all stats $paper --metrics all
+run stats-all stats $paper --metric all --full
 run stats-json stats $paper --json
 run stats-recorded stats $recorded --json
 run stats-sequential stats $paper --sequential
@@ -75,8 +75,8 @@ run stats-sequential-json stats $paper --sequential --json
 run diff diff paper extended $paper
 run diff-own diff paper mine.toml $paper --json
 run diff-scores diff scores.parquet scores.csv
-run rescore rescore report --definitions mine.toml --traces fixtures --out rescored
-run rescore-json rescore report --definitions extended --traces fixtures --out rescored-json --json
+run rescore rescore report --definitions mine.toml --traces fixtures/paper --out rescored
+run rescore-json rescore report --definitions extended --traces fixtures/paper --out rescored-json --json
 run verify verify report
 run verify-json verify report --json
 for table in main appendix; do
@@ -145,6 +145,8 @@ for file in "$root"/assets/experiments/*.toml; do
   run "experiments-explain-$name-json" experiments explain "$name" --json
   run "experiments-check-$name" experiments check "assets/experiments/$name.toml"
 done
+run experiments-check-own experiments check experiment.toml
+run experiments-explain-own experiments explain experiment.toml --json
 run world-config world config
 run world-scene world scene E1..E5 --seed 2 --run 3
 run world-sheet world sheet --out sheet
@@ -157,7 +159,7 @@ run refused score nosuch.parquet
 run refused-json --errors json score $paper --where "TSAA = 1"
 
 # Times are of the run; new names of commands are no difference in the words around them.
-sed -i -E 's/ in [0-9.]+ s( \([0-9]+ steps a second\))?/ in N s/; s/[0-9.]+ s of/N s of/g' "$work"/{old,new}/printed/record.err
+sed -i -E 's/ in [0-9.]+ s( \([0-9]+ steps a second\))?/ in N s/; s/[0-9.]+ (s of|%)/N \1/g' "$work"/{old,new}/printed/record.err
 nouns='table (audit|compare|rescore|verify)|trace (check|info|recover|renormalize|schema|validate)|definitions (sensitivity|sql)'
 sed -i -E "s/mirrorstats (($nouns)|world (filmstrip|replay)|setup (completions|config|man))/mirrorstats \3\4\5\6\7/g" \
   "$work"/{old,new}/printed/*.{out,err}

@@ -3,15 +3,16 @@
 //! `args` is what was typed and what several verbs share; `commands/<verb>.rs` is one thin file per verb;
 //! `outcome` maps what happened to an exit code, in one place.
 
+mod answers;
 pub mod commands;
-pub mod config;
+mod config;
 mod features;
 mod help;
 mod names;
-pub mod printed;
+mod printed;
 #[cfg(feature = "sim")]
-pub mod recording;
-pub mod typed;
+mod recording;
+mod typed;
 mod usage;
 
 use std::ffi::OsString;
@@ -23,13 +24,16 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use commands::Command;
 use exact::budget;
 use exact::escape::visible;
-use outcome::{ErrorFormat, Failure, Outcome};
-pub use printed::{outcome, output, quality, terminal, text_table};
+use outcome::{ErrorFormat, Outcome};
+
+pub use answers::schemas;
+pub use outcome::{ErrorAnswer, Failure};
+use printed::{outcome, output, quality, terminal, text_table};
 #[cfg(all(feature = "sim", feature = "view"))]
 use recording::human;
 #[cfg(feature = "sim")]
-pub use recording::{dry_run, exec, registration, vlm};
-pub use typed::{args, experiments, scoring, spark};
+use recording::{dry_run, exec, registration, vlm};
+use typed::{args, experiments, scoring, spark};
 
 pub(crate) const NAME: &str = "mirrorstats";
 

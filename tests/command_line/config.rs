@@ -144,14 +144,14 @@ fn errors_are_told_as_one_json_object_where_that_is_asked_for() {
 fn a_refused_option_or_command_is_told_where_it_is() {
     let here = Path::new(".");
     let refused = run(here, &["stats", "runs", "--published", "x.csv"]).refused();
-    assert!(refused.contains("tip: `--published` is an option of `compare`"), "{refused}");
+    assert!(refused.contains("tip: `--published` is an option of `table compare`"), "{refused}");
     let refused = run(here, &["ls"]).refused();
     assert!(
         refused.contains("tip: `mirrorstats help` lists the commands") && !refused.contains("filmstrip"),
         "{refused}"
     );
     let refused = run(here, &["valdate"]).refused();
-    assert!(refused.contains("a similar command exists: `validate`"), "{refused}");
+    assert!(refused.contains("a similar command exists: `trace validate`"), "{refused}");
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn shells_and_manuals_know_every_command() {
     let nested = folder.path().join("pages/man1/mirrorstats-definitions-check.1");
     assert!(nested.is_file());
     let whole = fs::read_to_string(folder.path().join("pages/man1/mirrorstats.1")).unwrap();
-    for command in ["report", "config", "renormalize"] {
+    for command in ["report", "setup", "trace"] {
         assert!(whole.contains(command), "{command}");
     }
 }

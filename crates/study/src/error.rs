@@ -12,6 +12,7 @@ use exact::replace::TargetIsInput;
 use metric::definitions::{ReplaceError, UnknownMetric};
 use metric::fault::Faults;
 use metric::file::FileError;
+use report::audit::AuditError;
 use report::bundle::BundleError;
 use report::cells::group::GroupError;
 use report::comparison::ComparisonError;
@@ -329,6 +330,9 @@ pub enum StudyError {
     /// A published table is not the one that the traces give.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
+    /// Published tables cannot be audited.
+    #[error(transparent)]
+    Audit(#[from] AuditError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),

@@ -11,6 +11,7 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+mod audit;
 mod backend;
 mod between;
 mod design;
@@ -71,6 +72,7 @@ use trace::inputs::Input;
 use trace::open::TraceSet;
 use trace::steps::Steps;
 
+pub use audit::{AuditRequest, audit_tables};
 pub use backend::Backend;
 pub use backend::{SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};

@@ -28,7 +28,7 @@ const TARGET: &str = "self_color";
 /// The key of a recording that tells the version of the rule.
 const VERSION_KEY: &str = "identification_version";
 
-/// The attributions that change in some traces.
+/// What changes.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct RenormalizeAnswer {
     /// The version of the rule of this program.

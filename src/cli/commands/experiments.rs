@@ -18,7 +18,6 @@ use world::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_
 /// Check, explain and show experiments
 #[derive(Clone, Debug, clap::Args)]
 pub struct ExperimentsArgs {
-    /// What to do.
     #[command(subcommand)]
     pub action: Action,
 }

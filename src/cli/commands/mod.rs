@@ -1,31 +1,27 @@
 //! The commands: one file each, in a folder where several share a noun.
 
-pub mod definitions;
-pub mod experiments;
+pub(super) mod definitions;
+pub(super) mod experiments;
 #[cfg(all(feature = "sim", feature = "view"))]
-pub mod participants;
-pub mod setup;
-pub mod study;
-pub mod style;
-pub mod table;
-pub mod trace;
+pub(super) mod participants;
+pub(super) mod setup;
+pub(super) mod study;
+pub(super) mod style;
+pub(super) mod table;
+pub(super) mod trace;
 #[cfg(feature = "sim")]
-pub mod world;
+pub(super) mod world;
 
-pub use study::report;
 #[cfg(feature = "view")]
 use study::view;
-use study::{diff, figure, plan, query, score, stats};
+use study::{diff, figure, plan, query, report, score, stats};
 
-pub use self::table::rescore;
-pub use self::trace::{import, recover, schema};
 #[cfg(feature = "sim")]
 pub use self::world::record;
 use super::outcome::{Failure, Outcome};
 
 /// The commands, in the order of the help: those of a first use, then nouns.
 #[derive(Debug, clap::Subcommand)]
-#[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
 pub enum Command {
     Report(report::ReportArgs),
     #[cfg(feature = "view")]

@@ -67,7 +67,6 @@ impl Failure {
 
 /// How errors are told: in words for people, or for programs as one object on one line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-#[expect(missing_docs, reason = "a value with words of its own makes the help of every command longer")]
 pub enum ErrorFormat {
     #[default]
     Text,

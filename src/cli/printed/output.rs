@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::cli::outcome::{Failure, Outcome};
 use exact::escape::visible_lines;
-use exact::replace::{self, Content, FolderFiles, NewFile, TemporaryFolder};
+use exact::replace::{self, Content, FolderFiles, NewFile};
 use trace::checksums::stale_note;
 use trace::inputs::Input;
 use trace::open::TraceFile;
@@ -76,14 +76,6 @@ pub fn write_file_with<T>(path: &Path, write: impl FnOnce(&mut File) -> Result<T
 pub fn write_folder(folder: &Path, files: &[(&Path, Content<'_>)]) -> Result<(), Failure> {
     let files = FolderFiles { new: files, index: None, old: &|_| Vec::new() };
     replace::replace_folder(folder, &files).map_err(|error| unwritable(&error.path, error.source))
-}
-
-/// A temporary folder for what [`write_folder`] puts into `folder`, beside it.
-pub fn stage_beside(folder: &Path) -> Result<TemporaryFolder, Failure> {
-    let parent = replace::folder_of(folder);
-    let name = folder.file_name().unwrap_or_default().to_string_lossy();
-    let made = replace::make_folder(parent).and_then(|()| TemporaryFolder::create(parent, &name));
-    made.map_err(|error| unwritable(folder, error))
 }
 
 /// Begins the new content of a file.

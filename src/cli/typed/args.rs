@@ -12,7 +12,6 @@ pub struct TraceArgs {
     /// Trace files, folders of them, quoted globs, or `-` for a list of files on standard input
     #[arg(required = true, value_name = "TRACES")]
     pub traces: Vec<OsString>,
-    /// How many threads to use.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }
@@ -76,7 +75,6 @@ pub struct EngineArgs {
     /// What computes the scores; the result is the same
     #[arg(long, value_enum, default_value_t)]
     pub engine: Engine,
-    /// The cluster.
     #[command(flatten)]
     pub spark: SparkArgs,
 }

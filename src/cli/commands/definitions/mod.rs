@@ -25,7 +25,6 @@ use trace::open::TraceSet;
 /// Check, explain and show metrics, their SQL, their sensitivity
 #[derive(Clone, Debug, clap::Args)]
 pub struct DefinitionsArgs {
-    /// What to do.
     #[command(subcommand)]
     pub action: Action,
 }
@@ -63,9 +62,7 @@ pub enum Action {
         #[arg(value_name = "NAME", default_value = "paper")]
         name: String,
     },
-    #[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
     Sql(sql::SqlArgs),
-    #[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
     Sensitivity(sensitivity::SensitivityArgs),
 }
 

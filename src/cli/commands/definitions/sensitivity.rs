@@ -16,13 +16,11 @@ use study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
 /// `mirror_self_px >= K`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SensitivityArgs {
-    /// The traces.
     #[command(flatten)]
     pub traces: TraceArgs,
     /// The least numbers of pixels that count as evidence, separated by commas
     #[arg(long, value_name = "PIXELS", default_value = DEFAULT_THRESHOLDS)]
     pub thresholds: Thresholds,
-    /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
     /// Let a cell hold episodes that were recorded differently

@@ -15,7 +15,6 @@ pub struct SqlArgs {
     /// Traces whose columns `steps` has [default: those that every trace has; what others mean then is part of the statement]
     #[arg(value_name = "TRACES")]
     pub traces: Vec<OsString>,
-    /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
     /// Whose SQL to write

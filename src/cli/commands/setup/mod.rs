@@ -8,7 +8,6 @@ use crate::cli::outcome::{Failure, Outcome};
 
 /// Show settings, write completions of a shell and manual pages
 #[derive(Debug, clap::Subcommand)]
-#[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
 pub enum SetupCommand {
     Config(config::ConfigArgs),
     Completions(completions::CompletionsArgs),

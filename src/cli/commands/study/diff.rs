@@ -45,7 +45,6 @@ pub struct DiffArgs {
     /// Print the answer as JSON
     #[arg(long)]
     pub json: bool,
-    /// How many threads to use.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }

@@ -17,13 +17,10 @@ pub struct FigureArgs {
     /// Which: spider, heatmap, scatter, completion-gap, e5-outcomes, intervals, slopes, decision-curve, gaze
     #[arg(value_name = "NAME")]
     pub name: FigureName,
-    /// The traces to draw it from.
     #[command(flatten)]
     pub traces: TraceArgs,
-    /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    /// What computes it.
     #[command(flatten)]
     pub engine: EngineArgs,
     /// The style whose order of models is taken: `default`, `paper`, or a TOML file

@@ -15,10 +15,8 @@ pub struct QueryArgs {
     /// The query, such as "SELECT model, COUNT(*) AS steps FROM steps GROUP BY model ORDER BY model"
     #[arg(value_name = "SELECT")]
     pub query: String,
-    /// What to ask.
     #[command(flatten)]
     pub traces: TraceArgs,
-    /// How metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
     /// How to write the answer [default: by the ending of FILE; table on standard output]

@@ -17,13 +17,10 @@ use study::{Report, ReportOptions, WrittenReport};
 /// Compute tables and figures of traces: print the main table, write all of them
 #[derive(Clone, Debug, clap::Args)]
 pub struct ReportArgs {
-    /// Traces, or files of scores in their place.
     #[command(flatten)]
     pub traces: TraceArgs,
-    /// How the metrics are defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    /// What computes it.
     #[command(flatten)]
     pub engine: EngineArgs,
     /// The folder to write
@@ -32,7 +29,6 @@ pub struct ReportArgs {
     /// How tables look: `default`, `paper`, or a TOML file
     #[arg(long, value_name = "STYLE", default_value = "default")]
     pub style: PathBuf,
-    /// How episodes are grouped into cells.
     #[command(flatten)]
     pub grouping: GroupingArgs,
     /// Write tables, cells and provenance alone: no figures, no report.html

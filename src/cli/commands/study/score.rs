@@ -15,13 +15,10 @@ use study::{SparkJob, are_uris, write_scores};
 /// Compute every metric of every episode
 #[derive(Clone, Debug, clap::Args)]
 pub struct ScoreArgs {
-    /// What to score.
     #[command(flatten)]
     pub traces: TraceArgs,
-    /// How it is defined.
     #[command(flatten)]
     pub scoring: ScoringArgs,
-    /// What computes it.
     #[command(flatten)]
     pub engine: EngineArgs,
     /// Write the episode table here: a name that ends in .parquet, .csv or .jsonl; with --engine spark any other name or

@@ -16,7 +16,6 @@ const ALL: &str = "all";
 /// Intervals, tests and comparisons that hold at small n
 #[derive(Clone, Debug, clap::Args)]
 pub struct StatsArgs {
-    /// Traces, or files of scores in their place.
     #[command(flatten)]
     pub traces: TraceArgs,
     /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
@@ -25,7 +24,6 @@ pub struct StatsArgs {
     /// Only episodes where this holds, in the language of definitions
     #[arg(long = "where", value_name = "EXPR")]
     pub condition: Option<String>,
-    /// How episodes are grouped into cells.
     #[command(flatten)]
     pub grouping: GroupingArgs,
     /// Confidence of every interval; tests are at one minus it

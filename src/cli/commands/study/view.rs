@@ -24,10 +24,8 @@ pub struct ViewArgs {
     /// Traces, logs, folders of them, quoted globs
     #[arg(value_name = "RUNS", default_value = "runs")]
     runs: Vec<OsString>,
-    /// How the metrics are defined.
     #[command(flatten)]
     scoring: ScoringArgs,
-    /// How episodes are grouped into cells.
     #[command(flatten)]
     grouping: GroupingArgs,
     /// Open at this episode, such as E1/oracle/s1/r1
@@ -54,7 +52,6 @@ pub struct ViewArgs {
     /// Write the page and all that it shows into this folder instead
     #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "token", "no_open", "episode"])]
     export: Option<PathBuf>,
-    /// How many threads to use.
     #[command(flatten)]
     threads: ThreadArgs,
 }

@@ -1,21 +1,16 @@
 //! `audit`: the cells of published tables that no data can give.
 
 use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
 use exact::rounding::Rounding;
-use metric::definitions::Definitions;
-use metric::implied::implied;
 use report::audit::episodes::Episodes;
-use report::audit::{NamedTable, Terms, audit, text};
-use report::published;
-use report::style::Style;
-use score::score_traces::{has_value, schema_columns};
-use study::StudyError;
+use report::audit::text;
+use study::{AuditRequest, audit_tables};
 
 /// Name the cells of published tables that no data can give, and say why
 #[derive(Clone, Debug, clap::Args)]
@@ -46,20 +41,8 @@ pub struct AuditArgs {
 impl AuditArgs {
     /// Audits; the check holds if some data can give every cell.
     pub fn run(self) -> Result<Outcome, Failure> {
-        let tables = self.tables.iter().map(|path| table(path)).collect::<Result<Vec<_>, _>>()?;
-        let definitions = Definitions::load(&self.definitions, &schema_columns()).map_err(StudyError::from)?;
-        let implied = implied(&definitions.plan, self.steps, has_value);
-        let style = Style::load(&self.style).map_err(StudyError::from)?;
-        style.check_against(&definitions.catalog).map_err(Failure::input)?;
-        let roundings = if self.rounding.is_empty() { Rounding::ALL.to_vec() } else { self.rounding };
-        let terms = Terms {
-            catalog: &definitions.catalog,
-            implied: &implied,
-            episodes: &self.episodes,
-            style: &style,
-            roundings: &roundings,
-        };
-        let found = audit(&tables, terms).map_err(Failure::input)?;
+        let Self { episodes, definitions, steps, rounding: roundings, style, .. } = self;
+        let found = audit_tables(&self.tables, &AuditRequest { episodes, definitions, steps, roundings, style })?;
         if self.json {
             output::print_json(&found)?;
         } else {
@@ -67,12 +50,6 @@ impl AuditArgs {
         }
         Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }
-}
-
-fn table(path: &Path) -> Result<NamedTable, Failure> {
-    let published = published::read(path).map_err(Failure::input)?;
-    let name = path.file_name().map_or_else(|| path.to_string_lossy(), |name| name.to_string_lossy());
-    Ok(NamedTable { name: name.into_owned(), published })
 }
 
 fn rounding_parser() -> impl clap::builder::TypedValueParser<Value = Rounding> {

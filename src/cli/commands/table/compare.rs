@@ -16,7 +16,6 @@ const PAPER_STYLE: &str = "paper";
 /// Compare the tables of traces with published ones, cell by cell.
 #[derive(Clone, Debug, clap::Args)]
 pub struct CompareArgs {
-    /// What to compare.
     #[command(flatten)]
     pub traces: TraceArgs,
     /// Published cells: a CSV file with the columns experiment,model,metric,mean,se,emphasis

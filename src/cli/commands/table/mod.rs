@@ -9,7 +9,6 @@ use crate::cli::outcome::{Failure, Outcome};
 
 /// Compare and audit published tables; verify and rescore reports
 #[derive(Debug, clap::Subcommand)]
-#[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
 pub enum TableCommand {
     Compare(compare::CompareArgs),
     Audit(audit::AuditArgs),

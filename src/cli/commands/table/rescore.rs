@@ -46,7 +46,6 @@ pub struct RescoreArgs {
     /// Print what was written and what changed as JSON
     #[arg(long)]
     pub json: bool,
-    /// How many threads to use.
     #[command(flatten)]
     pub threads: ThreadArgs,
 }

@@ -18,7 +18,6 @@ use study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 /// beside the traces.
 #[derive(Clone, Debug, clap::Args)]
 pub struct CheckArgs {
-    /// The traces to read.
     #[command(flatten)]
     pub traces: TraceArgs,
     /// The largest share of replies without a decision, such as 0.05

@@ -12,7 +12,6 @@ use crate::cli::outcome::{Failure, Outcome};
 
 /// Inspect, check and rewrite traces; their schema
 #[derive(Debug, clap::Subcommand)]
-#[expect(missing_docs, reason = "the words of a command are in the file of its arguments")]
 pub enum TraceCommand {
     Info(info::InfoCommand),
     Validate(validate::ValidateCommand),

@@ -59,7 +59,7 @@ pub fn damaged_files() -> Result<Vec<DamagedFile>, Box<dyn Error>> {
 /// The table of files, and how it came to be.
 pub fn readme(files: &[DamagedFile]) -> String {
     let mut text = String::from(
-        "# Damaged traces\n\nOne tiny file for each kind of damage, the finding that `mirrorstats validate` must give \
+        "# Damaged traces\n\nOne tiny file for each kind of damage, the finding that `mirrorstats trace validate` must give \
          for it, and what is wrong.\nMade by `cargo run --example damage`; not recordings of anything.\n\n\
          | file | code | damage |\n|---|---|---|\n",
     );

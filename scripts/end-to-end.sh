@@ -29,11 +29,11 @@ page=$PWD/reports/report.html.sha256
 (cd "$out/paper" && sha256sum --check --quiet "$page")
 
 echo "end-to-end: the published tables, cell by cell"
-mirrorstats compare fixtures/paper --published fixtures/published/main_table.csv
-mirrorstats compare fixtures/paper --published fixtures/published/appendix_table.csv
+mirrorstats table compare fixtures/paper --published fixtures/published/main_table.csv
+mirrorstats table compare fixtures/paper --published fixtures/published/appendix_table.csv
 
 echo "end-to-end: the bundled traces keep every rule"
-mirrorstats validate fixtures/paper
+mirrorstats trace validate fixtures/paper
 
 echo "end-to-end: the definitions have no fault"
 mirrorstats definitions check paper
@@ -50,9 +50,9 @@ echo "end-to-end: logs as MCAP's and Foxglove's own packages read them"
 fetch "$packages" mcap mcap==1.6.0 mcap-protobuf-support==0.6.0 foxglove-schemas-protobuf==0.4.0 jsonschema==4.26.0
 mirrorstats record --agent random --experiment E4,E5 --seeds 1 --runs 2 --no-frames --out "$out/runs" 2>/dev/null
 PYTHONPATH=$packages python3 scripts/check-log.py fixtures/recorded/*.mcap "$out"/runs/*.mcap
-mirrorstats recover "$out/runs/E4-random.mcap" --out "$out/recovered.parquet"
+mirrorstats trace recover "$out/runs/E4-random.mcap" --out "$out/recovered.parquet"
 cmp "$out/runs/E4-random.parquet" "$out/recovered.parquet"
-mirrorstats replay "$out/runs"
+mirrorstats world replay "$out/runs"
 
 echo "end-to-end: the same scores from the SQL lowering on Polars, byte for byte"
 mirrorstats score fixtures/paper >"$out/native.csv"

@@ -42,7 +42,7 @@ grep -q "Claude Sonnet 4.6" "$out/example.txt"
 timed clean mirrorstats record --agent oracle --experiment E1 --seeds 1 --runs 2 --out runs
 timed clean mirrorstats report runs --out report >"$out/report.txt"
 grep -q oracle "$out/report.txt"
-clean mirrorstats replay runs
+clean mirrorstats world replay runs
 test -s "$out/env/share/man/man1/mirrorstats-report.1"
 test -s "$out/env/share/bash-completion/completions/mirrorstats"
 # A reader that has seen enough is no error, and nothing is traced back.

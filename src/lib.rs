@@ -133,7 +133,6 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
-#[doc(hidden)]
 pub mod cli;
 
 pub use exact::moments::Moments;

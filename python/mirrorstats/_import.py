@@ -28,7 +28,7 @@ def import_steps(
     """Makes a trace of steps, so that episodes of any harness can be scored.
 
     Args:
-        rows: one row per step, with the columns of the schema (`mirrorstats schema step`): an iterable of dicts, or a
+        rows: one row per step, with the columns of the schema (`mirrorstats trace schema step`): an iterable of dicts, or a
             data frame of any library that gives Arrow streams (`__arrow_c_stream__`: Polars, pandas, pyarrow, DuckDB).
             None and null stand for a value that is not there. Other columns are kept. Rows may be in any order.
         out: the trace to write, a name that ends in .parquet. Where none is given, the trace is a temporary file until
@@ -44,18 +44,24 @@ def import_steps(
     Raises:
         Error: every row that is no step and every episode that is not whole, by row; nothing is written then.
         TypeError: a value that JSON does not have, such as a date.
-        ValueError: a number that is not finite.
+        ValueError: a number that is not finite; another `cluster`, or one with `reconstruction`.
     """
     out = os.fspath(out) if out is not None else _temporary()
-    options = ["-", "--out", out, "--definitions", os.fspath(definitions)]
-    if palette is not None:
+    if cluster not in (None, "seed"):
+        raise ValueError(f"cluster: expected 'seed' or None, found {cluster!r}")
+    if cluster is not None and reconstruction:
+        raise ValueError("cluster and reconstruction exclude each other")
+    if palette is not None and not isinstance(palette, str):
         # With a comma it is no name of a file.
-        options += ["--palette", palette if isinstance(palette, str) else ",".join([*palette, ""])]
-    if cluster is not None:
-        options += ["--cluster", cluster]
-    if reconstruction:
-        options.append("--reconstruction")
-    answer = Answer(_native.import_text("rows", _lines(rows), options))
+        palette = ",".join([*palette, ""])
+    asked = {
+        "out": out,
+        "definitions": os.fspath(definitions),
+        "palette": palette,
+        "clusters_by_seed": cluster == "seed",
+        "reconstruction": reconstruction,
+    }
+    answer = Answer(_native.import_text("rows", _lines(rows), asked))
     # Where it is, not how messages call it.
     answer["out"] = out
     return answer

@@ -91,7 +91,7 @@ class Study:
         """The steps of the episodes that the filter keeps, read from the traces each time somebody asks for the rows.
 
         Args:
-            columns: the columns wanted, in this order; all if None. `mirrorstats schema` lists those of the schema. A file
+            columns: the columns wanted, in this order; all if None. `mirrorstats trace schema` lists those of the schema. A file
                 that lacks a column has null there.
 
         Raises:

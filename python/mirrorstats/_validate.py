@@ -10,7 +10,7 @@ from ._paths import Path, Paths, texts
 
 
 def validate(paths: Paths, *, definitions: Path = "paper", threads: int | None = None) -> Answer:
-    """Checks traces against every rule of the schema, as `mirrorstats validate --json`.
+    """Checks traces against every rule of the schema, as `mirrorstats trace validate --json`.
 
     Args:
         paths: files, folders or globs, one or several.
@@ -24,7 +24,4 @@ def validate(paths: Paths, *, definitions: Path = "paper", threads: int | None =
     Raises:
         Error: no such file.
     """
-    options = ["--definitions", os.fspath(definitions)]
-    if threads is not None:
-        options += ["--threads", str(threads)]
-    return Answer(_native.validate([*options, "--", *texts(paths)]))
+    return Answer(_native.validate(texts(paths), os.fspath(definitions), threads))

@@ -2,17 +2,20 @@
 
 use std::ffi::OsString;
 use std::io::Cursor;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+use std::thread::available_parallelism;
 
 use arrow::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow::json::WriterBuilder;
 use arrow::json::writer::LineDelimited;
 use mirrorstats::cli;
-use mirrorstats::cli::commands::import::ImportArgs;
-use mirrorstats::cli::commands::validate::{ValidateCommand, print};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyCapsule;
+use study::ImportRequest;
 use trace::import::Text;
+use trace::inputs;
 
 use crate::answer::{self, Answer};
 use crate::error;
@@ -23,25 +26,41 @@ pub fn run(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
     py.detach(|| cli::run_to_code(arguments))
 }
 
-/// All findings of `mirrorstats validate` with these options.
+/// All findings of traces.
 #[pyfunction]
-pub fn validate(py: Python<'_>, options: Vec<OsString>) -> PyResult<Answer> {
+pub fn validate(
+    py: Python<'_>,
+    paths: Vec<OsString>,
+    definitions: PathBuf,
+    threads: Option<NonZeroUsize>,
+) -> PyResult<Answer> {
     let found = py.detach(|| {
-        let command = cli::options_of("validate", options).map_err(|failure| error::of_failure(&failure))?;
-        ValidateCommand::findings(&command).map_err(|failure| error::of_failure(&failure))
+        let inputs = inputs::resolve(&paths, std::io::empty()).map_err(error::of_input)?;
+        let threads = threads.or_else(|| available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN);
+        study::findings(&definitions, &inputs, threads).map_err(error::of_study)
     })?;
-    let mut words = Vec::new();
-    print(&mut words, &found)?;
-    answer::of(&found, String::from_utf8_lossy(&words).into_owned())
+    answer::of(&found, study::findings_text(&found))
 }
 
-/// Makes a trace of lines of steps, as `mirrorstats import` with these options.
+/// An import as Python asks for it.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub struct ImportAsked {
+    out: PathBuf,
+    definitions: PathBuf,
+    palette: Option<PathBuf>,
+    clusters_by_seed: bool,
+    reconstruction: bool,
+}
+
+/// Makes a trace of lines of steps.
 #[pyfunction]
-pub fn import_text(py: Python<'_>, name: &str, lines: Vec<u8>, options: Vec<OsString>) -> PyResult<Answer> {
+pub fn import_text(py: Python<'_>, name: &str, lines: Vec<u8>, asked: ImportAsked) -> PyResult<Answer> {
+    let ImportAsked { out, definitions, palette, clusters_by_seed, reconstruction } = asked;
+    let request = ImportRequest { out, definitions, palette, clusters_by_seed, reconstruction };
     let imported = py.detach(|| {
-        let args: ImportArgs = cli::options_of("import", options).map_err(|failure| error::of_failure(&failure))?;
         let text = Text::spool(name, Cursor::new(lines)).map_err(error::of_input)?;
-        args.import(vec![text]).map_err(|failure| error::of_failure(&failure))
+        study::import(vec![text], &request).map_err(error::of_study)
     })?;
     let words = imported.to_string();
     answer::of(&imported, words)

@@ -7,9 +7,8 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
 use std::time::Duration;
 
-use mirrorstats::cli;
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
-use mirrorstats::cli::outcome::Failure;
+use mirrorstats::cli::{self, Failure};
 use pyo3::prelude::*;
 use world::agent::Player;
 use world::agent::exec::Images;

@@ -99,7 +99,7 @@ impl Figure {
         py.detach(|| {
             let bytes = FigureFormat::of(&path).map_err(error::of_input)?.encode(&self.figure);
             let bytes = bytes.map_err(error::of_input)?;
-            mirrorstats::cli::output::write_file(&path, &bytes).map_err(|failure| error::of_failure(&failure))
+            exact::replace::replace(&path, &bytes).map_err(|fault| error::of_writing(&path, &fault))
         })
     }
 

@@ -113,7 +113,7 @@ def preamble(bench, options, folders, episodes, load):
         "that of `score`, the cells of the query for cells are those of `report`, and `score` writes the same bytes for both",
         "orders and for one thread. Our commands and the floors are whole processes, from start to exit. Rivals in Python are",
         "timed inside, without imports; they use all cores and write the same table as zstd Parquet. The hand-written queries",
-        "are in `scripts/bench/rivals.py`; generated SQL is that of `mirrorstats sql`.",
+        "are in `scripts/bench/rivals.py`; generated SQL is that of `mirrorstats definitions sql`.",
         "",
     ]
 

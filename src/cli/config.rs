@@ -15,6 +15,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use toml::de::{DeTable, DeValue};
 
+use crate::cli::names;
 use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
 use exact::budget::{self, Limit};
 use exact::escape::visible;
@@ -186,7 +187,7 @@ impl FileReader<'_> {
         for (key, value) in table {
             let name = key.get_ref().as_ref();
             if let DeValue::Table(inner) = value.get_ref() {
-                let path = joined(path, name);
+                let path = if path.is_empty() { names::current_section(name) } else { joined(path, name) };
                 if self.choices.iter().any(|choice| is_within(&choice.command, &path)) {
                     self.table(inner, &path);
                 } else {
@@ -290,9 +291,8 @@ fn of_environment(choices: &[Choice<'_>]) -> Result<Vec<Setting>, Failure> {
     let mut found = Vec::new();
     for choice in choices {
         let long = choice.arg.get_long().unwrap_or_default();
-        let of_all = (None, format!("{PREFIX}{}", spelled(long)));
-        let of_one = (Some(choice.command.clone()), format!("{PREFIX}{}_{}", spelled(&choice.command), spelled(long)));
-        for (command, variable) in [of_all, of_one] {
+        let of_one = names_of(&choice.command).map(|name| (Some(choice.command.clone()), variable(name, long)));
+        for (command, variable) in std::iter::once((None, variable("", long))).chain(of_one) {
             let Some(value) = env::var_os(&variable) else { continue };
             let value = value.into_string().map_err(|_| refused(&variable, "expected UTF-8 text"))?;
             let origin = Origin::Variable(variable.clone());
@@ -316,8 +316,8 @@ pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
     let known: Vec<String> = choices
         .iter()
         .flat_map(|choice| {
-            let long = spelled(choice.arg.get_long().unwrap_or_default());
-            [format!("{PREFIX}{long}"), format!("{PREFIX}{}_{long}", spelled(&choice.command))]
+            let long = choice.arg.get_long().unwrap_or_default();
+            std::iter::once("").chain(names_of(&choice.command)).map(|name| variable(name, long)).collect::<Vec<_>>()
         })
         .chain([FILE_VARIABLE, ERRORS_VARIABLE, budget::SETTING].map(str::to_owned))
         .collect();
@@ -331,13 +331,19 @@ pub fn unknown_variables(command: &Command) -> Vec<(String, Option<String>)> {
     unknown.into_iter().map(with_hint).collect()
 }
 
-fn spelled(name: &str) -> String {
-    name.replace(['-', ' '], "_").to_ascii_uppercase()
+/// The variable of an option of a command; of every command without a name.
+fn variable(command: &str, long: &str) -> String {
+    let name = joined(command, long).replace(['-', ' '], "_").to_ascii_uppercase();
+    format!("{PREFIX}{name}")
+}
+
+fn names_of(command: &str) -> impl Iterator<Item = &str> {
+    std::iter::once(command).chain(names::before(command))
 }
 
 fn refused(variable: &str, why: &str) -> Failure {
     Failure::input(format!(
-        "the environment variable {}: {why}\n  help: unset it, or see `mirrorstats config --help`",
+        "the environment variable {}: {why}\n  help: unset it, or see `mirrorstats setup config --help`",
         visible(variable)
     ))
 }

@@ -1,38 +1,26 @@
 //! What `--help` says beside the options: the commands in groups, and examples of each.
 //!
-//! Rule: every command stands in one group and has an example that runs as it is written, names of files apart.
+//! Rule: every command has an example that runs as it is written, names of files apart; the first page fits a small terminal.
 
 use clap::Command;
 use clap::builder::styling::Style;
 
-use crate::cli::terminal;
-use report::tables::fit::wrapped;
-
-/// The commands by what they are for, in the order of a first use.
-const GROUPS: &[(&str, &[&str])] = &[
-    ("Record", &["record", "replay", "filmstrip", "participants", "world", "experiments", "plan"]),
-    (
-        "Score and report",
-        &["report", "view", "score", "stats", "figure", "rescore", "diff", "sensitivity", "compare", "audit", "verify"],
-    ),
-    ("Traces", &["info", "validate", "check", "import", "recover", "renormalize", "schema"]),
-    ("Definitions and queries", &["definitions", "style", "query", "sql"]),
-    ("This program", &["config", "completions", "man", "help"]),
-];
-
 /// The examples of each command: what it is typed for, and what is typed.
 const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
-    ("audit", &[("Which cells of a published table no 21 episodes can give", "audit table.csv --n 21")]),
-    ("check", &[("Fail where more than a twentieth of the replies is unreadable", "check runs --max-unreadable 0.05")]),
-    ("compare", &[("Against a published table, cell by cell", "compare runs --published table.csv")]),
+    ("table audit", &[("Which cells of a published table no 21 episodes can give", "table audit table.csv --n 21")]),
     (
-        "completions",
+        "trace check",
+        &[("Fail where more than a twentieth of the replies is unreadable", "trace check runs --max-unreadable 0.05")],
+    ),
+    ("table compare", &[("Against a published table, cell by cell", "table compare runs --published table.csv")]),
+    (
+        "setup completions",
         &[(
             "For bash, from the next shell on",
-            "completions bash > ~/.local/share/bash-completion/completions/mirrorstats",
+            "setup completions bash > ~/.local/share/bash-completion/completions/mirrorstats",
         )],
     ),
-    ("config", &[("What holds here, and where it comes from", "config")]),
+    ("setup config", &[("What holds here, and where it comes from", "setup config")]),
     ("definitions check", &[("Every fault of a file, underlined", "definitions check mine.toml")]),
     ("definitions explain", &[("A metric in words", "definitions explain MTATO")]),
     ("definitions show", &[("A file to begin with", "definitions show paper > mine.toml")]),
@@ -56,19 +44,22 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ),
         ],
     ),
-    ("filmstrip", &[("Every frame of an episode in a row", "filmstrip E1/oracle/s1/r1 runs -o strip.png")]),
+    ("world filmstrip", &[("Every frame of an episode in a row", "world filmstrip E1/oracle/s1/r1 runs -o strip.png")]),
     (
         "import",
         &[
             ("Steps of another harness, a line of JSON each", "import steps.jsonl -o mine.parquet"),
-            ("What a line may hold", "schema step"),
+            ("What a line may hold", "trace schema step"),
         ],
     ),
     (
-        "info",
-        &[("What is there, and what is missing", "info runs"), ("Every episode by its id", "info runs --episodes")],
+        "trace info",
+        &[
+            ("What is there, and what is missing", "trace info runs"),
+            ("Every episode by its id", "trace info runs --episodes"),
+        ],
     ),
-    ("man", &[("Manual pages, a file per command", "man ~/.local/share/man/man1")]),
+    ("setup man", &[("Manual pages, a file per command", "setup man ~/.local/share/man/man1")]),
     ("participants remove", &[("Out of traces, logs and journals", "participants remove P01 runs")]),
     (
         "plan",
@@ -101,9 +92,12 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ),
         ],
     ),
-    ("recover", &[("A trace out of a log that was cut off", "recover runs/E1-oracle.mcap -o E1-oracle.parquet")]),
-    ("renormalize", &[("Attributions again from the texts of old replies", "renormalize runs -o anew")]),
-    ("replay", &[("The same episodes again, step by step", "replay runs")]),
+    (
+        "trace recover",
+        &[("A trace out of a log that was cut off", "trace recover runs/E1-oracle.mcap -o E1-oracle.parquet")],
+    ),
+    ("trace renormalize", &[("Attributions again from the texts of old replies", "trace renormalize runs -o anew")]),
+    ("world replay", &[("The same episodes again, step by step", "world replay runs")]),
     (
         "report",
         &[
@@ -112,8 +106,11 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("Some episodes, in other groups", "report runs --by model,seed --where \"experiment <> 'E2'\""),
         ],
     ),
-    ("rescore", &[("A report again under another definition", "rescore reports/mine --definitions mine.toml")]),
-    ("schema", &[("What a trace is", "schema"), ("The JSON Schema of a step", "schema step")]),
+    (
+        "table rescore",
+        &[("A report again under another definition", "table rescore reports/mine --definitions mine.toml")],
+    ),
+    ("trace schema", &[("What a trace is", "trace schema"), ("The JSON Schema of a step", "trace schema step")]),
     (
         "score",
         &[
@@ -121,16 +118,19 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("Why an episode has its scores", "score runs --explain E1/oracle/s1/r1"),
         ],
     ),
-    ("sensitivity", &[("Every cell under six thresholds", "sensitivity runs --out thresholds")]),
-    ("sql", &[("The scores as a statement for DuckDB", "sql --dialect duckdb > scores.sql")]),
+    (
+        "definitions sensitivity",
+        &[("Every cell under six thresholds", "definitions sensitivity runs --out thresholds")],
+    ),
+    ("definitions sql", &[("The scores as a statement for DuckDB", "definitions sql --dialect duckdb > scores.sql")]),
     (
         "stats",
         &[("What the data can bear", "stats runs"), ("At every look, while the study runs", "stats runs --sequential")],
     ),
     ("style check", &[("Every fault of a file, underlined", "style check mine.toml")]),
     ("style show", &[("A file to begin with", "style show paper > mine.toml")]),
-    ("validate", &[("Every rule, every finding", "validate runs")]),
-    ("verify", &[("Whether a report is as it was written", "verify reports/latest")]),
+    ("trace validate", &[("Every rule, every finding", "trace validate runs")]),
+    ("table verify", &[("Whether a report is as it was written", "table verify reports/latest")]),
     (
         "view",
         &[
@@ -144,22 +144,32 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ("world sheet", &[("Pictures of the first scenes", "world sheet --out sheet.png")]),
 ];
 
-/// The same command with its help in groups and with examples.
+/// The same command with a first page of one screen, and with examples.
 pub fn with_help(command: Command) -> Command {
     let template = format!(
-        "{{about-with-newline}}\n{{usage-heading}} {{usage}}\n{}\n{}{{options}}",
-        groups(&command),
-        title("Options:")
+        "{{about-with-newline}}{{usage-heading}} {{usage}}\n\n{}\n{}",
+        first_page(&command),
+        "Options: --errors text|json, --help, --version; `help COMMAND` for the rest\n"
     );
     with_examples_alone(command.help_template(template))
 }
 
 /// The same command with examples.
 pub fn with_examples_alone(command: Command) -> Command {
-    EXAMPLES.iter().fold(command, |command, (path, examples)| {
+    let command = EXAMPLES.iter().fold(command, |command, (path, examples)| {
         let names: Vec<&str> = path.split(' ').collect();
         with_examples(command, &names, &shown(examples))
+    });
+    let nouns: Vec<String> = command.get_subcommands().filter(|inner| inner.has_subcommands()).map(name_of).collect();
+    nouns.iter().fold(command, |command, noun| {
+        let of_noun = EXAMPLES.iter().filter(|(path, _)| path.split(' ').next() == Some(noun));
+        let first: Vec<_> = of_noun.flat_map(|(_, examples)| examples.first()).copied().collect();
+        with_examples(command, &[noun], &shown(&first))
     })
+}
+
+fn name_of(command: &Command) -> String {
+    command.get_name().to_owned()
 }
 
 fn with_examples(command: Command, path: &[&str], text: &str) -> Command {
@@ -168,7 +178,7 @@ fn with_examples(command: Command, path: &[&str], text: &str) -> Command {
         [name, rest @ ..] if command.find_subcommand(name).is_some() => {
             command.mut_subcommand(name, |inner| with_examples(inner, rest, text))
         }
-        // A command that this build has not.
+        // A command of a feature that this build has not.
         _ => command,
     }
 }
@@ -178,31 +188,15 @@ fn shown(examples: &[(&str, &str)]) -> String {
     title("Examples:") + &lines.collect::<String>()
 }
 
-/// Every group with its commands, each with the first sentence of what it does.
-fn groups(command: &Command) -> String {
-    let all: Vec<(String, String)> = command
-        .get_subcommands()
-        .filter(|inner| !inner.is_hide_set())
-        .map(|inner| (inner.get_name().to_owned(), inner.get_about().map(ToString::to_string).unwrap_or_default()))
-        .chain([("help".to_owned(), "Print this message or the help of a command".to_owned())])
-        .collect();
-    let widest = all.iter().map(|(name, _)| name.len()).max().unwrap_or_default();
-    let width = terminal::width().unwrap_or(100).min(100).max(widest + 24);
-    let mut text = String::new();
-    for (group, names) in GROUPS {
-        let listed: Vec<&(String, String)> =
-            names.iter().filter_map(|name| all.iter().find(|(known, _)| known == name)).collect();
-        if listed.is_empty() {
-            continue;
-        }
-        text += "\n";
-        text += &title(&format!("{group}:"));
-        for (name, about) in listed {
-            let line = format!("  {name:widest$}  {about}");
-            text += &(wrapped(&line, width, widest + 4).join("\n") + "\n");
-        }
-    }
-    text
+/// A line for each command, then a line for each noun: what it does, up to the first colon.
+fn first_page(command: &Command) -> String {
+    let line = |inner: &Command| {
+        let about = inner.get_about().map(ToString::to_string).unwrap_or_default();
+        format!("  {:<14}{}\n", inner.get_name(), about.split(": ").next().unwrap_or_default())
+    };
+    let (nouns, verbs): (Vec<_>, Vec<_>) = command.get_subcommands().partition(|inner| inner.has_subcommands());
+    let [verbs, nouns] = [verbs, nouns].map(|all| all.into_iter().map(line).collect::<String>());
+    format!("{verbs}\n{nouns}")
 }
 
 fn title(words: &str) -> String {
@@ -214,7 +208,7 @@ fn title(words: &str) -> String {
 mod tests {
     use clap::{Command, CommandFactory as _, Parser as _};
 
-    use super::{EXAMPLES, GROUPS};
+    use super::{EXAMPLES, with_help};
     use crate::cli::Cli;
 
     /// Every command that does something, as it is typed.
@@ -229,16 +223,10 @@ mod tests {
     }
 
     #[test]
-    fn every_command_stands_in_one_group() {
-        let mut grouped: Vec<&str> = GROUPS.iter().flat_map(|(_, names)| names.iter().copied()).collect();
-        grouped.retain(|name| *name != "help");
-        grouped.sort_unstable();
-        let command = Cli::command();
-        let mut known: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
-        known.sort_unstable();
-        // A build with fewer features has fewer commands.
-        grouped.retain(|name| cfg!(feature = "sim") || known.contains(name));
-        assert_eq!(grouped, known);
+    fn the_first_page_fits_24_lines_of_80_columns() {
+        let page = with_help(Cli::command()).render_help().to_string();
+        assert!(page.lines().count() <= 24, "{page}");
+        assert!(page.lines().all(|line| line.chars().count() <= 80), "{page}");
     }
 
     #[test]
@@ -251,8 +239,8 @@ mod tests {
             for (_, typed) in *examples {
                 let typed = typed.split(" > ").next().unwrap();
                 let words = words(typed);
-                let first = words.first().map(String::as_str).unwrap_or_default();
-                if Cli::command().find_subcommand(first).is_none() && cfg!(not(feature = "sim")) {
+                let is_noun = |name: &String| Cli::command().find_subcommand(name).is_some();
+                if !words.first().is_some_and(is_noun) && cfg!(not(feature = "sim")) {
                     continue;
                 }
                 let arguments = std::iter::once("mirrorstats".to_owned()).chain(words);

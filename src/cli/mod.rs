@@ -3,32 +3,17 @@
 //! `args` is what was typed and what several verbs share; `commands/<verb>.rs` is one thin file per verb;
 //! `outcome` maps what happened to an exit code, in one place.
 
-pub mod args;
+mod answers;
 pub mod commands;
-pub mod config;
-#[cfg(feature = "sim")]
-pub mod dry_run;
-#[cfg(feature = "sim")]
-pub mod exec;
-mod experiments;
+mod config;
 mod features;
 mod help;
-#[cfg(all(feature = "sim", feature = "view"))]
-mod human;
-pub mod outcome;
-pub mod output;
-pub mod quality;
+mod names;
+mod printed;
 #[cfg(feature = "sim")]
-pub mod recording;
-#[cfg(feature = "sim")]
-mod registration;
-pub mod scoring;
-pub mod spark;
-mod terminal;
-mod text_table;
+mod recording;
+mod typed;
 mod usage;
-#[cfg(feature = "sim")]
-pub mod vlm;
 
 use std::ffi::OsString;
 use std::io::{self, Write as _};
@@ -39,11 +24,20 @@ use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use commands::Command;
 use exact::budget;
 use exact::escape::visible;
-use outcome::{ErrorFormat, Failure, Outcome};
+use outcome::{ErrorFormat, Outcome};
+
+pub use answers::schemas;
+pub use outcome::{ErrorAnswer, Failure};
+use printed::{outcome, output, quality, terminal, text_table};
+#[cfg(all(feature = "sim", feature = "view"))]
+use recording::human;
+#[cfg(feature = "sim")]
+use recording::{dry_run, exec, registration, vlm};
+use typed::{args, experiments, scoring, spark};
 
 pub(crate) const NAME: &str = "mirrorstats";
 
-/// Score mirror self-recognition episodes: step traces in, exact metrics, tables and reports out.
+/// Score mirror self-recognition episodes: traces in, exact metrics and reports out.
 #[derive(Debug, Parser)]
 #[command(name = NAME, version, long_version = long_version(), propagate_version = true, max_term_width = 100)]
 struct Cli {
@@ -73,7 +67,7 @@ pub fn run(arguments: impl IntoIterator<Item = OsString>) -> ExitCode {
 
 /// As [`run`]; gives the code as a number, for a process that is not ours to end.
 pub fn run_to_code(arguments: impl IntoIterator<Item = OsString>) -> u8 {
-    let arguments: Vec<OsString> = arguments.into_iter().collect();
+    let arguments = names::current(arguments.into_iter().collect());
     let format = ErrorFormat::asked_for(&arguments);
     let answer = execute(arguments.clone()).map_err(|failure| scoring::with_commands(failure, &arguments));
     let code = outcome::exit_code(answer.and_then(flushed), format);

@@ -7,7 +7,7 @@ use crate::cli::features;
 use exact::suggest;
 
 /// The commands of the feature `sim`.
-const OF_SIM: [&str; 4] = ["record", "replay", "filmstrip", "world"];
+const OF_SIM: [&str; 2] = ["record", "world"];
 
 /// An error that names the commands which have a refused option, and the feature that has a refused command.
 pub fn with_tips(mut error: Error, command: &Command) -> Error {
@@ -62,10 +62,16 @@ fn of_feature(name: &str) -> Option<String> {
     })
 }
 
-/// The command whose name is nearest, or where they are listed.
+/// The command whose last word is nearest, or where they are listed.
 fn similar(name: &str, command: &Command) -> String {
-    match suggest::nearest(name, command.get_subcommands().map(Command::get_name)) {
-        Some(near) => format!("a similar command exists: `{near}`"),
+    let nouns: Vec<&Command> = command.get_subcommands().collect();
+    let verbs = nouns.iter().flat_map(|noun| noun.get_subcommands().map(move |verb| (noun.get_name(), verb)));
+    let verbs = verbs.map(|(noun, verb)| (verb.get_name(), format!("{noun} {}", verb.get_name())));
+    let all: Vec<(&str, String)> =
+        nouns.iter().map(|noun| (noun.get_name(), noun.get_name().to_owned())).chain(verbs).collect();
+    let near = suggest::nearest(name, all.iter().map(|(last, _)| *last));
+    match near.and_then(|near| all.iter().find(|(last, _)| *last == near)) {
+        Some((_, path)) => format!("a similar command exists: `{path}`"),
         None => "`mirrorstats help` lists the commands".to_owned(),
     }
 }

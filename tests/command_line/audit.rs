@@ -68,7 +68,7 @@ fn rows_may_have_their_own_number_of_episodes() {
     let folder = tempfile::tempdir().unwrap();
     let table = "experiment,model,metric,mean,se,emphasis\nE1,a,TSA,0.57,0.11,\nE2,a,TSA,0.50,0.11,\n";
     fs::write(folder.path().join("t.csv"), table).unwrap();
-    let audit = |n: &str| run(folder.path(), &["audit", "t.csv", "--n", n]);
+    let audit = |n: &str| run(folder.path(), &["table", "audit", "t.csv", "--n", n]);
     assert!(audit("21").ends(1).stdout.contains("no count over 21 episodes has a mean that prints 0.50"));
     audit("E1=21,E2=22").done();
     audit("21,E2/a=22").done();
@@ -88,5 +88,5 @@ fn large_numbers_are_decided_in_time() {
     let header = "experiment,model,metric,mean,se,emphasis\n";
     let table = "E1,a,TSA,0.57,0.01,\nE1,a,TSA-C,0.80,0.01,\nE1,a,MCR,0.71,0.01,\nE1,a,MTATO,0.58,0.01,\nE1,a,TTD,47.67,0.81,\n";
     fs::write(folder.path().join("t.csv"), header.to_owned() + table).unwrap();
-    run(folder.path(), &["audit", "t.csv", "--n", "2000", "--rounding", "half-even"]).done();
+    run(folder.path(), &["table", "audit", "t.csv", "--n", "2000", "--rounding", "half-even"]).done();
 }

@@ -243,7 +243,7 @@ fn a_claimed_color_that_nothing_has_is_a_note() {
         (["b.parquet", "f", "self_color", "`gren` in 1 row, first in this one"], 4),
     ];
     assert_eq!(told, expected);
-    let text = run(at, &["validate", "a.parquet", "b.parquet"]).done();
+    let text = run(at, &["trace", "validate", "a.parquet", "b.parquet"]).done();
     assert!(text.contains("unseen-color: a.parquet, row group 0, episode `e`, t = 2, column `self_color`"), "{text}");
     assert!(text.ends_with("0 errors, 2 notes\n"), "{text}");
     // A body of that colour in any of the inputs is enough.

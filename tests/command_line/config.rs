@@ -107,8 +107,8 @@ fn every_fault_of_the_file_is_underlined_before_anything_runs() {
     }
     assert!(!folder.path().join("reports").exists());
     assert!(run(folder.path(), &["report", "--help"]).done().contains("Usage"));
-    assert!(run(folder.path(), &["completions", "bash"]).done().contains("mirrorstats"));
-    let refused = run(folder.path(), &["config"]).refused();
+    assert!(run(folder.path(), &["setup", "completions", "bash"]).done().contains("mirrorstats"));
+    let refused = run(folder.path(), &["setup", "config"]).refused();
     assert!(refused.contains("5 faults"), "{refused}");
     let wrong =
         with(tempfile::tempdir().unwrap().path(), &[("MIRRORSTATS_THREADS", "many")], &["score", "x"]).refused();
@@ -144,29 +144,29 @@ fn errors_are_told_as_one_json_object_where_that_is_asked_for() {
 fn a_refused_option_or_command_is_told_where_it_is() {
     let here = Path::new(".");
     let refused = run(here, &["stats", "runs", "--published", "x.csv"]).refused();
-    assert!(refused.contains("tip: `--published` is an option of `compare`"), "{refused}");
+    assert!(refused.contains("tip: `--published` is an option of `table compare`"), "{refused}");
     let refused = run(here, &["ls"]).refused();
     assert!(
         refused.contains("tip: `mirrorstats help` lists the commands") && !refused.contains("filmstrip"),
         "{refused}"
     );
     let refused = run(here, &["valdate"]).refused();
-    assert!(refused.contains("a similar command exists: `validate`"), "{refused}");
+    assert!(refused.contains("a similar command exists: `trace validate`"), "{refused}");
 }
 
 #[test]
 fn shells_and_manuals_know_every_command() {
     let folder = tempfile::tempdir().unwrap();
     for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        assert!(run(folder.path(), &["completions", shell]).done().contains("renormalize"), "{shell}");
+        assert!(run(folder.path(), &["setup", "completions", shell]).done().contains("renormalize"), "{shell}");
     }
-    run(folder.path(), &["man", "pages/man1"]).ends(0);
+    run(folder.path(), &["setup", "man", "pages/man1"]).ends(0);
     let page = fs::read_to_string(folder.path().join("pages/man1/mirrorstats-score.1")).unwrap();
     assert!(page.contains("\\-\\-explain") && page.contains("Examples:"), "{page}");
     let nested = folder.path().join("pages/man1/mirrorstats-definitions-check.1");
     assert!(nested.is_file());
     let whole = fs::read_to_string(folder.path().join("pages/man1/mirrorstats.1")).unwrap();
-    for command in ["report", "config", "renormalize"] {
+    for command in ["report", "setup", "trace"] {
         assert!(whole.contains(command), "{command}");
     }
 }

@@ -150,12 +150,12 @@ fn every_command_takes_a_declared_experiment() {
     let answer = run(at, &[&asked, &TRACES[..], &["--format", "csv"]].concat()).done();
     assert_eq!(answer, "experiment,n\nA7,8\nE1,8\nE6,8\n");
     fs::write(at.join("own.toml"), "include = [\"paper\"]\n[let]\nvisible = \"t = 2\"\n").unwrap();
-    run(at, &["rescore", "report", "--definitions", "own.toml", "--traces", "."]).done();
+    run(at, &["table", "rescore", "report", "--definitions", "own.toml", "--traces", "."]).done();
     let again = fs::read_to_string(at.join("report-rescored/tables/main.md")).unwrap();
     assert!(again.contains("E6: Delayed mirror"), "{again}");
     let published = "experiment,model,metric,mean,se,emphasis\nE6,ant,TSA,0.50,,\n";
     fs::write(at.join("published.csv"), published).unwrap();
-    let compared = run(at, &["compare", "--published", "published.csv", "six.parquet"]);
+    let compared = run(at, &["table", "compare", "--published", "published.csv", "six.parquet"]);
     assert!([0, 1].contains(&compared.code) && compared.stderr.is_empty(), "{}", compared.stderr);
     run(at, &["diff", "paper", "own.toml", "six.parquet"]).done();
 }
@@ -194,7 +194,7 @@ fn a_threshold_of_evidence_keeps_a_declared_experiment() {
     let mut one = episode("ant", "E6", 0, "red");
     one.steps.iter_mut().for_each(|step| step.extra.mirror_self_px = Some(20));
     write_episodes(&at.join("six.parquet"), Some(json!({ "experiment": six() })), &[one]).unwrap();
-    let told = run(at, &["sensitivity", "six.parquet", "--thresholds", "10,30"]).done();
+    let told = run(at, &["definitions", "sensitivity", "six.parquet", "--thresholds", "10,30"]).done();
     assert!(told.contains("E6"), "{told}");
 }
 
@@ -210,7 +210,7 @@ fn an_experiment_that_nobody_declares_is_refused_as_before() {
     );
     let polars = run(at, &["score", "nine.parquet", "--engine", "polars"]).refused();
     assert!(polars.contains("unknown-experiment: nine.parquet"), "{polars}");
-    let told = run(at, &["validate", "nine.parquet"]).ends(1).stdout;
+    let told = run(at, &["trace", "validate", "nine.parquet"]).ends(1).stdout;
     assert!(told.contains("unknown-experiment") && told.contains("found `E9`"), "{told}");
     // What one trace declares holds for those beside it, in any order.
     write(at, "bare", "E6", &json!({}));
@@ -274,7 +274,7 @@ fn what_the_definitions_say_counts() {
     write(at, "zero", "E6", &json!({ "experiment": with(six(), "title", json!("Other")) }));
     let table = run(at, &["report", "six.parquet", "zero.parquet", "--definitions", "own.toml"]).done();
     assert!(table.contains("E6: Own") && !table.contains("Delayed"), "{table}");
-    let told = run(at, &["validate", "six.parquet", "--definitions", "own.toml", "--json"]).json();
+    let told = run(at, &["trace", "validate", "six.parquet", "--definitions", "own.toml", "--json"]).json();
     let codes: Vec<&str> =
         told["findings"].as_array().unwrap().iter().map(|finding| finding["code"].as_str().unwrap()).collect();
     let overridden = "experiment-overridden";
@@ -301,7 +301,7 @@ fn a_declaration_that_is_not_as_it_must_be_is_an_error_of_its_file() {
             let message = run(at, &[arguments, &["bad.parquet"]].concat()).refused();
             assert!(message.contains("bad.parquet") && message.contains(words), "{message}");
         }
-        let told = run(at, &["validate", "bad.parquet"]).ends(1).stdout;
+        let told = run(at, &["trace", "validate", "bad.parquet"]).ends(1).stdout;
         assert!(told.contains("bad.parquet") && !told.contains('\u{1b}'), "{told}");
     }
 }

@@ -36,12 +36,13 @@ fn generated_traces_of_both_orders_keep_every_rule_and_score_the_same() {
         let study = Study::new(7, STEPS, optional);
         generate(at, name, &study, order);
         assert_eq!(contents(&at.join(name)).len(), FILES);
-        let validated = run(at, &["validate", name, "--json"]).done();
+        let validated = run(at, &["trace", "validate", name, "--json"]).done();
         let validated: serde_json::Value = serde_json::from_str(&validated).unwrap();
         // In so few episodes agents claim colours that no body has, which is noted, as unreadable replies are.
         let findings = validated["findings"].as_array().unwrap();
         assert!(findings.iter().all(|finding| finding["severity"] == "note"), "{name}: {findings:?}");
-        let info: serde_json::Value = serde_json::from_str(&run(at, &["info", name, "--json"]).done()).unwrap();
+        let info: serde_json::Value =
+            serde_json::from_str(&run(at, &["trace", "info", name, "--json"]).done()).unwrap();
         assert_eq!((info["steps"].as_u64(), info["episodes"].as_u64()), (Some(STEPS), Some(study.episodes())));
         let required = COLUMNS.iter().filter(|column| column.required).count();
         let columns = info["columns"].as_array().unwrap().len();

@@ -112,7 +112,7 @@ fn values_in_a_faulty_trace_are_shown_and_do_not_act() {
         let answer = run(at, &["report", "a.parquet"]);
         check(&answer);
         assert!(answer.refused().contains("unknown-experiment"));
-        check(&run(at, &["validate", "a.parquet"]));
+        check(&run(at, &["trace", "validate", "a.parquet"]));
     }
     assert_eq!(contents(at).len(), 1);
 }

@@ -28,6 +28,7 @@ mod quality;
 mod readme;
 mod refusals;
 #[cfg(unix)]
+mod renamed;
 mod reports;
 mod scores;
 mod sensitivity;

@@ -104,7 +104,7 @@ fn an_unknown_experiment_is_accepted_where_the_file_says_so() {
     for definitions in ["open.toml", "named.toml"] {
         let scores = run(folder.path(), &["score", "a.parquet", "--definitions", definitions]).done();
         assert_eq!(column(&scores, "experiment"), ["E9"]);
-        let checked = run(folder.path(), &["validate", "a.parquet", "--definitions", definitions]);
+        let checked = run(folder.path(), &["trace", "validate", "a.parquet", "--definitions", definitions]);
         assert_eq!(checked.code, 0, "{}", checked.stdout);
     }
 }

@@ -98,7 +98,7 @@ fn each_command_takes_the_definitions_that_the_traces_name() {
     }
     let stats = run(at, &["stats", "reach.parquet", "--metric", "SUCCESS"]).done();
     assert!(stats.contains("SUCCESS"), "{stats}");
-    assert!(run(at, &["sql", "mark.parquet"]).done().contains("MARK_REPORT"));
+    assert!(run(at, &["definitions", "sql", "mark.parquet"]).done().contains("MARK_REPORT"));
     assert!(run(at, &["score", "mark.parquet", "--explain", "a"]).done().contains("MARK_REPORT"));
     run(at, &["figure", "slopes", "mark.parquet", "cube.parquet", "-o", "slopes.svg"]).done();
 }

@@ -105,21 +105,24 @@ fn quality_is_in_reports_in_info_and_in_check() {
     assert!(table.contains("| E1 | m | 8 | 2 | 24 | 2/24 (8.3 %) | timeout 2 | 6: case 6, fence 6 |"), "{table}");
     assert!(fs::read_to_string(at.join("out/report.html")).unwrap().contains("<section id=\"quality\">"));
     assert!(at.join("out/tables/quality.tex").is_file());
-    let info: Value = run(at, &["info", "a.parquet", "--json"]).json();
+    let info: Value = run(at, &["trace", "info", "a.parquet", "--json"]).json();
     let cell = &info["quality"][0];
     assert_eq!(
         [&cell["lost"], &cell["statuses"]["timeout"], &cell["repairs"]["fence"]],
         [&json!(2), &json!(2), &json!(6)]
     );
     assert_eq!(cell["cost_nano_usd"]["sum"], json!(24_000_000));
-    assert!(run(at, &["info", "a.parquet"]).done().contains("timeout 2"));
-    run(at, &["check", "a.parquet", "--max-unreadable", "0.1", "--max-lost", "2", "--max-latency", "100"]).done();
-    let failed = run(at, &["check", "a.parquet", "--max-unreadable", "0.05", "--max-lost", "0"]).ends(1).stdout;
+    assert!(run(at, &["trace", "info", "a.parquet"]).done().contains("timeout 2"));
+    run(at, &["trace", "check", "a.parquet", "--max-unreadable", "0.1", "--max-lost", "2", "--max-latency", "100"])
+        .done();
+    let failed =
+        run(at, &["trace", "check", "a.parquet", "--max-unreadable", "0.05", "--max-lost", "0"]).ends(1).stdout;
     assert!(failed.contains("E1, m: --max-unreadable: expected at most 0.05, found 0.0833"), "{failed}");
     assert!(failed.contains("--max-lost: expected at most 0, found 2"), "{failed}");
-    let answer: Value =
-        serde_json::from_str(&run(at, &["check", "a.parquet", "--max-unreadable", "0.05", "--json"]).ends(1).stdout)
-            .unwrap();
+    let answer: Value = serde_json::from_str(
+        &run(at, &["trace", "check", "a.parquet", "--max-unreadable", "0.05", "--json"]).ends(1).stdout,
+    )
+    .unwrap();
     let violation = json!({
         "cell": { "experiment": "E1", "model": "m", "condition": "default" },
         "limit": "max-unreadable", "expected": 0.05, "found": 2.0 / 24.0,
@@ -127,8 +130,8 @@ fn quality_is_in_reports_in_info_and_in_check() {
     assert_eq!(answer["violations"], json!([violation]));
     assert_eq!([&answer["holds"], &answer["not_recorded"]], [&json!(false), &json!([])]);
     assert!(answer.get("passed").is_none());
-    assert!(run(at, &["check", "a.parquet"]).refused().contains("expected a limit to check"));
-    assert_eq!(run(at, &["check", "a.parquet", "--max-unreadable", "5"]).code, 2);
+    assert!(run(at, &["trace", "check", "a.parquet"]).refused().contains("expected a limit to check"));
+    assert_eq!(run(at, &["trace", "check", "a.parquet", "--max-unreadable", "5"]).code, 2);
 }
 
 #[test]
@@ -136,10 +139,11 @@ fn what_is_not_recorded_passes_no_check_and_is_not_zero() {
     let folder = tempfile::tempdir().unwrap();
     let episodes = [episode("e1", vec![Step { action: Some(Action::Done), ..Step::default() }])];
     write_trace(&folder.path().join("a.parquet"), &episodes, OptionalColumns::NONE);
-    let failed = run(folder.path(), &["check", "a.parquet", "--max-unreadable", "1"]).ends(1).stdout;
+    let failed = run(folder.path(), &["trace", "check", "a.parquet", "--max-unreadable", "1"]).ends(1).stdout;
     let told = "E1, m: --max-unreadable: not recorded for 1 of 1 steps, so the limit cannot be checked";
     assert!(failed.contains(told), "{failed}");
-    let failed = run(folder.path(), &["check", "a.parquet", "--max-lost", "9", "--max-latency", "9"]).ends(1).stdout;
+    let failed =
+        run(folder.path(), &["trace", "check", "a.parquet", "--max-lost", "9", "--max-latency", "9"]).ends(1).stdout;
     assert!(failed.contains("--max-lost: not recorded") && failed.contains("--max-latency: not recorded"), "{failed}");
     run(folder.path(), &["report", "a.parquet", "--out", "out"]).done();
     let quality = fs::read_to_string(folder.path().join("out/tables/quality.md")).unwrap();
@@ -177,9 +181,9 @@ fn an_experiment_that_the_definitions_describe_otherwise_is_a_note() {
     let mut writer = TraceWriter::create(&path, &metadata).unwrap();
     writer.write(&episode("e1", vec![Step { action: Some(Action::Done), ..Step::default() }])).unwrap();
     writer.finish().unwrap();
-    let told = run(folder.path(), &["validate", "a.parquet"]).done();
+    let told = run(folder.path(), &["trace", "validate", "a.parquet"]).done();
     assert!(told.contains("the chance level of TSA of `E1` as the definitions give it: 1/3"), "{told}");
     assert!(told.contains("found `Other`") && told.contains("0 errors, 2 notes"), "{told}");
-    let findings: Value = run(folder.path(), &["validate", "a.parquet", "--json"]).json();
+    let findings: Value = run(folder.path(), &["trace", "validate", "a.parquet", "--json"]).json();
     assert_eq!(findings["findings"][0]["code"], "experiment-overridden");
 }

@@ -58,9 +58,14 @@ fn a_threshold_that_matters_is_told_in_sentences() {
     let answer = run(folder.path(), &arguments);
     assert_eq!(answer.stderr, "note: 1 episode was lost for want of an answer: in no denominator\n");
     assert_shown!(arguments.join(" "), answer.done());
-    let none = run(folder.path(), &["sensitivity", ".", "--where", "experiment = 'E1'", "--thresholds", "60"]).done();
+    let none =
+        run(folder.path(), &["definitions", "sensitivity", ".", "--where", "experiment = 'E1'", "--thresholds", "60"])
+            .done();
     assert!(none.ends_with("\nNo conclusion changes.\n"), "{none}");
-    let filtered = run(folder.path(), &["sensitivity", ".", "--where", "MCR = 1", "--thresholds", "1,60", "--json"]);
+    let filtered = run(
+        folder.path(),
+        &["definitions", "sensitivity", ".", "--where", "MCR = 1", "--thresholds", "1,60", "--json"],
+    );
     assert!(filtered.stderr.contains("note: the filter depends on `visible`"), "{}", filtered.stderr);
     let cells = filtered.json()["cells"].as_array().unwrap().clone();
     let episodes = |threshold: Value| {
@@ -164,7 +169,8 @@ fn what_a_threshold_cannot_be_asked_of_is_refused() {
         let message = run(folder.path(), &[&["sensitivity"], arguments].concat()).refused();
         assert!(words.iter().all(|word| message.contains(word)), "{arguments:?}: {message}");
     }
-    let usage = run(folder.path(), &["sensitivity", "a.parquet", "--thresholds", "1,0"]).ends(2).stderr;
+    let usage = run(folder.path(), &["definitions", "sensitivity", "a.parquet", "--thresholds", "1,0"]).ends(2).stderr;
     assert!(usage.contains("whole numbers of pixels from 1 on"), "{usage}");
-    run(folder.path(), &["sensitivity", "some.parquet", "--where", "all(mirror_self_px is not null)"]).done();
+    run(folder.path(), &["definitions", "sensitivity", "some.parquet", "--where", "all(mirror_self_px is not null)"])
+        .done();
 }

@@ -5,15 +5,6 @@ use std::path::PathBuf;
 
 use metric::explain::Explanation;
 use metric::shape::DefinitionFile;
-use mirrorstats::cli::commands::check::QualityCheckAnswer;
-use mirrorstats::cli::commands::definitions::CheckAnswer;
-use mirrorstats::cli::commands::experiments::ExperimentsAnswer;
-use mirrorstats::cli::commands::import::ImportAnswer;
-use mirrorstats::cli::commands::recover::RecoverAnswer;
-use mirrorstats::cli::commands::renormalize::RenormalizeAnswer;
-use mirrorstats::cli::commands::report::ReportAnswer;
-use mirrorstats::cli::commands::rescore::RescoreAnswer;
-use mirrorstats::cli::commands::schema::Name;
 use report::audit::Audit;
 use report::bundle::Manifest;
 use report::cells::diff::Changes;
@@ -28,9 +19,11 @@ use schemars::schema_for;
 use score::evidence::Evidence;
 use serde_json::{Value, json};
 use study::verify::Verification;
+use study::{ImportAnswer, QualityCheckAnswer};
 use trace::describe::SchemaDocument;
 use trace::info::Info;
 use trace::log::message::{Decision, EpisodeMessage};
+use trace::renormalize::RenormalizeAnswer;
 use trace::validate::Validation;
 use world::agent::reply;
 use world::experiment::Experiment;
@@ -41,51 +34,39 @@ fn folder() -> PathBuf {
 
 /// Every file of the folder: what a person writes, what the program reads and prints as JSON.
 fn current() -> Vec<(&'static str, Value)> {
-    #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
     let mut schemas = vec![
         ("audit", json!(schema_for!(Audit))),
         ("check", json!(schema_for!(QualityCheckAnswer))),
         ("comparison", json!(schema_for!(Comparison))),
         ("decision", json!(schema_for!(Decision))),
-        ("definitions-check", json!(schema_for!(CheckAnswer))),
         ("definitions-explain", json!(schema_for!(Explanation))),
         ("definitions", json!(schema_for!(DefinitionFile))),
         ("diff", json!(schema_for!(Changes))),
         ("episode", json!(schema_for!(EpisodeMessage))),
-        ("experiment", Name::Experiment.document()),
-        ("experiments", Name::Experiments.document()),
-        ("experiments-check", json!(schema_for!(ExperimentsAnswer))),
         ("errata", json!(schema_for!(Errata))),
         ("import", json!(schema_for!(ImportAnswer))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),
         ("plan", json!(schema_for!(Plan))),
         ("plan-register", json!(schema_for!(RegisteredPlan))),
-        ("recover", json!(schema_for!(RecoverAnswer))),
-        ("report", json!(schema_for!(ReportAnswer))),
         ("renormalize", json!(schema_for!(RenormalizeAnswer))),
-        ("reply-cubes", Name::ReplyCubes.document()),
-        ("reply-exploration", Name::ReplyExploration.document()),
-        ("rescore", json!(schema_for!(RescoreAnswer))),
         ("score-explain", json!(schema_for!(Evidence))),
         ("sensitivity", json!(schema_for!(Sensitivity))),
         ("stats", json!(schema_for!(Statistics))),
         ("stats-sequential", json!(schema_for!(Sequential))),
         ("style", json!(schema_for!(StyleFile))),
-        ("step", Name::Step.document()),
         ("trace", json!(SchemaDocument::current())),
         ("validation", json!(schema_for!(Validation))),
         ("verify", json!(schema_for!(Verification))),
     ];
+    schemas.extend(mirrorstats::cli::schemas());
     #[cfg(feature = "sim")]
     schemas.extend([
         ("participants-remove", json!(schema_for!(world::record::participants::Removed))),
-        ("record", json!(schema_for!(mirrorstats::cli::recording::RecordAnswer))),
         ("census", json!(schema_for!(world::sim::visibility::Visibility))),
         ("replay", json!(schema_for!(world::replay::verify::ReplayAnswer))),
         ("exec-message", json!(schema_for!(world::agent::exec::message::Message))),
         ("lost", json!(schema_for!(world::record::failures::LostEpisode))),
-        ("record-forecast", json!(schema_for!(mirrorstats::cli::dry_run::ForecastAnswer))),
         ("scene", json!(schema_for!(world::sim::scene::Scene))),
         ("world-config", json!(schema_for!(world::sim::config::WorldConfig))),
     ]);

@@ -95,7 +95,7 @@ fn run(folder: &Path, arguments: &[&str], input: &str) -> (i32, String, String) 
 fn what_the_writer_makes_is_valid() {
     let folder = folder();
     for threads in ["1", "8"] {
-        let (code, out, err) = run(folder.path(), &["validate", "runs", "--threads", threads], "");
+        let (code, out, err) = run(folder.path(), &["trace", "validate", "runs", "--threads", threads], "");
         assert_eq!((code, err.as_str()), (0, ""), "{out}");
         assert_eq!(out, "2 files, 7 episodes, 21 steps checked: 0 errors, 0 notes\n");
     }
@@ -124,7 +124,7 @@ fn every_way_to_name_the_files_gives_the_same() {
 #[test]
 fn info_counts_and_names_what_is_missing() {
     let folder = folder();
-    let (code, out, _) = run(folder.path(), &["info", "--json", "runs"], "");
+    let (code, out, _) = run(folder.path(), &["trace", "info", "--json", "runs"], "");
     let info: Value = serde_json::from_str(&out).unwrap();
     assert_eq!(code, 0);
     assert_eq!((&info["episodes"], &info["steps"]), (&json!(7), &json!(21)));
@@ -139,7 +139,7 @@ fn info_counts_and_names_what_is_missing() {
     let file = &info["files"][0];
     assert_eq!((&file["name"], &file["recording"]), (&json!("runs/a.parquet"), &json!({"view": [64, 48]})));
     assert_eq!(file["writer"], concat!("mirrorstats ", env!("CARGO_PKG_VERSION")));
-    let (_, text, _) = run(folder.path(), &["info", "runs"], "");
+    let (_, text, _) = run(folder.path(), &["trace", "info", "runs"], "");
     assert!(text.contains("E2, b: 2/1"), "{text}");
     assert!(!text.contains(&*folder.path().to_string_lossy()), "an absolute path: {text}");
 }
@@ -151,11 +151,11 @@ fn findings_are_bounded_for_people_and_whole_for_programs() {
     for name in ["1.parquet", "2.parquet"] {
         write_episodes(&folder.path().join(name), None, &twice).unwrap();
     }
-    let (code, out, _) = run(folder.path(), &["validate", "1.parquet", "2.parquet"], "");
+    let (code, out, _) = run(folder.path(), &["trace", "validate", "1.parquet", "2.parquet"], "");
     assert_eq!(code, 1);
     assert_eq!(out.matches("episode-in-two-files: 2.parquet, row group 0").count(), 10, "{out}");
     assert!(out.contains("episode-in-two-files: 2.parquet, and 5 more of these"), "{out}");
-    let (code, out, _) = run(folder.path(), &["validate", "--json", "1.parquet", "2.parquet"], "");
+    let (code, out, _) = run(folder.path(), &["trace", "validate", "--json", "1.parquet", "2.parquet"], "");
     let report: Value = serde_json::from_str(&out).unwrap();
     assert_eq!((code, report["findings"].as_array().unwrap().len()), (1, 15));
 }
@@ -175,7 +175,7 @@ fn what_cannot_be_read_is_bad_usage() {
         assert!(err.contains(why), "{arguments:?}: {err}");
     }
     fs::write(folder.path().join("runs/c.parquet"), "").unwrap();
-    let (code, _, err) = run(folder.path(), &["info", "runs"], "");
+    let (code, _, err) = run(folder.path(), &["trace", "info", "runs"], "");
     assert_eq!(code, 2);
     assert!(err.starts_with("error: empty-file: runs/c.parquet\n  expected a Parquet file\n  found 0 bytes"), "{err}");
 }
@@ -183,7 +183,7 @@ fn what_cannot_be_read_is_bad_usage() {
 #[test]
 fn schema_prints_every_column_and_rule() {
     let folder = tempfile::tempdir().unwrap();
-    let (code, text, _) = run(folder.path(), &["schema"], "");
+    let (code, text, _) = run(folder.path(), &["trace", "schema"], "");
     assert_eq!(code, 0);
     for name in COLUMNS.iter().map(|column| column.name).chain(Code::ALL.map(Code::name)) {
         assert!(text.contains(name), "{name}");
@@ -196,7 +196,7 @@ fn schema_prints_every_column_and_rule() {
         let before = if values.is_empty() { column.doc } else { &values };
         assert!(words.contains(&format!("{before}{default} Since version {}.", column.since)), "{}", column.name);
     }
-    let (_, printed, _) = run(folder.path(), &["schema", "--json"], "");
+    let (_, printed, _) = run(folder.path(), &["trace", "schema", "--json"], "");
     assert_eq!(printed, kept("trace.schema.json"));
 }
 

@@ -226,7 +226,9 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
     for (name, (declared, place)) in &document.columns {
         if name == "t" || columns.of_schema(name).is_some_and(|known| known != *declared) {
             let message = format!("`{name}` is a column of every trace and cannot be declared as another");
-            faults.push(Fault::new(place.clone(), message).help("remove the declaration: `mirrorstats schema` has it"));
+            faults.push(
+                Fault::new(place.clone(), message).help("remove the declaration: `mirrorstats trace schema` has it"),
+            );
         } else if let Some(found) = columns.get(name).filter(|found| found.ty != declared.ty) {
             let (declared, found) = (declared.ty.name(), found.ty.name());
             let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");

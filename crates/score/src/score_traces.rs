@@ -137,7 +137,8 @@ pub fn has_value(name: &str) -> bool {
 
 /// The columns that definitions may name over these traces: those of the schema, and the traces' own.
 pub fn trace_columns(traces: &TraceSet) -> Columns {
-    let mut columns = schema_columns().with_help("`mirrorstats schema` and `mirrorstats info` list the columns");
+    let mut columns =
+        schema_columns().with_help("`mirrorstats trace schema` and `mirrorstats trace info` list the columns");
     set_fallbacks(&mut columns, |name| traces.declares(name));
     for name in traces.column_names().into_iter().filter(|name| *name != "t") {
         if schema::column(name).is_some_and(|known| known.since > 1 && !traces.declares(name)) {

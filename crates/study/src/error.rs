@@ -12,6 +12,7 @@ use exact::replace::TargetIsInput;
 use metric::definitions::{ReplaceError, UnknownMetric};
 use metric::fault::Faults;
 use metric::file::FileError;
+use report::audit::AuditError;
 use report::bundle::BundleError;
 use report::cells::group::GroupError;
 use report::comparison::ComparisonError;
@@ -25,6 +26,7 @@ use score::format::FormatError;
 use score::score_traces::ScoreError;
 use score::select::SelectError;
 use trace::error::TraceError;
+use trace::import::ImportError;
 use trace::lost::LostListError;
 
 /// Why a study gives no answer. Each message says what, where, expected, found, and what to do.
@@ -68,7 +70,7 @@ pub enum StudyError {
     /// Traces that do not record what a threshold is of.
     #[error(
         "expected traces with the column `{column}`, to which a threshold applies: {problem}\n  \
-         help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats info` lists the columns"
+         help: give traces that record it, as those of `mirrorstats record` do; `mirrorstats trace info` lists the columns"
     )]
     NoPixels {
         /// The column.
@@ -275,6 +277,17 @@ pub enum StudyError {
         /// The option or the command.
         what: &'static str,
     },
+    /// The colours of an import cannot be taken.
+    #[error("--palette {typed}: {words}")]
+    Palette {
+        /// As typed.
+        typed: String,
+        /// What is wrong, and a remedy.
+        words: String,
+    },
+    /// Lines of steps are not as they must be.
+    #[error(transparent)]
+    Import(#[from] ImportError),
     /// The traces are not as they must be.
     #[error(transparent)]
     Trace(#[from] TraceError),
@@ -317,6 +330,9 @@ pub enum StudyError {
     /// A published table is not the one that the traces give.
     #[error(transparent)]
     Comparison(#[from] ComparisonError),
+    /// Published tables cannot be audited.
+    #[error(transparent)]
+    Audit(#[from] AuditError),
     /// A figure cannot be drawn.
     #[error(transparent)]
     Figure(#[from] FigureError),

@@ -11,6 +11,7 @@
 
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
+mod audit;
 mod backend;
 mod between;
 mod design;
@@ -19,6 +20,8 @@ mod empty_filter;
 mod error;
 mod experiment_findings;
 mod figure_inputs;
+mod findings;
+mod import;
 mod input_hashes;
 mod inputs;
 mod losses;
@@ -26,6 +29,9 @@ mod overview;
 mod own_definitions;
 mod pooled;
 mod provenance;
+mod quality_check;
+#[cfg(feature = "polars")]
+mod query;
 mod report;
 mod rescore;
 mod results;
@@ -66,16 +72,19 @@ use trace::inputs::Input;
 use trace::open::TraceSet;
 use trace::steps::Steps;
 
+pub use audit::{AuditRequest, audit_tables};
 pub use backend::Backend;
 pub use backend::{SparkJob, are_uris};
 pub use diff::{Diff, DiffRequest, Side, diff};
 pub use error::StudyError;
-pub use experiment_findings::experiment_findings;
 pub use figure_inputs::{Drawings, FigureInputs};
+pub use findings::{findings, findings_text};
+pub use import::{ImportAnswer, ImportRequest, OwnColumn, import};
 pub use inputs::{ScoreFile, Source, resolve};
 pub use losses::LostAs;
 pub use overview::{Overview, Part};
 pub use provenance::ProvenanceError;
+pub use quality_check::{CellAnswer, NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 pub use report::{Report, ReportOptions, WrittenReport};
 pub use rescore::{RescoreRequest, Rescored, folder_of_rescored};
 pub use results::{Outputs, Results};

@@ -110,7 +110,7 @@ codes! {
     /// A required column is not there.
     MissingColumn, Error, "missing-column":
         "every required column is there",
-        "`mirrorstats schema` lists the columns: add this one, or rename the one that holds it";
+        "`mirrorstats trace schema` lists the columns: add this one, or rename the one that holds it";
     /// Two columns have the same name.
     RepeatedColumn, Error, "repeated-column": "every column has its own name", "drop or rename all but one of them";
     /// A column of the schema has another type.
@@ -198,7 +198,7 @@ impl Code {
         self.entry().1
     }
 
-    /// The rule in one line, as `mirrorstats schema` prints it.
+    /// The rule in one line, as `mirrorstats trace schema` prints it.
     pub const fn explain(self) -> &'static str {
         self.entry().2
     }

@@ -90,7 +90,7 @@ pub enum TraceError {
 fn more_findings(more: usize) -> String {
     match more {
         0 => String::new(),
-        more => format!("\n  and {more} more: `mirrorstats validate` shows them all"),
+        more => format!("\n  and {more} more: `mirrorstats trace validate` shows them all"),
     }
 }
 

@@ -2,17 +2,25 @@
 //!
 //! Rule: a step without a text keeps what it has; every step whose attribution changes is a flip, and told.
 
-use std::io::Write;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
 
+use schemars::JsonSchema;
+use serde::Serialize;
 use serde_json::{Map, Value};
 
-use super::diagnostic::{Code, Finding};
+use super::diagnostic::{Code, Finding, Severity};
 use super::error::TraceError;
 use super::identification::{VERSION, normal_form};
 use super::inputs::Input;
 use super::open::{TraceFile, TraceSet};
 use super::schema::RECORDING_KEY;
+use super::validate::validate;
 use super::write::rewrite::{Before, rewrite};
+use exact::replace::{Content, FolderFiles, TemporaryFolder, folder_of, is_same_file, make_folder, replace_folder};
 
 /// The free text, as replied.
 const SOURCE: &str = "identification";
@@ -20,43 +28,144 @@ const TARGET: &str = "self_color";
 /// The key of a recording that tells the version of the rule.
 const VERSION_KEY: &str = "identification_version";
 
-/// An attribution that changes.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What changes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RenormalizeAnswer {
+    /// The version of the rule of this program.
+    pub identification_version: String,
+    /// Whether new traces were written.
+    pub written: bool,
+    /// The traces, by name.
+    pub files: Vec<RenormalizedFile>,
+    /// Every step whose attribution changes, by file and row.
+    pub flips: Vec<Flip>,
+}
+
+/// One trace.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RenormalizedFile {
+    /// The old trace.
+    pub name: String,
+    /// The new one; null with --dry-run.
+    pub out: Option<String>,
+    /// The version of the rule that the old trace tells; null where it tells none.
+    pub version_before: Option<String>,
+    /// How many steps it has.
+    pub steps: u64,
+    /// How many of them have a text.
+    pub texts: u64,
+    /// How many of them change.
+    pub flips: usize,
+}
+
+/// A step whose attribution changes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 pub struct Flip {
+    /// The trace.
+    pub file: String,
     /// The episode.
     pub episode_id: String,
     /// The timestep.
     pub t: i64,
-    /// The attribution that the trace has.
+    /// The attribution of the old trace; null where it has none.
     pub before: Option<String>,
-    /// The attribution by the rule of this program.
+    /// The attribution of the new one; null where the text holds none.
     pub after: Option<String>,
     /// The text behind both.
     pub identification: String,
 }
 
-/// What a trace's texts give.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Renormalized {
-    /// The version of the rule that the recording tells, if it tells any.
-    pub version_before: Option<String>,
-    /// How many steps the trace has.
-    pub steps: u64,
-    /// How many of them have a text.
-    pub texts: u64,
-    /// The steps that change, in the order of the trace.
-    pub flips: Vec<Flip>,
+/// Why no trace was written.
+#[derive(Debug, thiserror::Error)]
+pub enum RenormalizeError {
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    #[error("{file}: expected {expected}, found {found}\n  help: give another --out, or fewer traces at a time")]
+    Location { file: String, expected: String, found: String },
+    #[error("cannot write `{}`: {source}", path.display())]
+    Unwritable { path: PathBuf, source: io::Error },
+}
+
+/// Makes the attributions of traces anew: finds what changes, and writes the traces into `folder` if there is one, all or none.
+///
+/// Each trace must keep every rule of the schema.
+pub fn renormalize(
+    inputs: &[Input],
+    folder: Option<&Path>,
+    threads: NonZeroUsize,
+) -> Result<RenormalizeAnswer, RenormalizeError> {
+    let targets = folder.map(|folder| targets(inputs, folder)).transpose()?;
+    let old = inputs.iter().map(Old::open).collect::<Result<Vec<_>, _>>()?;
+    let errors = validate(inputs, None, threads)?.findings.into_iter();
+    TraceError::of(errors.filter(|finding| finding.severity == Severity::Error).collect()).map_or(Ok(()), Err)?;
+    let mut answer = RenormalizeAnswer {
+        identification_version: VERSION.to_owned(),
+        written: folder.is_some(),
+        files: Vec::new(),
+        flips: Vec::new(),
+    };
+    let stage = folder.map(stage_beside).transpose()?;
+    let mut staged = Vec::new();
+    for (at, (input, old)) in inputs.iter().zip(&old).enumerate() {
+        let target = targets.as_ref().map(|targets| targets[at].as_path());
+        let new = stage.as_ref().map(|stage| stage.path().join(at.to_string()));
+        let (mut file, flips) = old.renormalized(&input.name, target.zip(new.as_deref()))?;
+        file.out = target.map(|target| Input::new(target).name);
+        answer.files.push(file);
+        answer.flips.extend(flips);
+        staged.extend(input.path.file_name().map(Path::new).zip(new));
+    }
+    if let Some(folder) = folder {
+        let new: Vec<_> = staged.iter().map(|(name, new)| (*name, Content::File(new))).collect();
+        let files = FolderFiles { new: &new, index: None, old: &|_| Vec::new() };
+        replace_folder(folder, &files).map_err(|error| unwritable(&error.path, error.source))?;
+    }
+    Ok(answer)
+}
+
+/// The new trace of each; refused where two have one name, or a trace would replace itself.
+fn targets(inputs: &[Input], folder: &Path) -> Result<Vec<PathBuf>, RenormalizeError> {
+    let refused = |input: &Input, expected: String, found: &str| RenormalizeError::Location {
+        file: input.name.clone(),
+        expected,
+        found: found.to_owned(),
+    };
+    let mut taken: BTreeMap<PathBuf, &Input> = BTreeMap::new();
+    let mut targets = Vec::new();
+    for input in inputs {
+        let target = folder.join(input.path.file_name().unwrap_or_default());
+        if let Some(other) = taken.insert(target.clone(), input) {
+            return Err(refused(input, format!("a name of its own in {}", folder.display()), &other.name));
+        }
+        targets.push(target);
+    }
+    let itself = |input: &&Input| targets.iter().any(|target| is_same_file(target, &input.path));
+    match inputs.iter().find(itself) {
+        Some(input) => Err(refused(input, "another folder for the new trace".to_owned(), "the trace itself")),
+        None => Ok(targets),
+    }
+}
+
+fn stage_beside(folder: &Path) -> Result<TemporaryFolder, RenormalizeError> {
+    let parent = folder_of(folder);
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let made = make_folder(parent).and_then(|()| TemporaryFolder::create(parent, &name));
+    made.map_err(|error| unwritable(folder, error))
+}
+
+fn unwritable(path: &Path, source: io::Error) -> RenormalizeError {
+    RenormalizeError::Unwritable { path: path.to_owned(), source }
 }
 
 /// A trace whose attributions can be made anew.
 #[derive(Debug)]
-pub struct Old {
+struct Old {
     set: TraceSet,
     recording: Value,
 }
 
 impl Old {
-    pub fn open(input: &Input) -> Result<Self, TraceError> {
+    fn open(input: &Input) -> Result<Self, TraceError> {
         let file = TraceFile::open(input).map_err(|findings| match TraceError::of(findings) {
             Some(error) => error,
             None => unexplained(input),
@@ -75,16 +184,43 @@ impl Old {
         Ok(Self { set: TraceSet::of(vec![file]), recording })
     }
 
-    /// Writes the trace with its attributions made anew, all else as it is, to `out`.
-    pub fn renormalize<W: Write + Send>(&self, out: W) -> Result<(W, Renormalized), TraceError> {
+    /// What changes; the new trace of `target` is written to another path, if anything is written.
+    fn renormalized(
+        &self,
+        name: &str,
+        to: Option<(&Path, &Path)>,
+    ) -> Result<(RenormalizedFile, Vec<Flip>), RenormalizeError> {
         let mut recording = self.recording.clone();
-        let mut result = Renormalized { version_before: put_version(&mut recording), ..Renormalized::default() };
-        let out = rewrite(&self.set, [SOURCE, TARGET], |step| result.attribution(step), &recording, out)?;
-        Ok((out, result))
+        let mut texts =
+            Texts { name, version_before: put_version(&mut recording), steps: 0, texts: 0, flips: Vec::new() };
+        match to {
+            None => drop(rewrite(&self.set, [SOURCE, TARGET], |step| texts.attribution(step), &recording, io::sink())?),
+            Some((target, staged)) => {
+                let out = File::create(staged).map_err(|error| unwritable(target, error))?;
+                let written = rewrite(&self.set, [SOURCE, TARGET], |step| texts.attribution(step), &recording, out);
+                written.map_err(|error| error.writing(target))?;
+            }
+        }
+        Ok(texts.into_file())
     }
 }
 
-impl Renormalized {
+/// The texts of a trace, as far as they are read.
+struct Texts<'a> {
+    name: &'a str,
+    version_before: Option<String>,
+    steps: u64,
+    texts: u64,
+    flips: Vec<Flip>,
+}
+
+impl Texts<'_> {
+    fn into_file(self) -> (RenormalizedFile, Vec<Flip>) {
+        let Self { name, version_before, steps, texts, flips } = self;
+        let name = name.to_owned();
+        (RenormalizedFile { name, out: None, version_before, steps, texts, flips: flips.len() }, flips)
+    }
+
     /// The attribution of a step, noted if it is another one than before.
     fn attribution(&mut self, (episode_id, t, source, target): Before<'_>) -> Option<String> {
         self.steps += 1;
@@ -93,8 +229,9 @@ impl Renormalized {
         self.texts += 1;
         let after = normal_form(text).map(str::to_owned);
         if before != after {
-            let (episode_id, identification) = (episode_id.to_owned(), text.to_owned());
-            self.flips.push(Flip { episode_id, t, before, after: after.clone(), identification });
+            let (file, episode_id) = (self.name.to_owned(), episode_id.to_owned());
+            let (after, identification) = (after.clone(), text.to_owned());
+            self.flips.push(Flip { file, episode_id, t, before, after, identification });
         }
         after
     }

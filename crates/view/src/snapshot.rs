@@ -84,7 +84,7 @@ impl Snapshot {
         if scored.is_none() && running.is_empty() {
             let runs = options.runs.iter().map(|run| visible(&run.to_string_lossy())).collect::<Vec<_>>().join(", ");
             return Err(ViewError::Absent(format!(
-                "{runs}: expected traces, or a recording that has begun, found no episode\n  help: `mirrorstats recover` makes \
+                "{runs}: expected traces, or a recording that has begun, found no episode\n  help: `mirrorstats trace recover` makes \
                  a trace of a log"
             )));
         }

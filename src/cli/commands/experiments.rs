@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::super::experiments;
-use super::super::outcome::{Failure, Outcome};
-use super::super::output;
+use crate::cli::experiments;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
 use exact::escape::visible;
 use exact::suggest::hint;
 use world::experiment::explain::explained;
@@ -18,7 +18,6 @@ use world::experiment::{Experiment, Spec, UnknownExperiment, built_in, built_in_
 /// Check, explain and show experiments
 #[derive(Clone, Debug, clap::Args)]
 pub struct ExperimentsArgs {
-    /// What to do.
     #[command(subcommand)]
     pub action: Action,
 }

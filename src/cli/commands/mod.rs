@@ -1,136 +1,85 @@
-//! The verbs: one file each.
+//! The commands: one file each, in a folder where several share a noun.
 
-pub mod audit;
-pub mod check;
-pub mod compare;
-pub mod completions;
-pub mod config;
-pub mod definitions;
-pub mod diff;
-pub mod experiments;
-pub mod figure;
-#[cfg(feature = "sim")]
-pub mod filmstrip;
-pub mod import;
-pub mod info;
-pub mod man;
+pub(super) mod definitions;
+pub(super) mod experiments;
 #[cfg(all(feature = "sim", feature = "view"))]
-pub mod participants;
-pub mod plan;
-pub mod query;
+pub(super) mod participants;
+pub(super) mod setup;
+pub(super) mod study;
+pub(super) mod style;
+pub(super) mod table;
+pub(super) mod trace;
 #[cfg(feature = "sim")]
-pub mod record;
-pub mod recover;
-pub mod renormalize;
-#[cfg(feature = "sim")]
-pub mod replay;
-pub mod report;
-pub mod rescore;
-pub mod schema;
-pub mod score;
-pub mod sensitivity;
-pub mod sql;
-pub mod stats;
-pub mod style;
-pub mod validate;
-pub mod verify;
-#[cfg(feature = "view")]
-pub mod view;
-#[cfg(feature = "sim")]
-pub mod world;
+pub(super) mod world;
 
+#[cfg(feature = "view")]
+use study::view;
+use study::{diff, figure, plan, query, report, score, stats};
+
+#[cfg(feature = "sim")]
+pub use self::world::record;
 use super::outcome::{Failure, Outcome};
 
-/// What to do.
+/// The commands, in the order of the help: those of a first use, then nouns.
 #[derive(Debug, clap::Subcommand)]
-#[expect(missing_docs, reason = "the words of each verb stand with its arguments")]
 pub enum Command {
     Report(report::ReportArgs),
-    #[cfg(feature = "sim")]
-    Record(Box<record::RecordArgs>),
     #[cfg(feature = "view")]
     View(view::ViewArgs),
     Score(score::ScoreArgs),
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
-    Sensitivity(sensitivity::SensitivityArgs),
-    Compare(compare::CompareArgs),
-    Audit(audit::AuditArgs),
-    Plan(plan::PlanArgs),
     Diff(diff::DiffArgs),
-    Rescore(rescore::RescoreArgs),
-    Verify(verify::VerifyArgs),
-    Validate(validate::ValidateCommand),
-    Check(check::CheckArgs),
-    Info(info::InfoCommand),
-    Import(import::ImportArgs),
-    Recover(recover::RecoverArgs),
-    Renormalize(renormalize::RenormalizeArgs),
     #[cfg(feature = "sim")]
-    Replay(replay::ReplayArgs),
-    #[cfg(feature = "sim")]
-    Filmstrip(filmstrip::FilmstripArgs),
-    #[cfg(all(feature = "sim", feature = "view"))]
-    Participants(participants::ParticipantsArgs),
-    Schema(schema::SchemaCommand),
-    Sql(sql::SqlArgs),
+    Record(Box<world::record::RecordArgs>),
+    Import(trace::import::ImportArgs),
     Query(query::QueryArgs),
+    Plan(plan::PlanArgs),
+    #[command(subcommand)]
+    Trace(trace::TraceCommand),
+    #[command(subcommand)]
+    Table(table::TableCommand),
     Definitions(definitions::DefinitionsArgs),
-    Style(style::StyleArgs),
     Experiments(experiments::ExperimentsArgs),
+    Style(style::StyleArgs),
     #[cfg(feature = "sim")]
     World(world::WorldArgs),
-    Config(config::ConfigArgs),
-    Completions(completions::CompletionsArgs),
-    Man(man::ManArgs),
+    #[cfg(all(feature = "sim", feature = "view"))]
+    Participants(participants::ParticipantsArgs),
+    #[command(subcommand)]
+    Setup(setup::SetupCommand),
 }
 
 impl Command {
-    /// Whether it runs where the configuration cannot be used: what it does depends on no default.
+    /// Returns true if the command runs even if the configuration cannot be used.
     pub const fn needs_no_settings(&self) -> bool {
-        matches!(self, Self::Config(_) | Self::Completions(_) | Self::Man(_))
+        matches!(self, Self::Setup(_))
     }
 
     pub fn run(self) -> Result<Outcome, Failure> {
         match self {
             Self::Report(args) => args.run(),
-            #[cfg(feature = "sim")]
-            Self::Record(args) => args.run(),
             #[cfg(feature = "view")]
             Self::View(args) => args.run(),
             Self::Score(args) => args.run(),
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
-            Self::Sensitivity(args) => args.run(),
-            Self::Compare(args) => args.run(),
-            Self::Audit(args) => args.run(),
-            Self::Plan(args) => args.run(),
             Self::Diff(args) => args.run(),
-            Self::Rescore(args) => args.run(),
-            Self::Verify(args) => args.run(),
-            Self::Validate(command) => command.run(),
-            Self::Check(args) => args.run(),
-            Self::Info(command) => command.run(),
+            #[cfg(feature = "sim")]
+            Self::Record(args) => args.run(),
             Self::Import(args) => args.run(),
-            Self::Recover(args) => args.run(),
-            Self::Renormalize(args) => args.run(),
-            #[cfg(feature = "sim")]
-            Self::Replay(args) => args.run(),
-            #[cfg(feature = "sim")]
-            Self::Filmstrip(args) => args.run(),
-            #[cfg(all(feature = "sim", feature = "view"))]
-            Self::Participants(args) => args.run(),
-            Self::Schema(command) => command.run(),
-            Self::Sql(args) => args.run(),
             Self::Query(args) => args.run(),
+            Self::Plan(args) => args.run(),
+            Self::Trace(command) => command.run(),
+            Self::Table(command) => command.run(),
             Self::Definitions(args) => args.run(),
-            Self::Style(args) => args.run(),
             Self::Experiments(args) => args.run(),
+            Self::Style(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::World(args) => args.run(),
-            Self::Config(args) => args.run(),
-            Self::Completions(args) => args.run(),
-            Self::Man(args) => args.run(),
+            #[cfg(all(feature = "sim", feature = "view"))]
+            Self::Participants(args) => args.run(),
+            Self::Setup(command) => command.run(),
         }
     }
 }

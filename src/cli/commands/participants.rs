@@ -12,7 +12,7 @@ use crate::cli::text_table::counted;
 use exact::escape::visible;
 use world::record::participants::{self, Removed};
 
-/// What is to be done about the people of a recording
+/// Remove people from a recording
 #[derive(Clone, Debug, clap::Args)]
 pub struct ParticipantsArgs {
     #[command(subcommand)]

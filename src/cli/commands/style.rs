@@ -14,7 +14,6 @@ use study::StudyError;
 /// Show and check styles: how tables look
 #[derive(Clone, Debug, clap::Args)]
 pub struct StyleArgs {
-    /// What to do.
     #[command(subcommand)]
     action: Action,
 }

@@ -164,7 +164,7 @@ fn what_is_said_on_standard_error_is_kept_for_recorded_and_for_lost_episodes() {
     assert_eq!(kept(1), [line(1), line(2), line(3)].concat());
     assert_eq!(kept(2), [line(1), line(2)].concat());
     // The folder is no input of a report.
-    run(bench.folder.path(), &["validate", "runs"]).done();
+    run(bench.folder.path(), &["trace", "validate", "runs"]).done();
 }
 
 #[test]
@@ -260,7 +260,7 @@ fn lost_episodes_are_listed_until_they_are_recorded_and_disturb_no_report() {
     let first = &bench.lost()[0];
     assert_eq!((&first["episode_id"], &first["status"]), (&"E1/exec/s1/r2".into(), &"server_error".into()));
 
-    let validation = run(bench.folder.path(), &["validate", "runs", "--json"]).done();
+    let validation = run(bench.folder.path(), &["trace", "validate", "runs", "--json"]).done();
     assert!(!validation.contains("lost.jsonl"), "{validation}");
 
     // One of them is recorded, another is lost again; a run that asks for neither leaves the list as it is.

@@ -87,9 +87,9 @@ fn a_trace_with_other_rows_than_the_log_is_not_written_over() {
     fs::write(path("log.mcap"), &RECORDING.log).unwrap();
     fs::write(path("trace.parquet"), &RECORDING.trace).unwrap();
     alter(&path("trace.parquet"));
-    run(folder.path(), &["validate", "trace.parquet"]).done();
+    run(folder.path(), &["trace", "validate", "trace.parquet"]).done();
     let before = fs::read(path("trace.parquet")).unwrap();
-    let said = run(folder.path(), &["recover", "log.mcap", "-o", "trace.parquet"]).refused();
+    let said = run(folder.path(), &["trace", "recover", "log.mcap", "-o", "trace.parquet"]).refused();
     assert!(said.contains("do not belong together") && said.contains("E1/random/s1/r1"), "{said}");
     assert!(fs::read(path("trace.parquet")).unwrap() == before);
 }
@@ -101,7 +101,7 @@ fn a_log_with_other_rows_than_the_trace_is_not_replaced_by_its_replay() {
     fs::write(path("log.mcap"), &RECORDING.log).unwrap();
     fs::write(path("trace.parquet"), &RECORDING.trace).unwrap();
     alter(&path("trace.parquet"));
-    let said = run(folder.path(), &["replay", "trace.parquet", "--mcap", "log.mcap"]).refused();
+    let said = run(folder.path(), &["world", "replay", "trace.parquet", "--mcap", "log.mcap"]).refused();
     assert!(said.contains("do not belong together") && said.contains("`trace.parquet` and `log.mcap`"), "{said}");
     assert!(fs::read(path("log.mcap")).unwrap() == RECORDING.log);
 }
@@ -112,7 +112,7 @@ fn a_film_strip_of_a_log_and_a_trace_that_do_not_belong_together_is_refused() {
     let trace = folder.path().join("E1-guesser.parquet");
     fs::copy(fixture("recorded/E1-guesser.mcap"), folder.path().join("E1-guesser.mcap")).unwrap();
     fs::copy(fixture("recorded/E1-guesser.parquet"), &trace).unwrap();
-    let strip = |out: &str| run(folder.path(), &["filmstrip", "E1/guesser/s1/r1", ".", "--out", out]);
+    let strip = |out: &str| run(folder.path(), &["world", "filmstrip", "E1/guesser/s1/r1", ".", "--out", out]);
     strip("whole.svg").done();
     alter(&trace);
     let said = strip("parted.svg").refused();

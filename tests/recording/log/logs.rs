@@ -100,7 +100,7 @@ impl Desk {
 
     /// The ids of the trace's episodes, after `validate` found nothing wrong with it.
     pub fn validated(&self) -> Vec<String> {
-        run(self.0.path(), &["validate", "trace.parquet"]).ends(0);
+        run(self.0.path(), &["trace", "validate", "trace.parquet"]).ends(0);
         let text = run(self.0.path(), &["score", "trace.parquet"]).done();
         text.lines().skip(1).map(|line| line.split(',').next().unwrap().to_owned()).collect()
     }

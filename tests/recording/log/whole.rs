@@ -54,7 +54,7 @@ fn a_trace_that_has_more_than_the_log_is_not_written_over() {
     write_small_world(folder.path(), SHORT);
     let words = "record --config small.toml --agent random --experiment E1 --seeds 1 --no-frames --runs";
     let record = |more: &str| succeeds(&mut typed(folder.path(), &format!("{words} {more}")));
-    let recover = |trace: &str| run(folder.path(), &["recover", "log.mcap", "-o", trace]);
+    let recover = |trace: &str| run(folder.path(), &["trace", "recover", "log.mcap", "-o", trace]);
     fs::write(path("log.mcap"), &RECORDING.log).unwrap();
     record("4 --out more");
     write_small_world(folder.path(), &format!("{SHORT}eye.fovy = 90.0\n"));

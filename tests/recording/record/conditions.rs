@@ -152,7 +152,7 @@ fn the_same_scene_is_played_again_and_its_flips_are_the_noise_floor() {
     assert_eq!(actions(trace, &ids[0]), actions("once/E1-random.parquet", &ids[0]));
     assert_ne!(actions(trace, &ids[0]), actions(trace, &ids[1]));
     let at = bench.folder.path();
-    run(at, &["replay", "again/E1-random.parquet"]).done();
+    run(at, &["world", "replay", "again/E1-random.parquet"]).done();
     let stats: Value = run(at, &["stats", "again", "--json"]).json();
     let retest = stats["retests"].as_array().unwrap().iter().find(|row| row["metric"] == "TSA").unwrap();
     assert_eq!((retest["scenes"].as_u64(), retest["episodes"].as_u64()), (Some(3), Some(9)));

@@ -143,7 +143,7 @@ fn a_report_can_be_made_of_it() {
     for agent in ["random", "frozen"] {
         bench.recorded("runs", &format!("--agent {agent} --experiment E1..E5 --seeds 1 --runs 2"));
     }
-    let checked = run(bench.folder.path(), &["validate", "runs"]).done();
+    let checked = run(bench.folder.path(), &["trace", "validate", "runs"]).done();
     assert!(checked.contains("0 errors, 0 notes"));
     let table = run(bench.folder.path(), &["report", "runs", "--out", "report"]).done();
     assert!(table.contains("frozen") && table.contains("random"), "{table}");

@@ -36,7 +36,7 @@ fn remove(bench: &Bench, ending: &str) {
 }
 
 fn recover_into(bench: &Bench, trace: &str) {
-    run(bench.folder.path(), &["recover", "runs/E1-random.mcap", "-o", trace]).done();
+    run(bench.folder.path(), &["trace", "recover", "runs/E1-random.mcap", "-o", trace]).done();
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn a_log_without_its_trace_is_not_added_to_under_another_configuration() {
     let expected = [
         "the log `runs/E1-random.mcap` does not belong to this recording: it was recorded with another world.episode.steps",
         "expected 41, found 100",
-        "help: `mirrorstats recover runs/E1-random.mcap -o TRACE.parquet` makes a trace of it; move the log away",
+        "help: `mirrorstats trace recover runs/E1-random.mcap -o TRACE.parquet` makes a trace of it; move the log away",
     ];
     refused(&bench, &words(2), &expected);
     // What the message advises is what helps.
@@ -68,7 +68,7 @@ fn a_log_without_its_trace_gives_it_again() {
     remove(&bench, "parquet");
     let expected = [
         "does not belong to this recording: it holds the episode `E1/random/s1/r1`, and there is no trace `runs/E1-random.parquet`",
-        "help: `mirrorstats recover runs/E1-random.mcap -o runs/E1-random.parquet` makes its trace again",
+        "help: `mirrorstats trace recover runs/E1-random.mcap -o runs/E1-random.parquet` makes its trace again",
     ];
     refused(&bench, &words(3), &expected);
     recover_into(&bench, "runs/E1-random.parquet");

@@ -79,8 +79,8 @@ fn a_script_plays_it_and_reports_show_it_beside_the_five() {
     // The trace is enough: neither the file nor its prompt is needed any more.
     fs::remove_file(bench.path("echo.toml")).unwrap();
     fs::remove_dir_all(bench.path("asked")).unwrap();
-    run(at, &["validate", "runs"]).done();
-    let replayed: Value = run(at, &["replay", "runs/late-echo-random.parquet", "--json"]).json();
+    run(at, &["trace", "validate", "runs"]).done();
+    let replayed: Value = run(at, &["world", "replay", "runs/late-echo-random.parquet", "--json"]).json();
     assert_eq!((&replayed["episodes"], &replayed["divergences"]), (&json!(8), &json!([])));
 
     let recorded = fixture("recorded/E1-oracle.parquet").display().to_string();
@@ -132,7 +132,7 @@ fn a_program_is_asked_in_its_words_and_another_prompt_is_another_recording() {
     let asked = heard[1]["user_prompt"].as_str().unwrap();
     assert!(asked.starts_with("Which cube is like you?\nPosition: x = "), "{asked}");
     let name = "late-echo-exec.parquet";
-    run(at, &["replay", &format!("runs/{name}")]).done();
+    run(at, &["world", "replay", &format!("runs/{name}")]).done();
     let cubes = texts(&bench.path(&format!("runs/{name}")), "selected_cube");
     assert_eq!(cubes.last().unwrap().as_deref(), Some("red"));
 
@@ -210,7 +210,7 @@ fn scenes_and_sheets_show_any_experiment() {
 #[test]
 fn the_schemas_of_files_and_footers_are_printed() {
     let folder = tempfile::tempdir().unwrap();
-    let schema = |name: &str| run(folder.path(), &["schema", name]).json();
+    let schema = |name: &str| run(folder.path(), &["trace", "schema", name]).json();
     assert_eq!(schema("experiment")["title"], "Experiment");
     assert_eq!(schema("experiments")["title"], "ExperimentFile");
 }

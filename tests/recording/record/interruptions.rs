@@ -55,7 +55,7 @@ fn ctrl_c_ends_it_at_whole_episodes_and_says_how_to_go_on() {
     assert!((2..16).contains(&recorded), "{answer}");
     // What it left is a recording like any other: whole episodes in a trace, and nothing beside traces and logs.
     assert!(bench.files("cut").keys().all(|name| !name.starts_with('.')));
-    let checked = run(bench.folder.path(), &["validate", "--json", "cut"]).json();
+    let checked = run(bench.folder.path(), &["trace", "validate", "--json", "cut"]).json();
     let episodes: u64 =
         checked["files"].as_array().unwrap().iter().map(|file| file["episodes"].as_u64().unwrap()).sum();
     assert_eq!(episodes, recorded);

@@ -49,15 +49,15 @@ fn frames_log_and_trace_of_a_late_mirror_replay_step_by_step() {
             before = distance;
         }
     }
-    let said = run(at, &["replay", "runs", "--frames", "frames", "--mcap", "again.mcap", "--json"]).json();
+    let said = run(at, &["world", "replay", "runs", "--frames", "frames", "--mcap", "again.mcap", "--json"]).json();
     assert_eq!((&said["episodes"], &said["divergences"]), (&json!(2), &json!([])));
-    run(at, &["recover", "again.mcap", "-o", "again.parquet"]).done();
+    run(at, &["trace", "recover", "again.mcap", "-o", "again.parquet"]).done();
     assert!(fs::read(bench.path("again.parquet")).unwrap() == fs::read(&trace).unwrap());
-    run(at, &["validate", "runs"]).done();
+    run(at, &["trace", "validate", "runs"]).done();
 
     // The frames of the log are those of the replay.
     let strip = |source: &str, out: &str| {
-        run(at, &["filmstrip", "small-late/random/s1/r2", source, "--out", out]).done();
+        run(at, &["world", "filmstrip", "small-late/random/s1/r2", source, "--out", out]).done();
         fs::read(bench.path(out)).unwrap()
     };
     let [log, anew] = [("runs/small-late-random.mcap", "log.png"), ("runs/small-late-random.parquet", "anew.png")]
@@ -82,7 +82,7 @@ fn frames_have_the_size_that_the_file_says() {
     succeeds(&mut bench.record_with_frames("runs", "--experiment large.toml --seeds 1 --runs 1 --agent random"));
     let footer = recording(&bench.path("runs/large-random.parquet"));
     assert_eq!(footer["experiment"]["view"], json!({ "width": 1024, "height": 1024, "fovy": 60 }));
-    run(bench.folder.path(), &["replay", "runs", "--frames", "frames"]).done();
+    run(bench.folder.path(), &["world", "replay", "runs", "--frames", "frames"]).done();
     let png = fs::read(bench.path("frames/large-random-s1-r1/t001.png")).unwrap();
     assert_eq!(png[16..24], [0, 0, 4, 0, 0, 0, 4, 0], "1024 x 1024 pixels");
 }
@@ -124,7 +124,7 @@ fn levels_and_arms_are_pairs_and_stand_in_one_report() {
     // Nobody is asked for a colour or a cube: these columns are absent, and mean no value beside episodes that have them.
     let columns = rows(&bench.path("runs/reach-bare-frozen.parquet")).schema();
     assert!(["self_color", "selected_cube"].iter().all(|name| columns.column_with_name(name).is_none()), "{columns}");
-    run(at, &["validate", "runs"]).done();
+    run(at, &["trace", "validate", "runs"]).done();
     bench.recorded("both", "--experiment E1,reach-bare --seeds 1 --runs 2 --no-log --agent random");
     // Each has definitions of its own; a file that includes both scores the mixture.
     fs::write(bench.path("both.toml"), "include = [\"paper\", \"reach\"]\n").unwrap();

@@ -115,7 +115,7 @@ fn a_recording_without_a_palette_is_of_another_version() {
     assert_same(&bench.files("runs"), &before);
     // It can be scored and replayed as before.
     run(bench.folder.path(), &["score", "runs"]).done();
-    run(bench.folder.path(), &["replay", "runs/E1-random.parquet"]).done();
+    run(bench.folder.path(), &["world", "replay", "runs/E1-random.parquet"]).done();
 }
 
 #[test]
@@ -133,7 +133,7 @@ fn a_colour_outside_of_the_palette_is_refused_wherever_the_recording_is_read() {
         assert!(said.contains("invalid-color: runs/E1-random.parquet") && said.contains(&expected), "{said}");
         assert!(said.contains(&format!("help: did you mean `{near}`?")), "{said}");
     }
-    let checked = run(bench.folder.path(), &["validate", "runs"]).ends(1);
+    let checked = run(bench.folder.path(), &["trace", "validate", "runs"]).ends(1);
     assert!(checked.stdout.contains(&format!("did you mean `{near}`?")), "{}", checked.stdout);
 }
 

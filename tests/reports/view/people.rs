@@ -158,9 +158,9 @@ fn two_people_play_at_once_and_one_is_removed() {
         let bytes = std::fs::read(entry.path()).unwrap_or_default();
         assert!(!bytes.windows(11).any(|some| some == b"leaver-0001"), "{}", entry.path().display());
     }
-    run(folder.path(), &["validate", "runs"]).done();
+    run(folder.path(), &["trace", "validate", "runs"]).done();
     assert_eq!(run(folder.path(), &["score", "runs", "--json"]).done().lines().count(), 1);
-    run(folder.path(), &["replay", "runs"]).done();
+    run(folder.path(), &["world", "replay", "runs"]).done();
     let recover = ["recover", "runs/E1-people.mcap", "-o", "log.parquet"];
     run(folder.path(), &recover).done();
     assert_eq!(

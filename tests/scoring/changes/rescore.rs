@@ -21,7 +21,7 @@ fn the_report_is_the_one_that_the_same_options_give() {
     let folder = reported();
     let at = folder.path();
     let before = contents(&at.join("old"));
-    let answer = run(at, &["rescore", "old", "--definitions", "late.toml"]).ends(0);
+    let answer = run(at, &["table", "rescore", "old", "--definitions", "late.toml"]).ends(0);
     assert!(answer.stdout.contains("1 of 2 cells moved; 1 flip in 1 episode"), "{}", answer.stdout);
     assert!(answer.stderr.contains("the report is in old-rescored"), "{}", answer.stderr);
     assert_eq!(contents(&at.join("old")), before);
@@ -35,7 +35,7 @@ fn the_report_is_the_one_that_the_same_options_give() {
 fn the_same_definitions_give_the_same_bytes() {
     let folder = reported();
     let at = folder.path();
-    let answer = run(at, &["rescore", "old", "--definitions", "all.toml", "--out", "new/er", "--json"]).json();
+    let answer = run(at, &["table", "rescore", "old", "--definitions", "all.toml", "--out", "new/er", "--json"]).json();
     assert_eq!(contents(&at.join("new/er")), contents(&at.join("old")));
     assert_eq!((&answer["out"], &answer["episodes"]), (&json!("new/er"), &json!(2)));
     assert_eq!((&answer["changes"]["flips"], &answer["changes"]["cells"]), (&json!([]), &json!([])));
@@ -46,7 +46,7 @@ fn a_report_with_figures_is_made_again_with_figures() {
     let folder = folder();
     let at = folder.path();
     run(at, &["report", "a.parquet", "--out", "old"]).ends(0);
-    run(at, &["rescore", "old", "--definitions", "paper"]).ends(0);
+    run(at, &["table", "rescore", "old", "--definitions", "paper"]).ends(0);
     assert_eq!(contents(&at.join("old-rescored")), contents(&at.join("old")));
     assert!(at.join("old-rescored/report.html").is_file());
 }
@@ -56,11 +56,11 @@ fn a_choice_of_metrics_is_kept() {
     let folder = folder();
     let at = folder.path();
     run(at, &["report", "a.parquet", "--no-figures", "--metrics", "MCR,TSA", "--out", "old"]).ends(0);
-    let answer = run(at, &["rescore", "old", "--definitions", "extended", "--json"]).json();
+    let answer = run(at, &["table", "rescore", "old", "--definitions", "extended", "--json"]).json();
     assert_eq!(answer["manifest"]["metrics"], json!(["TSA", "MCR"]));
-    let said = run(at, &["rescore", "old", "--definitions", "all.toml"]).refused();
+    let said = run(at, &["table", "rescore", "old", "--definitions", "all.toml"]).refused();
     assert!(said.contains("unknown metric `TSA`"), "{said}");
-    run(at, &["rescore", "old", "--definitions", "all.toml", "--metrics", "GAZE"]).ends(0);
+    run(at, &["table", "rescore", "old", "--definitions", "all.toml", "--metrics", "GAZE"]).ends(0);
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn every_trace_that_changed_is_told_and_nothing_is_written() {
     let at = folder.path();
     fs::copy(at.join("b.parquet"), at.join("a.parquet")).unwrap();
     fs::remove_file(at.join("b.parquet")).unwrap();
-    let said = run(at, &["rescore", "old", "--definitions", "late.toml"]).refused();
+    let said = run(at, &["table", "rescore", "old", "--definitions", "late.toml"]).refused();
     assert!(said.contains("a.parquet: changed; expected sha256 ") && said.contains(", found "), "{said}");
     assert!(said.contains("b.parquet: missing"), "{said}");
     assert!(!at.join("old-rescored").exists());
@@ -100,7 +100,8 @@ fn every_trace_that_changed_is_told_and_nothing_is_written() {
 fn the_old_report_is_never_replaced() {
     let folder = reported();
     for out in ["old", "./old/", "old/../old"] {
-        let said = run(folder.path(), &["rescore", "old", "--definitions", "late.toml", "--out", out]).refused();
+        let said =
+            run(folder.path(), &["table", "rescore", "old", "--definitions", "late.toml", "--out", out]).refused();
         assert!(said.contains("found the report itself"), "{said}");
     }
 }
@@ -109,7 +110,7 @@ fn the_old_report_is_never_replaced() {
 fn a_folder_that_is_no_report_is_refused() {
     let folder = reported();
     let at = folder.path();
-    let said = run(at, &["rescore", ".", "--definitions", "late.toml"]).refused();
+    let said = run(at, &["table", "rescore", ".", "--definitions", "late.toml"]).refused();
     assert!(said.contains("expected a report's folder"), "{said}");
     let manifest = fs::read_to_string(at.join("old/manifest.json")).unwrap();
     for (from, to, expected) in [
@@ -121,7 +122,7 @@ fn a_folder_that_is_no_report_is_refused() {
     ] {
         assert!(manifest.contains(from));
         fs::write(at.join("old/manifest.json"), manifest.replacen(from, to, 1)).unwrap();
-        let said = run(at, &["rescore", "old", "--definitions", "late.toml"]).refused();
+        let said = run(at, &["table", "rescore", "old", "--definitions", "late.toml"]).refused();
         assert!(said.contains(expected), "{said}");
     }
 }
@@ -135,7 +136,7 @@ fn a_style_that_was_a_file_must_be_named_again() {
     fs::write(at.join("styles/mine.toml"), style).unwrap();
     let report = ["report", "a.parquet", "--no-figures", "--style", "styles/mine.toml", "--out", "old"];
     run(at, &report).ends(0);
-    let said = run(at, &["rescore", "old", "--definitions", "extended", "--metrics", "MCR"]).refused();
+    let said = run(at, &["table", "rescore", "old", "--definitions", "extended", "--metrics", "MCR"]).refused();
     assert!(said.contains("the report's style `mine`") && said.contains("--style"), "{said}");
-    run(at, &["rescore", "old", "--definitions", "paper", "--style", "styles/mine.toml"]).ends(0);
+    run(at, &["table", "rescore", "old", "--definitions", "paper", "--style", "styles/mine.toml"]).ends(0);
 }

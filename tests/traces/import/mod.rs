@@ -38,7 +38,7 @@ fn imported(text: impl Into<Vec<u8>>) -> (Vec<u8>, Value) {
     let folder = tempfile::tempdir().unwrap();
     let answer = run(folder.path(), &["import", "-", "-o", "x.parquet", "--json"], text);
     assert_eq!(answer.code, 0, "{}", answer.stderr);
-    let checked = run(folder.path(), &["validate", "x.parquet"], "");
+    let checked = run(folder.path(), &["trace", "validate", "x.parquet"], "");
     assert_eq!(checked.code, 0, "{}", checked.stdout);
     (fs::read(folder.path().join("x.parquet")).unwrap(), serde_json::from_str(&answer.stdout).unwrap())
 }
@@ -104,7 +104,7 @@ fn an_episode_may_lie_in_several_files() {
         run(folder.path(), &["import", "late.jsonl", "-", "early.jsonl", "-o", "x.parquet"], lines(&[step("b", 2)]));
     assert_eq!(answer.code, 0, "{}", answer.stderr);
     assert_eq!(answer.stdout, "imported 2 episodes, 5 steps into x.parquet\n");
-    assert_eq!(run(folder.path(), &["validate", "x.parquet"], "").code, 0);
+    assert_eq!(run(folder.path(), &["trace", "validate", "x.parquet"], "").code, 0);
 }
 
 #[test]
@@ -174,8 +174,9 @@ fn many_episodes_fill_several_row_groups_and_none_is_split() {
     }
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("x.parquet"), imported(text).0).unwrap();
-    let info: Value = serde_json::from_str(&run(folder.path(), &["info", "x.parquet", "--json"], "").stdout).unwrap();
-    let checked = run(folder.path(), &["validate", "x.parquet"], "").stdout;
+    let info: Value =
+        serde_json::from_str(&run(folder.path(), &["trace", "info", "x.parquet", "--json"], "").stdout).unwrap();
+    let checked = run(folder.path(), &["trace", "validate", "x.parquet"], "").stdout;
     assert!(checked.contains("1320 episodes, 132000 steps checked: 0 errors, 0 notes"), "{checked}");
     assert!(info.to_string().contains("132000"), "{info}");
 }

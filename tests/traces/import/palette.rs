@@ -32,7 +32,7 @@ fn the_trace_declares_the_palette() {
         assert_eq!(answer.code, 0, "{palette}: {}", answer.stderr);
         let declared = recording(&folder.path().join("x.parquet"));
         assert_eq!((&declared["kind"], &declared["palette"]), (&json!("import"), &json!(expected)), "{palette}");
-        assert_eq!(run(folder.path(), &["validate", "x.parquet"], "").code, 0);
+        assert_eq!(run(folder.path(), &["trace", "validate", "x.parquet"], "").code, 0);
     }
     run(folder.path(), &["import", "-", "-o", "y.parquet"], claiming("red"));
     assert_eq!(recording(&folder.path().join("y.parquet")).get("palette"), None);

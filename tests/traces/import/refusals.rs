@@ -28,7 +28,7 @@ fn check(values: Value, expected: &str, found: &str, help: &str) {
     assert!(said.starts_with(&words), "{said}\nfor\n{words}");
 }
 
-const SEE: &str = "`mirrorstats schema step` prints what a step may hold";
+const SEE: &str = "`mirrorstats trace schema step` prints what a step may hold";
 const ACTIONS: &str = "one of move_forward, move_backward, turn_left, turn_right, done, hand_up, hand_down, \
      hand_left, hand_right, hand_forward, hand_backward, or null";
 

@@ -1,4 +1,4 @@
-//! `mirrorstats renormalize` at the process boundary: what changes, what stays, what is refused.
+//! `mirrorstats trace renormalize` at the process boundary: what changes, what stays, what is refused.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -87,7 +87,7 @@ fn attributions_follow_the_texts_and_all_else_stays() {
     let answer = run(folder.path(), &["old.parquet", "-o", "new"]);
     assert_eq!((answer.code, answer.stderr.as_str()), (0, ""));
     let steps: Vec<_> = texts(&old, "identification").into_iter().zip(colors(&old)).collect();
-    assert_shown!(format!("mirrorstats renormalize old.parquet -o new, of the steps {steps:?}"), answer.stdout);
+    assert_shown!(format!("mirrorstats trace renormalize old.parquet -o new, of the steps {steps:?}"), answer.stdout);
     let new = folder.path().join("new/old.parquet");
     assert_eq!(fs::read(&old).unwrap(), before);
     assert_eq!(colors(&new), AFTER.map(|color| color.map(str::to_owned)));
@@ -105,7 +105,7 @@ fn attributions_follow_the_texts_and_all_else_stays() {
         pairs.into_iter().filter(|pair| !is_made_anew(&pair.key)).collect()
     };
     assert_eq!(rest(is), rest(was));
-    program::run(folder.path(), &["validate", "new/old.parquet"]).done();
+    program::run(folder.path(), &["trace", "validate", "new/old.parquet"]).done();
 }
 
 #[test]
@@ -203,7 +203,7 @@ fn traces_of_other_writers_keep_their_columns_and_keys() {
     assert!(kept.iter().any(|pair| pair.key == "theirs" && pair.value.as_deref() == Some("kept")));
     let recording = kept.iter().find(|pair| pair.key == "mirrorstats.recording").unwrap();
     assert_eq!(recording.value.as_deref(), Some(r#"{"identification_version":"1"}"#));
-    program::run(folder.path(), &["validate", "deep/new/theirs.parquet"]).ends(0);
+    program::run(folder.path(), &["trace", "validate", "deep/new/theirs.parquet"]).ends(0);
 }
 
 #[test]

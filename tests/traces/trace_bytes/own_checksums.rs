@@ -112,10 +112,10 @@ fn a_column_that_the_schema_does_not_know_is_checked() {
     let path = at.join("own.parquet");
     let mut bytes = fs::read(&path).unwrap();
     let page = pages(&bytes).into_iter().find(|page| page.column == "mood").unwrap();
-    run(at, &["validate", "own.parquet"]).done();
+    run(at, &["trace", "validate", "own.parquet"]).done();
     bytes[page.end - 1] ^= 1;
     fs::write(&path, bytes).unwrap();
-    let told = run(at, &["validate", "own.parquet"]).ends(1).stdout;
+    let told = run(at, &["trace", "validate", "own.parquet"]).ends(1).stdout;
     assert!(told.contains("corrupt-data") && told.contains("`mood`") && told.contains("CRC-32"), "{told}");
 }
 
@@ -191,9 +191,9 @@ fn checksums_that_another_program_carried_along_do_not_apply() {
     let anew = folder.path().join("anew.parquet");
     merge::write(&anew, None, &merge::read(&other).unwrap()).unwrap();
     assert_eq!((state(&anew), findings(&anew)), (Checksums::Present, Vec::new()));
-    let info = run(folder.path(), &["info", "--json", "own.parquet"]).json();
+    let info = run(folder.path(), &["trace", "info", "--json", "own.parquet"]).json();
     assert_eq!(info["files"][0]["checksums"], "present");
-    let told = run(folder.path(), &["info", "other.parquet"]).done();
+    let told = run(folder.path(), &["trace", "info", "other.parquet"]).done();
     assert!(told.contains("checksums") && told.contains("stale"), "{told}");
 }
 
@@ -217,13 +217,13 @@ fn a_damaged_trace_is_not_renormalized() {
         ..Step::default()
     };
     write_episodes(&path, None, &[traces::episode("a", vec![step])]).unwrap();
-    run(folder.path(), &["renormalize", "old.parquet", "-o", "new"]).done();
+    run(folder.path(), &["trace", "renormalize", "old.parquet", "-o", "new"]).done();
     assert_eq!(findings(&folder.path().join("new/old.parquet")), []);
     let mut bytes = fs::read(&path).unwrap();
     let page = pages(&bytes).into_iter().find(|page| page.column == "action").unwrap();
     bytes[page.end - 1] ^= 1;
     fs::write(&path, bytes).unwrap();
-    let told = run(folder.path(), &["renormalize", "old.parquet", "-o", "newer"]).refused();
+    let told = run(folder.path(), &["trace", "renormalize", "old.parquet", "-o", "newer"]).refused();
     assert!(told.contains("CRC-32") && told.contains("`action`"), "{told}");
     assert!(!folder.path().join("newer/old.parquet").exists());
 }

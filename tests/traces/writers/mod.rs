@@ -137,7 +137,7 @@ fn a_trace_that_another_program_wrote_again_is_read_and_every_verb_says_so() {
     let answer = run(at, &["stats", "trace.parquet", "--json"]).json();
     let warnings = answer["warnings"].as_array().unwrap();
     assert!(warnings.iter().any(|words| words.as_str().unwrap().contains("another program wrote")), "{warnings:?}");
-    assert!(run(at, &["info", "trace.parquet"]).done().contains("stale"));
+    assert!(run(at, &["trace", "info", "trace.parquet"]).done().contains("stale"));
 }
 
 #[test]
@@ -155,9 +155,9 @@ fn traces_without_checksums_are_counted() {
         write_rows(&at.join(name), &[rows.slice(first, count)], None);
     }
     let both = ["one.parquet", "two.parquet"];
-    let told = run(at, &["validate", both[0], both[1]]).stdout;
+    let told = run(at, &["trace", "validate", both[0], both[1]]).stdout;
     assert!(told.contains("no checksums in 2 files"), "{told}");
-    let checked = run(at, &["validate", both[0], "--json"]).stdout;
+    let checked = run(at, &["trace", "validate", both[0], "--json"]).stdout;
     assert!(checked.contains(r#""checksums": "none""#), "{checked}");
     let answer = run(at, &["report", both[0], both[1], "--no-figures", "--json", "--out", "report"]);
     let words = "one.parquet and one other file: no checksums";
@@ -165,7 +165,7 @@ fn traces_without_checksums_are_counted() {
     assert!(answer.json()["warnings"].to_string().contains(words));
     // Our own have them.
     let own = fixture("paper").display().to_string();
-    assert!(!run(at, &["validate", &own]).stdout.contains("no checksums"));
+    assert!(!run(at, &["trace", "validate", &own]).stdout.contains("no checksums"));
 }
 
 #[test]

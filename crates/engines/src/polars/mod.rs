@@ -7,5 +7,6 @@ pub mod answer;
 pub mod frame;
 pub mod run;
 pub mod score;
+pub mod shared_file;
 pub mod statement;
 pub mod tables;

@@ -40,7 +40,7 @@ impl Recordings {
                 format!("mirrorstats view {runs}{definitions} --episode "),
                 String::new()
             ),
-            command("a film strip", "mirrorstats filmstrip ".to_owned(), format!(" {runs} --out filmstrip.png")),
+            command("a film strip", "mirrorstats world filmstrip ".to_owned(), format!(" {runs} --out filmstrip.png")),
         ])
     }
 

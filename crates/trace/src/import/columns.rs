@@ -42,7 +42,7 @@ struct Inferred {
 const MOST_OWN: usize = 1000;
 /// Floating-point numbers of 64 bits hold every integer up to here.
 const EXACT: u64 = 1 << 53;
-const SEE: &str = "`mirrorstats schema step` prints what a step may hold";
+const SEE: &str = "`mirrorstats trace schema step` prints what a step may hold";
 
 impl Columns {
     /// Checks a line against the schema and against the lines before it.

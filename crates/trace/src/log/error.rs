@@ -20,7 +20,7 @@ pub enum LogError {
     },
     /// The bytes are not those of a log.
     #[error(
-        "the log `{file}` is damaged: {fault}\n  help: `mirrorstats recover {file} -o TRACE.parquet` saves what can be saved"
+        "the log `{file}` is damaged: {fault}\n  help: `mirrorstats trace recover {file} -o TRACE.parquet` saves what can be saved"
     )]
     Damaged {
         /// The log.

@@ -1,4 +1,4 @@
-//! The schema as a document: what `mirrorstats schema` prints and `schemas/trace.schema.json` holds.
+//! The schema as a document: what `mirrorstats trace schema` prints and `schemas/trace.schema.json` holds.
 
 use serde::Serialize;
 
@@ -18,7 +18,7 @@ pub struct SchemaDocument {
     pub columns: &'static [Column],
     /// The key-value metadata of the footer.
     pub metadata: &'static [MetadataKey],
-    /// The rules that `mirrorstats validate` checks.
+    /// The rules that `mirrorstats trace validate` checks.
     pub rules: Vec<Rule>,
 }
 

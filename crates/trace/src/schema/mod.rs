@@ -1,6 +1,6 @@
 //! The table of columns: what a trace holds, and the one place that says so.
 //!
-//! Writer, reader, `validate`, `import`, the messages of logs, `mirrorstats schema` and `schemas/trace.schema.json` all
+//! Writer, reader, `validate`, `import`, the messages of logs, `mirrorstats trace schema` and `schemas/trace.schema.json` all
 //! follow `COLUMNS`: a new column is an entry there, and a field of `Episode` or `Extra`. Columns that it does not name
 //! are a trace's own: they are kept, and definitions may use them.
 

@@ -22,7 +22,7 @@ fn with_help(fault: Fault) -> Fault {
     if fault.help.is_some() {
         return fault;
     }
-    fault.help("`mirrorstats schema experiments` says what each key may be")
+    fault.help("`mirrorstats trace schema experiments` says what each key may be")
 }
 
 fn entries(source: Source, folder: Option<&Path>, known: &[&Spec]) -> Result<Vec<Entry>, Faults> {

@@ -32,12 +32,12 @@ pub(super) fn check(log: &Path, trace: &Path, recording: &Value, episodes: &[Epi
     let (own, place) = (log.display(), trace.display());
     let help = if trace.exists() || difference_of(&found, recording).is_some() {
         format!(
-            "`mirrorstats recover {own} -o TRACE.parquet` makes a trace of it; move the log away to go on without it, or \
+            "`mirrorstats trace recover {own} -o TRACE.parquet` makes a trace of it; move the log away to go on without it, or \
              record into another folder"
         )
     } else {
         format!(
-            "`mirrorstats recover {own} -o {place}` makes its trace again, and the same command goes on from there; or \
+            "`mirrorstats trace recover {own} -o {place}` makes its trace again, and the same command goes on from there; or \
              move the log away to record its episodes anew"
         )
     };

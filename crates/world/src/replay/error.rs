@@ -26,7 +26,7 @@ pub enum ReplayError {
     Scenes { found: String },
     #[error("episode `{episode}`: {fault}")]
     World { episode: String, fault: String },
-    #[error("no trace has the episode `{0}`; `mirrorstats info --episodes` lists what is there")]
+    #[error("no trace has the episode `{0}`; `mirrorstats trace info --episodes` lists what is there")]
     NoEpisode(String),
     #[error("`{episode}` has no frame of step {t}")]
     NoFrame { episode: String, t: i32 },

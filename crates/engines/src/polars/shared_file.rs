@@ -1,0 +1,66 @@
+//! A file that Polars writes, whose errors are kept: Polars drops its writers without a word about what they did not write.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use polars::prelude::LazyFrame;
+
+use super::answer::{Format, write};
+use super::run::PolarsError;
+
+/// Why rows are not in a file.
+#[derive(Debug, thiserror::Error)]
+pub enum WriteError {
+    #[error(transparent)]
+    Output(io::Error),
+    #[error(transparent)]
+    Polars(PolarsError),
+}
+
+/// Writes the rows of a query to a file.
+pub fn write_file(frame: LazyFrame, format: Format, file: File) -> Result<(), WriteError> {
+    let out = SharedFile::new(file);
+    let written = write(frame, format, out.clone());
+    out.finish().map_err(WriteError::Output)?;
+    written.map_err(WriteError::Polars)
+}
+
+/// A file with several writers that keeps the first error.
+#[derive(Clone)]
+struct SharedFile(Arc<Mutex<Shared>>);
+
+struct Shared {
+    out: BufWriter<File>,
+    fault: Option<io::Error>,
+}
+
+impl SharedFile {
+    fn new(file: File) -> Self {
+        Self(Arc::new(Mutex::new(Shared { out: BufWriter::new(file), fault: None })))
+    }
+
+    fn finish(&self) -> io::Result<()> {
+        let mut shared = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        shared.fault.take().map_or_else(|| shared.out.flush(), Err)
+    }
+
+    fn with<T>(&self, work: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>) -> io::Result<T> {
+        let mut shared = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        work(&mut shared.out).map_err(|error| {
+            let kind = error.kind();
+            shared.fault.get_or_insert(error);
+            kind.into()
+        })
+    }
+}
+
+impl Write for SharedFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.with(|out| out.write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.with(Write::flush)
+    }
+}

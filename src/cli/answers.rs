@@ -1,0 +1,34 @@
+//! The JSON Schemas of what commands print, as far as no crate has the type, and of what others write.
+
+use schemars::schema_for;
+use serde_json::{Value, json};
+
+use super::commands::definitions::CheckAnswer;
+use super::commands::experiments::ExperimentsAnswer;
+use super::commands::study::report::ReportAnswer;
+use super::commands::table::rescore::RescoreAnswer;
+use super::commands::trace::recover::RecoverAnswer;
+use super::commands::trace::schema::Name;
+
+/// The schemas, each with the name of its file in `schemas/`.
+pub fn schemas() -> Vec<(&'static str, Value)> {
+    #[cfg_attr(not(feature = "sim"), expect(unused_mut, reason = "the feature adds to them"))]
+    let mut schemas = vec![
+        ("definitions-check", json!(schema_for!(CheckAnswer))),
+        ("experiment", Name::Experiment.document()),
+        ("experiments", Name::Experiments.document()),
+        ("experiments-check", json!(schema_for!(ExperimentsAnswer))),
+        ("recover", json!(schema_for!(RecoverAnswer))),
+        ("report", json!(schema_for!(ReportAnswer))),
+        ("reply-cubes", Name::ReplyCubes.document()),
+        ("reply-exploration", Name::ReplyExploration.document()),
+        ("rescore", json!(schema_for!(RescoreAnswer))),
+        ("step", Name::Step.document()),
+    ];
+    #[cfg(feature = "sim")]
+    schemas.extend([
+        ("record", json!(schema_for!(super::recording::RecordAnswer))),
+        ("record-forecast", json!(schema_for!(super::recording::dry_run::ForecastAnswer))),
+    ]);
+    schemas
+}

@@ -1,0 +1,147 @@
+//! `definitions`: check a definition file, explain a metric, list and show the built-in files.
+
+pub mod sensitivity;
+pub mod sql;
+
+use std::ffi::OsString;
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use exact::escape::visible;
+use exact::suggest::nearest;
+use metric::definitions::{Definitions, UnknownMetric};
+use metric::fault::FaultRecord;
+use metric::file::{FileError, built_in, built_in_names};
+use score::score_traces;
+use study::StudyError;
+use trace::inputs;
+use trace::open::TraceSet;
+
+/// Check, explain and show metrics, their SQL, their sensitivity
+#[derive(Clone, Debug, clap::Args)]
+pub struct DefinitionsArgs {
+    #[command(subcommand)]
+    pub action: Action,
+}
+
+/// What to do with definitions.
+#[derive(Clone, Debug, clap::Subcommand)]
+pub enum Action {
+    /// Show every fault of a definition file, underlined, with a suggestion
+    Check {
+        /// `paper`, `extended`, or a TOML file
+        #[arg(value_name = "NAME|FILE")]
+        file: PathBuf,
+        /// Traces whose own columns the definitions may use
+        #[arg(value_name = "TRACES")]
+        traces: Vec<OsString>,
+        /// Print the answer as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Say in words how a metric is computed
+    Explain {
+        /// The metric's name
+        #[arg(value_name = "METRIC")]
+        metric: String,
+        /// `paper`, `extended`, or a TOML file
+        #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
+        definitions: PathBuf,
+        /// Print the answer as JSON
+        #[arg(long)]
+        json: bool,
+    },
+    /// Print a built-in definition file, to start your own from
+    Show {
+        /// `paper` or `extended`
+        #[arg(value_name = "NAME", default_value = "paper")]
+        name: String,
+    },
+    Sql(sql::SqlArgs),
+    Sensitivity(sensitivity::SensitivityArgs),
+}
+
+/// The answer of `check` for a program.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct CheckAnswer {
+    /// Whether the definitions have no fault.
+    pub ok: bool,
+    /// The hash of the resolved definitions; null with faults.
+    pub hash: Option<String>,
+    /// The metrics; empty with faults.
+    pub metrics: Vec<String>,
+    /// Every fault.
+    pub faults: Vec<FaultRecord>,
+}
+
+impl DefinitionsArgs {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self.action {
+            Action::Check { file, traces, json } => check(&file, &traces, json),
+            Action::Explain { metric, definitions, json } => explain(&metric, &definitions, json),
+            Action::Show { name } => show(&name),
+            Action::Sql(args) => args.run(),
+            Action::Sensitivity(args) => args.run(),
+        }
+    }
+}
+
+fn check(file: &Path, traces: &[OsString], json: bool) -> Result<Outcome, Failure> {
+    let columns = if traces.is_empty() {
+        score_traces::schema_columns()
+    } else {
+        let inputs = inputs::resolve(traces, io::stdin().lock()).map_err(Failure::input)?;
+        score_traces::trace_columns(&TraceSet::open(&inputs).map_err(Failure::input)?)
+    };
+    match Definitions::load(file, &columns) {
+        Ok(definitions) if json => {
+            let catalog = definitions.catalog;
+            let metrics = catalog.metric.keys().cloned().collect();
+            output::print_json(&CheckAnswer { ok: true, hash: Some(catalog.hash), metrics, faults: vec![] })
+        }
+        Ok(definitions) => {
+            let catalog = &definitions.catalog;
+            let metrics: Vec<&str> = catalog.metric.keys().map(String::as_str).collect();
+            writeln!(
+                io::stdout().lock(),
+                "{}: no fault\n  {} metrics: {}\n  {} named expressions, {} experiments\n  sha256 {}",
+                visible(&file.display().to_string()),
+                metrics.len(),
+                visible(&metrics.join(", ")),
+                catalog.lets.len(),
+                catalog.experiment.len(),
+                catalog.hash
+            )?;
+            Ok(Outcome::Done)
+        }
+        Err(FileError::Faults(faults)) if json => {
+            output::print_json(&CheckAnswer { ok: false, hash: None, metrics: vec![], faults: faults.records() })?;
+            Err(Failure::of_faults(&faults))
+        }
+        Err(error) => Err(StudyError::from(error).into()),
+    }
+}
+
+fn explain(metric: &str, definitions: &Path, json: bool) -> Result<Outcome, Failure> {
+    let definitions = Definitions::load(definitions, &score_traces::schema_columns()).map_err(StudyError::from)?;
+    if let Some(explanation) = definitions.explain(metric) {
+        return output::print(&explanation, json);
+    }
+    let known: Vec<String> = definitions.catalog.metric.keys().cloned().collect();
+    let near = nearest(metric, known.iter().map(String::as_str)).map(str::to_owned);
+    Err(Failure::input(UnknownMetric { name: metric.to_owned(), near, known }))
+}
+
+fn show(name: &str) -> Result<Outcome, Failure> {
+    let Some(text) = built_in(name) else {
+        let names = built_in_names().join(", ");
+        return Err(Failure::Rendered(format!("error: no built-in definitions `{name}`; there are {names}")));
+    };
+    io::stdout().lock().write_all(text.as_bytes())?;
+    Ok(Outcome::Done)
+}

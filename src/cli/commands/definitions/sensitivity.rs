@@ -1,0 +1,86 @@
+//! `sensitivity`: how every cell moves with the threshold of mirror evidence, and where a conclusion changes.
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{output, terminal};
+use exact::replace::Content;
+use report::figures::FigureFormat;
+use study::{DEFAULT_THRESHOLDS, SensitivityReport, Thresholds};
+
+/// Tell how every cell moves with the threshold of mirror evidence, and where a conclusion changes
+///
+/// Needs traces that record `mirror_self_px`. A threshold replaces the `let` named `visible` of the definitions by
+/// `mirror_self_px >= K`.
+#[derive(Clone, Debug, clap::Args)]
+pub struct SensitivityArgs {
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    /// The least numbers of pixels that count as evidence, separated by commas
+    #[arg(long, value_name = "PIXELS", default_value = DEFAULT_THRESHOLDS)]
+    pub thresholds: Thresholds,
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    /// Let a cell hold episodes that were recorded differently
+    #[arg(long)]
+    pub pool: bool,
+    /// Write sensitivity.csv, .md and .tex, and the figure in every format, into this folder
+    #[arg(short, long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Write the figure here; the ending says the format
+    #[arg(long, value_name = "FILE")]
+    pub figure: Option<PathBuf>,
+    /// Print the answer as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The names of the tables in the folder.
+const TABLES: [&str; 3] = ["sensitivity.csv", "sensitivity.md", "sensitivity.tex"];
+
+impl SensitivityArgs {
+    /// Scores under every threshold, prints and writes.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        // A name of no known format should not cost a pass over the traces.
+        let format = self.figure.as_deref().map(FigureFormat::of).transpose().map_err(Failure::input)?;
+        let study = self.traces.study(&self.scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
+        let mut targets = self.out.iter().flat_map(|out| names().map(|name| out.join(name))).chain(self.figure.clone());
+        targets.try_for_each(|path| output::check_target(&path, study.files_read(None)))?;
+        if let Some(out) = &self.out {
+            study.check_out(out)?;
+        }
+        let report = study.sensitivity(&self.thresholds)?;
+        output::notes(&report.notes);
+        if let (Some(path), Some(format)) = (&self.figure, format) {
+            output::write_file(path, &format.encode(&report.figure).map_err(Failure::input)?)?;
+        }
+        if let Some(out) = &self.out {
+            write(out, &report)?;
+        }
+        if self.json {
+            return output::print_json(&report.found);
+        }
+        io::stdout().lock().write_all(report.found.render(terminal::now()).as_bytes())?;
+        Ok(Outcome::Done)
+    }
+}
+
+/// The files of the folder: the tables, then the figure in every format.
+fn names() -> impl Iterator<Item = PathBuf> {
+    let figures = FigureFormat::ALL.iter().map(|format| format!("figures/sensitivity.{}", format.ending()).into());
+    TABLES.into_iter().map(PathBuf::from).chain(figures)
+}
+
+fn write(out: &Path, report: &SensitivityReport) -> Result<(), Failure> {
+    let found = &report.found;
+    let mut contents = vec![found.csv().into_bytes(), found.markdown().into_bytes(), found.latex().into_bytes()];
+    for format in FigureFormat::ALL {
+        contents.push(format.encode(&report.figure).map_err(Failure::input)?);
+    }
+    let names: Vec<PathBuf> = names().collect();
+    let files: Vec<_> =
+        names.iter().map(PathBuf::as_path).zip(contents.iter().map(|bytes| Content::Bytes(bytes))).collect();
+    output::write_folder(out, &files)
+}

@@ -1,0 +1,59 @@
+//! `sql`: the statement that computes the episode table on another engine.
+
+use std::ffi::OsString;
+use std::io::{self, Write as _};
+
+use crate::cli::args::{GroupingArgs, ScoringArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use metric::sql::{self, Dialect};
+use score::score_traces::{schema_columns, trace_columns};
+use study::Study;
+
+/// Print the SQL statement that computes the episode table from a table `steps`
+#[derive(Clone, Debug, clap::Args)]
+pub struct SqlArgs {
+    /// Traces whose columns `steps` has [default: those that every trace has; what others mean then is part of the statement]
+    #[arg(value_name = "TRACES")]
+    pub traces: Vec<OsString>,
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    /// Whose SQL to write
+    #[arg(long, value_enum, default_value_t = DialectArg::Portable)]
+    pub dialect: DialectArg,
+}
+
+/// The dialects by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum DialectArg {
+    /// What all engines share
+    Portable,
+    /// Spark SQL
+    Spark,
+    /// The one of `DuckDB`
+    Duckdb,
+}
+
+impl From<DialectArg> for Dialect {
+    fn from(dialect: DialectArg) -> Self {
+        match dialect {
+            DialectArg::Portable => Self::Portable,
+            DialectArg::Spark => Self::Spark,
+            DialectArg::Duckdb => Self::Duckdb,
+        }
+    }
+}
+
+impl SqlArgs {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let question = self.scoring.question(&GroupingArgs::default());
+        let definitions = if self.traces.is_empty() {
+            question.bind_to(&schema_columns())?
+        } else {
+            let study = Study::open(self.traces.clone())?;
+            question.resolved(study.traces()?)?.bind_to(&trace_columns(study.traces()?))?
+        };
+        let statement = sql::lower(&definitions.plan, self.dialect.into()).map_err(Failure::input)?;
+        io::stdout().lock().write_all(statement.as_bytes())?;
+        Ok(Outcome::Done)
+    }
+}

@@ -1,0 +1,81 @@
+//! `diff`: what another set of definitions changes, or another set of scores.
+
+use std::ffi::OsString;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+use crate::cli::args::ThreadArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::{output, terminal};
+use report::cells::diff::Changes;
+use report::cells::group::DEFAULT_BY;
+use report::changes::{self, Limit};
+use study::{DiffRequest, Side, diff, resolve};
+
+/// Show which cells and episodes change under other definitions: two sets of definitions, or of scores
+#[derive(Clone, Debug, clap::Args)]
+pub struct DiffArgs {
+    /// The definitions before: `paper`, `extended`, or a TOML file; or a file of scores, or a report's folder
+    #[arg(value_name = "OLD")]
+    pub old: PathBuf,
+    /// The definitions after, or scores
+    #[arg(value_name = "NEW")]
+    pub new: PathBuf,
+    /// The traces to score; between two files of scores, those that tell which timesteps decided
+    #[arg(value_name = "TRACES")]
+    pub traces: Vec<OsString>,
+    /// Only these metrics, separated by commas [default: all]
+    #[arg(long, value_name = "METRICS", value_delimiter = ',')]
+    pub metrics: Option<Vec<String>>,
+    /// Only episodes where this holds on both sides, in the language of definitions, such as "seed = 1"
+    #[arg(long = "where", value_name = "EXPR")]
+    pub condition: Option<String>,
+    /// Group episodes by these columns, separated by commas [default: experiment,model]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',', default_values = DEFAULT_BY, hide_default_value = true)]
+    pub by: Vec<String>,
+    /// What scores that do not say it were computed with: CSV, JSON lines, other engines' Parquet [default: paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub definitions: Option<PathBuf>,
+    /// The most lines of each list on the terminal; --json has all
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub limit: usize,
+    /// Exit with 1 if a cell moved, a value flipped, or one side lacks a metric or an episode
+    #[arg(long)]
+    pub fail_on_change: bool,
+    /// Print the answer as JSON
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+impl DiffArgs {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let (old, new) = (Side::of(&self.old)?, Side::of(&self.new)?);
+        let traces = resolve(&self.traces, io::stdin().lock())?;
+        output::note_stale_checksums(&traces);
+        let found = diff(&old, &new, &traces, &self.request())?;
+        output::notes(&found.notes);
+        self.print(&found.changes)
+    }
+
+    fn request(&self) -> DiffRequest {
+        DiffRequest {
+            metrics: self.metrics.clone(),
+            filter: self.condition.clone(),
+            by: self.by.clone(),
+            definitions_of_scores: self.definitions.clone(),
+            threads: self.threads.count(),
+        }
+    }
+
+    fn print(&self, changes: &Changes) -> Result<Outcome, Failure> {
+        if self.json {
+            output::print_json(changes)?;
+        } else {
+            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit), terminal::width()).as_bytes())?;
+        }
+        let failed = self.fail_on_change && !changes.is_empty();
+        Ok(if failed { Outcome::CheckFailed } else { Outcome::Done })
+    }
+}

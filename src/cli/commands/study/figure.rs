@@ -1,0 +1,99 @@
+//! `mirrorstats figure NAME TRACES...`: one figure, to a file or to standard output.
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+use clap::ValueEnum;
+use clap::builder::PossibleValue;
+
+use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use report::figures::{FigureFormat, FigureName};
+
+/// Draw one figure.
+#[derive(Clone, Debug, clap::Args)]
+pub struct FigureArgs {
+    /// Which: spider, heatmap, scatter, completion-gap, e5-outcomes, intervals, slopes, decision-curve, gaze
+    #[arg(value_name = "NAME")]
+    pub name: FigureName,
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    #[command(flatten)]
+    pub engine: EngineArgs,
+    /// The style whose order of models is taken: `default`, `paper`, or a TOML file
+    #[arg(long, value_name = "STYLE", default_value = "default")]
+    pub style: PathBuf,
+    /// The file format [default: by the ending of FILE; svg on standard output]
+    #[arg(long, value_enum)]
+    pub format: Option<Format>,
+    /// Where to write it [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// Let a cell hold episodes that were recorded differently
+    #[arg(long)]
+    pub pool: bool,
+}
+
+/// A file format, as clap lists it.
+#[derive(Clone, Copy, Debug)]
+pub struct Format(FigureFormat);
+
+/// Every format that this build has.
+const FORMATS: &[Format] = &[
+    Format(FigureFormat::Svg),
+    #[cfg(feature = "raster")]
+    Format(FigureFormat::Png),
+    #[cfg(feature = "raster")]
+    Format(FigureFormat::Pdf),
+];
+
+impl ValueEnum for Format {
+    fn value_variants<'a>() -> &'a [Self] {
+        FORMATS
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self.0 {
+            FigureFormat::Svg => "Vectors for the web, values on hover",
+            #[cfg(feature = "raster")]
+            FigureFormat::Png => "Pixels, about 300 per inch at a width of 7 inches",
+            #[cfg(feature = "raster")]
+            FigureFormat::Pdf => "Vectors for LaTeX",
+        };
+        Some(PossibleValue::new(self.0.ending()).help(help))
+    }
+}
+
+impl FigureArgs {
+    /// Scores the traces and draws.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        // An ending of no known format should not cost a pass over the traces.
+        let format = self.format()?;
+        let study = self.traces.study_on(
+            &self.engine,
+            &self.scoring,
+            &GroupingArgs { pool: self.pool, ..GroupingArgs::default() },
+        )?;
+        if let Some(path) = &self.output {
+            output::check_target(path, study.files_read(Some(&self.style)))?;
+        }
+        let figure = study.figure(self.name, &self.style)?;
+        let bytes = format.encode(&figure).map_err(Failure::input)?;
+        match &self.output {
+            Some(path) => output::write_file(path, &bytes)?,
+            None => io::stdout().lock().write_all(&bytes)?,
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn format(&self) -> Result<FigureFormat, Failure> {
+        match (self.format, &self.output) {
+            (Some(Format(format)), _) => Ok(format),
+            (None, Some(path)) => FigureFormat::of(path).map_err(Failure::input),
+            (None, None) => Ok(FigureFormat::Svg),
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! `plan`: how many episodes a study needs, or what its episodes can show.
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::cli::outcome::{Failure, Outcome};
+#[cfg(feature = "sim")]
+use crate::cli::registration;
+use crate::cli::{output, terminal};
+use exact::ratio::Ratio;
+use metric::definitions::Definitions;
+use report::plan::register::{NamedHash, RegisteredPlan};
+use report::plan::{Given, Plan, PlanRequest, plan, text};
+use score::score_traces::schema_columns;
+use statistics::sample_size::Clusters;
+use study::StudyError;
+#[cfg(feature = "sim")]
+use world::sim::config::WorldConfig;
+
+/// Plan how many episodes a study needs: for a wanted difference, or the difference that given episodes can show
+#[derive(Clone, Debug, clap::Args)]
+#[command(group(clap::ArgGroup::new("given").required(true).args(["difference", "episodes", "runs"])))]
+pub struct PlanArgs {
+    /// The difference of two rates to show, such as 0.3: how many episodes does it take?
+    #[arg(long, value_name = "D", value_parser = share)]
+    pub difference: Option<f64>,
+    /// Episodes per model and experiment, as many for each seed: which difference can they show?
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub episodes: Option<u64>,
+    /// The same as runs per seed
+    #[arg(long, value_name = "R", value_parser = clap::value_parser!(u64).range(1..))]
+    pub runs: Option<u64>,
+    /// The lower of the two rates [default: both around 1/2, the worst case]
+    #[arg(long, value_name = "RATE", value_parser = share)]
+    pub baseline: Option<f64>,
+    /// The probability of finding the difference
+    #[arg(long, value_name = "POWER", default_value = "0.8", value_parser = within)]
+    pub power: f64,
+    /// Confidence of the tests; they are at one minus it
+    #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = within)]
+    pub confidence: f64,
+    /// Models, each compared with each
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u64).range(2..=1000))]
+    pub models: u64,
+    /// Seeds, each with as many runs
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=2000))]
+    pub seeds: u64,
+    /// The share of pairs in which one model alone succeeds [default: as if independent, the worst case]
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub discordance: Option<f64>,
+    /// Intraclass correlation of the episodes of one seed
+    #[arg(long, value_name = "ICC", default_value = "0", value_parser = share)]
+    pub icc: f64,
+    /// A level of chance to hold each model against as well, such as 1/3
+    #[arg(long, value_name = "LEVEL", value_parser = chance)]
+    pub chance: Option<Ratio>,
+    /// Definitions that a registered plan names by their hash: `paper`, `extended`, or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
+    pub definitions: PathBuf,
+    /// Write the plan, the hash of the definitions and its own hash to a new file
+    #[arg(long, value_name = "FILE")]
+    pub register: Option<PathBuf>,
+    /// The world configuration that a registered plan names by its hash [default: the built-in one]
+    #[cfg(feature = "sim")]
+    #[arg(long, value_name = "FILE", requires = "register")]
+    pub config: Option<PathBuf>,
+    /// Print the answer as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options that do not go together.
+#[derive(Debug, thiserror::Error)]
+enum UsageError {
+    #[error(
+        "--episodes {episodes}: expected as many episodes for each of {seeds} seeds; give a multiple of {seeds}, or --seeds 1"
+    )]
+    Uneven { episodes: u64, seeds: u64 },
+    #[error("{file}: a registered plan is not replaced; give the name of a new file")]
+    Registered { file: String },
+}
+
+impl PlanArgs {
+    /// Plans, prints, and registers where asked to.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let plan = plan(self.request()?).map_err(Failure::input)?;
+        if let Some(file) = &self.register {
+            self.write(file, &plan)?;
+        }
+        if self.json {
+            return output::print_json(&plan);
+        }
+        std::io::stdout().lock().write_all(text::render(&plan, terminal::width()).as_bytes())?;
+        Ok(Outcome::Done)
+    }
+
+    fn request(&self) -> Result<PlanRequest, Failure> {
+        Ok(PlanRequest {
+            given: self.given()?,
+            baseline: self.baseline,
+            power: self.power,
+            confidence: self.confidence,
+            models: self.models,
+            clusters: Clusters { seeds: self.seeds, icc: self.icc },
+            discordance: self.discordance,
+            chance: self.chance,
+        })
+    }
+
+    fn given(&self) -> Result<Given, Failure> {
+        match (self.difference, self.episodes, self.runs) {
+            (Some(difference), ..) => Ok(Given::Difference(difference)),
+            (_, Some(episodes), _) if !episodes.is_multiple_of(self.seeds) => {
+                Err(Failure::input(UsageError::Uneven { episodes, seeds: self.seeds }))
+            }
+            (_, Some(episodes), _) => Ok(Given::Runs(episodes / self.seeds)),
+            (_, _, runs) => Ok(Given::Runs(runs.expect("one of the three is required"))),
+        }
+    }
+
+    fn write(&self, file: &Path, plan: &Plan) -> Result<(), Failure> {
+        let catalog = Definitions::load(&self.definitions, &schema_columns()).map_err(StudyError::from)?.catalog;
+        if file.exists() {
+            return Err(Failure::input(UsageError::Registered { file: file.display().to_string() }));
+        }
+        let definitions = NamedHash { name: catalog.name, sha256: catalog.hash };
+        let (experiments, prompts) = self.recorded()?;
+        let registered = RegisteredPlan::new(plan.clone(), definitions, experiments, prompts);
+        let mut new = output::create(file)?;
+        let written = new.write_all(registered.to_json().as_bytes()).and_then(|()| new.commit_new());
+        written.map_err(|error| match error.kind() {
+            // Another process has registered one meanwhile.
+            io::ErrorKind::AlreadyExists => Failure::input(UsageError::Registered { file: file.display().to_string() }),
+            _ => output::unwritable(file, error),
+        })
+    }
+
+    /// The hashes of what will be recorded: the world and the prompts.
+    #[cfg(feature = "sim")]
+    fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
+        let config = match &self.config {
+            Some(path) => WorldConfig::load(path).map_err(Failure::input)?,
+            None => WorldConfig::default(),
+        };
+        let world = NamedHash { name: registration::WORLD.to_owned(), sha256: config.hash() };
+        Ok((vec![world], registration::prompts()))
+    }
+
+    /// Nothing, in a program that cannot record.
+    #[cfg(not(feature = "sim"))]
+    #[expect(clippy::unnecessary_wraps, clippy::unused_self, reason = "a program that records reads a file")]
+    fn recorded(&self) -> Result<(Vec<NamedHash>, Vec<NamedHash>), Failure> {
+        Ok((Vec::new(), Vec::new()))
+    }
+}
+
+fn number(text: &str, expected: &str, holds: impl Fn(f64) -> bool) -> Result<f64, String> {
+    let value = text.parse::<f64>().ok().filter(|value| holds(*value));
+    value.ok_or_else(|| format!("expected {expected}, found `{text}`"))
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(text, "a number from 0 to 1 such as 0.3", |value| (0.0..=1.0).contains(&value))
+}
+
+fn within(text: &str) -> Result<f64, String> {
+    number(text, "a number between 0 and 1 such as 0.8", |value| value > 0.0 && value < 1.0)
+}
+
+fn chance(text: &str) -> Result<Ratio, String> {
+    let level: Ratio = text.parse()?;
+    let is_share = level.numerator() >= 0 && level.numerator() <= level.denominator();
+    if is_share { Ok(level) } else { Err(format!("expected a fraction from 0 to 1 such as 1/3, found `{text}`")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{chance, share, within};
+
+    #[test]
+    fn shares_and_levels_are_numbers_from_zero_to_one() {
+        assert_eq!([share("0"), share("1"), within("0.5")], [0.0, 1.0, 0.5].map(Ok));
+        for text in ["-0.1", "1.1", "NaN", "30%", ""] {
+            assert!(share(text).is_err() && within(text).is_err() && chance(text).is_err(), "{text}");
+        }
+        assert!(within("0").is_err() && within("1").is_err() && chance("4/3").is_err());
+        assert_eq!(chance("1/3").unwrap().to_string(), "1/3");
+    }
+}

@@ -1,0 +1,166 @@
+//! `query`: any SELECT over steps, episodes and cells.
+
+use std::path::PathBuf;
+
+use crate::cli::args::{ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+
+/// Run a SELECT over the tables steps, episodes and cells
+///
+/// `steps` has one row per step, with every column of the traces as it is; a column that one file lacks is null there.
+/// `episodes` is what `score` writes, `cells` what `report` writes as cells.csv. Rows come in no fixed order unless the
+/// query says ORDER BY. A query reads the traces named and nothing else.
+#[derive(Clone, Debug, clap::Args)]
+pub struct QueryArgs {
+    /// The query, such as "SELECT model, COUNT(*) AS steps FROM steps GROUP BY model ORDER BY model"
+    #[arg(value_name = "SELECT")]
+    pub query: String,
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    /// How to write the answer [default: by the ending of FILE; table on standard output]
+    #[arg(long, value_enum)]
+    pub format: Option<AnswerFormat>,
+    /// Where to write it [default: standard output]
+    #[arg(short, long, value_name = "FILE")]
+    pub output: Option<PathBuf>,
+    /// The most rows of a table, the first and the last ones; 0 for all
+    #[arg(long, value_name = "N", default_value_t = 40)]
+    pub rows: usize,
+}
+
+/// The formats by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum AnswerFormat {
+    /// For people: names, types, the first and the last rows
+    Table,
+    /// Comma-separated with a header; null is empty
+    Csv,
+    /// One JSON object per line
+    Jsonl,
+    /// Parquet; only with -o
+    Parquet,
+}
+
+impl QueryArgs {
+    /// Refuses: the work needs Polars.
+    #[cfg(not(feature = "polars"))]
+    pub fn run(self) -> Result<Outcome, Failure> {
+        Err(study::StudyError::WithoutPolars { what: "query" }.into())
+    }
+
+    #[cfg(feature = "polars")]
+    pub fn run(self) -> Result<Outcome, Failure> {
+        rows::answer(&self)
+    }
+}
+
+/// From a query as typed to its rows on standard output or in a file.
+#[cfg(feature = "polars")]
+mod rows {
+    use std::io::{self, Write as _};
+    use std::path::Path;
+
+    use super::{AnswerFormat, Failure, Outcome, QueryArgs};
+    use crate::cli::args::GroupingArgs;
+    use crate::cli::text_table::listing;
+    use crate::cli::{output, terminal};
+    use engines::polars::answer::{Excerpt, Format, excerpt, write};
+    use engines::polars::run::PolarsError;
+    use engines::polars::shared_file::{WriteError, write_file};
+    use engines::polars::statement;
+    use exact::escape::visible;
+    use exact::replace::is_stream;
+    use report::tables::fit::fitted;
+    use study::StudyError;
+
+    /// What stands for null in a table.
+    const NULL: &str = "NULL";
+
+    pub(super) fn answer(args: &QueryArgs) -> Result<Outcome, Failure> {
+        let format = format(args)?;
+        // A slip in the query should not cost a look at the traces.
+        let query = statement::check(&args.query).map_err(|found| Failure::of_faults(&found))?;
+        let study = args.traces.study(&args.scoring, &GroupingArgs::default())?;
+        if let Some(path) = &args.output {
+            output::check_target(path, study.files_read(None))?;
+        }
+        let (frame, note) = study.query(&query)?;
+        output::notes(note.as_slice());
+        match (format, &args.output) {
+            (None, path) => {
+                let excerpt = excerpt(frame, (args.rows > 0).then_some(args.rows)).map_err(failed)?;
+                match path {
+                    Some(path) => output::write_file(path, render(&excerpt, None).as_bytes())?,
+                    None => io::stdout().lock().write_all(render(&excerpt, terminal::width()).as_bytes())?,
+                }
+            }
+            (Some(format), None) => write(frame, format, io::stdout()).map_err(failed)?,
+            (Some(format), Some(path)) => {
+                let file = output::create(path)?;
+                let out = file.as_file().try_clone().map_err(|error| output::unwritable(path, error))?;
+                write_file(frame, format, out).map_err(|error| match error {
+                    WriteError::Output(error) => output::unwritable(path, error),
+                    WriteError::Polars(error) => failed(error),
+                })?;
+                output::commit(file, path)?;
+            }
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn failed(error: PolarsError) -> Failure {
+        StudyError::from(error).into()
+    }
+
+    /// The format asked for; `None` for a table.
+    fn format(args: &QueryArgs) -> Result<Option<Format>, Failure> {
+        let ending = args.output.as_deref().and_then(Path::extension).map(std::ffi::OsStr::to_ascii_lowercase);
+        let ending = ending.as_deref().and_then(std::ffi::OsStr::to_str);
+        let by_ending = match (ending, &args.output) {
+            (_, None) | (Some("txt"), _) => AnswerFormat::Table,
+            (Some("csv"), _) => AnswerFormat::Csv,
+            (Some("jsonl" | "ndjson"), _) => AnswerFormat::Jsonl,
+            (Some("parquet"), _) => AnswerFormat::Parquet,
+            (_, Some(path)) if args.format.is_none() && !is_stream(path) => {
+                return Err(Failure::Rendered(format!(
+                    "error: `{}`: expected a name that ends in .csv, .jsonl, .parquet or .txt\n  help: or say which format with --format",
+                    path.display()
+                )));
+            }
+            _ => AnswerFormat::Table,
+        };
+        match args.format.unwrap_or(by_ending) {
+            AnswerFormat::Table => Ok(None),
+            AnswerFormat::Csv => Ok(Some(Format::Csv)),
+            AnswerFormat::Jsonl => Ok(Some(Format::JsonLines)),
+            AnswerFormat::Parquet if args.output.is_none() => Err(Failure::Rendered(
+                "error: Parquet is no text for standard output\n  help: name a file with -o".to_owned(),
+            )),
+            AnswerFormat::Parquet => Ok(Some(Format::Parquet)),
+        }
+    }
+
+    /// The rows for people: names, types, rows, how many there are.
+    fn render(excerpt: &Excerpt, width: Option<usize>) -> String {
+        let mut table = listing(excerpt.columns.iter().map(|(name, _)| visible(name)));
+        table.add_row(excerpt.columns.iter().map(|(_, ty)| ty.clone()).collect::<Vec<_>>());
+        let shown = |row: &Vec<Option<String>>| -> Vec<String> {
+            row.iter().map(|cell| cell.as_deref().map_or_else(|| NULL.to_owned(), visible)).collect()
+        };
+        for row in &excerpt.head {
+            table.add_row(shown(row));
+        }
+        let left_out = excerpt.rows - excerpt.head.len() - excerpt.tail.len();
+        if left_out > 0 {
+            table.add_row(excerpt.columns.iter().map(|_| "·").collect::<Vec<_>>());
+        }
+        for row in &excerpt.tail {
+            table.add_row(shown(row));
+        }
+        let count = if excerpt.rows == 1 { "1 row".to_owned() } else { format!("{} rows", excerpt.rows) };
+        let note = if left_out > 0 { format!(" ({} shown)", excerpt.rows - left_out) } else { String::new() };
+        format!("{}\n{count}{note}\n", fitted(&table, 1, width))
+    }
+}

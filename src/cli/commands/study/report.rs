@@ -1,0 +1,93 @@
+//! `report`: every table of the study from traces, on the terminal and as a folder.
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::text_table::counted;
+use report::bundle::Manifest;
+use report::tables::terminal;
+use study::{Report, ReportOptions, WrittenReport};
+
+/// Compute tables and figures of traces: print the main table, write all of them
+#[derive(Clone, Debug, clap::Args)]
+pub struct ReportArgs {
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    #[command(flatten)]
+    pub scoring: ScoringArgs,
+    #[command(flatten)]
+    pub engine: EngineArgs,
+    /// The folder to write
+    #[arg(short, long, value_name = "DIR", default_value = "reports/latest")]
+    pub out: PathBuf,
+    /// How tables look: `default`, `paper`, or a TOML file
+    #[arg(long, value_name = "STYLE", default_value = "default")]
+    pub style: PathBuf,
+    #[command(flatten)]
+    pub grouping: GroupingArgs,
+    /// Write tables, cells and provenance alone: no figures, no report.html
+    #[arg(long)]
+    pub no_figures: bool,
+    /// Print what was written as JSON instead of the table
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// The answer for a program.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct ReportAnswer {
+    /// The folder, as typed.
+    pub out: String,
+    /// The files in it that were written, by path inside the folder.
+    pub files: Vec<String>,
+    /// How many episodes were counted.
+    pub episodes: usize,
+    /// What a reader of the tables must know of the data.
+    pub warnings: Vec<String>,
+    /// Where everything comes from; the same as `manifest.json`.
+    pub manifest: Manifest,
+}
+
+impl ReportArgs {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let study = self.traces.study_on(&self.engine, &self.scoring, &self.grouping)?;
+        let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };
+        study.check_folder(&self.out, &options)?;
+        let report = study.report(&options)?;
+        output::notes(&report.notes);
+        let warnings = study.stale_checksums().into_iter().chain(report.notes.iter().cloned()).collect();
+        let WrittenReport { files, manifest } = report.write(&self.out)?;
+        if self.json {
+            let (out, episodes) = (self.out.display().to_string(), report.results.episodes.len());
+            return output::print_json(&ReportAnswer { out, files, episodes, warnings, manifest });
+        }
+        self.print(&report)
+    }
+
+    fn print(&self, report: &Report) -> Result<Outcome, Failure> {
+        let mut out = io::stdout().lock();
+        if let Some(table) = report.main_table() {
+            out.write_all(terminal::render(table, crate::cli::terminal::now()).as_bytes())?;
+        }
+        if let Some(table) = report.other_table() {
+            writeln!(out, "\n{}: what the style names nowhere", table.title)?;
+            out.write_all(terminal::render(table, crate::cli::terminal::now()).as_bytes())?;
+        }
+        if let Some(replies) = &report.replies {
+            writeln!(out, "\n{replies}")?;
+        }
+        let episodes = counted(report.results.episodes.len() as u64, "episode");
+        output::say(&format!("{episodes}; the report is in {}", self.out.display()));
+        if !self.no_figures {
+            output::say(&format!("open {}", self.out.join("report.html").display()));
+        }
+        output::say("next: `mirrorstats stats` with the same traces tells what these numbers can bear");
+        Ok(Outcome::Done)
+    }
+}

@@ -1,0 +1,147 @@
+//! `mirrorstats stats`: what can be concluded at this n, and what cannot.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::terminal;
+use exact::suggest::hint;
+use report::statistics::text::{self, Length};
+use report::statistics::{Options, Sequential, Statistics};
+
+/// The word that stands for every metric.
+const ALL: &str = "all";
+
+/// Intervals, tests and comparisons that hold at small n
+#[derive(Clone, Debug, clap::Args)]
+pub struct StatsArgs {
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub definitions: Option<PathBuf>,
+    /// Only episodes where this holds, in the language of definitions
+    #[arg(long = "where", value_name = "EXPR")]
+    pub condition: Option<String>,
+    #[command(flatten)]
+    pub grouping: GroupingArgs,
+    /// Confidence of every interval; tests are at one minus it
+    #[arg(long, value_name = "LEVEL", default_value = "0.95", value_parser = confidence)]
+    pub confidence: f64,
+    /// Metrics to print tables for, or `all` [default: those with a chance level, and time to decision]
+    #[arg(long = "metric", value_name = "NAME")]
+    pub metrics: Vec<String>,
+    /// Horizon of restricted means, in steps [default: the last step known for every model of an experiment]
+    #[arg(long, value_name = "STEPS", value_parser = clap::value_parser!(i64).range(1..))]
+    pub horizon: Option<i64>,
+    /// Print every interval, plain means, clusters, and what could have been shown
+    #[arg(long)]
+    pub full: bool,
+    /// For a study that still runs: intervals and tests of rates that may be looked at after every episode
+    #[arg(long, conflicts_with_all = ["by", "horizon", "full"])]
+    pub sequential: bool,
+    /// Print everything as JSON, of every metric
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A metric asked for that the definitions do not have.
+#[derive(Debug, thiserror::Error)]
+#[error("no {kind} is named `{name}`; the definitions have {known}{suggestion}")]
+struct UnknownMetric {
+    kind: &'static str,
+    name: String,
+    known: String,
+    suggestion: String,
+}
+
+impl StatsArgs {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let scoring =
+            ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
+        let study = self.traces.study(&scoring, &self.grouping)?;
+        let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
+        let options = Options { confidence, horizon, improvements, ..Options::default() };
+        let text = if self.sequential {
+            self.sequential_page(&study.sequential(&options)?)?
+        } else {
+            self.page(&study.statistics(&options)?)?
+        };
+        std::io::stdout().lock().write_all(text.as_bytes())?;
+        Ok(Outcome::Done)
+    }
+
+    const fn length(&self) -> Length {
+        if self.full { Length::Full } else { Length::Short }
+    }
+
+    fn page(&self, statistics: &Statistics) -> Result<String, Failure> {
+        if self.json {
+            return json(statistics);
+        }
+        let metrics = statistics.cells.iter().map(|cell| cell.metric.as_str());
+        let chosen = self.chosen("metric", metrics, &statistics.headline)?;
+        Ok(text::render(statistics, &chosen, self.length(), terminal::width()))
+    }
+
+    fn sequential_page(&self, sequential: &Sequential) -> Result<String, Failure> {
+        if self.json {
+            return json(sequential);
+        }
+        let rates = sequential.rates.iter().map(|rate| rate.metric.as_str());
+        let chosen = self.chosen("rate", rates, &sequential.headline)?;
+        Ok(text::sequential::render(sequential, &chosen, terminal::width()))
+    }
+
+    /// The metrics to print: those asked for, if they are among `all`, else the headline ones.
+    fn chosen<'a>(
+        &self,
+        kind: &'static str,
+        all: impl Iterator<Item = &'a str>,
+        headline: &[String],
+    ) -> Result<Vec<String>, Failure> {
+        let mut known: Vec<&str> = Vec::new();
+        for metric in all {
+            if !known.contains(&metric) {
+                known.push(metric);
+            }
+        }
+        if self.metrics.is_empty() {
+            return Ok(headline.to_vec());
+        }
+        if self.metrics.iter().any(|name| name == ALL) {
+            return Ok(known.into_iter().map(str::to_owned).collect());
+        }
+        match self.metrics.iter().find(|name| !known.contains(&name.as_str())) {
+            None => Ok(self.metrics.clone()),
+            Some(name) => {
+                let suggestion = hint(name, known.iter().copied());
+                Err(Failure::input(UnknownMetric { kind, name: name.clone(), known: known.join(", "), suggestion }))
+            }
+        }
+    }
+}
+
+fn json(statistics: &impl serde::Serialize) -> Result<String, Failure> {
+    Ok(serde_json::to_string_pretty(statistics).map_err(Failure::input)? + "\n")
+}
+
+fn confidence(text: &str) -> Result<f64, String> {
+    let fault = || format!("expected a number between 0 and 1 such as 0.95, found `{text}`");
+    let value: f64 = text.parse().map_err(|_| fault())?;
+    if value > 0.0 && value < 1.0 { Ok(value) } else { Err(fault()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::confidence;
+
+    #[test]
+    fn a_confidence_lies_strictly_between_zero_and_one() {
+        assert_eq!(confidence("0.99"), Ok(0.99));
+        for text in ["0", "1", "95", "-0.5", "NaN", "", "95%"] {
+            assert!(confidence(text).unwrap_err().contains("between 0 and 1"), "{text}");
+        }
+    }
+}

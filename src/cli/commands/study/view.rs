@@ -1,0 +1,136 @@
+//! `mirrorstats view`: recordings in the browser.
+
+use std::ffi::OsString;
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+use std::process::{Command, Stdio};
+use std::sync::Arc;
+
+use crate::cli::args::{GroupingArgs, ScoringArgs, ThreadArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use exact::escape::visible;
+use study::Question;
+use trace::inputs;
+use view::{Options, View, ViewError, export, routes};
+use web::{Guard, check_token};
+
+/// Look at recordings in the browser: the report, every episode step by step, two beside each other
+///
+/// A server for this machine alone: it prints its address, and Ctrl-C ends it. Recordings that still run grow on the page. With --export
+/// the page is written as files instead, which any web server or a disk can hold.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ViewArgs {
+    /// Traces, logs, folders of them, quoted globs
+    #[arg(value_name = "RUNS", default_value = "runs")]
+    runs: Vec<OsString>,
+    #[command(flatten)]
+    scoring: ScoringArgs,
+    #[command(flatten)]
+    grouping: GroupingArgs,
+    /// Open at this episode, such as E1/oracle/s1/r1
+    #[arg(long, value_name = "EPISODE")]
+    episode: Option<String>,
+    /// Other definitions, to show what they change: a name or a TOML file
+    #[arg(long, value_name = "NAME|FILE")]
+    against: Option<PathBuf>,
+    /// How tables look: `default`, `paper`, or a TOML file
+    #[arg(long, value_name = "STYLE", default_value = "default")]
+    style: String,
+    /// The port; 0 for any that is free
+    #[arg(long, value_name = "PORT", default_value_t = 7431)]
+    port: u16,
+    /// Listen on this address or name too, not on this machine alone; needs --token
+    #[arg(long, value_name = "HOST", requires = "token")]
+    host: Option<String>,
+    /// Ask for this word, which the printed link has: at least 16 letters and digits
+    #[arg(long, value_name = "TOKEN", value_parser = token)]
+    token: Option<String>,
+    /// Open no browser
+    #[arg(long)]
+    no_open: bool,
+    /// Write the page and all that it shows into this folder instead
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["port", "host", "token", "no_open", "episode"])]
+    export: Option<PathBuf>,
+    #[command(flatten)]
+    threads: ThreadArgs,
+}
+
+impl ViewArgs {
+    /// Shows recordings, until the process is ended.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let view = View::open(Options {
+            runs: self.runs.clone(),
+            question: Question { each: true, ..self.scoring.question(&self.grouping) },
+            against: self.against.clone(),
+            style: self.style.clone(),
+            threads: self.threads.count(),
+        })?;
+        if let Some(id) = self.episode.as_ref().filter(|id| !view.has_episode(id)) {
+            return Err(Failure::input(format!(
+                "--episode: expected the id of an episode in these recordings, found `{}`\n  help: `mirrorstats trace info --episodes` lists them",
+                visible(id)
+            )));
+        }
+        if let Ok(inputs) = inputs::resolve(&self.runs, io::empty()) {
+            output::note_stale_checksums(&inputs);
+        }
+        if let Some(folder) = &self.export {
+            let written = export::write(&view, folder)?;
+            output::say(&format!("{written} files; open {}", folder.join("index.html").display()));
+            return Ok(Outcome::Done);
+        }
+        self.serve(view)
+    }
+
+    fn serve(&self, view: View) -> Result<Outcome, Failure> {
+        let host = self.host.as_deref().unwrap_or("127.0.0.1");
+        let taken = |error: io::Error| {
+            let help = "is another `mirrorstats view` there? `--port 0` takes any port that is free";
+            Failure::Rendered(format!("error: cannot listen on {host}:{}: {error}\n  help: {help}", self.port))
+        };
+        let (listener, address) = routes::bind(host, self.port).map_err(taken)?;
+        let guard = Guard::new(address, self.host.as_deref(), self.token.as_deref());
+        let link = self
+            .episode
+            .as_deref()
+            .map_or_else(|| guard.link(), |id| guard.link_with(&[("view", "episode"), ("id", id)]));
+        writeln!(io::stdout(), "{link}")?;
+        io::stdout().flush()?;
+        output::say(&format!("{} episodes; Ctrl-C ends it", view.episodes()));
+        if !self.no_open {
+            open(&link);
+        }
+        routes::serve(Arc::new(view), listener, guard).map_err(taken)?;
+        Ok(Outcome::Done)
+    }
+}
+
+impl From<ViewError> for Failure {
+    fn from(error: ViewError) -> Self {
+        match error {
+            ViewError::Study(error) => (*error).into(),
+            error => Self::input(error),
+        }
+    }
+}
+
+fn token(text: &str) -> Result<String, String> {
+    check_token(text).map(|()| text.to_owned())
+}
+
+/// Opens an address in the browser; where there is none, it stands on standard output.
+fn open(link: &str) {
+    let program = if cfg!(target_os = "macos") {
+        "open"
+    } else if cfg!(windows) {
+        "explorer"
+    } else {
+        "xdg-open"
+    };
+    let quiet =
+        Command::new(program).arg(link).stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    if quiet.is_err() {
+        output::say("no browser was opened: open the address above");
+    }
+}

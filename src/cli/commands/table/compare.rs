@@ -1,0 +1,73 @@
+//! `compare`: what the traces print beside what is published.
+
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::terminal;
+use report::comparison::Comparison;
+use report::errata::Errata;
+use report::tables::side_by_side;
+
+/// The style that printed the published tables.
+const PAPER_STYLE: &str = "paper";
+
+/// Compare the tables of traces with published ones, cell by cell.
+#[derive(Clone, Debug, clap::Args)]
+pub struct CompareArgs {
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    /// Published cells: a CSV file with the columns experiment,model,metric,mean,se,emphasis
+    #[arg(long, value_name = "FILE")]
+    pub published: PathBuf,
+    /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub definitions: Option<PathBuf>,
+    /// The style that prints the tables: `paper` or a style file
+    #[arg(long, value_name = "STYLE", default_value = PAPER_STYLE)]
+    pub style: PathBuf,
+    /// The table to compare [default: the first that has all the published metrics]
+    #[arg(long, value_name = "NAME")]
+    pub table: Option<String>,
+    /// Differences that are slips of the publication [default: those of the paper, with its style]
+    #[arg(long, value_name = "FILE")]
+    pub errata: Option<PathBuf>,
+    /// Print the answer as JSON
+    #[arg(long)]
+    pub json: bool,
+    /// Let a cell hold episodes that were recorded differently
+    #[arg(long)]
+    pub pool: bool,
+}
+
+impl CompareArgs {
+    /// Scores the traces and compares; the check holds if every difference is excused.
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let errata = self.errata()?;
+        let scoring = ScoringArgs { definitions: self.definitions.clone(), ..ScoringArgs::default() };
+        let study = self.traces.study(&scoring, &GroupingArgs { pool: self.pool, ..GroupingArgs::default() })?;
+        let comparison = study.compare(&self.published, &self.style, self.table.as_deref(), &errata)?;
+        print(&comparison, self.json)?;
+        Ok(if comparison.holds() { Outcome::Done } else { Outcome::CheckFailed })
+    }
+
+    fn errata(&self) -> Result<Errata, Failure> {
+        match &self.errata {
+            Some(path) => Errata::read(path).map_err(Failure::input),
+            None if self.style == Path::new(PAPER_STYLE) => Ok(Errata::of_paper()),
+            None => Ok(Errata::default()),
+        }
+    }
+}
+
+fn print(comparison: &Comparison, json: bool) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    if json {
+        serde_json::to_writer_pretty(&mut out, comparison).map_err(io::Error::from)?;
+        writeln!(out)?;
+    } else {
+        out.write_all(side_by_side::render(comparison, terminal::width()).as_bytes())?;
+    }
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! `mirrorstats trace check`: whether the replies in traces are good enough, for CI and before a report.
+
+use std::io::{self, Write as _};
+
+use crate::cli::args::TraceArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::quality;
+use exact::escape::visible;
+use exact::format::fixed;
+use score::quality::{CellKey, QualityByCell};
+use study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
+
+/// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
+///
+/// Shares are of the replies of one cell: an experiment, a model and a condition. A limit cannot be checked where traces do
+/// not record its quantity for every step. Lost episodes are those that the infrastructure ended, and those in `lost.jsonl`
+/// beside the traces.
+#[derive(Clone, Debug, clap::Args)]
+pub struct CheckArgs {
+    #[command(flatten)]
+    pub traces: TraceArgs,
+    /// The largest share of replies without a decision, such as 0.05
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub max_unreadable: Option<f64>,
+    /// The largest share of refusals
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub max_refused: Option<f64>,
+    /// The largest share of replies that were cut off
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub max_truncated: Option<f64>,
+    /// The largest share of replies that had to be repaired
+    #[arg(long, value_name = "SHARE", value_parser = share)]
+    pub max_repaired: Option<f64>,
+    /// The most lost episodes, over all cells
+    #[arg(long, value_name = "N")]
+    pub max_lost: Option<u64>,
+    /// The longest time within which 95 % of a cell's replies came, in milliseconds
+    #[arg(long, value_name = "MS")]
+    pub max_latency: Option<i64>,
+    /// Answer as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl CheckArgs {
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let limits = QualityLimits {
+            max_unreadable: self.max_unreadable,
+            max_refused: self.max_refused,
+            max_truncated: self.max_truncated,
+            max_repaired: self.max_repaired,
+            max_lost: self.max_lost,
+            max_latency: self.max_latency,
+        };
+        if limits.is_empty() {
+            let words = "expected a limit to check, found none\n  help: name one, such as --max-unreadable 0.05";
+            return Err(Failure::input(words));
+        }
+        let (answer, cells) = self.traces.open()?.check_quality(&limits)?;
+        if self.json {
+            output::print_json(&answer)?;
+        } else {
+            print(&answer, &cells)?;
+        }
+        Ok(if answer.holds { Outcome::Done } else { Outcome::CheckFailed })
+    }
+}
+
+fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    out.write_all(quality::text(cells, crate::cli::terminal::width()).as_bytes())?;
+    writeln!(out)?;
+    let named = |cell: &CellKey| match cell.condition.as_str() {
+        _ if !cells.has_conditions() => format!("{}, {}: ", visible(&cell.experiment), visible(&cell.model)),
+        condition => format!("{}, {} [{}]: ", visible(&cell.experiment), visible(&cell.model), visible(condition)),
+    };
+    for Violation { cell, limit, expected, found } in &answer.violations {
+        let place = cell.as_ref().map_or_else(String::new, named);
+        writeln!(out, "{place}--{limit}: expected at most {}, found {}", number(*expected), number(*found))?;
+    }
+    for NotRecorded { cell, limit, missing, steps } in &answer.not_recorded {
+        let what = format!("not recorded for {missing} of {steps} steps, so the limit cannot be checked");
+        writeln!(out, "{}--{limit}: {what}", named(cell))?;
+    }
+    if answer.holds {
+        writeln!(out, "no limit is exceeded")?;
+    }
+    Ok(())
+}
+
+/// As few digits as say it.
+fn number(value: f64) -> String {
+    let text = fixed(Some(value), 4);
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    let fault = || format!("expected a share from 0 to 1 such as 0.05, found `{}`", visible(text));
+    let value: f64 = text.parse().map_err(|_| fault())?;
+    if (0.0..=1.0).contains(&value) { Ok(value) } else { Err(fault()) }
+}

@@ -1,0 +1,84 @@
+//! `mirrorstats import`: JSON lines of steps, of whatever harness, as a trace.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use exact::replace;
+use study::ImportRequest;
+use trace::import::Text;
+
+/// Make a trace of JSON lines of steps: episodes of any harness can be scored
+///
+/// One line is one step: an object with the columns of the schema as keys, as `mirrorstats trace schema step` prints them.
+/// Other keys become columns of their own. Lines of an episode may be in any order and in several files. The trace holds
+/// every line and keeps every rule of `mirrorstats trace validate`, or nothing is written.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ImportArgs {
+    /// Files of JSON lines, `-` for standard input
+    #[arg(value_name = "STEPS.jsonl", required = true)]
+    steps: Vec<PathBuf>,
+    /// The trace to write
+    #[arg(short, long, value_name = "TRACE.parquet")]
+    out: PathBuf,
+    /// The definitions whose experiments are known: `paper`, `extended`, or a TOML file
+    #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
+    definitions: PathBuf,
+    /// The colours that there are, which the trace then declares: names with commas between them, a file of names, or
+    /// `default`, the ten colours of the study
+    #[arg(long, value_name = "NAMES|FILE|default")]
+    palette: Option<PathBuf>,
+    /// What episodes share that are more alike than chance: statistics of the trace then take it as a cluster. Episodes with
+    /// an equal `scene` are pairs without a word
+    #[arg(long, value_enum, value_name = "COLUMN")]
+    cluster: Option<ClusterArg>,
+    /// The steps are rebuilt from published numbers, which leave the rest of them open: statistics take no pairs and no
+    /// clusters from them
+    #[arg(long, conflicts_with = "cluster")]
+    reconstruction: bool,
+    /// Answer as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What a cluster is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ClusterArg {
+    /// The episodes of one seed
+    Seed,
+}
+
+impl ImportArgs {
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        self.check_places()?;
+        let texts = self.steps.iter().map(|path| text(path)).collect::<Result<Vec<_>, _>>()?;
+        let request = ImportRequest {
+            out: self.out.clone(),
+            definitions: self.definitions.clone(),
+            palette: self.palette.clone(),
+            clusters_by_seed: self.cluster.is_some(),
+            reconstruction: self.reconstruction,
+        };
+        output::print(&study::import(texts, &request)?, self.json)
+    }
+
+    /// Standard input is there once, and no file is written over its own lines.
+    fn check_places(&self) -> Result<(), Failure> {
+        if self.steps.iter().filter(|path| is_standard_input(path)).count() > 1 {
+            let words = "error: `-`: expected standard input once, found it twice\n  help: name it once";
+            return Err(Failure::Rendered(words.to_owned()));
+        }
+        replace::check_target(&self.out, &self.steps, "the steps themselves").map_err(Failure::input)?;
+        output::check_target(&self.out, [&self.definitions].into_iter().chain(&self.palette))
+    }
+}
+
+fn text(path: &Path) -> Result<Text, Failure> {
+    let text = if is_standard_input(path) { Text::spool("standard input", io::stdin()) } else { Text::open(path) };
+    text.map_err(Failure::input)
+}
+
+fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == "-"
+}

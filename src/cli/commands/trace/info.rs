@@ -1,0 +1,185 @@
+//! `mirrorstats trace info`: what traces hold.
+
+use std::fmt::Display;
+use std::io::{self, Write};
+
+use comfy_table::Table;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use crate::cli::args::TraceArgs;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::quality;
+use crate::cli::terminal;
+use crate::cli::text_table::{aligned_right, counted, listing};
+use exact::escape::visible;
+use report::tables::fit::{fitted, wrapped};
+use score::quality::QualityByCell;
+use study::CellAnswer;
+use trace::answered::by_others;
+use trace::checksums::Checksums;
+use trace::info::{Cell, EpisodeInfo, Info, Listing, SeedRun, info};
+
+/// Summarise traces: episodes, steps, models, experiments, coverage, files
+#[derive(Clone, Debug, clap::Args)]
+pub struct InfoCommand {
+    #[command(flatten)]
+    input: TraceArgs,
+    /// List the episodes: their ids, steps and files
+    #[arg(long)]
+    episodes: bool,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// The answer for a program.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub struct InfoAnswer {
+    /// What the traces hold.
+    #[serde(flatten)]
+    pub info: Info,
+    /// What became of the replies, by cell; empty where the traces do not record it.
+    pub quality: Vec<CellAnswer>,
+}
+
+impl InfoCommand {
+    /// Reads the traces and prints what they hold.
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let study = self.input.open()?;
+        let listing = if self.episodes { Listing::Episodes } else { Listing::Nothing };
+        output::notes(&by_others(study.traces()?.files()));
+        let info = info(study.traces()?, listing, self.input.threads.count()).map_err(Failure::input)?;
+        if let Some(episodes) = info.episode_list.as_ref().filter(|_| !self.json) {
+            writeln!(io::stdout().lock(), "{}", fitted(&list_of(episodes), 1, terminal::width()))?;
+            return Ok(Outcome::Done);
+        }
+        let quality = if study.has_quality()? { study.quality()? } else { QualityByCell::default() };
+        let mut out = io::stdout().lock();
+        if self.json {
+            writeln!(out, "{:#}", serde_json::json!(InfoAnswer { info, quality: CellAnswer::of_all(&quality) }))?;
+        } else {
+            print(&mut out, &info, terminal::width())?;
+            let text = quality::text(&quality, terminal::width());
+            if !text.is_empty() {
+                writeln!(out, "\nreplies by experiment and model\n{text}")?;
+            }
+        }
+        Ok(Outcome::Done)
+    }
+}
+
+fn print(out: &mut impl Write, info: &Info, width: Option<usize>) -> io::Result<()> {
+    let bytes: u64 = info.files.iter().map(|file| file.bytes).sum();
+    let (episodes, steps) = (counted(info.episodes, "episode"), counted(info.steps, "step"));
+    writeln!(out, "{episodes}, {steps}, {}, {}\n", counted(info.files.len() as u64, "file"), counted(bytes, "byte"))?;
+    list(out, "models", &info.models, width)?;
+    list(out, "experiments", &info.experiments, width)?;
+    list(out, "seeds", &info.seeds, width)?;
+    list(out, "runs", &info.runs, width)?;
+    let own: Vec<_> = info.columns.iter().filter(|column| !column.known).map(|column| &column.name).collect();
+    if !own.is_empty() {
+        list(out, "own columns", &own, width)?;
+    }
+    if let Some(replies) = info.replies.as_ref().filter(|replies| replies.all_unreadable() > 0) {
+        let (bad, all) = (replies.all_unreadable(), replies.replies);
+        writeln!(out, "\n{bad} of {all} replies could not be read: {replies} (`reply_status`)")?;
+    }
+    writeln!(out, "\nepisodes by experiment and model\n{}", fitted(&coverage(info), 1, width))?;
+    gaps(out, info)?;
+    writeln!(out, "\nfiles\n{}", fitted(&files(info), 1, width))
+}
+
+fn list(out: &mut impl Write, what: &str, values: &[impl Display], width: Option<usize>) -> io::Result<()> {
+    let shown: Vec<_> = values.iter().map(|value| visible(&value.to_string())).collect();
+    let head = format!("{what:<12} {:>3}   ", values.len());
+    let indent = head.len();
+    let lines = wrapped(&shown.join(", "), width.map_or(usize::MAX, |width| width.saturating_sub(indent)), 0);
+    writeln!(out, "{head}{}", lines.join(&format!("\n{}", " ".repeat(indent))))
+}
+
+fn coverage(info: &Info) -> Table {
+    let mut table =
+        listing(std::iter::once("model".to_owned()).chain(info.experiments.iter().map(|name| visible(name))));
+    for (row, model) in info.models.iter().enumerate() {
+        // Cells come experiment by experiment, each with all models.
+        let counts = info.coverage.iter().skip(row).step_by(info.models.len()).map(|cell| match cell.episodes {
+            0 => "none".to_owned(),
+            episodes => episodes.to_string(),
+        });
+        table.add_row([visible(model)].into_iter().chain(counts));
+    }
+    aligned_right(table, 1..=info.experiments.len())
+}
+
+/// Seeds and runs that are listed for a cell.
+const LISTED: usize = 8;
+
+fn gaps(out: &mut impl Write, info: &Info) -> io::Result<()> {
+    let incomplete: Vec<&Cell> = info.coverage.iter().filter(|cell| !cell.missing.is_empty()).collect();
+    if incomplete.is_empty() {
+        writeln!(out, "\nevery cell has every seed and run that any cell has")?;
+    } else {
+        writeln!(out, "\nmissing (seed/run), of those that other cells have")?;
+    }
+    for cell in incomplete {
+        let what = if cell.episodes == 0 { "all".to_owned() } else { pairs(&cell.missing) };
+        writeln!(out, "  {}, {}: {what}", visible(&cell.experiment), visible(&cell.model))?;
+    }
+    let repeated = info.coverage.iter().filter(|cell| !cell.repeated.is_empty());
+    for (i, cell) in repeated.enumerate() {
+        if i == 0 {
+            writeln!(out, "\nmore than one episode (seed/run)")?;
+        }
+        writeln!(out, "  {}, {}: {}", visible(&cell.experiment), visible(&cell.model), pairs(&cell.repeated))?;
+    }
+    Ok(())
+}
+
+fn pairs(pairs: &[SeedRun]) -> String {
+    let shown: Vec<_> = pairs.iter().take(LISTED).map(|pair| format!("{}/{}", pair.seed, pair.run)).collect();
+    match pairs.len().saturating_sub(LISTED) {
+        0 => shown.join(" "),
+        more => format!("{} and {more} more", shown.join(" ")),
+    }
+}
+
+fn list_of(episodes: &[EpisodeInfo]) -> Table {
+    let mut table = listing(["episode", "experiment", "model", "seed", "run", "steps", "file"]);
+    for episode in episodes {
+        table.add_row([
+            visible(&episode.episode_id),
+            visible(&episode.experiment),
+            visible(&episode.model),
+            episode.seed.to_string(),
+            episode.run.to_string(),
+            episode.steps.to_string(),
+            visible(&episode.file),
+        ]);
+    }
+    aligned_right(table, 3..=5)
+}
+
+fn files(info: &Info) -> Table {
+    let mut table =
+        listing(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "checksums", "writer"]);
+    for file in &info.files {
+        table.add_row([
+            visible(&file.name),
+            file.episodes.to_string(),
+            file.steps.to_string(),
+            file.row_groups.to_string(),
+            file.bytes.to_string(),
+            file.sha256.chars().take(12).collect(),
+            visible(file.schema_version.as_deref().unwrap_or("not named")),
+            match file.checksums {
+                Checksums::None => "none".to_owned(),
+                Checksums::Stale => "stale".to_owned(),
+                Checksums::Present => "present".to_owned(),
+            },
+            visible(file.writer.as_deref().unwrap_or("not named")),
+        ]);
+    }
+    aligned_right(table, 1..=4)
+}

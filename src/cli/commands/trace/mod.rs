@@ -1,0 +1,35 @@
+//! `trace`: what traces hold, whether they are valid, how they are written anew; `import` makes one.
+
+pub mod check;
+pub mod import;
+pub mod info;
+pub mod recover;
+pub mod renormalize;
+pub mod schema;
+pub mod validate;
+
+use crate::cli::outcome::{Failure, Outcome};
+
+/// Inspect, check and rewrite traces; their schema
+#[derive(Debug, clap::Subcommand)]
+pub enum TraceCommand {
+    Info(info::InfoCommand),
+    Validate(validate::ValidateCommand),
+    Check(check::CheckArgs),
+    Recover(recover::RecoverArgs),
+    Renormalize(renormalize::RenormalizeArgs),
+    Schema(schema::SchemaCommand),
+}
+
+impl TraceCommand {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self {
+            Self::Info(args) => args.run(),
+            Self::Validate(args) => args.run(),
+            Self::Check(args) => args.run(),
+            Self::Recover(args) => args.run(),
+            Self::Renormalize(args) => args.run(),
+            Self::Schema(args) => args.run(),
+        }
+    }
+}

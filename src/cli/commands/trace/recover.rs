@@ -1,0 +1,161 @@
+//! `mirrorstats trace recover`: a trace out of a log, also of a cut one.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use schemars::JsonSchema;
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::text_table::counted;
+use trace::diagnostic::Severity;
+use trace::inputs::Input;
+use trace::log::recover::{Losses, recover};
+use trace::merge::{self, EpisodeRows};
+use trace::open::TraceFile;
+use trace::schema::RECORDING_KEY;
+use trace::validate::validate;
+use trace::write::OptionalColumns;
+
+/// Make a trace of a log, also of one that was cut off or damaged
+///
+/// Every episode whose end is in the log is in the trace, which is checked against every rule. A trace that is there is
+/// replaced if it is one of the same recording and the log has all its episodes with the same rows. Exits with 3 if anything of the log is
+/// lost, be it the index at its end.
+#[derive(Clone, Debug, clap::Args)]
+pub struct RecoverArgs {
+    /// The log
+    #[arg(value_name = "LOG.mcap")]
+    log: PathBuf,
+    /// The trace to write
+    #[arg(short, long, value_name = "TRACE.parquet")]
+    out: PathBuf,
+    /// Answer as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct RecoverAnswer {
+    /// Episodes in the trace.
+    pub episodes: usize,
+    /// Their rows.
+    pub steps: usize,
+    /// Whether a trace was written; not so without an episode.
+    pub written: bool,
+    /// What is lost.
+    pub losses: Losses,
+}
+
+impl RecoverArgs {
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        output::check_target(&self.out, [&self.log])?;
+        let recovered = recover(&self.log).map_err(Failure::input)?;
+        let columns = recovered.recording.as_ref().map_or_else(OptionalColumns::all, OptionalColumns::recorded);
+        let rows = recovered.episodes.iter().map(|episode| merge::rows(episode, &columns));
+        let rows = rows.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
+        self.check_target(&rows, recovered.recording.as_ref())?;
+        let answer = RecoverAnswer {
+            episodes: rows.len(),
+            steps: rows.iter().map(merge::EpisodeRows::len).sum(),
+            written: !rows.is_empty(),
+            losses: recovered.losses,
+        };
+        if answer.written {
+            merge::write(&self.out, recovered.recording.as_ref(), &rows).map_err(Failure::input)?;
+            self.check()?;
+        }
+        output::print(&answer, self.json)?;
+        Ok(if answer.losses.is_any() { Outcome::Lossy } else { Outcome::Done })
+    }
+
+    /// Refuses to write over a trace of another recording, or one with an episode that the log does not have, or has with
+    /// other rows.
+    fn check_target(&self, rows: &[EpisodeRows], recording: Option<&Value>) -> Result<(), Failure> {
+        // A file that cannot be read as a trace is what a recovery is there to replace.
+        let (Ok(file), Ok(there)) = (TraceFile::open(&self.target()), merge::read(&self.out)) else { return Ok(()) };
+        let help = "name another file, or move that one away";
+        let ids: BTreeSet<&str> = rows.iter().map(|episode| episode.episode_id.as_str()).collect();
+        if let Some(missing) = there.iter().find(|episode| !ids.contains(episode.episode_id.as_str())) {
+            let (out, id) = (self.out.display(), &missing.episode_id);
+            return Err(Failure::input(format!(
+                "`{out}` has the episode `{id}`, which cannot be recovered from the log\n  help: {help}"
+            )));
+        }
+        let theirs = file.metadata_value(RECORDING_KEY).and_then(|text| serde_json::from_str(text).ok());
+        if without_seeds(theirs.as_ref()) != without_seeds(recording) {
+            let out = self.out.display();
+            return Err(Failure::input(format!(
+                "`{out}` is a trace of another recording than the log\n  help: {help}"
+            )));
+        }
+        let hashes: BTreeMap<_, _> = rows.iter().map(|episode| (&episode.episode_id, episode.stated_hash())).collect();
+        for episode in &there {
+            let logged = hashes.get(&episode.episode_id).cloned().flatten();
+            if let Some((traced, logged)) = episode.stated_hash().zip(logged).filter(|(a, b)| a != b) {
+                let (out, log, id) = (self.out.display(), self.log.display(), &episode.episode_id);
+                return Err(Failure::input(format!(
+                    "`{out}` and `{log}` do not belong together: expected rows of the episode `{id}` with the hash {traced}, \
+                     as in the trace, found {logged}\n  help: {help}"
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    fn target(&self) -> Input {
+        Input { name: self.out.display().to_string(), path: self.out.clone() }
+    }
+
+    /// Holds the trace that was written against every rule of the schema.
+    fn check(&self) -> Result<(), Failure> {
+        let report = validate(&[self.target()], None, NonZeroUsize::MIN).map_err(Failure::input)?;
+        match report.findings.iter().find(|finding| finding.severity == Severity::Error) {
+            None => Ok(()),
+            Some(finding) => Err(Failure::input(format!("the recovered trace breaks a rule: {finding}"))),
+        }
+    }
+}
+
+/// The metadata of a recording but for the seeds, which grow with its episodes.
+fn without_seeds(recording: Option<&Value>) -> Value {
+    let mut recording = recording.cloned().unwrap_or_default();
+    if let Some(object) = recording.as_object_mut() {
+        object.remove("seeds");
+    }
+    recording
+}
+
+impl fmt::Display for RecoverAnswer {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let episodes = counted(self.episodes as u64, "episode");
+        let steps = counted(self.steps as u64, "step");
+        if self.written {
+            writeln!(f, "recovered {episodes}, {steps}")?;
+        } else {
+            writeln!(f, "recovered no episode; no trace was written")?;
+        }
+        for lost in &self.losses.episodes {
+            let rows = counted(lost.rows as u64, "row");
+            writeln!(f, "lost {}: {}; {rows} of it are there", lost.episode_id, lost.reason)?;
+        }
+        if self.losses.stray_rows > 0 {
+            writeln!(f, "lost {} of no known episode", counted(self.losses.stray_rows as u64, "row"))?;
+        }
+        if self.losses.damaged_chunks > 0 {
+            writeln!(f, "{} damaged", counted(self.losses.damaged_chunks as u64, "chunk"))?;
+        }
+        for damage in &self.losses.damage {
+            writeln!(f, "damaged: {damage}")?;
+        }
+        for reason in self.losses.recording.iter().chain(&self.losses.cut) {
+            writeln!(f, "{reason}")?;
+        }
+        Ok(())
+    }
+}

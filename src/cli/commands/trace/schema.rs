@@ -1,0 +1,125 @@
+//! `mirrorstats trace schema`: what a trace is, and the JSON Schemas of what others write for this program.
+
+use std::io::{self, Write};
+
+use clap::ValueEnum as _;
+use comfy_table::{ContentArrangement, Table};
+use schemars::schema_for;
+use serde_json::{Value, json};
+
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::terminal;
+use crate::cli::text_table::listing;
+use trace::describe::SchemaDocument;
+use trace::import;
+use trace::schema::Column;
+use world::agent::reply;
+use world::experiment::schema::ExperimentFile;
+use world::experiment::{Experiment, Spec};
+
+/// Print what a trace is: columns, footer metadata, rules; or a JSON Schema by its name
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct SchemaCommand {
+    /// What to describe; all but `trace` are printed as JSON Schema
+    #[arg(value_enum, value_name = "NAME", default_value_t)]
+    name: Name,
+    /// Print JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// What there is a schema of, for those who write it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Name {
+    /// A trace: its columns, footer and rules
+    #[default]
+    Trace,
+    /// A line of the JSON lines that `mirrorstats import` reads
+    Step,
+    /// A file of experiments, for `record --experiment`
+    Experiments,
+    /// An experiment as traces carry it in their footer
+    Experiment,
+    /// A model's reply in E1 to E4
+    ReplyCubes,
+    /// A model's reply in E5
+    ReplyExploration,
+}
+
+impl Name {
+    /// The document, as the file of this name in `schemas/` has it.
+    pub fn document(self) -> Value {
+        match self {
+            Self::Trace => json!(SchemaDocument::current()),
+            Self::Step => import::schema::document(),
+            Self::Experiments => json!(schema_for!(ExperimentFile)),
+            Self::Experiment => json!(schema_for!(Spec)),
+            Self::ReplyCubes => reply::schema("Reply in E1 to E4", &Experiment::E1.reply, Experiment::E1.actions),
+            Self::ReplyExploration => reply::schema("Reply in E5", &Experiment::E5.reply, Experiment::E5.actions),
+        }
+    }
+}
+
+/// Columns that text is wrapped to wherever it goes, but for narrower terminals.
+const WIDTH: usize = 110;
+
+impl SchemaCommand {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        let mut out = io::stdout().lock();
+        if self.json || self.name != Name::Trace {
+            writeln!(out, "{:#}", self.name.document())?;
+        } else {
+            print(&mut out, &SchemaDocument::current())?;
+        }
+        Ok(Outcome::Done)
+    }
+}
+
+fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
+    let sentences = schema.description.replace(". ", ".\n");
+    writeln!(out, "{}, schema version {}\n\n{sentences}\n", schema.title, schema.version)?;
+    let mut columns = wrapped(["column", "type", "unit", "presence", "may be", "per", "meaning"]);
+    for column in schema.columns {
+        columns.add_row([
+            column.name,
+            column.stored.name(),
+            column.unit.unwrap_or(""),
+            if column.required { "required" } else { "optional" },
+            if column.nullable { "null" } else { "" },
+            if column.constant { "episode" } else { "step" },
+            &meaning(column),
+        ]);
+    }
+    let mut metadata = wrapped(["footer key", "meaning"]);
+    metadata.add_rows(schema.metadata.iter().map(|entry| [entry.key, entry.doc]));
+    let mut rules = wrapped(["code", "rule"]);
+    rules.add_rows(schema.rules.iter().map(|rule| [rule.code.name(), rule.rule]));
+    writeln!(out, "{}\n\n{}\n\n{}", columns.trim_fmt(), metadata.trim_fmt(), rules.trim_fmt())?;
+    let mut others = wrapped(["JSON Schema", "of"]);
+    for name in Name::value_variants().iter().filter(|name| **name != Name::Trace) {
+        if let Some(value) = name.to_possible_value() {
+            let of = value.get_help().map(ToString::to_string).unwrap_or_default();
+            others.add_row([format!("mirrorstats trace schema {}", value.get_name()), of]);
+        }
+    }
+    writeln!(out, "\n{}", others.trim_fmt())
+}
+
+/// What a column means, its only values, what no value means, and the version that brought it.
+fn meaning(column: &Column) -> String {
+    let values = (!column.values.is_empty()).then(|| format!("One of {}.", column.values.join(", ")));
+    let default = column.default.map(|default| format!("No value means {default}."));
+    let since = (column.since > 1).then(|| format!("Since version {}.", column.since));
+    let doc = Some(column.doc.to_owned());
+    [doc, values, default, since].into_iter().flatten().collect::<Vec<_>>().join(" ")
+}
+
+fn wrapped<const N: usize>(header: [&str; N]) -> Table {
+    let mut table = listing(header);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width());
+    table
+}
+
+fn width() -> u16 {
+    u16::try_from(terminal::width().unwrap_or(WIDTH).min(WIDTH)).unwrap_or(u16::MAX)
+}

@@ -1,0 +1,100 @@
+//! `mirrorstats world filmstrip`: one episode as a row of frames.
+
+use std::ffi::OsString;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use report::figures::{Figure, FigureFormat};
+use trace::inputs;
+use world::replay::film_strip::{Steps, Strip};
+
+/// Draw one episode as a row of frames: what was done and claimed at each, and when the mirror was in view
+///
+/// Frames come from a log, or are rendered again from a trace. First sight, first claim and decision are marked.
+#[derive(Clone, Debug, clap::Args)]
+pub struct FilmstripArgs {
+    /// The episode's id, such as E1/oracle/s1/r1
+    #[arg(value_name = "EPISODE")]
+    episode: String,
+    /// Logs or traces to look for it in: files, folders or quoted globs
+    #[arg(value_name = "RECORDINGS", default_value = "runs")]
+    recordings: Vec<OsString>,
+    /// The picture to write: .png, .svg or .pdf
+    #[arg(short, long, value_name = "FILE")]
+    out: PathBuf,
+    /// How many frames
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u16).range(1..=20))]
+    count: u16,
+    /// These steps instead of chosen ones
+    #[arg(long, value_name = "T,T,..", value_delimiter = ',', conflicts_with = "count")]
+    steps: Option<Vec<i32>>,
+}
+
+impl FilmstripArgs {
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let format = self.format()?;
+        let figure = self.figure()?;
+        output::write_file(&self.out, &format.encode(&figure).map_err(Failure::input)?)?;
+        Ok(Outcome::Done)
+    }
+
+    fn format(&self) -> Result<FigureFormat, Failure> {
+        let ending = self.out.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        if !["png", "svg", "pdf"].contains(&ending) {
+            return Err(Failure::input("--out: expected a file that ends in .png, .svg or .pdf"));
+        }
+        let missing = format!("this build writes no .{ending}; build it with the feature `raster`");
+        FigureFormat::of(&self.out).map_err(|_| Failure::input(missing))
+    }
+
+    fn figure(&self) -> Result<Figure, Failure> {
+        let chosen = Steps::Chosen(usize::from(self.count));
+        let steps = self.steps.clone().map_or(chosen, Steps::Named);
+        let strip = Strip { episode: self.episode.clone(), steps };
+        let (logs, traces) = self.sources()?;
+        output::check_target(&self.out, &logs)?;
+        let files = if traces.is_empty() { Ok(Vec::new()) } else { inputs::resolve(&traces, io::stdin()) };
+        let files = files.map_err(Failure::input)?;
+        output::note_stale_checksums(&files);
+        output::check_target(&self.out, files.iter().map(|file| &file.path))?;
+        if let Some(figure) = strip.from_logs(&logs, &files)? {
+            return Ok(figure);
+        }
+        if !files.is_empty()
+            && let Some(figure) = strip.from_traces(&files)?
+        {
+            return Ok(figure);
+        }
+        Err(Failure::input(format!(
+            "no log or trace in {} has the episode `{}`; `mirrorstats trace info --episodes` lists those of traces",
+            self.recordings.iter().map(|named| named.to_string_lossy()).collect::<Vec<_>>().join(", "),
+            self.episode
+        )))
+    }
+
+    fn sources(&self) -> Result<(Vec<PathBuf>, Vec<OsString>), Failure> {
+        let (mut logs, mut traces) = (Vec::new(), Vec::new());
+        for named in &self.recordings {
+            let path = Path::new(named);
+            if path.is_dir() {
+                let entries = std::fs::read_dir(path)
+                    .map_err(|error| Failure::input(format!("cannot read `{}`: {error}", path.display())))?;
+                let mut found: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+                found.sort();
+                traces.extend(found.iter().any(|path| ends_in(path, "parquet")).then(|| named.clone()));
+                logs.extend(found.into_iter().filter(|path| ends_in(path, "mcap")));
+            } else if ends_in(path, "mcap") {
+                logs.push(path.to_owned());
+            } else {
+                traces.push(named.clone());
+            }
+        }
+        Ok((logs, traces))
+    }
+}
+
+fn ends_in(path: &Path, ending: &str) -> bool {
+    path.extension().is_some_and(|found| found == ending)
+}

@@ -1,0 +1,106 @@
+//! `mirrorstats world`: what the experiments are made of, without running any.
+
+pub mod filmstrip;
+pub mod record;
+pub mod replay;
+
+use std::io::{self, Write as _};
+use std::path::PathBuf;
+
+use crate::cli::experiments;
+use crate::cli::outcome::{Failure, Outcome};
+#[cfg(feature = "raster")]
+use crate::cli::output;
+use world::record::plan::Experiments;
+use world::sim::config::WorldConfig;
+#[cfg(feature = "raster")]
+use world::sim::contact_sheet;
+use world::sim::scene::Scene;
+
+/// Replay episodes, draw film strips, show scenes and configurations
+#[derive(Clone, Debug, clap::Args)]
+pub struct WorldArgs {
+    #[command(subcommand)]
+    verb: WorldVerb,
+}
+
+/// What to show.
+#[derive(Clone, Debug, clap::Subcommand)]
+enum WorldVerb {
+    Replay(replay::ReplayArgs),
+    Filmstrip(filmstrip::FilmstripArgs),
+    /// Print the built-in configuration: every size, speed, light and threshold, as TOML for --config
+    Config,
+    /// Print the scene of one episode as JSON, a scene for each experiment
+    Scene(SceneArgs),
+    /// Draw the contact sheet: experiments from above and as the agent sees them
+    #[cfg(feature = "raster")]
+    Sheet(SheetArgs),
+}
+
+/// Which scene.
+#[derive(Clone, Debug, clap::Args)]
+struct SceneArgs {
+    /// Which experiments: E1, E1..E5, E1,E3, or a file such as mine.toml
+    #[arg(value_name = "LIST", value_parser = experiments::parser())]
+    experiments: Experiments,
+    /// The seed of the block of runs
+    #[arg(long, default_value_t = 1)]
+    seed: i32,
+    /// The run within its seed
+    #[arg(long, default_value_t = 1)]
+    run: i32,
+    /// A TOML file whose values lie over the built-in configuration
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+/// Where the sheet goes.
+#[cfg(feature = "raster")]
+#[derive(Clone, Debug, clap::Args)]
+struct SheetArgs {
+    /// The folder for `sheet.png`
+    #[arg(short, long, value_name = "DIR", default_value = "reports/world")]
+    out: PathBuf,
+    /// Which experiments, a row each: E1, E1..E5, E1,E3, or a file such as mine.toml
+    #[arg(long, value_name = "LIST", default_value = "E1..E5", value_parser = experiments::parser())]
+    experiment: Experiments,
+    /// The seed of the scenes
+    #[arg(long, default_value_t = 1)]
+    seed: i32,
+    /// A TOML file whose values lie over the built-in configuration
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+fn configured(path: Option<&PathBuf>) -> Result<WorldConfig, Failure> {
+    path.map_or_else(|| Ok(WorldConfig::default()), |path| WorldConfig::load(path)).map_err(Failure::input)
+}
+
+impl WorldArgs {
+    pub fn run(self) -> Result<Outcome, Failure> {
+        match self.verb {
+            WorldVerb::Replay(args) => return args.run(),
+            WorldVerb::Filmstrip(args) => return args.run(),
+            WorldVerb::Config => io::stdout().lock().write_all(WorldConfig::default_text().as_bytes())?,
+            WorldVerb::Scene(args) => {
+                let config = configured(args.config.as_ref())?;
+                for experiment in experiments::asked(&args.experiments, &config)? {
+                    let scene = Scene::draw(&config, experiment, args.seed, args.run).map_err(Failure::input)?;
+                    writeln!(io::stdout().lock(), "{:#}", serde_json::json!(scene))?;
+                }
+            }
+            #[cfg(feature = "raster")]
+            WorldVerb::Sheet(args) => {
+                let config = configured(args.config.as_ref())?;
+                let target = args.out.join("sheet.png");
+                output::check_target(&target, &args.config)?;
+                let experiments = experiments::asked(&args.experiment, &config)?;
+                let png = contact_sheet::png(&config, &experiments, args.seed).map_err(Failure::input)?;
+                output::make_folder(&args.out)?;
+                output::write_file(&target, &png)?;
+            }
+        }
+        Ok(Outcome::Done)
+    }
+}

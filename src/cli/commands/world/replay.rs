@@ -1,0 +1,177 @@
+//! `mirrorstats world replay`: a trace's episodes again, held against what was recorded.
+
+use std::ffi::OsString;
+use std::fmt;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::output;
+use crate::cli::text_table::counted;
+use exact::replace::{self, is_same_file};
+use serde::Serialize;
+use trace::inputs;
+use trace::log::read::{episode_hashes, other_episode};
+use world::replay::again::MOST_RAYS;
+use world::replay::divergence::Divergence;
+use world::replay::error::ReplayError;
+use world::replay::verify::{Outputs, Recorded, Recount, ReplayAnswer, frame_path};
+
+/// Repeat a trace's episodes in the worlds that it describes, and hold every step against what was recorded
+///
+/// Poses, distances, pixel counts, `bumped` and `mirror_visible` must match. Exits with 1 where they do not; the first divergence of
+/// each episode is printed.
+#[derive(Clone, Debug, clap::Args)]
+pub struct ReplayArgs {
+    /// Traces of `mirrorstats record`: files, folders or quoted globs
+    #[arg(required = true, value_name = "TRACES")]
+    traces: Vec<OsString>,
+    /// Only this episode
+    #[arg(long, value_name = "ID")]
+    episode: Option<String>,
+    /// Render every step into this folder, as EPISODE/t001.png
+    #[arg(long, value_name = "DIR")]
+    frames: Option<PathBuf>,
+    /// Write a log of the replay in place of the log that is there; for a single trace. With --episode, a log that has
+    /// other episodes is refused
+    #[arg(long, value_name = "LOG.mcap")]
+    mcap: Option<PathBuf>,
+    /// Count pixels and decide visibility anew, into the trace of --out; for a single trace
+    #[arg(long, requires = "out")]
+    recompute_visibility: bool,
+    /// The threshold for visibility, pixels of the grid [default: the recorded one, scaled to the grid]
+    #[arg(long, value_name = "PX", requires = "recompute_visibility")]
+    threshold: Option<u32>,
+    /// The grid of rays, such as 320x240 [default: the size of the view]
+    #[arg(long, value_name = "WxH", requires = "recompute_visibility", value_parser = grid)]
+    grid: Option<(u32, u32)>,
+    /// The trace to write with --recompute-visibility
+    #[arg(short, long, value_name = "TRACE.parquet", requires = "recompute_visibility")]
+    out: Option<PathBuf>,
+    /// Answer as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+fn grid(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    match sides {
+        Some((width @ 1..=MOST_RAYS, height @ 1..=MOST_RAYS)) => Ok((width, height)),
+        _ => Err(format!("expected a grid such as 320x240, at most {MOST_RAYS}x{MOST_RAYS}")),
+    }
+}
+
+impl ReplayArgs {
+    pub fn run(&self) -> Result<Outcome, Failure> {
+        let files = inputs::resolve(&self.traces, io::stdin()).map_err(Failure::input)?;
+        output::note_stale_checksums(&files);
+        let traces = Recorded::open(&files, self.episode.as_deref())?;
+        if traces.len() > 1 && (self.mcap.is_some() || self.recompute_visibility) {
+            return Err(Failure::input("--mcap and --recompute-visibility take a single trace"));
+        }
+        self.check_targets(&traces)?;
+        let mut answer = ReplayAnswer::default();
+        for trace in &traces {
+            trace.replay(&self.outputs(), &mut answer, save)?;
+        }
+        output::print(&Shown(&answer), self.json)?;
+        Ok(if answer.divergences.is_empty() { Outcome::Done } else { Outcome::CheckFailed })
+    }
+
+    fn outputs(&self) -> Outputs {
+        let out = self.out.clone().filter(|_| self.recompute_visibility);
+        let recount = out.map(|out| Recount { out, threshold: self.threshold, grid: self.grid });
+        Outputs { frames: self.frames.clone(), log: self.mcap.clone(), recount }
+    }
+
+    /// That no output is a trace that is read, and that no episode is lost with a log that is there.
+    fn check_targets(&self, traces: &[Recorded]) -> Result<(), Failure> {
+        for (option, target) in [("--mcap", &self.mcap), ("--out", &self.out)] {
+            let is_trace = |target: &PathBuf| traces.iter().any(|trace| is_same_file(target, &trace.path));
+            if target.as_ref().is_some_and(is_trace) {
+                return Err(Failure::input(format!("{option} is the trace itself; name another file")));
+            }
+        }
+        if self.mcap.is_some() && self.mcap == self.out {
+            return Err(Failure::input("--mcap and --out: expected two files, found one name"));
+        }
+        for (folder, trace) in self.frames.iter().flat_map(|folder| traces.iter().map(move |trace| (folder, trace))) {
+            for (rows, t) in trace.rows.iter().flat_map(|rows| (1..=rows.len()).map(move |t| (rows, t))) {
+                output::check_target(&frame_path(folder, &rows.episode_id, t), traces.iter().map(|trace| &trace.path))?;
+            }
+        }
+        self.check_log()?;
+        self.check_hashes(traces)
+    }
+
+    /// That a log which is there is none of other rows than the traces have.
+    fn check_hashes(&self, traces: &[Recorded]) -> Result<(), Failure> {
+        // What cannot be read as a log is there to be replaced.
+        let Some((log, logged)) = self.mcap.as_ref().and_then(|log| Some((log, episode_hashes(log).ok()?))) else {
+            return Ok(());
+        };
+        for (trace, rows) in traces.iter().flat_map(|trace| trace.rows.iter().map(move |rows| (trace, rows))) {
+            let hashes = rows.stated_hash().zip(logged.get(&rows.episode_id));
+            if let Some((traced, logged)) = hashes.filter(|(traced, logged)| traced != *logged) {
+                let name = trace.path.display().to_string();
+                return Err(ReplayError::apart(&rows.episode_id, (&name, &traced), (log, logged)).into());
+            }
+        }
+        Ok(())
+    }
+
+    /// That a log which is there holds no episode that this replay leaves out.
+    fn check_log(&self) -> Result<(), Failure> {
+        let (Some(path), Some(id)) = (&self.mcap, &self.episode) else { return Ok(()) };
+        if !path.is_file() {
+            return Ok(());
+        }
+        let found = match other_episode(path, id) {
+            Ok(None) => return Ok(()),
+            Ok(Some(other)) => format!("one with the episode `{other}`"),
+            Err(error) => {
+                let error = error.to_string();
+                format!("a file whose episodes cannot be read ({})", error.lines().next().unwrap_or_default())
+            }
+        };
+        Err(Failure::Rendered(format!(
+            "error: `{}`: expected no file, or a log of the episode `{id}` alone, found {found}\n  help: give --mcap another name, or leave out --episode to replace the whole log",
+            path.display()
+        )))
+    }
+}
+
+impl From<ReplayError> for Failure {
+    fn from(error: ReplayError) -> Self {
+        Self::input(error)
+    }
+}
+
+/// Writes the frame of a step.
+fn save(path: &Path, png: &[u8]) -> Result<(), Failure> {
+    output::make_folder(replace::folder_of(path))?;
+    output::write_file(path, png)
+}
+
+/// The answer, with its words for people.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Shown<'a>(&'a ReplayAnswer);
+
+impl fmt::Display for Shown<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for Divergence { episode_id, t, column, expected, found } in &self.0.divergences {
+            writeln!(f, "{episode_id}, t = {t}: {column}: recorded {expected}, replayed {found}")?;
+        }
+        write!(f, "{}, {} replayed", counted(self.0.episodes as u64, "episode"), counted(self.0.steps as u64, "step"))?;
+        match self.0.divergences.len() {
+            0 => write!(f, ": all match")?,
+            1 => write!(f, ": 1 of the episodes parts from the trace")?,
+            parted => write!(f, ": {parted} of the episodes part from the trace")?,
+        }
+        match self.0.flipped {
+            Some(flipped) => writeln!(f, "; mirror_visible is another at {}", counted(flipped as u64, "step")),
+            None => writeln!(f),
+        }
+    }
+}

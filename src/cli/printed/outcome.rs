@@ -1,0 +1,160 @@
+//! How a command ends, and the exit code for it.
+//!
+//! | code | meaning |
+//! |---|---|
+//! | 0 | done |
+//! | 1 | a check that was asked for did not hold (`validate`, `compare`, `audit`, `verify`) |
+//! | 2 | bad usage, input or definition |
+//! | 3 | something of the input is lost (`recover`); the rest was saved |
+//! | 130 | interrupted (`record`); what was done stays |
+
+use std::error::Error;
+use std::ffi::OsString;
+use std::fmt::Write as _;
+use std::io::{self, Write as _};
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use exact::escape::visible_lines;
+use metric::fault::{FaultRecord, Faults};
+use trace::diagnostic::{MORE_FILES, is_short_of_files};
+
+/// Which form errors have, where no option says it: decided before anything is parsed.
+pub const ERRORS_VARIABLE: &str = "MIRRORSTATS_ERRORS";
+/// The exit code for bad usage, input or definitions.
+const BAD_INPUT: u8 = 2;
+
+/// A command that ran to its end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Everything asked for was done.
+    Done,
+    /// The check that was asked for did not hold; what did not is on standard output.
+    CheckFailed,
+    /// Something of the input is lost; the rest was saved.
+    Lossy,
+    /// Ctrl-C ended it; what was done until then stays, and the same command continues.
+    Interrupted,
+}
+
+/// A command that could not run to its end.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    /// The command line itself.
+    #[error("bad usage")]
+    Usage(Box<clap::Error>),
+    /// Output could not be written.
+    #[error("cannot write the output")]
+    Output(#[from] io::Error),
+    /// Input or definitions are not as they must be. The message is complete: what, where, expected, found, remedy.
+    #[error(transparent)]
+    Input(Box<dyn Error + Send + Sync>),
+    /// A message that already has its own layout.
+    #[error("{0}")]
+    Rendered(String),
+    /// Faults of definitions, a filter or a query, each at its place.
+    #[error("{0}")]
+    Faults(Faults),
+}
+
+impl Failure {
+    /// Input that is not as it must be.
+    pub fn input(error: impl Into<Box<dyn Error + Send + Sync>>) -> Self {
+        Self::Input(error.into())
+    }
+}
+
+/// How errors are told: in words for people, or for programs as one object on one line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum ErrorFormat {
+    #[default]
+    Text,
+    Json,
+}
+
+impl ErrorFormat {
+    /// What is asked for, before anything is parsed: the arguments may be what is wrong.
+    pub fn asked_for(arguments: &[OsString]) -> Self {
+        let typed = arguments.windows(2).any(|pair| pair[0] == "--errors" && pair[1] == "json");
+        let is_json = typed || arguments.iter().any(|argument| argument == "--errors=json");
+        let is_text = arguments.windows(2).any(|pair| pair[0] == "--errors" && pair[1] == "text");
+        let in_environment = std::env::var_os(ERRORS_VARIABLE).is_some_and(|value| value == "json");
+        if is_json || (in_environment && !is_text) { Self::Json } else { Self::Text }
+    }
+}
+
+/// An error as a program reads it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct ErrorAnswer {
+    /// What, where, expected, found, remedy; may have several lines.
+    pub error: String,
+    /// The exit code.
+    pub code: u8,
+    /// Each fault of a text, with its place.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<FaultRecord>,
+}
+
+impl ErrorAnswer {
+    /// What is said of a failure.
+    pub fn of(failure: &Failure) -> Self {
+        let faults = if let Failure::Faults(faults) = failure { faults.records() } else { Vec::new() };
+        let text = words(failure, false);
+        Self { error: text.trim_end().trim_start_matches("error: ").to_owned(), code: BAD_INPUT, faults }
+    }
+}
+
+/// Says what went wrong on standard error and gives the code to leave with.
+pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
+    match result {
+        Ok(Outcome::Done) => 0,
+        Ok(Outcome::CheckFailed) => 1,
+        Ok(Outcome::Lossy) => 3,
+        Ok(Outcome::Interrupted) => 130,
+        // The reader of a pipe has seen enough (`| head`): not an error.
+        Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => 0,
+        Err(failure) => {
+            say(&failure, format);
+            BAD_INPUT
+        }
+    }
+}
+
+fn say(failure: &Failure, format: ErrorFormat) {
+    // With standard error closed there is nobody left to tell.
+    let _ = match (failure, format) {
+        (Failure::Usage(error), ErrorFormat::Text) if colored() => write!(io::stderr(), "{}", error.render().ansi()),
+        (failure, ErrorFormat::Text) => writeln!(io::stderr(), "{}", words(failure, colored()).trim_end()),
+        (failure, ErrorFormat::Json) => {
+            let answer = ErrorAnswer::of(failure);
+            serde_json::to_string(&answer).map_err(io::Error::from).and_then(|line| writeln!(io::stderr(), "{line}"))
+        }
+    };
+}
+
+fn words(failure: &Failure, colored: bool) -> String {
+    let mut text = match failure {
+        Failure::Usage(error) => visible_lines(&error.to_string()),
+        Failure::Faults(faults) => faults.render(colored),
+        Failure::Rendered(text) => visible_lines(text),
+        other => visible_lines(&format!("error: {other}")),
+    };
+    let mut cause = failure.source();
+    while let Some(error) = cause {
+        let words = visible_lines(&error.to_string());
+        // Some messages tell their cause themselves.
+        if !text.contains(&words) {
+            let _ = write!(text, "\n  caused by: {words}");
+        }
+        cause = error.source();
+    }
+    if is_short_of_files(&text) && !text.contains(MORE_FILES) {
+        let _ = write!(text, "\n  help: {MORE_FILES}");
+    }
+    text
+}
+
+fn colored() -> bool {
+    io::IsTerminal::is_terminal(&io::stderr()) && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+}

@@ -1,0 +1,55 @@
+//! What was typed about a program as an agent, and the player that it comes to.
+
+use std::path::Path;
+use std::time::Duration;
+
+use crate::cli::outcome::Failure;
+use world::agent::exec::{Exec, Images, Settings};
+use world::record::folder_lock::parts_of;
+
+/// The folder within that of a recording for what programs say on standard error.
+const STANDARD_ERROR: &str = "stderr";
+
+/// How a program of one's own is run.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "With --agent exec:'CMD'")]
+pub struct ExecArgs {
+    /// How the program gets its frames
+    #[arg(long, value_enum, default_value_t)]
+    exec_images: ExecImages,
+    /// Seconds for one reply, the first one with the program's start
+    #[arg(long, value_name = "SECONDS", default_value_t = 180, value_parser = clap::value_parser!(u64).range(1..=86_400))]
+    exec_timeout: u64,
+}
+
+/// How frames are passed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+enum ExecImages {
+    /// A PNG file, which is there until the episode ends
+    #[default]
+    Path,
+    /// PNG in base64, within the line
+    Base64,
+}
+
+impl ExecArgs {
+    /// The player that runs a command, called `model` in tables, for recordings into `out`.
+    pub fn player(&self, command: &str, model: Option<&str>, out: &Path) -> Result<Exec, Failure> {
+        if command.trim().is_empty() {
+            return Err(Failure::input("--agent exec: needs a command, such as --agent exec:'python3 agent.py'"));
+        }
+        let images = match self.exec_images {
+            ExecImages::Path => Images::Path,
+            ExecImages::Base64 => Images::Base64,
+        };
+        Exec::new(Settings {
+            model: model.unwrap_or("exec").to_owned(),
+            command: command.to_owned(),
+            images,
+            timeout: Duration::from_secs(self.exec_timeout),
+            scratch: parts_of(out),
+            standard_error: out.join(STANDARD_ERROR),
+        })
+        .map_err(Failure::input)
+    }
+}

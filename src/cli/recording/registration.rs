@@ -1,0 +1,66 @@
+//! A registered plan on its way into a recording: what it promised is held against what is about to be recorded.
+
+use std::path::Path;
+
+use crate::cli::outcome::Failure;
+use exact::budget::Limit;
+use exact::input;
+use report::plan::register::{NamedHash, RegisteredPlan};
+use trace::declared::Registration;
+use world::agent::prompt;
+use world::sim::config::WorldConfig;
+
+/// The largest plan that is read, bytes.
+const LARGEST: Limit = Limit::new("bytes of a plan", 1 << 20);
+/// The name of the world among the experiments of a plan.
+pub(crate) const WORLD: &str = "world";
+
+/// The hashes of this program's prompts.
+pub(crate) fn prompts() -> Vec<NamedHash> {
+    let hashes = prompt::hashes();
+    let named = hashes.as_object().into_iter().flatten();
+    named.filter_map(|(name, hash)| Some(NamedHash { name: name.clone(), sha256: hash.as_str()?.to_owned() })).collect()
+}
+
+/// The plan in a file, for the footers of a recording with this world.
+pub(crate) fn registration(file: &Path, config: &WorldConfig) -> Result<Registration, Failure> {
+    let shown = file.display();
+    let text = input::text(file, LARGEST)
+        .map_err(|error| Failure::input(format!("{shown}: cannot read the plan: {error}")))?;
+    let plan: RegisteredPlan = serde_json::from_str(&text).map_err(|error| {
+        let help = "`mirrorstats plan ... --register FILE` writes one";
+        Failure::input(format!("{shown}: expected a registered plan: {error}\n  help: {help}"))
+    })?;
+    if !plan.is_unchanged() {
+        let words = "the plan was changed after it was registered: its hash is not that of its content";
+        return Err(Failure::input(format!(
+            "{shown}: {words}\n  help: take the file as it was registered, or register anew"
+        )));
+    }
+    check(&shown.to_string(), &plan, config)?;
+    Ok(Registration { sha256: plan.sha256, definitions: Some(plan.definitions.sha256) })
+}
+
+fn check(file: &str, plan: &RegisteredPlan, config: &WorldConfig) -> Result<(), Failure> {
+    let refused = |what: &str, expected: &str, found: &str| {
+        let help = "record what was registered, or register another plan";
+        let words =
+            format!("{file}: expected {what} as registered ({expected}), found another ({found})\n  help: {help}");
+        Err(Failure::input(words))
+    };
+    let short = |hash: &str| hash.chars().take(12).collect::<String>();
+    for registered in &plan.prompts {
+        let own =
+            prompts().into_iter().find(|own| own.name == registered.name).map(|own| own.sha256).unwrap_or_default();
+        if own != registered.sha256 {
+            return refused(&format!("the prompt `{}`", registered.name), &short(&registered.sha256), &short(&own));
+        }
+    }
+    let world = config.hash();
+    match plan.experiments.iter().find(|experiment| experiment.name == WORLD) {
+        Some(registered) if registered.sha256 != world => {
+            refused("the world", &short(&registered.sha256), &short(&world))
+        }
+        _ => Ok(()),
+    }
+}

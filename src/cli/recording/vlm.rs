@@ -1,0 +1,229 @@
+//! What was typed about a model behind a provider, and the player that it comes to.
+
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::runtime::Runtime;
+
+use crate::cli::outcome::Failure;
+use trace::model_id::OWN_SERVER;
+use world::agent::vlm::limits::{Account, Limits, Spend};
+use world::agent::vlm::models::{Choice, Contract, Models};
+use world::agent::vlm::provider::{Patience, Provider};
+use world::agent::vlm::secrets::Secret;
+use world::agent::vlm::wire_format::{Dialect, Effort};
+use world::agent::vlm::{OnOutage, Vlm, spent};
+use world::agent::{Agent, Lost, Player, Task};
+use world::record::plan::slug;
+
+/// A model, who serves it, and what a recording with it may spend.
+#[derive(Clone, Debug, clap::Args)]
+#[command(next_help_heading = "With --agent vlm")]
+pub struct VlmArgs {
+    /// The model: a name of the paper's table, an id, or one of --models; of any other agent its name in tables
+    #[arg(long, value_name = "NAME|ID")]
+    model: Option<String>,
+    /// A file with more models, in the shape of assets/models.toml
+    #[arg(long, value_name = "FILE")]
+    models: Option<PathBuf>,
+    /// Who serves the model, instead of what the models' file says: openai, openrouter, google, anthropic, compatible
+    #[arg(long, value_name = "NAME")]
+    backend: Option<String>,
+    /// The address of a server that takes OpenAI's chat completions, such as `http://localhost:8000/v1`
+    #[arg(long, value_name = "URL")]
+    base_url: Option<String>,
+    /// Record the answers of this model too, by its id as the provider returns it: else an answer by another model than the one
+    /// asked for stops the recording
+    #[arg(long, value_name = "ID")]
+    accept_model: Vec<String>,
+    /// Let the prompt alone ask for the reply's shape, and not the provider enforce it
+    #[arg(long)]
+    prompt_only: bool,
+    /// Stop before more US dollars are spent on all that the model plays into the folder, over all starts; needs both prices of
+    /// the model
+    #[arg(long, value_name = "USD", value_parser = amount)]
+    max_cost: Option<f64>,
+    /// Stop before more tokens are used on all that the model plays into the folder, over all starts
+    #[arg(long, value_name = "N")]
+    max_tokens: Option<u64>,
+    /// Stop before more requests are sent for all that the model plays into the folder, over all starts
+    #[arg(long, value_name = "N")]
+    max_requests: Option<u64>,
+    /// The most tokens of a reply, those of hidden reasoning included [default: what the models' file says, else 2048, or
+    /// 16384 for a model that is asked to reason]
+    #[arg(long, value_name = "N")]
+    max_output_tokens: Option<NonZeroU32>,
+    /// How much the model is asked to reason: none, minimal, low, medium, high or xhigh, as far as it takes it [default: what
+    /// the models' file says, else what the provider does]
+    #[arg(long, value_name = "EFFORT", value_parser = effort)]
+    reasoning_effort: Option<Effort>,
+    /// Requests that are out at once, at most; fewer where the provider says that it gets too many
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    at_once: usize,
+    /// Attempts for one step
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=50))]
+    attempts: u32,
+    /// Seconds for one answer
+    #[arg(long, value_name = "SECONDS", default_value_t = 180, value_parser = clap::value_parser!(u64).range(1..=3_600))]
+    timeout: u64,
+    /// Count a step whose attempts are used up as one without a decision, rather than lose its episode
+    #[arg(long)]
+    stand_still_on_outage: bool,
+    /// Play the answers of an earlier recording's journals; nothing is sent
+    #[arg(long, value_name = "DIR")]
+    cassette: Option<PathBuf>,
+}
+
+/// The folder of journals in the folder of a recording.
+const JOURNALS: &str = "journal";
+
+impl VlmArgs {
+    /// The name that was typed.
+    pub fn name(&self) -> Option<&str> {
+        self.model.as_deref()
+    }
+
+    /// The player, whose journals are in the folder of the recording.
+    pub fn player(&self, out: &Path) -> Result<VlmPlayer, Failure> {
+        let choice = self.choice()?;
+        if let Some(folder) = &self.cassette {
+            let vlm = Arc::new(Vlm::cassette(choice, folder.clone()));
+            return Ok(VlmPlayer { vlm, at_once: 1, network: None });
+        }
+        if self.max_cost.is_some() {
+            choice.check_prices().map_err(Failure::input)?;
+        }
+        let network = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .map_err(|error| Failure::input(format!("cannot start the network's thread: {error}")))?;
+        let provider = self.provider(&choice)?;
+        let journals = out.join(JOURNALS);
+        let reader = Vlm::cassette(choice.clone(), journals.clone());
+        let spend: Spend = spent(&reader, &journals, &slug(&choice.name)).map_err(Failure::input)?;
+        let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
+        let on_outage = if self.stand_still_on_outage { OnOutage::StandStill } else { OnOutage::Lose };
+        let vlm = Vlm::online(
+            choice,
+            provider,
+            network.handle().clone(),
+            journals,
+            Arc::new(Account::new(limits, spend)),
+            on_outage,
+        );
+        Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network) })
+    }
+
+    /// The player of a forecast: knows the journals in the folder of the recording, has no key and sends nothing.
+    pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
+        let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
+        Ok(VlmPlayer { vlm, at_once: 1, network: None })
+    }
+
+    /// Whether requests go out, and are not played from an earlier recording.
+    pub fn sends(&self) -> bool {
+        self.cassette.is_none()
+    }
+
+    fn choice(&self) -> Result<Choice, Failure> {
+        let Some(name) = &self.model else {
+            return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
+        };
+        let models = Models::load(self.models.as_deref()).map_err(Failure::input)?;
+        let backend = self.backend.as_deref().or(self.base_url.is_some().then_some(OWN_SERVER));
+        let mut choice = models.choose(name, backend).map_err(Failure::input)?;
+        if let Some(url) = &self.base_url {
+            choice.backend.base_url = Some(url.clone());
+        }
+        if self.prompt_only {
+            choice.model.contract = Contract::Prompt;
+        }
+        choice.model.accepted.clone_from(&self.accept_model);
+        choice.model.max_output_tokens = self.max_output_tokens.or(choice.model.max_output_tokens);
+        choice.model.reasoning_effort = self.reasoning_effort.or(choice.model.reasoning_effort);
+        Ok(choice)
+    }
+
+    fn provider(&self, choice: &Choice) -> Result<Provider, Failure> {
+        let Some(url) = &choice.backend.base_url else {
+            return Err(Failure::input(format!("the backend of `{}` has no address; give --base-url", choice.name)));
+        };
+        let secret = Secret::from_environment(&choice.backend.key);
+        let secret = match (secret, choice.backend.dialect) {
+            (Ok(secret), _) => Some(secret),
+            // Servers of one's own mostly ask for no key.
+            (Err(_), Dialect::OpenaiCompatible) if self.base_url.is_some() => None,
+            (Err(missing), _) => return Err(Failure::input(missing)),
+        };
+        let patience =
+            Patience { attempts: self.attempts, timeout: Duration::from_secs(self.timeout), ..Patience::default() };
+        Provider::new(url, choice.backend.dialect, &choice.model.id, secret, patience, self.at_once)
+            .map_err(Failure::input)
+    }
+}
+
+/// An amount of money, as typed.
+fn amount(text: &str) -> Result<f64, String> {
+    let value = text.parse::<f64>().map_err(|fault| fault.to_string())?;
+    if value.is_finite() && value >= 0.0 { Ok(value) } else { Err("expected a finite number from 0".to_owned()) }
+}
+
+fn effort(text: &str) -> Result<Effort, String> {
+    Effort::named(text).ok_or_else(|| format!("expected one of {}", Effort::ALL.map(Effort::name).join(", ")))
+}
+
+/// A model as a player.
+pub struct VlmPlayer {
+    vlm: Arc<Vlm>,
+    at_once: usize,
+    /// Requests run on it; it ends with the player.
+    network: Option<Runtime>,
+}
+
+impl VlmPlayer {
+    pub fn vlm(&self) -> &Vlm {
+        &self.vlm
+    }
+}
+
+impl Player for VlmPlayer {
+    fn model(&self) -> &str {
+        &self.vlm.choice().name
+    }
+
+    fn description(&self) -> serde_json::Value {
+        self.vlm.description()
+    }
+
+    fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
+        let agent = self.vlm.agent(task, &episode_id.replace('/', "-"));
+        Ok(Box::new(agent.map_err(|error| Lost::because(error.to_string()))?))
+    }
+
+    fn waits(&self) -> bool {
+        self.network.is_some()
+    }
+
+    fn in_flight(&self) -> usize {
+        self.at_once
+    }
+
+    fn resumes(&self) {
+        self.vlm.note_answered();
+    }
+
+    fn spend(&self) -> Option<Spend> {
+        self.network.is_some().then(|| self.vlm.spend())
+    }
+
+    fn check(&self) -> Result<(), String> {
+        self.vlm.connect().map_err(|fault| fault.to_string())
+    }
+
+    fn stopped(&self) -> Option<String> {
+        self.vlm.stopped().map(str::to_owned)
+    }
+}

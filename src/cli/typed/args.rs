@@ -1,0 +1,109 @@
+//! What was typed, where several verbs share it.
+
+use std::ffi::OsString;
+use std::num::{NonZeroU32, NonZeroUsize};
+use std::path::PathBuf;
+
+use engines::spark::setting::Setting;
+
+/// The traces to read.
+#[derive(Clone, Debug, clap::Args)]
+pub struct TraceArgs {
+    /// Trace files, folders of them, quoted globs, or `-` for a list of files on standard input
+    #[arg(required = true, value_name = "TRACES")]
+    pub traces: Vec<OsString>,
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// How many threads to use.
+#[derive(Clone, Copy, Debug, clap::Args)]
+pub struct ThreadArgs {
+    /// Threads to use; results do not depend on it [default: all cores]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<NonZeroUsize>,
+}
+
+impl ThreadArgs {
+    /// The number asked for, or one per core.
+    pub fn count(self) -> NonZeroUsize {
+        self.threads.or_else(|| std::thread::available_parallelism().ok()).unwrap_or(NonZeroUsize::MIN)
+    }
+}
+
+/// What to score, and how it is defined.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct ScoringArgs {
+    /// Definitions: `paper`, `extended`, or a TOML file [default: those that the traces name, else paper]
+    #[arg(long, value_name = "NAME|FILE")]
+    pub definitions: Option<PathBuf>,
+    /// Only these metrics, separated by commas [default: all of the definitions]
+    #[arg(long, value_name = "METRICS", value_delimiter = ',')]
+    pub metrics: Option<Vec<String>>,
+    /// Only episodes where this holds, in the language of definitions, such as "seed = 1 and TSA = 1"
+    #[arg(long = "where", value_name = "EXPR")]
+    pub condition: Option<String>,
+}
+
+/// How episodes are grouped into cells.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct GroupingArgs {
+    /// Group episodes by these columns, separated by commas [default: experiment,model, and condition where there are some]
+    #[arg(long, value_name = "COLUMNS", value_delimiter = ',')]
+    pub by: Option<Vec<String>>,
+    /// Let a cell hold episodes that were recorded differently: in another world, with other prompts, by another agent
+    #[arg(long)]
+    pub pool: bool,
+    /// What episodes count as that were lost for want of an answer
+    #[arg(long, value_enum, default_value_t)]
+    pub lost: LostArg,
+}
+
+/// What lost episodes count as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum LostArg {
+    /// They are in no denominator
+    #[default]
+    Excluded,
+    /// They are in the denominator of every rate that each episode has, as failures
+    AsFailure,
+}
+
+/// What computes the episode table.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct EngineArgs {
+    /// What computes the scores; the result is the same
+    #[arg(long, value_enum, default_value_t)]
+    pub engine: Engine,
+    #[command(flatten)]
+    pub spark: SparkArgs,
+}
+
+/// The engines by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Engine {
+    /// The program's own kernels
+    #[default]
+    Native,
+    /// The SQL statement of `mirrorstats definitions sql` on Polars, in this process
+    Polars,
+    /// The same statement on your own Spark: `SPARK_HOME`, `spark-submit` on PATH, or Python's package `pyspark`
+    Spark,
+}
+
+/// How to submit to Spark.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct SparkArgs {
+    /// The master of --engine spark: spark://HOST:PORT, yarn, local, ... [default: what your Spark is configured for]
+    #[arg(long, value_name = "URL")]
+    pub master: Option<String>,
+    /// A setting for --engine spark, as often as needed
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub spark_conf: Vec<Setting>,
+    /// Give up on Spark after so many seconds [default: never]
+    #[arg(long, value_name = "SECONDS")]
+    pub spark_timeout: Option<NonZeroU32>,
+    /// Keep Spark's own log in this file
+    #[arg(long, value_name = "FILE")]
+    pub spark_log: Option<PathBuf>,
+}

@@ -1,0 +1,68 @@
+//! Experiments as they are asked for: built in by name, or all of a file, held against the room that they are to be in.
+
+use std::path::Path;
+
+#[cfg(feature = "sim")]
+use clap::builder::{OsStringValueParser, TypedValueParser};
+
+use crate::cli::outcome::Failure;
+use world::experiment::load::{self, FileError, Loaded};
+#[cfg(feature = "sim")]
+use {
+    metric::fault::{Fault, Faults},
+    world::experiment::Experiment,
+    world::record::plan::{Experiments, Named},
+    world::sim::{config::WorldConfig, placement},
+};
+
+/// Reads experiments as they are typed; the name of a file may have any bytes.
+#[cfg(feature = "sim")]
+pub fn parser() -> impl TypedValueParser<Value = Experiments> {
+    OsStringValueParser::new().try_map(|typed| Experiments::of(&typed))
+}
+
+/// The experiments of a file.
+pub fn load(path: &Path) -> Result<Vec<Loaded>, Failure> {
+    load::load(path).map_err(|error| match error {
+        FileError::Faults(faults) => Failure::of_faults(&faults),
+        other => Failure::input(other),
+    })
+}
+
+/// The experiments of a file, each of which has a place in a room.
+#[cfg(feature = "sim")]
+pub fn placed(path: &Path, config: &WorldConfig) -> Result<Vec<Loaded>, Failure> {
+    let loaded = load(path)?;
+    let faults: Vec<Fault> = loaded
+        .iter()
+        .filter_map(|one| {
+            let crowded = placement::crowded(config, one.experiment)?;
+            Some(Fault::new(one.cubes.clone(), crowded.what).help(crowded.help))
+        })
+        .collect();
+    if faults.is_empty() { Ok(loaded) } else { Err(Failure::of_faults(&Faults(faults))) }
+}
+
+/// What was asked for, in its order; each experiment once.
+#[cfg(feature = "sim")]
+pub fn asked(asked: &Experiments, config: &WorldConfig) -> Result<Vec<Experiment>, Failure> {
+    let mut all: Vec<Experiment> = Vec::new();
+    for named in &asked.0 {
+        let found = match named {
+            Named::BuiltIn(experiment) => vec![*experiment],
+            Named::File(path) => placed(path, config)?.into_iter().map(|one| one.experiment).collect(),
+        };
+        for experiment in found {
+            if all.iter().any(|other| *other != experiment && other.name() == experiment.name()) {
+                let name = experiment.name();
+                return Err(Failure::input(format!(
+                    "two different experiments are called `{name}`; give one another name"
+                )));
+            }
+            if !all.contains(&experiment) {
+                all.push(experiment);
+            }
+        }
+    }
+    Ok(all)
+}

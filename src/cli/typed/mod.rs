@@ -1,0 +1,6 @@
+//! From what was typed to values of the library.
+
+pub mod args;
+pub mod experiments;
+pub mod scoring;
+pub mod spark;

@@ -1,0 +1,122 @@
+//! From what was typed to a study, and from its errors to what is said of them.
+
+use std::borrow::Cow;
+use std::ffi::OsString;
+use std::io;
+
+use crate::cli::NAME;
+use crate::cli::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs};
+use crate::cli::outcome::Failure;
+use crate::cli::output;
+use exact::escape::visible;
+use metric::fault::Faults;
+use report::html;
+use study::{LostAs, Question, ScoredAlike, Study, StudyError, resolve};
+use trace::inputs::Input;
+
+impl TraceArgs {
+    /// The files named on the command line.
+    pub fn inputs(&self) -> Result<Vec<Input>, Failure> {
+        Ok(resolve(&self.traces, io::stdin().lock())?)
+    }
+
+    pub fn open(&self) -> Result<Study, Failure> {
+        let study = Study::of(self.inputs()?)?.threads(self.threads.count());
+        output::notes(study.stale_checksums().as_slice());
+        Ok(study)
+    }
+
+    /// The files, opened, and what is asked of them.
+    pub fn study(&self, scoring: &ScoringArgs, grouping: &GroupingArgs) -> Result<Study, Failure> {
+        Ok(self.open()?.asked(scoring.question(grouping))?)
+    }
+
+    /// As [`TraceArgs::study`], scored by the engine asked for.
+    pub fn study_on(
+        &self,
+        engine: &EngineArgs,
+        scoring: &ScoringArgs,
+        grouping: &GroupingArgs,
+    ) -> Result<Study, Failure> {
+        let backend = engine.backend()?;
+        Ok(self.study(scoring, grouping)?.backend(backend))
+    }
+}
+
+impl ScoringArgs {
+    /// What is asked, with cells grouped so.
+    pub fn question(&self, grouping: &GroupingArgs) -> Question {
+        Question {
+            definitions: self.definitions.clone(),
+            each: false,
+            parts: Vec::new(),
+            filter: self.condition.clone(),
+            metrics: self.metrics.clone(),
+            by: grouping.by.clone(),
+            pool: grouping.pool,
+            lost: match grouping.lost {
+                LostArg::Excluded => LostAs::Nothing,
+                LostArg::AsFailure => LostAs::Failure,
+            },
+        }
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error.into_io() {
+            Ok(error) => Self::Output(error),
+            Err(error) => match error.faults() {
+                Some(faults) => Self::of_faults(faults),
+                None => Self::input(error),
+            },
+        }
+    }
+}
+
+/// A refusal of experiments that need different definitions, with what to type in place of what was typed.
+pub(crate) fn with_commands(failure: Failure, typed: &[OsString]) -> Failure {
+    let Failure::Input(error) = &failure else { return failure };
+    let Some(StudyError::DefinitionsDiffer { groups }) = error.downcast_ref() else { return failure };
+    let words = error.to_string();
+    let found = words.split('\n').next().unwrap_or_default();
+    Failure::input(format!("{found}\n  help: ask for each by itself:\n    {}", commands(typed, groups).join("\n    ")))
+}
+
+/// A word of a command line for a shell; a plain option stays as it is.
+fn as_typed(word: &str) -> String {
+    let name = word.trim_start_matches('-');
+    if name.len() < word.len() && html::word(name) == name { word.to_owned() } else { html::word(word) }
+}
+
+/// A command line for the episodes of each group alone.
+pub(crate) fn commands(typed: &[OsString], groups: &[ScoredAlike]) -> Vec<String> {
+    let (mut kept, mut filter, mut words) = (Vec::new(), None, typed.iter().skip(1).map(|word| word.to_string_lossy()));
+    while let Some(word) = words.next() {
+        match word.strip_prefix("--where") {
+            Some("") => filter = words.next().map(Cow::into_owned),
+            Some(rest) => filter = rest.strip_prefix('=').map(str::to_owned),
+            None => kept.push(as_typed(&word)),
+        }
+    }
+    let has_out = typed.iter().any(|word| ["--out", "-o"].iter().any(|out| word.to_string_lossy().starts_with(out)));
+    let command = |group: &ScoredAlike| {
+        let condition =
+            filter.as_ref().map_or_else(String::new, |filter| format!("({filter}) and ")) + &group.condition;
+        let is_plain = visible(&condition) == condition && !condition.contains(['$', '`', '"', '\\', '!']);
+        let condition = if is_plain { format!("\"{condition}\"") } else { html::word(&condition) };
+        let definitions = html::word(&group.definitions);
+        // Two reports in one folder would be the last one.
+        let is_report = kept.first().is_some_and(|verb| verb == "report") && !has_out;
+        let out = if is_report { format!(" --out reports/{definitions}") } else { String::new() };
+        format!("{NAME} {} --where {condition} --definitions {definitions}{out}", kept.join(" "))
+    };
+    groups.iter().map(command).collect()
+}
+
+impl Failure {
+    /// Faults of definitions, a filter or a query, underlined.
+    pub fn of_faults(faults: &Faults) -> Self {
+        Self::Faults(faults.clone())
+    }
+}

@@ -6,7 +6,7 @@ use clap::Command;
 use clap::builder::styling::Style;
 
 use crate::cli::terminal;
-use report::tables::fit::wrapped;
+use report::tables::wrapped;
 
 /// The commands by what they are for, in the order of a first use.
 const GROUPS: &[(&str, &[&str])] = &[

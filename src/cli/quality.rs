@@ -3,9 +3,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::text_table::listing;
-use report::quality::QualityTable;
-use report::tables::fit::fitted;
+use report::layout::quality::QualityTable;
 use score::quality::{CellKey, Quality, QualityByCell};
 
 /// The replies of one cell.
@@ -35,9 +33,6 @@ pub(super) fn answers(cells: &QualityByCell) -> Vec<CellAnswer> {
 
 /// The table, no wider than the terminal; empty without a cell.
 pub(super) fn text(cells: &QualityByCell, width: Option<usize>) -> String {
-    let Some(table) = QualityTable::of(cells) else { return String::new() };
-    let keys = if cells.has_conditions() { 3 } else { 2 };
-    let mut lines = listing(table.header);
-    lines.add_rows(table.rows);
-    format!("{}\n", fitted(&lines, keys, width))
+    let table = QualityTable::from_cells(cells);
+    table.map_or_else(String::new, |table| table.printed.lines(width))
 }

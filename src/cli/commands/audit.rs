@@ -11,7 +11,7 @@ use exact::rounding::Rounding;
 use metric::definitions::Definitions;
 use metric::implied::implied;
 use report::audit::episodes::Episodes;
-use report::audit::{NamedTable, Terms, audit, text};
+use report::audit::{NamedTable, Terms, audit};
 use report::published;
 use report::style::Style;
 use score::score_traces::{has_value, schema_columns};
@@ -63,7 +63,7 @@ impl AuditArgs {
         if self.json {
             output::print_json(&found)?;
         } else {
-            std::io::stdout().lock().write_all(text::render(&found, terminal::width()).as_bytes())?;
+            std::io::stdout().lock().write_all(found.render(terminal::width()).as_bytes())?;
         }
         Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }

@@ -11,11 +11,11 @@ use serde::Serialize;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::text_table::{aligned_right, counted, listing};
+use crate::cli::text_table::counted;
 use crate::cli::{output, terminal};
 use exact::escape::visible;
 use exact::replace::{Content, is_same_file};
-use report::tables::fit::fitted;
+use report::tables::Table;
 use trace::diagnostic::Severity;
 use trace::error::TraceError;
 use trace::identification::VERSION;
@@ -196,10 +196,11 @@ const LONGEST: usize = 80;
 impl fmt::Display for RenormalizeAnswer {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if !self.flips.is_empty() {
-            let mut table = listing(["episode", "t", "before", "after", "identification"]);
+            let header = ["episode", "t", "before", "after", "identification"];
+            let mut table = Table { names: 2, ..Table::of_texts(header).aligned_right([1]) };
             let name = |color: &Option<String>| visible(color.as_deref().unwrap_or("--"));
             for flip in &self.flips {
-                table.add_row([
+                table.push([
                     visible(&flip.episode_id),
                     flip.t.to_string(),
                     name(&flip.before),
@@ -207,7 +208,7 @@ impl fmt::Display for RenormalizeAnswer {
                     shortened(&flip.identification),
                 ]);
             }
-            writeln!(f, "{}\n", fitted(&aligned_right(table, [1]), 2, terminal::width()))?;
+            writeln!(f, "{}", table.within(terminal::width()))?;
         }
         let sum = |of: fn(&RenormalizedFile) -> u64| self.files.iter().map(of).sum::<u64>();
         let (flips, texts) = (counted(self.flips.len() as u64, "attribution"), sum(|file| file.texts));

@@ -11,7 +11,6 @@ use super::super::outcome::{Failure, Outcome};
 use super::super::output;
 use super::super::text_table::counted;
 use report::bundle::Manifest;
-use report::tables::terminal;
 use study::{Report, ReportOptions, WrittenReport};
 
 /// Compute the tables and figures of traces, print the main table, write all of them
@@ -77,11 +76,11 @@ impl ReportArgs {
     fn print(&self, report: &Report) -> Result<Outcome, Failure> {
         let mut out = io::stdout().lock();
         if let Some(table) = report.main_table() {
-            out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
+            out.write_all(table.printed().terminal(super::super::terminal::now()).as_bytes())?;
         }
         if let Some(table) = report.other_table() {
             writeln!(out, "\n{}: what the style names nowhere", table.title)?;
-            out.write_all(terminal::render(table, super::super::terminal::now()).as_bytes())?;
+            out.write_all(table.printed().terminal(super::super::terminal::now()).as_bytes())?;
         }
         if let Some(replies) = &report.replies {
             writeln!(out, "\n{replies}")?;

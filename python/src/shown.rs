@@ -4,14 +4,14 @@ use std::path::PathBuf;
 
 use mirrorstats::FigureFormat;
 use pyo3::prelude::*;
-use report::tables::{csv, html, latex, markdown, terminal};
+use report::tables::Terminal;
 
 use crate::error;
 
 /// A table of a report.
 #[pyclass(frozen, module = "mirrorstats", name = "Table")]
 pub struct ReportTable {
-    table: mirrorstats::Table,
+    table: mirrorstats::MetricTable,
 }
 
 /// A figure of a report.
@@ -22,7 +22,7 @@ pub struct Figure {
 }
 
 impl ReportTable {
-    pub fn new(table: mirrorstats::Table) -> Self {
+    pub fn new(table: mirrorstats::MetricTable) -> Self {
         Self { table }
     }
 }
@@ -42,22 +42,22 @@ impl ReportTable {
 
     #[getter]
     fn latex(&self) -> String {
-        latex::render(&self.table)
+        self.table.printed().latex()
     }
 
     #[getter]
     fn markdown(&self) -> String {
-        markdown::render(&self.table)
+        self.table.printed().markdown()
     }
 
     #[getter]
     fn csv(&self) -> String {
-        csv::render(&self.table)
+        self.table.records().csv()
     }
 
     #[getter]
     fn html(&self) -> String {
-        html::render(&self.table)
+        self.table.printed().html()
     }
 
     fn _repr_html_(&self) -> String {
@@ -69,7 +69,7 @@ impl ReportTable {
     }
 
     fn __str__(&self) -> String {
-        terminal::render(&self.table, terminal::Terminal::default())
+        self.table.printed().terminal(Terminal::default())
     }
 
     fn __repr__(&self) -> String {

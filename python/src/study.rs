@@ -7,8 +7,8 @@ use std::sync::{Arc, OnceLock};
 use arrow::array::RecordBatch;
 use mirrorstats::{FigureName, ReportOptions, StatisticsOptions};
 use pyo3::prelude::*;
-use report::changes::{self, Limit};
-use report::statistics::text::{self, Length};
+use report::changes::Limit;
+use report::statistics::text::Length;
 use study::{LostAs, Question};
 
 use crate::answer::{self, Answer};
@@ -141,13 +141,13 @@ impl Study {
     fn stats(&self, py: Python<'_>, confidence: f64, horizon: Option<i64>) -> PyResult<Answer> {
         let options = StatisticsOptions { confidence, horizon, improvements: true, ..StatisticsOptions::default() };
         let found = py.detach(|| self.inner.statistics(&options).map_err(error::of_study))?;
-        answer::of(&found, text::render(&found, &found.headline, Length::Short, None))
+        answer::of(&found, found.render(&found.headline, Length::Short, None))
     }
 
     #[pyo3(signature = (other))]
     fn diff(&self, py: Python<'_>, other: &Self) -> PyResult<Answer> {
         let found = py.detach(|| self.inner.diff(&other.inner).map_err(error::of_study))?;
-        let shown = changes::render(&found.changes, Limit(LISTED), None);
+        let shown = found.changes.render(Limit(LISTED), None);
         let notes = found.notes.iter().map(|note| format!("note: {note}"));
         answer::of(&found.changes, notes.chain([shown]).collect::<Vec<_>>().join("\n"))
     }

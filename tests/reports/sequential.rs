@@ -4,7 +4,7 @@
 
 use indexmap::IndexMap;
 use metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
-use report::statistics::{Options, Sequential, Verdict, text};
+use report::statistics::{Options, Sequential, Verdict};
 use score::table::{Declared, EpisodeKey, EpisodeTable, LabelColumn, MetricColumn};
 
 use crate::assert_shown;
@@ -114,12 +114,12 @@ fn models_are_told_apart_by_their_discordant_pairs() {
 fn the_text_says_what_it_is_for() {
     let found = sequential(&STUDY);
     let blocks = STUDY.map(|(experiment, model, solved)| format!("{experiment} {model} {solved}/21"));
-    assert_shown!(blocks.join("\n"), text::sequential::render(&found, &found.headline, None));
+    assert_shown!(blocks.join("\n"), found.render(&found.headline, None));
 }
 
 #[test]
 fn names_from_traces_cannot_write_to_the_terminal() {
     let found = sequential(&[("E1", "b\nc", 0), ("E1", "evil\u{1b}[2J", 21)]);
-    let text = text::sequential::render(&found, &found.headline, None);
+    let text = found.render(&found.headline, None);
     assert!(!text.contains('\u{1b}') && text.contains("evil\\u{1b}[2J") && text.contains("b\\u{a}c"), "{text}");
 }

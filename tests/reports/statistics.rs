@@ -8,7 +8,7 @@ use indexmap::IndexMap;
 use metric::catalog::{Better, Catalog, Experiment, Kind, Metric, StandardError};
 use report::cells::interval::ranges;
 use report::cells::{Cells, Group, KeyValue};
-use report::statistics::text::{self, Length};
+use report::statistics::text::Length;
 use report::statistics::{Contrast, Intervals, Options, Statistics, Verdict};
 use score::lost_counts::LostCounts;
 use score::quality::CellKey;
@@ -251,7 +251,7 @@ fn lost_episodes_are_bounded_and_unknown_losses_are_said_to_be_unknown() {
 fn nothing_at_all_is_no_fault() {
     let found = statistics(&[]);
     assert_eq!((found.episodes, found.cells.len(), found.models.len()), (0, 0, 0));
-    assert!(text::render(&found, &found.headline, Length::Short, None).starts_with("0 episodes"));
+    assert!(found.render(&found.headline, Length::Short, None).starts_with("0 episodes"));
 }
 
 #[test]
@@ -267,7 +267,7 @@ fn json_reads_back_to_the_same_rows() {
 
 #[test]
 fn a_rate_without_failure_is_never_certain() {
-    let text = text::render(&statistics(&block("E1", "a", 21, 9)), &["TSA".into()], Length::Full, None);
+    let text = statistics(&block("E1", "a", 21, 9)).render(&["TSA".into()], Length::Full, None);
     assert!(text.contains("[0.845, 1.000]") && !text.contains("[1.000, 1.000]") && !text.contains(" 0.000"), "{text}");
 }
 
@@ -293,12 +293,12 @@ fn values_too_large_to_square_are_refused() {
 fn the_text_begins_with_the_answers() {
     let found = recorded(&study());
     let blocks = STUDY.map(|(experiment, model, solved, steps)| format!("{experiment} {model} {solved}/21 in {steps}"));
-    assert_shown!(blocks.join("\n"), text::render(&found, &found.headline, Length::Short, None));
+    assert_shown!(blocks.join("\n"), found.render(&found.headline, Length::Short, None));
 }
 
 #[test]
 fn names_from_traces_cannot_write_to_the_terminal() {
     let found = statistics(&[block("E1", "evil\u{1b}[2J", 21, 9), block("E1", "b\nc", 0, 9)].concat());
-    let text = text::render(&found, &found.headline, Length::Short, None);
+    let text = found.render(&found.headline, Length::Short, None);
     assert!(!text.contains('\u{1b}') && text.contains("evil\\u{1b}[2J") && text.contains("b\\u{a}c"));
 }

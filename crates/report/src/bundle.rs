@@ -13,9 +13,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::cells::{Cell, Cells};
+use crate::layout::MetricTable;
 use crate::style::Style;
-use crate::table::Table;
-use crate::tables::{csv, latex, markdown};
+use crate::tables::{Table, key_field};
 use exact::hash;
 use exact::number::full_precision;
 use exact::replace::{self, Content, FolderFiles, FolderHoldsInput, TargetIsInput};
@@ -28,7 +28,7 @@ pub struct Bundle<'a> {
     /// For `cells.csv`.
     pub cells: &'a Cells,
     /// For `tables/<name>.{tex,md,csv}`.
-    pub tables: &'a [Table],
+    pub tables: &'a [MetricTable],
     /// The bytes of `episodes.parquet`.
     pub episodes: &'a [u8],
     /// For `manifest.json`, which gets its outputs when they are written.
@@ -225,9 +225,8 @@ fn files(bundle: &Bundle) -> Vec<OutputFile> {
     let mut files =
         vec![file("cells.csv", cells_csv(bundle.cells).as_bytes()), file("episodes.parquet", bundle.episodes)];
     for table in bundle.tables {
-        for (ending, text) in
-            [("tex", latex::render(table)), ("md", markdown::render(table)), ("csv", csv::render(table))]
-        {
+        let printed = table.printed();
+        for (ending, text) in [("tex", printed.latex()), ("md", printed.markdown()), ("csv", table.records().csv())] {
             files.push(file(&format!("tables/{}.{ending}", table.name), text.as_bytes()));
         }
     }
@@ -241,15 +240,13 @@ fn files(bundle: &Bundle) -> Vec<OutputFile> {
 /// quantity, at 95 %. What is undefined or withheld is empty. The header's keys are those that the cells are grouped by.
 pub fn cells_csv(cells: &Cells) -> String {
     const TAIL: [&str; 8] = ["metric", "n", "sum", "sum_sq", "mean", "se", "ci_low", "ci_high"];
-    let mut writer = ::csv::Writer::from_writer(Vec::new());
-    csv::write(&mut writer, cells.by.iter().cloned().chain(TAIL.map(str::to_owned)));
-    cells.all().for_each(|cell| csv::write(&mut writer, cell_record(cell)));
-    csv::finish(writer)
+    let header = cells.by.iter().map(String::as_str).chain(TAIL);
+    Table::of_texts(header).with(cells.all().map(cell_record)).csv()
 }
 
 fn cell_record(Cell { key, name, metric, moments, interval }: Cell) -> Vec<String> {
     let of = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
-    let mut record: Vec<String> = key.iter().map(csv::key_field).collect();
+    let mut record: Vec<String> = key.iter().map(key_field).collect();
     record.extend([name.to_owned(), moments.n.to_string(), moments.sum.to_string(), moments.sum_sq.to_string()]);
     record.extend([of(moments.mean()), of(moments.se(metric.se))]);
     record.extend([of(interval.map(|i| i.low)), of(interval.map(|i| i.high))]);

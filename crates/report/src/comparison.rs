@@ -10,9 +10,10 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::errata::{Errata, Erratum, Field};
+use crate::layout::{MetricCell, MetricRow, MetricTable};
 use crate::published::{CellLabel, PrintedCell, Published};
 use crate::style::Style;
-use crate::table::{Cell, Emphasis, Table, Value};
+use crate::tables::Emphasis;
 use exact::number::Decimal;
 
 /// What a comparison found.
@@ -78,11 +79,11 @@ impl Comparison {
 
 /// The table to compare: the one called `name`, else the first that has all the published metrics.
 pub fn choose<'t>(
-    tables: &'t [Table],
+    tables: &'t [MetricTable],
     published: &Published,
     name: Option<&str>,
     style: &Style,
-) -> Result<&'t Table, ComparisonError> {
+) -> Result<&'t MetricTable, ComparisonError> {
     let style = style.name.clone();
     let metrics: BTreeSet<&str> = published.cells.iter().map(|(cell, _)| cell.metric.as_str()).collect();
     let table = match name {
@@ -101,17 +102,17 @@ pub fn choose<'t>(
     if prints_se { Ok(table) } else { Err(ComparisonError::NoStandardErrors { style, table: table.name.clone() }) }
 }
 
-fn has_all(table: &Table, metrics: &BTreeSet<&str>) -> bool {
+fn has_all(table: &MetricTable, metrics: &BTreeSet<&str>) -> bool {
     metrics.iter().all(|metric| table.columns.iter().any(|column| column.metric == *metric))
 }
 
-fn described(table: &Table) -> String {
+fn described(table: &MetricTable) -> String {
     let metrics: Vec<&str> = table.columns.iter().map(|column| column.metric.as_str()).collect();
     format!("`{}` ({})", table.name, metrics.join(", "))
 }
 
 /// Compares `table`, made of cells by experiment and model, with the published cells.
-pub fn compare(table: &Table, published: &Published, errata: &Errata) -> Comparison {
+pub fn compare(table: &MetricTable, published: &Published, errata: &Errata) -> Comparison {
     let ours = our_cells(table);
     let about_table: Vec<&Erratum> = errata.erratum.iter().filter(|erratum| erratum.table == table.name).collect();
     let mut used = vec![false; about_table.len()];
@@ -147,26 +148,21 @@ pub fn compare(table: &Table, published: &Published, errata: &Errata) -> Compari
     comparison
 }
 
-fn our_cells(table: &Table) -> BTreeMap<CellLabel, PrintedCell> {
+fn our_cells(table: &MetricTable) -> BTreeMap<CellLabel, PrintedCell> {
     let place = |key: &str| table.keys.iter().position(|of| of == key);
-    let text = |row: &crate::table::Row, key: &str| place(key).map(|at| row.key[at].to_string()).unwrap_or_default();
-    let rows = table.groups.iter().flat_map(|group| &group.rows);
-    rows.flat_map(|row| {
+    let text = |row: &MetricRow, key: &str| place(key).map(|at| row.key[at].to_string()).unwrap_or_default();
+    let cells = table.rows().flat_map(|row| {
         let (experiment, model) = (text(row, "experiment"), text(row, "model"));
         table.columns.iter().zip(&row.cells).map(move |(column, cell)| {
             let metric = column.metric.clone();
             (CellLabel { experiment: experiment.clone(), model: model.clone(), metric }, printed(cell))
         })
-    })
-    .collect()
+    });
+    cells.collect()
 }
 
-fn printed(cell: &Cell) -> PrintedCell {
-    let se = match cell.value {
-        Value::MeanSe { se, .. } => se,
-        Value::Undefined | Value::Count { .. } | Value::Mean { .. } => None,
-    };
-    PrintedCell { mean: cell.value.mean(), se, emphasis: cell.emphasis }
+fn printed(cell: &MetricCell) -> PrintedCell {
+    PrintedCell { mean: cell.value.mean(), se: cell.value.se(), emphasis: cell.emphasis }
 }
 
 fn unpublished(ours: &BTreeMap<CellLabel, PrintedCell>, published: &Published) -> Vec<CellLabel> {

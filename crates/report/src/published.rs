@@ -10,8 +10,7 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::table::Emphasis;
-use crate::tables::csv::text_of;
+use crate::tables::{Emphasis, text_of};
 use exact::budget::Limit;
 use exact::escape::visible;
 use exact::input;

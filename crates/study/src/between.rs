@@ -7,7 +7,7 @@ use super::diff::{Diff, DiffRequest, Pair, Scored, Side, diff};
 use super::error::StudyError;
 use super::inputs::Source;
 use report::cells::group::DEFAULT_BY;
-use report::order::TableOrder;
+use report::layout::TableOrder;
 use report::style::Style;
 use score::table::EpisodeTable;
 

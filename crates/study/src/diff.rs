@@ -16,7 +16,7 @@ use exact::suggest::nearest;
 use metric::definitions::{Definitions, UnknownMetric};
 use report::cells::diff::{Changes, Flip, Overlap};
 use report::cells::group::DEFAULT_BY;
-use report::order::TableOrder;
+use report::layout::TableOrder;
 use report::style::Style;
 use score::evidence::{self, Evidence};
 use score::flips;

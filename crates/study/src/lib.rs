@@ -53,10 +53,10 @@ use ::report::comparison::{Comparison, choose, compare};
 use ::report::errata::Errata;
 use ::report::figures::{Figure, FigureName};
 pub use ::report::layout;
+use ::report::layout::MetricTable;
 use ::report::published;
 use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics};
 use ::report::style::Style;
-use ::report::table::Table;
 use exact::replace;
 use metric::columns::Columns;
 use metric::definitions::Definitions;
@@ -355,7 +355,7 @@ impl Study {
     }
 
     /// The tables of these episodes, each with the filter that chose them.
-    fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<Table>, StudyError> {
+    fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StudyError> {
         let mut tables = layout::tables(cells, style)?;
         if let Some(selection) = self.selection(episodes) {
             for table in &mut tables {

@@ -10,7 +10,7 @@ use super::results::Results;
 use report::bundle::Manifest;
 use report::cells::{Cells, KeyValue};
 use report::html::{self, Figure, Page};
-use report::quality::QualityTable;
+use report::layout::quality::QualityTable;
 use report::statistics::Options;
 use report::style::Style;
 use trace::schema::SCHEMA_VERSION;
@@ -60,7 +60,7 @@ impl Study {
         let svgs: Vec<String> = drawings.drawn.iter().map(|(_, figure)| figure.inline_svg()).collect();
         let figures: Vec<Figure> =
             drawings.drawn.iter().zip(&svgs).map(|((name, drawn), svg)| figure_of(*name, drawn, svg)).collect();
-        let quality = results.quality.as_ref().and_then(QualityTable::of);
+        let quality = results.quality.as_ref().and_then(QualityTable::from_cells);
         let tables = self.tables(&results.episodes, &cells, &style)?;
         let manifest =
             Manifest::new(&cells, &style, SCHEMA_VERSION, self.question.filter.clone(), results.inputs.clone());

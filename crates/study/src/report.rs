@@ -14,11 +14,10 @@ use report::bundle::{self, Bundle, BundleError, Manifest, OutputFile};
 use report::cells::Cells;
 use report::figures::{Figure as Drawn, FigureName};
 use report::html::{self, Figure, Page, Recordings};
-use report::quality::{self, QualityTable};
+use report::layout::MetricTable;
+use report::layout::quality::{self, QualityTable};
 use report::statistics::{Options, Replies, Statistics, TEXT_SCORES};
 use report::style::{MAIN_TABLE, OTHER_TABLE, Style};
-use report::table::Table;
-use report::tables::markdown;
 use score::format::Format;
 use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
@@ -54,7 +53,7 @@ pub struct Report {
     /// The cells, grouped as the study says.
     pub cells: Cells,
     /// The tables, as the style lays them out.
-    pub tables: Vec<Table>,
+    pub tables: Vec<MetricTable>,
     /// What became of the replies; `None` for scores, which do not say.
     pub quality: Option<QualityTable>,
     /// Where everything comes from.
@@ -110,7 +109,7 @@ impl Study {
         let statistics =
             options.figures.then(|| self.statistics_of(&counted, &cells, &Options::default())).transpose()?;
         let Counted { results, all, lost } = counted;
-        let quality = results.quality.as_ref().and_then(QualityTable::of);
+        let quality = results.quality.as_ref().and_then(QualityTable::from_cells);
         let replies = results.quality.as_ref().and_then(Replies::of).and_then(|replies| replies.sentence());
         let tables = self.tables(&results.episodes, &cells, &style)?;
         let filter = self.question.filter.clone();
@@ -205,12 +204,12 @@ fn undeclared(episodes: &EpisodeTable) -> Option<String> {
 
 impl Report {
     /// The table that is shown first.
-    pub fn main_table(&self) -> Option<&Table> {
+    pub fn main_table(&self) -> Option<&MetricTable> {
         self.tables.iter().find(|table| table.name == MAIN_TABLE).or(self.tables.first())
     }
 
     /// The metrics that the style names nowhere, where there are too many of them for the main table.
-    pub fn other_table(&self) -> Option<&Table> {
+    pub fn other_table(&self) -> Option<&MetricTable> {
         self.tables.iter().find(|table| table.name == OTHER_TABLE)
     }
 
@@ -218,7 +217,7 @@ impl Report {
     ///
     /// # Errors
     /// Where the style has none: which there are.
-    pub fn table(&self, name: &str) -> Result<&Table, StudyError> {
+    pub fn table(&self, name: &str) -> Result<&MetricTable, StudyError> {
         self.tables.iter().find(|table| table.name == name).ok_or_else(|| {
             let known = || self.tables.iter().map(|table| table.name.as_str());
             let (style, known, hint) =
@@ -229,7 +228,7 @@ impl Report {
 
     /// A table as Markdown; `None` where the style has no table of this name.
     pub fn markdown(&self, name: &str) -> Option<String> {
-        self.tables.iter().find(|table| table.name == name).map(markdown::render)
+        self.tables.iter().find(|table| table.name == name).map(|table| table.printed().markdown())
     }
 
     /// Writes the folder of the report, in place of the report that is there.
@@ -256,8 +255,8 @@ impl Report {
             path: format!("tables/{}.{ending}", quality::NAME).into(),
             bytes: text.into_bytes(),
         };
-        let Some(table) = &self.quality else { return Vec::new() };
-        vec![file("tex", table.latex()), file("md", table.markdown()), file("csv", table.csv().to_owned())]
+        let Some(QualityTable { printed, records }) = &self.quality else { return Vec::new() };
+        vec![file("tex", printed.latex()), file("md", printed.markdown()), file("csv", records.csv())]
     }
 
     /// Adds the figures and the page.

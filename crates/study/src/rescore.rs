@@ -12,7 +12,7 @@ use super::report::{Report, ReportOptions};
 use super::{LostAs, Question, Study, provenance};
 use exact::input;
 use report::bundle::Manifest;
-use report::order::TableOrder;
+use report::layout::TableOrder;
 use report::style::Style;
 use score::format::{self, Partition};
 use score::table::EpisodeTable;

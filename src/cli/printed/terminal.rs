@@ -2,7 +2,7 @@
 
 use std::io::{self, IsTerminal as _};
 
-use report::tables::terminal::{Marks, Terminal};
+use report::tables::{Marks, Terminal};
 
 /// The columns that a line may take: those that COLUMNS says, else those of the terminal; none where output goes to a
 /// file or a pipe, in which lines are as long as they come.

@@ -10,9 +10,9 @@ use report::cells::group::group;
 use report::figures::{self, FigureName};
 use report::html::{self, Figure, HtmlError, Page, Recordings};
 use report::layout;
+use report::layout::MetricTable;
 use report::statistics::{Options, Statistics};
 use report::style::Style;
-use report::table::Table;
 use score::score_traces::{self, Request};
 use score::table::EpisodeTable;
 use trace::{inputs, open::TraceSet};
@@ -34,7 +34,7 @@ pub static PAPER_PAGE: LazyLock<String> = LazyLock::new(|| Report::paper().rende
 pub struct Report {
     pub episodes: EpisodeTable,
     pub cells: Cells,
-    pub tables: Vec<Table>,
+    pub tables: Vec<MetricTable>,
     pub manifest: Manifest,
     pub statistics: Option<Statistics>,
     pub recordings: Recordings,

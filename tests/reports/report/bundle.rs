@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 
 use report::bundle::{Bundle, BundleError, Input, Manifest, OutputFile, cells_csv, write};
 use report::cells::Cells;
+use report::layout::MetricTable;
 use report::style::Style;
-use report::table::Table;
 
 use crate::assert_shown;
 use crate::report::published;
 
 struct Report {
     cells: Cells,
-    tables: Vec<Table>,
+    tables: Vec<MetricTable>,
     manifest: Manifest,
 }
 

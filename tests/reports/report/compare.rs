@@ -7,7 +7,6 @@ use report::comparison::{Comparison, choose, compare};
 use report::errata::Errata;
 use report::published::{Published, read};
 use report::style::Style;
-use report::tables::side_by_side;
 
 use crate::assert_shown;
 use crate::report::published;
@@ -38,13 +37,10 @@ fn changed(change: impl Fn(&str) -> String) -> Comparison {
 fn all_but_two_published_cells_are_as_published() {
     let main = against(&paper("main"), &Errata::of_paper());
     assert!(main.holds());
-    assert_shown!("fixtures/paper against fixtures/published/main_table.csv", side_by_side::render(&main, None));
+    assert_shown!("fixtures/paper against fixtures/published/main_table.csv", main.render(None));
     let appendix = against(&paper("appendix"), &Errata::of_paper());
     assert!(appendix.holds());
-    assert_eq!(
-        side_by_side::render(&appendix, None),
-        "appendix: 280 cells: 280 as published, 0 excused by errata, 0 differ\n"
-    );
+    assert_eq!(appendix.render(None), "appendix: 280 cells: 280 as published, 0 excused by errata, 0 differ\n");
 }
 
 #[test]
@@ -79,7 +75,7 @@ fn an_erratum_excuses_exactly_what_it_states() {
     let found = changed(|text| text.replace("57.90,10.07", "57.91,10.07"));
     assert!(found.holds());
     assert_eq!(found.unused_errata.len(), 1);
-    let text = side_by_side::render(&found, None);
+    let text = found.render(None);
     let note = text.lines().find(|line| line.contains("not needed")).unwrap();
     assert_shown!("main_table.csv with 57.91,10.07 for 57.90,10.07, the errata of the paper", note);
 }
@@ -92,7 +88,7 @@ fn cells_that_one_side_lacks_are_told() {
     let line = "E1,Unheard Of,TSA,0.57,0.11,\n";
     let found = changed(|text| format!("{text}{line}"));
     assert!(!found.holds());
-    assert_shown!(format!("main_table.csv and {line}"), side_by_side::render(&found, None));
+    assert_shown!(format!("main_table.csv and {line}"), found.render(None));
 }
 
 #[test]

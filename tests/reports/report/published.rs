@@ -13,10 +13,8 @@ use indexmap::IndexMap;
 use metric::catalog::{Better, Catalog, Kind, Metric, StandardError};
 use metric::definitions::Definitions;
 use report::cells::{Cell as CellOf, Cells, Group, KeyValue};
-use report::layout;
+use report::layout::{self, MetricTable, Value, value};
 use report::style::Style;
-use report::table::{Table, Value};
-use report::value;
 use score::score_traces::schema_columns;
 
 /// Episodes behind every published cell.
@@ -127,7 +125,7 @@ fn quantities(cell: &Published) -> impl Iterator<Item = Moments> + use<> {
     })
 }
 
-pub fn tables(style: &str) -> Vec<Table> {
+pub fn tables(style: &str) -> Vec<MetricTable> {
     layout::tables(&cells(), &Style::load(style).unwrap()).unwrap()
 }
 

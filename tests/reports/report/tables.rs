@@ -6,16 +6,14 @@ use std::fs;
 use exact::moments::Moments;
 use metric::catalog::{Better, Catalog, Kind, StandardError};
 use report::cells::{Cells, Group, KeyValue};
-use report::layout;
+use report::layout::{self, MetricTable, Spread, Value};
 use report::style::Style;
-use report::table::{Emphasis, Spread, Table, Value};
-use report::tables::terminal::{self, Marks, Terminal};
-use report::tables::{csv, latex, markdown};
+use report::tables::{Emphasis, Marks, Terminal};
 
 use crate::assert_shown;
 use crate::report::published::{self, metric_of};
 
-fn table(style: &str, name: &str) -> Table {
+fn table(style: &str, name: &str) -> MetricTable {
     published::tables(style).into_iter().find(|table| table.name == name).unwrap()
 }
 
@@ -39,7 +37,7 @@ fn corrected(table: &str) -> String {
 #[test]
 fn the_published_tables_come_out_character_for_character() {
     for name in ["main", "appendix"] {
-        let (ours, theirs) = (latex::render(&table("paper", name)), corrected(name));
+        let (ours, theirs) = (table("paper", name).printed().latex(), corrected(name));
         for (ours, theirs) in lines(&ours).into_iter().zip(lines(&theirs)) {
             assert_eq!(ours, theirs, "{name}");
         }
@@ -51,7 +49,7 @@ fn the_published_tables_come_out_character_for_character() {
 fn the_published_csv_files_come_out_but_for_the_slips() {
     for (name, slips) in [("main", 2), ("appendix", 0)] {
         let (ours, theirs) =
-            (csv::render(&table("paper", name)), fs::read_to_string(published::path(name, "csv")).unwrap());
+            (table("paper", name).records().csv(), fs::read_to_string(published::path(name, "csv")).unwrap());
         let differing = ours.lines().zip(theirs.lines()).filter(|(a, b)| a != b).count();
         assert_eq!((ours.lines().count(), differing), (theirs.lines().count(), slips), "{name}");
     }
@@ -103,11 +101,11 @@ fn everything(cells: &Cells, style: &str) -> String {
     let mut all = String::new();
     for table in layout::tables(cells, &Style::load(style).unwrap()).unwrap() {
         for (format, text) in [
-            ("terminal", terminal::render(&table, Terminal::default())),
-            ("narrow terminal", terminal::render(&table, Terminal { width: Some(50), emphasis: Marks::Ansi })),
-            ("markdown", markdown::render(&table)),
-            ("csv", csv::render(&table)),
-            ("latex", latex::render(&table)),
+            ("terminal", table.printed().terminal(Terminal::default())),
+            ("narrow terminal", table.printed().terminal(Terminal { width: Some(50), emphasis: Marks::Ansi })),
+            ("markdown", table.printed().markdown()),
+            ("csv", table.records().csv()),
+            ("latex", table.printed().latex()),
         ] {
             writeln!(all, "######## {} as {format}\n{text}", table.name).unwrap();
         }
@@ -163,11 +161,11 @@ fn marks_are_where_the_caption_says() {
     }
     assert!(cells.iter().any(|cell| cell.is_marked) && cells.iter().any(|cell| cell.n > 4 && !cell.is_marked));
     let marked = cells.iter().filter(|cell| cell.is_marked).count();
-    let (html, dagger) = (report::tables::html::render(&table), "†");
+    let (html, dagger) = (table.printed().html(), "†");
     for (format, text, mark) in [
-        ("terminal", terminal::render(&table, Terminal::default()), dagger),
-        ("markdown", markdown::render(&table), dagger),
-        ("latex", latex::render(&table), "$^{\\dagger}$"),
+        ("terminal", table.printed().terminal(Terminal::default()), dagger),
+        ("markdown", table.printed().markdown(), dagger),
+        ("latex", table.printed().latex(), "$^{\\dagger}$"),
         ("html", html, dagger),
     ] {
         assert_eq!(text.matches(mark).count(), marked + 1, "{format}: each of them, and the caption");
@@ -204,9 +202,9 @@ fn no_episodes_give_a_table_without_rows() {
         let none = cells(&["experiment", "model"], small_catalog(), &[]);
         for table in layout::tables(&none, &Style::load(style).unwrap()).unwrap() {
             assert!(table.groups.is_empty());
-            assert!(latex::render(&table).contains("\\bottomrule"));
-            assert!(markdown::render(&table).ends_with('\n') && csv::render(&table).lines().count() == 1);
-            assert!(terminal::render(&table, Terminal::default()).contains("Model"));
+            assert!(table.printed().latex().contains("\\bottomrule"));
+            assert!(table.printed().markdown().ends_with('\n') && table.records().csv().lines().count() == 1);
+            assert!(table.printed().terminal(Terminal::default()).contains("Model"));
         }
     }
 }
@@ -216,7 +214,7 @@ fn every_metric_is_in_some_table() {
     let mut catalog = small_catalog();
     let names = |catalog: Catalog| -> Vec<(String, Vec<String>)> {
         let tables = layout::tables(&cells(&["model"], catalog, &[]), &Style::load("default").unwrap()).unwrap();
-        let columns = |table: &Table| table.columns.iter().map(|column| column.metric.clone()).collect();
+        let columns = |table: &MetricTable| table.columns.iter().map(|column| column.metric.clone()).collect();
         tables.iter().map(|table| (table.name.clone(), columns(table))).collect()
     };
     let of =

@@ -1,6 +1,6 @@
 //! What is compared with what follows from the declared design: pairs, clusters, conditions, strata.
 
-use report::statistics::text::{self, Length};
+use report::statistics::text::Length;
 use report::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
 use statistics::design::{Cluster, Design, DesignKind};
 
@@ -65,7 +65,7 @@ fn reconstructions_and_undeclared_traces_have_neither_pairs_nor_clusters() {
         assert!(found.conditions.iter().all(|contrast| contrast.comparison.pairs.is_none()));
         assert_eq!((found.clusters.len(), found.gaps.len()), (0, 0));
         assert!(found.warnings[0].contains(note), "{:?}", found.warnings);
-        let text = text::render(&found, &found.headline, Length::Short, None);
+        let text = found.render(&found.headline, Length::Short, None);
         assert!(text.contains("Fisher") && !text.contains("pairs of equal") && text.contains(note), "{text}");
     }
 }
@@ -207,7 +207,7 @@ fn conditions_of_one_model_are_compared_like_models() {
         let names: Vec<_> =
             both.map(|contrast| (contrast.condition.as_deref().unwrap(), contrast.comparison.n)).collect();
         assert_eq!(names, [("default", [7, 7]), ("pocket mirror", [14, 14])]);
-        text::render(&found, &found.headline, Length::Full, None)
+        found.render(&found.headline, Length::Full, None)
     };
     assert!(text.contains("a [pocket mirror]"), "{text}");
     table.labels[0].values = rows.iter().map(|_| Some("default")).collect();

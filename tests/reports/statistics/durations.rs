@@ -1,6 +1,6 @@
 //! Durations are compared by restricted means, and intervals are given only where they hold what they promise.
 
-use report::statistics::text::{self, Length};
+use report::statistics::text::Length;
 use report::statistics::{Intervals, Options, Statistics};
 use statistics::coverage::{self, Withheld};
 use statistics::interval::Interval;
@@ -36,7 +36,7 @@ fn chance_is_tested_among_finished_episodes_too() {
         of("TSA-C").find(same).is_some_and(|other| other.verdict != row.verdict)
     });
     assert_eq!((of("TSA").count(), changed.count()), (32, 6));
-    let text = text::render(&found, &["TSA".to_owned()], Length::Short, None);
+    let text = found.render(&["TSA".to_owned()], Length::Short, None);
     assert!(text.contains("TSA     chance 1/3") && text.contains("TSA-C   chance 1/3"), "{text}");
 }
 
@@ -131,9 +131,9 @@ fn points(value: &serde_json::Value) -> Vec<String> {
 #[test]
 fn the_dagger_is_explained_where_it_stands_and_only_there() {
     let found = statistics(&[block("E1", "a", 4, 9), block("E1", "b", 0, 9)].concat());
-    let with = text::render(&found, &["MTATO".to_owned()], Length::Short, None);
+    let with = found.render(&["MTATO".to_owned()], Length::Short, None);
     assert!(with.contains('†') && with.contains("† fewer than 5 defined episodes"), "{with}");
-    let without = text::render(&found, &["TTD".to_owned()], Length::Full, None);
+    let without = found.render(&["TTD".to_owned()], Length::Full, None);
     assert!(!without.contains('†') && !without.contains("dagger"), "{without}");
 }
 

@@ -3,11 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::{InfeasibleCell, NamedTable, Terms};
-use crate::emphasis::emphasise;
 use crate::errata::Field;
+use crate::layout::emphasis::emphasise;
+use crate::layout::{MetricCell, Value};
 use crate::published::PrintedCell;
 use crate::style::{EmphasisRule, TableSheet};
-use crate::table::{Cell, Emphasis, Value};
+use crate::tables::Emphasis;
 use exact::moments::Moments;
 
 /// The cells of a table that stand out otherwise than their printed means say, by position.
@@ -40,7 +41,7 @@ pub(super) fn infeasible(
 
 fn expected<'c>(cells: impl Iterator<Item = &'c PrintedCell>, metric: &str, terms: Terms<'_>) -> Vec<Emphasis> {
     let value = |cell: &PrintedCell| cell.mean.map_or(Value::Undefined, |mean| Value::MeanSe { mean, se: cell.se });
-    let mut cells: Vec<Cell> = cells.map(|cell| Cell::plain(value(cell), &Moments::default(), 0)).collect();
+    let mut cells: Vec<MetricCell> = cells.map(|cell| MetricCell::plain(value(cell), &Moments::default(), 0)).collect();
     let better = terms.style.sheet.better(metric, terms.catalog);
     emphasise(&mut cells.iter_mut().collect::<Vec<_>>(), better, EmphasisRule::PrintedMean);
     cells.into_iter().map(|cell| cell.emphasis).collect()

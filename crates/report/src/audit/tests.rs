@@ -1,5 +1,5 @@
 use super::episodes::Episodes;
-use super::{Audit, NamedTable, Terms, audit, text};
+use super::{Audit, NamedTable, Terms, audit};
 use crate::published;
 use crate::style::Style;
 use exact::moments::Moments;
@@ -39,13 +39,13 @@ const APPENDIX: (&str, &str) = ("appendix.csv", include_str!("../../../../fixtur
 #[test]
 fn the_papers_tables_have_two_infeasible_cells_of_520() {
     let found = audited(&[MAIN, APPENDIX], "paper");
-    insta::assert_snapshot!(text::render(&found, None));
+    insta::assert_snapshot!(found.render(None));
 }
 
 #[test]
 fn without_the_papers_style_a_zero_is_a_zero() {
     let found = audited(&[MAIN, APPENDIX], "default");
-    insta::assert_snapshot!(text::render(&found, None));
+    insta::assert_snapshot!(found.render(None));
 }
 
 fn row(cells: &str) -> String {
@@ -55,7 +55,7 @@ fn row(cells: &str) -> String {
 
 fn audited_row(lines: &str) -> String {
     let table = format!("experiment,model,metric,mean,se,emphasis\n{lines}");
-    text::render(&audited(&[("t.csv", &table)], "default"), None)
+    audited(&[("t.csv", &table)], "default").render(None)
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn two_tables_must_come_from_the_same_data() {
     let found = audited(&[("a.csv", &table("5.00")), ("b.csv", &table("5.01"))], "default");
     assert!(found.holds(), "rounded twice, 5.0049 prints 5.01: {found:?}");
     let found = audited(&[("a.csv", &table("5.00")), ("b.csv", &table("5.02"))], "default");
-    insta::assert_snapshot!(text::render(&found, None));
+    insta::assert_snapshot!(found.render(None));
 }
 
 /// Digits of a generator (Knuth's MMIX constants).

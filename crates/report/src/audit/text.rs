@@ -2,50 +2,48 @@
 
 use std::fmt::Write as _;
 
-use comfy_table::{LineStyle, Table, presets};
-
 use super::{Audit, AuditedTable, InfeasibleCell};
-use crate::tables::fit::{fitted, wrapped};
+use crate::tables::{Column, Look, Table, push_wrapped};
 use exact::escape::visible;
 use exact::rounding::Rounding;
 
 /// The columns that name a cell.
 const NAMES: usize = 4;
 
-/// The whole answer, in lines of at most `width` columns.
-pub fn render(audit: &Audit, width: Option<usize>) -> String {
-    let mut text = String::new();
-    if !audit.infeasible.is_empty() {
-        push_cells(&mut text, audit, width);
-        text.push('\n');
+impl Audit {
+    /// The whole answer, in lines of at most `width` columns.
+    pub fn render(&self, width: Option<usize>) -> String {
+        let audit = self;
+        let mut text = String::new();
+        if !audit.infeasible.is_empty() {
+            push_cells(&mut text, audit, width);
+            text.push('\n');
+        }
+        for zero in &audit.undefined_as_zero {
+            let cell = &zero.cell;
+            let [experiment, model, metric] = [&cell.experiment, &cell.model, &cell.metric].map(|name| visible(name));
+            let words = format!(
+                "note: {}, {experiment}, {model}, {metric}: zero is printed where no episode counts, as tables of the style `{}` do",
+                visible(&zero.table),
+                visible(&audit.style)
+            );
+            push_wrapped(&mut text, &words, width, 2);
+        }
+        for table in &audit.tables {
+            push_wrapped(&mut text, &summary(table), width, 2);
+        }
+        let _ = writeln!(text, "{} of {} cells are feasible", audit.feasible, audit.cells);
+        text
     }
-    for zero in &audit.undefined_as_zero {
-        let cell = &zero.cell;
-        let [experiment, model, metric] = [&cell.experiment, &cell.model, &cell.metric].map(|name| visible(name));
-        let words = format!(
-            "note: {}, {experiment}, {model}, {metric}: zero is printed where no episode counts, as tables of the style `{}` do",
-            visible(&zero.table),
-            visible(&audit.style)
-        );
-        push_wrapped(&mut text, &words, width, 2);
-    }
-    for table in &audit.tables {
-        push_wrapped(&mut text, &summary(table), width, 2);
-    }
-    let _ = writeln!(text, "{} of {} cells are feasible", audit.feasible, audit.cells);
-    text
 }
 
 fn push_cells(text: &mut String, audit: &Audit, width: Option<usize>) {
-    let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
-    table.set_header(["table", "experiment", "model", "metric", "published", "infeasible"]);
-    for (at, cell) in audit.infeasible.iter().enumerate() {
+    let header = ["table", "experiment", "model", "metric", "published", "infeasible"];
+    let rows = audit.infeasible.iter().enumerate().map(|(at, cell)| {
         let names = [&cell.table, &cell.cell.experiment, &cell.cell.model, &cell.cell.metric, &cell.published];
-        let names = names.map(|name| visible(name)).into_iter();
-        table.add_row(names.chain([format!("{} [{}]", cell.field.name(), at + 1)]).collect::<Vec<_>>());
-    }
-    let _ = writeln!(text, "{}", fitted(&table, NAMES, width));
+        names.map(Clone::clone).into_iter().chain([format!("{} [{}]", cell.field.name(), at + 1)])
+    });
+    *text += &Table::list(Look::Framed, NAMES, header.map(Column::left)).with(rows).within(width);
     for (at, cell) in audit.infeasible.iter().enumerate() {
         let number = format!("[{}] ", at + 1);
         push_wrapped(
@@ -82,9 +80,4 @@ fn summary(table: &AuditedTable) -> String {
         table.rounding.name(),
         counts.collect::<Vec<_>>().join(", ")
     )
-}
-
-fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
-    let lines = wrapped(words, width.unwrap_or(usize::MAX), indent);
-    let _ = writeln!(text, "{}", lines.join("\n"));
 }

@@ -1,11 +1,10 @@
 //! The lists: one line per cell, flip or expression.
 
-use comfy_table::{LineStyle, Table, presets};
 use indexmap::IndexMap;
 
 use super::{Limit, words};
 use crate::cells::diff::{Changes, Flip, Rewritten};
-use crate::tables::fit::fitted;
+use crate::tables::{Column, Look, Table};
 use exact::escape::visible;
 
 /// Expressions that are not written the same.
@@ -96,10 +95,8 @@ impl<R: Iterator<Item = Vec<String>>> List<R> {
             (_, Limit(0)) => return rest.map(|rest| format!("  {rest}")),
             _ => {}
         }
-        let mut table = Table::new();
-        table.load_style(presets::NOTHING.header_separator(LineStyle::none().fill('─').junction('─')));
-        table.set_header(self.header).add_rows(self.rows.take(limit.0));
-        let rest = rest.map_or_else(String::new, |rest| format!("\n  {rest}"));
-        Some(format!("{}{rest}", fitted(&table, self.names, width)))
+        let table = Table::list(Look::Ruled, self.names, self.header.into_iter().map(Column::left));
+        let table = table.with(self.rows.take(limit.0)).within(width);
+        Some(rest.map_or_else(|| table.trim_end_matches('\n').to_owned(), |rest| format!("{table}  {rest}")))
     }
 }

@@ -17,19 +17,22 @@ pub struct Limit(pub usize);
 /// Digits of a hash that tell definitions apart.
 const SHORT_HASH: usize = 12;
 
-/// The whole answer of `diff`, its tables at most `width` columns wide; the last line sums up.
-pub fn render(changes: &Changes, limit: Limit, width: Option<usize>) -> String {
-    let mut text = String::new();
-    let names = &changes.definitions;
-    let _ = writeln!(text, "before: {}\nafter:  {}", origin(&names.before), origin(&names.after));
-    push_section(&mut text, "Written differently", lists::rewritten(&changes.rewritten, limit, width));
-    push_alone(&mut text, "metric", &changes.metrics, limit, |name| visible(name));
-    push_alone(&mut text, "episode", &changes.episodes, limit, |name| visible(&name.episode_id));
-    push_section(&mut text, "Cells that moved", lists::cells(changes, limit, width));
-    push_section(&mut text, "Values that flipped, by metric", lists::flips_by_metric(&changes.flips));
-    push_section(&mut text, "Episodes that flipped", lists::flips(&changes.flips, limit, width));
-    let _ = writeln!(text, "\n{}", sum(changes));
-    text
+impl Changes {
+    /// The whole answer of `diff`, its tables at most `width` columns wide; the last line sums up.
+    pub fn render(&self, limit: Limit, width: Option<usize>) -> String {
+        let changes = self;
+        let mut text = String::new();
+        let names = &changes.definitions;
+        let _ = writeln!(text, "before: {}\nafter:  {}", origin(&names.before), origin(&names.after));
+        push_section(&mut text, "Written differently", lists::rewritten(&changes.rewritten, limit, width));
+        push_alone(&mut text, "metric", &changes.metrics, limit, |name| visible(name));
+        push_alone(&mut text, "episode", &changes.episodes, limit, |name| visible(&name.episode_id));
+        push_section(&mut text, "Cells that moved", lists::cells(changes, limit, width));
+        push_section(&mut text, "Values that flipped, by metric", lists::flips_by_metric(&changes.flips));
+        push_section(&mut text, "Episodes that flipped", lists::flips(&changes.flips, limit, width));
+        let _ = writeln!(text, "\n{}", sum(changes));
+        text
+    }
 }
 
 fn origin(name: &DefinitionsName) -> String {

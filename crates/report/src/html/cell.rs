@@ -6,7 +6,8 @@
 use serde_json::{Value as Json, json};
 
 use crate::cells;
-use crate::table::{Cell, DAGGER, Emphasis, Value};
+use crate::layout::{MetricCell, Value};
+use crate::tables::{DAGGER, Emphasis};
 use exact::escape::visible;
 use exact::moments::Moments;
 use exact::number::{Decimal, full_precision};
@@ -15,7 +16,7 @@ use metric::catalog::{Kind, Metric};
 use statistics::interval::Interval;
 
 /// A cell of a metric, with the level of blind guessing where there is one.
-pub(super) fn cell(cell: &Cell, of: cells::Cell, undefined: &str, chance: Option<Ratio>) -> Json {
+pub(super) fn cell(cell: &MetricCell, of: cells::Cell, undefined: &str, chance: Option<Ratio>) -> Json {
     let cells::Cell { name, metric, moments, interval, .. } = of;
     let (estimate, detail) = cell.value.parts(&visible(undefined));
     let of = |value: Option<f64>| value.map(full_precision).unwrap_or_default();

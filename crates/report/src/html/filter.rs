@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde_json::{Value as Json, json};
 
 use crate::cells::{Cells, KeyValue};
+use crate::layout::MetricTable;
 use crate::layout::heading;
-use crate::table::Table;
 use exact::escape::visible;
 
 /// The filters of a page, and where each value stands among its filter's.
@@ -19,7 +19,7 @@ pub(super) struct Filters {
 
 impl Filters {
     /// The values that the rows of `tables` have, in order of their coming.
-    pub(super) fn of(tables: &[Table], cells: &Cells, undefined: &str) -> Self {
+    pub(super) fn of(tables: &[MetricTable], cells: &Cells, undefined: &str) -> Self {
         let mut values: Vec<Vec<KeyValue>> = vec![Vec::new(); cells.by.len()];
         let mut places: Vec<BTreeMap<KeyValue, usize>> = vec![BTreeMap::new(); cells.by.len()];
         for row in tables.iter().flat_map(|table| &table.groups).flat_map(|group| &group.rows) {

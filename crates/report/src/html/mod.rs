@@ -25,9 +25,9 @@ mod template;
 use crate::bundle::Manifest;
 use crate::cells::Cells;
 use crate::cells::group::GroupError;
-use crate::quality::QualityTable;
+use crate::layout::MetricTable;
+use crate::layout::quality::QualityTable;
 use crate::statistics::Statistics;
-use crate::table::Table;
 use score::table::EpisodeTable;
 
 pub use command::{Recordings, word};
@@ -36,7 +36,7 @@ pub use command::{Recordings, word};
 #[derive(Clone, Copy, Debug)]
 pub struct Page<'a> {
     /// The tables, in order.
-    pub tables: &'a [Table],
+    pub tables: &'a [MetricTable],
     /// The cells that the tables show.
     pub cells: &'a Cells,
     /// The episodes that the cells are of.

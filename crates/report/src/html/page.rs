@@ -14,12 +14,10 @@ use crate::bundle::Manifest;
 use crate::cells::Cells;
 use crate::cells::group::group;
 use crate::figures;
-use crate::layout::heading;
-use crate::order::row_key;
-use crate::quality::QualityTable;
+use crate::layout::quality::QualityTable;
+use crate::layout::{MetricColumn, MetricRow, MetricRows, MetricTable, heading, row_key};
 use crate::statistics::Statistics;
-use crate::statistics::text::{self, Length};
-use crate::table::{Column, Row, RowGroup, Table};
+use crate::statistics::text::Length;
 use exact::escape::visible;
 use metric::catalog::Better;
 use score::table::{EpisodeTable, KeyRef};
@@ -58,9 +56,9 @@ fn counts(episodes: &EpisodeTable) -> Json {
     json!({ "episodes": episodes.len(), "models": models, "experiments": experiments })
 }
 
-fn table(table: &Table, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
+fn table(table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
     let group_keys: Vec<&str> = others(&table.keys, row_key(&table.keys)).map(String::as_str).collect();
-    let rows = |group: &RowGroup| row_group(group, table, cells, filters);
+    let rows = |group: &MetricRows| row_group(group, table, cells, filters);
     Ok(json!({
         "name": table.name,
         "title": visible(&table.title),
@@ -73,7 +71,7 @@ fn table(table: &Table, cells: &Cells, filters: &Filters) -> Result<Json, HtmlEr
     }))
 }
 
-fn column(column: &Column) -> Json {
+fn column(column: &MetricColumn) -> Json {
     // The direction to sort by first.
     let best_first = match column.better {
         Better::Higher | Better::Neither => "descending",
@@ -82,7 +80,7 @@ fn column(column: &Column) -> Json {
     json!({ "metric": visible(&column.metric), "arrow": column.better.arrow(), "best_first": best_first })
 }
 
-fn row_group(group: &RowGroup, table: &Table, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
+fn row_group(group: &MetricRows, table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
     let first = group.rows.first().map_or(&[][..], |row| &row.key);
     // The heading's keys alone: `E1`.
     let short = others(first, row_key(&table.keys)).map(|value| shown(value, &table.undefined));
@@ -91,7 +89,7 @@ fn row_group(group: &RowGroup, table: &Table, cells: &Cells, filters: &Filters) 
     Ok(json!({ "heading": group.heading.as_deref().map(visible), "short": short, "rows": rows }))
 }
 
-fn row(row: &Row, table: &Table, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
+fn row(row: &MetricRow, table: &MetricTable, cells: &Cells, filters: &Filters) -> Result<Json, HtmlError> {
     let stray = || HtmlError::StrayRow { table: table.name.clone(), row: row.name.clone() };
     let at = cells.groups.binary_search_by(|group| group.key.cmp(&row.key)).map_err(|_| stray())?;
     let group = &cells.groups[at];
@@ -124,16 +122,15 @@ fn statistics(statistics: &Statistics) -> Json {
     json!({
         "conclusions": all(&statistics.conclusions),
         "warnings": all(&statistics.warnings),
-        "text": text::render(statistics, &statistics.headline, Length::Full, None),
+        "text": statistics.render(&statistics.headline, Length::Full, None),
     })
 }
 
-fn quality(table: &QualityTable) -> Json {
-    let all = |texts: &[String]| texts.iter().map(|text| visible(text)).collect::<Vec<_>>();
+fn quality(QualityTable { printed, .. }: &QualityTable) -> Json {
     json!({
-        "notes": all(&table.notes),
-        "header": all(&table.header),
-        "rows": table.rows.iter().map(|row| all(row)).collect::<Vec<_>>(),
+        "notes": printed.sentences.iter().map(|text| visible(text)).collect::<Vec<_>>(),
+        "header": printed.columns.iter().map(|column| visible(&column.heading)).collect::<Vec<_>>(),
+        "rows": printed.rows().map(|row| row.iter().map(|cell| visible(&cell.text)).collect()).collect::<Vec<Json>>(),
     })
 }
 

@@ -1,5 +1,5 @@
 use super::register::{NamedHash, RegisteredPlan};
-use super::{Given, PlanRequest, TestName, plan, text};
+use super::{Given, PlanRequest, TestName, plan};
 use exact::ratio::Ratio;
 use statistics::sample_size::Clusters;
 
@@ -24,7 +24,7 @@ fn the_answer_comes_first() {
         PlanRequest { given: Given::Runs(1), models: 2, ..PAPER },
         PlanRequest { given: Given::Difference(0.4), baseline: Some(0.5), discordance: Some(0.5), ..PAPER },
     ];
-    let told: Vec<String> = requests.map(|request| text::render(&plan(request).unwrap(), None)).into();
+    let told: Vec<String> = requests.map(|request| plan(request).unwrap().render(None)).into();
     insta::assert_snapshot!(told.join("\n\n"));
 }
 

@@ -1,37 +1,23 @@
 //! A plan in words: the answer in one line, a row per test and level, what was assumed.
 
-use std::fmt::Write as _;
-
-use comfy_table::{CellAlignment, LineStyle, Table, presets};
-
 use super::{Given, Plan, PlanRequest, PlannedTest};
-use crate::tables::fit::{fitted, wrapped};
+use crate::tables::{Table, push_wrapped};
 use exact::format::{UNDEFINED, fixed};
 use statistics::sample_size::{MOST_EPISODES, Rates};
 
-/// The columns that name a row.
-const NAMES: usize = 2;
-
-/// The whole answer, in lines of at most `width` columns.
-pub fn render(plan: &Plan, width: Option<usize>) -> String {
-    let mut text = String::new();
-    push_wrapped(&mut text, &plan.answer, width);
-    let mut table = Table::new();
-    table.load_style(presets::NOTHING.header_separator(LineStyle::none().fill('─').junction('─')));
-    table.set_header(["test", "level", "difference", "episodes", "runs per seed", "effective", "power"]);
-    for column in 2..7 {
-        if let Some(column) = table.column_mut(column) {
-            column.set_cell_alignment(CellAlignment::Right);
+impl Plan {
+    /// The whole answer, in lines of at most `width` columns.
+    pub fn render(&self, width: Option<usize>) -> String {
+        let mut text = String::new();
+        push_wrapped(&mut text, &self.answer, width, 2);
+        let header = ["test", "level", "difference", "episodes", "runs per seed", "effective", "power"];
+        let table = Table { names: 2, ..Table::of_texts(header).aligned_right(2..7) };
+        text += &format!("\n{}\n", table.with(self.tests.iter().map(record)).within(width));
+        for assumption in &self.assumptions {
+            push_wrapped(&mut text, assumption, width, 2);
         }
+        text
     }
-    for test in &plan.tests {
-        table.add_row(record(test));
-    }
-    let _ = writeln!(text, "\n{}\n", fitted(&table, NAMES, width));
-    for assumption in &plan.assumptions {
-        push_wrapped(&mut text, assumption, width);
-    }
-    text
 }
 
 fn record(test: &PlannedTest) -> [String; 7] {
@@ -46,10 +32,6 @@ fn record(test: &PlannedTest) -> [String; 7] {
         count(test.effective),
         fixed(test.power, 3),
     ]
-}
-
-fn push_wrapped(text: &mut String, words: &str, width: Option<usize>) {
-    let _ = writeln!(text, "{}", wrapped(words, width.unwrap_or(usize::MAX), 2).join("\n"));
 }
 
 /// The answer that a test gives, in one line.

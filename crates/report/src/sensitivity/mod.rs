@@ -13,10 +13,9 @@ use serde::Serialize;
 
 use super::statistics::Statistics;
 use super::style::Style;
-use super::table::Table;
-use super::tables::latex;
-use super::tables::terminal::Terminal;
 use crate::cells::{Cells, Group, KeyValue};
+use crate::layout::MetricTable;
+use crate::tables::Terminal;
 use exact::moments::Moments;
 use metric::catalog::Kind;
 
@@ -84,7 +83,7 @@ pub struct Sensitivity {
     pub changes: Vec<Change>,
     /// The cells as one table.
     #[serde(skip)]
-    pub table: Table,
+    pub table: MetricTable,
 }
 
 /// One cell under one threshold.
@@ -152,7 +151,7 @@ impl Sensitivity {
 
     /// As LaTeX, the table alone.
     pub fn latex(&self) -> String {
-        latex::render(&self.table)
+        self.table.printed().latex()
     }
 
     /// For a terminal: the table, then where a conclusion changes.

@@ -2,9 +2,8 @@
 
 use super::{Level, Reference};
 use crate::cells::{Group, KeyValue};
-use crate::order::TableOrder;
+use crate::layout::{MetricCell, MetricColumn, MetricRow, MetricRows, MetricTable, Spread, TableOrder, Value};
 use crate::style::{CellForm, Style, TableSheet};
-use crate::table::{Cell, Column, Row, RowGroup, Spread, Table, Value};
 use exact::moments::Moments;
 use exact::number::Decimal;
 use metric::catalog::{Better, Kind, Metric};
@@ -19,9 +18,9 @@ pub(super) fn table(
     reference: &Reference,
     (metrics, independent): (&[String], &[String]),
     style: &Style,
-) -> Table {
+) -> MetricTable {
     let unmoved = format!("The threshold does not move {}.", independent.join(", "));
-    Table {
+    MetricTable {
         name: "sensitivity".to_owned(),
         title: "Sensitivity to the threshold of mirror evidence".to_owned(),
         note: NOTE.to_owned(),
@@ -51,25 +50,30 @@ fn by(levels: &[Level]) -> &[String] {
     levels.first().map_or(&[], |level| &level.cells.by)
 }
 
-fn column(metric: &str, levels: &[Level], style: &Style) -> Column {
+fn column(metric: &str, levels: &[Level], style: &Style) -> MetricColumn {
     let better = levels.first().map(|level| style.sheet.better(metric, &level.cells.catalog));
-    Column {
+    MetricColumn {
         metric: metric.to_owned(),
         latex: style.sheet.column.get(metric).and_then(|column| column.latex.clone()),
         better: better.unwrap_or(Better::Neither),
     }
 }
 
-fn group(key: &[KeyValue], levels: &[Level], reference: &Reference, shown: (&[String], &Style)) -> RowGroup {
+fn group(key: &[KeyValue], levels: &[Level], reference: &Reference, shown: (&[String], &Style)) -> MetricRows {
     let parts = by(levels).iter().zip(key).map(|(name, value)| match name.as_str() {
         "experiment" | "model" => value.to_string(),
         _ => format!("{name} {value}"),
     });
     let rows = levels.iter().filter_map(|level| row(level, level.group(key)?, reference, shown));
-    RowGroup { heading: Some(parts.collect::<Vec<_>>().join(", ")), rows: rows.collect() }
+    MetricRows { heading: Some(parts.collect::<Vec<_>>().join(", ")), rows: rows.collect() }
 }
 
-fn row(level: &Level, group: &Group, reference: &Reference, (metrics, style): (&[String], &Style)) -> Option<Row> {
+fn row(
+    level: &Level,
+    group: &Group,
+    reference: &Reference,
+    (metrics, style): (&[String], &Style),
+) -> Option<MetricRow> {
     let (name, threshold) = match level.px {
         Some(px) => (format!("{px} px"), KeyValue::Int(px.into())),
         None => (reference.words(), KeyValue::Text(reference.word().to_owned())),
@@ -77,10 +81,10 @@ fn row(level: &Level, group: &Group, reference: &Reference, (metrics, style): (&
     let cell = |metric: &String| {
         let moments = level.moments(group, metric)?;
         let value = value(moments, level.cells.catalog.metric.get(metric)?, group.episodes, style);
-        Some(Cell::plain(value, moments, group.episodes))
+        Some(MetricCell::plain(value, moments, group.episodes))
     };
     let cells = metrics.iter().map(cell).collect::<Option<Vec<_>>>()?;
-    Some(Row { key: group.key.iter().cloned().chain([threshold]).collect(), name, cells })
+    Some(MetricRow { key: group.key.iter().cloned().chain([threshold]).collect(), name, cells })
 }
 
 /// A count or a mean without an interval: rows are the same episodes, and differ by definition, not by chance.

@@ -1,9 +1,7 @@
 //! The answer as text: for a terminal, as Markdown, as CSV.
 
 use super::{Sensitivity, ThresholdCell};
-use crate::tables::fit::wrapped;
-use crate::tables::terminal::Terminal;
-use crate::tables::{csv as spreadsheet, markdown as marked, terminal};
+use crate::tables::{Table, Terminal, escape_markdown, key_field, wrapped};
 use exact::escape::visible;
 use exact::number::full_precision;
 
@@ -22,33 +20,29 @@ pub(super) fn render(found: &Sensitivity, on: Terminal) -> String {
         let sentences = found.changes.iter().map(|change| format!("- {}", visible(&change.sentence)));
         lines.extend(sentences.flat_map(|sentence| wrapped(&sentence, on.width.unwrap_or(ROOM), 2)));
     }
-    terminal::render(&found.table, on) + &lines.join("\n") + "\n"
+    found.table.printed().terminal(on) + &lines.join("\n") + "\n"
 }
 
 pub(super) fn markdown(found: &Sensitivity) -> String {
-    let text = marked::render(&found.table);
+    let text = found.table.printed().markdown();
     if found.changes.is_empty() {
         return text + "\n" + NONE + "\n";
     }
     let sentences: Vec<String> =
-        found.changes.iter().map(|change| format!("- {}\n", marked::escape(&change.sentence))).collect();
+        found.changes.iter().map(|change| format!("- {}\n", escape_markdown(&change.sentence))).collect();
     text + "\n**" + HEADING + ".**\n\n" + &sentences.concat()
 }
 
 pub(super) fn csv(found: &Sensitivity) -> String {
-    let mut writer = ::csv::Writer::from_writer(Vec::new());
-    let tail = ["threshold", "metric", "n", "sum", "mean", "se"].map(str::to_owned);
-    spreadsheet::write(&mut writer, found.by.iter().cloned().chain(tail));
-    for cell in &found.cells {
-        spreadsheet::write(&mut writer, record(found, cell));
-    }
-    spreadsheet::finish(writer)
+    let tail = ["threshold", "metric", "n", "sum", "mean", "se"];
+    let header = found.by.iter().map(String::as_str).chain(tail);
+    Table::of_texts(header).with(found.cells.iter().map(|cell| record(found, cell))).csv()
 }
 
 fn record(found: &Sensitivity, cell: &ThresholdCell) -> Vec<String> {
     let word = || found.reference.split(' ').next().unwrap_or_default().to_owned();
     let number = |value: Option<f64>| value.map(full_precision).unwrap_or_default();
-    let keys = cell.key.values().map(spreadsheet::key_field);
+    let keys = cell.key.values().map(key_field);
     keys.chain([
         cell.threshold.map_or_else(word, |px| px.to_string()),
         cell.metric.clone(),

@@ -4,8 +4,7 @@
 
 use std::fmt::Write as _;
 
-use super::marked_up;
-use crate::table::{Cell, Column, Row, Table};
+use super::Table;
 use exact::escape::visible;
 
 const NUMBER: &str = " style=\"text-align: right; white-space: nowrap\"";
@@ -14,43 +13,35 @@ const NAME: &str = " style=\"text-align: left\"";
 /// The table with its caption.
 pub fn render(table: &Table) -> String {
     let mut text = format!("<table>\n<caption{NAME}><b>{}.</b>", escape(&table.title));
-    for sentence in table.sentences() {
+    for sentence in &table.sentences {
         let _ = write!(text, " {}", escape(sentence));
     }
-    let _ = write!(text, "</caption>\n<thead>\n<tr><th{NAME}>{}</th>", escape(&table.row_heading));
-    for column in &table.columns {
-        let _ = write!(text, "<th{NUMBER}>{}</th>", heading(column));
-    }
-    text.push_str("</tr>\n</thead>\n");
+    text.push_str("</caption>\n<thead>\n");
+    push_row(&mut text, "th", table, table.columns.iter().map(|column| column.spelled(escape)));
+    text.push_str("</thead>\n");
     for group in &table.groups {
         text.push_str("<tbody>\n");
         if let Some(heading) = &group.heading {
-            let columns = table.columns.len() + 1;
+            let columns = table.columns.len();
             let _ = writeln!(text, "<tr><th{NAME} colspan=\"{columns}\">{}</th></tr>", escape(heading));
         }
-        group.rows.iter().for_each(|row| push_row(&mut text, row, table));
+        for row in &group.rows {
+            let cells = row.iter().map(|cell| cell.marked_up(escape, ["<b>", "</b>"], ["<u>", "</u>"]));
+            push_row(&mut text, "td", table, cells);
+        }
         text.push_str("</tbody>\n");
     }
     text.push_str("</table>\n");
     text
 }
 
-fn heading(column: &Column) -> String {
-    let name = escape(&column.metric);
-    column.better.arrow().map_or_else(|| name.clone(), |arrow| format!("{name} {arrow}"))
-}
-
-fn push_row(text: &mut String, row: &Row, table: &Table) {
-    let _ = write!(text, "<tr><td{NAME}>{}</td>", escape(&row.name));
-    for cell in &row.cells {
-        let _ = write!(text, "<td{NUMBER}>{}</td>", spell(cell, table));
+fn push_row(text: &mut String, element: &str, table: &Table, cells: impl Iterator<Item = String>) {
+    text.push_str("<tr>");
+    for (cell, column) in cells.zip(&table.columns) {
+        let style = if column.align == super::Align::Left { NAME } else { NUMBER };
+        let _ = write!(text, "<{element}{style}>{cell}</{element}>");
     }
     text.push_str("</tr>\n");
-}
-
-/// Numbers need no escaping, only the style's word for undefined does.
-fn spell(cell: &Cell, table: &Table) -> String {
-    marked_up(cell, &escape(&table.undefined), ["<b>", "</b>"], ["<u>", "</u>"])
 }
 
 /// Text in which nothing is markup, nor mathematics to a notebook.
@@ -74,10 +65,7 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{escape, render};
-    use crate::cells::KeyValue;
-    use crate::style::CellForm;
-    use crate::table::{Column, Row, RowGroup, Table};
-    use metric::catalog::Better;
+    use crate::tables::{Column, RowGroup, Table};
 
     #[test]
     fn no_name_is_markup() {
@@ -96,20 +84,11 @@ mod tests {
     fn every_text_of_a_table_is_escaped() {
         let text = || "<b>".to_owned();
         let table = Table {
-            name: text(),
             title: text(),
-            note: text(),
-            footnotes: vec![text()],
-            label: None,
-            undefined: text(),
-            form: CellForm::MeanSe,
-            keys: vec!["model".to_owned()],
-            row_heading: text(),
-            columns: vec![Column { metric: text(), latex: None, better: Better::Higher }],
-            groups: vec![RowGroup {
-                heading: Some(text()),
-                rows: vec![Row { key: vec![KeyValue::Missing], name: text(), cells: Vec::new() }],
-            }],
+            sentences: vec![text(), text()],
+            columns: vec![Column::left(text()), Column::right(text())],
+            groups: vec![RowGroup { heading: Some(text()), rows: vec![vec![text().into()]] }],
+            ..Table::default()
         };
         let html = render(&table);
         // The one that is markup stands around the title.

@@ -1,32 +1,31 @@
 //! Tables as LaTeX: booktabs, set as the paper sets them.
-//!
-//! Needs the packages booktabs, graphicx and xcolor with its option `table`.
 
 use std::fmt::Write as _;
 
-use crate::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
+use super::{Align, Column, DAGGER, Emphasis, Look, RowGroup, Table, TableCell};
 use exact::escape::visible;
 use metric::catalog::Better;
 
-/// What has to stand in the preamble, as a comment before the table.
+/// What has to stand in the preamble, as a comment before a sheet.
 const PACKAGES: &str =
     "% Needs in the preamble: \\usepackage{booktabs}, \\usepackage{graphicx}, \\usepackage[table]{xcolor}\n";
 
 /// The whole float, caption and label included.
 pub fn render(table: &Table) -> String {
-    let columns = "c".repeat(table.columns.len());
+    let is_sheet = table.look == Look::Sheet;
+    let (packages, blank) = if is_sheet { (PACKAGES, "\n") } else { ("", "") };
+    let columns: String = table.columns.iter().map(|c| if c.align == Align::Left { 'l' } else { 'c' }).collect();
+    let header = line(table.columns.iter().map(|column| header(column, is_sheet)));
     let mut text = format!(
-        "{PACKAGES}\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{l{columns}}}\n\\toprule\n{}\n",
-        header(table)
+        "{packages}\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n{header}"
     );
     for (at, group) in table.groups.iter().enumerate() {
         if at == 0 || group.heading.is_some() {
-            text.push_str(if at == 0 { "\\midrule\n\n" } else { "\n\\midrule\n" });
+            text += &if at == 0 { format!("\\midrule\n{blank}") } else { format!("{blank}\\midrule\n") };
         }
         push_group(&mut text, group, table);
     }
-    text.push_str("\n\\bottomrule\n\\end{tabular}%\n}\n");
-    let _ = writeln!(text, "\\caption{{{}}}", caption(table));
+    let _ = writeln!(text, "{blank}\\bottomrule\n\\end{{tabular}}%\n}}\n\\caption{{{}}}", caption(table));
     if let Some(label) = &table.label {
         let _ = writeln!(text, "\\label{{{}}}", identifier(label));
     }
@@ -34,67 +33,69 @@ pub fn render(table: &Table) -> String {
     text
 }
 
-fn header(table: &Table) -> String {
-    let mut cells = vec![format!("\\textbf{{{}}}", escape(&table.row_heading))];
-    cells.extend(table.columns.iter().map(|column| {
-        let arrow = match column.better {
-            Better::Higher => " $\\uparrow$",
-            Better::Lower => " $\\downarrow$",
-            Better::Neither => "",
-        };
-        format!("\\textbf{{{}}}{arrow}", column_name(column))
-    }));
-    format!("{} \\\\", cells.join(" & "))
+fn line(cells: impl Iterator<Item = String>) -> String {
+    format!("{} \\\\\n", cells.collect::<Vec<_>>().join(" & "))
+}
+
+fn header(column: &Column, is_sheet: bool) -> String {
+    let arrow = match column.better {
+        Better::Higher => " $\\uparrow$",
+        Better::Lower => " $\\downarrow$",
+        Better::Neither => "",
+    };
+    if is_sheet { format!("\\textbf{{{}}}{arrow}", column_name(column)) } else { column_name(column) }
 }
 
 fn column_name(column: &Column) -> String {
-    column.latex.clone().unwrap_or_else(|| escape(&column.metric))
+    column.latex.clone().unwrap_or_else(|| escape(&column.heading))
 }
 
 fn push_group(text: &mut String, group: &RowGroup, table: &Table) {
     if let Some(heading) = &group.heading {
-        let width = table.columns.len() + 1;
-        let heading = escape(heading);
+        let (width, heading) = (table.columns.len(), escape(heading));
         let _ = write!(
             text,
             "\\rowcolor{{gray!15}}\n\\multicolumn{{{width}}}{{c}}{{\\textbf{{{heading}}}}} \\\\\n\\midrule\n"
         );
     }
     for row in &group.rows {
-        text.push_str(&line(row, table));
-        text.push('\n');
+        let is_name = |at: usize| table.look == Look::Sheet && at < table.names;
+        *text += &line(row.iter().enumerate().map(|(at, cell)| match is_name(at) {
+            true => format!("\\texttt{{{}}}", escape(&cell.text)),
+            false => spell(cell),
+        }));
     }
 }
 
-fn line(row: &Row, table: &Table) -> String {
-    let mut cells = vec![format!("\\texttt{{{}}}", escape(&row.name))];
-    cells.extend(row.cells.iter().map(|cell| spell(cell, table)));
-    format!("{} \\\\", cells.join(" & "))
-}
-
-fn spell(cell: &Cell, table: &Table) -> String {
+fn spell(cell: &TableCell) -> String {
+    if !cell.is_number {
+        return escape(&cell.text);
+    }
     let mark = if cell.is_marked { "$^{\\dagger}$" } else { "" };
     let math = |body: &str| match cell.emphasis {
         Emphasis::Plain => format!("${body}$"),
         Emphasis::Bold => format!("$\\mathbf{{{body}}}$"),
         Emphasis::Underline => format!("$\\underline{{{body}}}$"),
     };
-    match &cell.value {
-        Value::Undefined => escape(&table.undefined),
-        Value::MeanSe { mean, se: Some(se) } => format!("{}{mark}", math(&format!("{mean} \\pm {se}"))),
-        value => match value.parts(&table.undefined) {
-            (estimate, None) => format!("{}{mark}", math(&estimate)),
-            // A hyphen before a digit is a minus sign only in mathematics.
-            (estimate, Some(detail)) => format!("{}{mark} {}", math(&estimate), detail.replace('-', "$-$")),
-        },
+    match &cell.detail {
+        None => format!("{}{mark}", math(&cell.text)),
+        Some(detail) if cell.is_whole => {
+            format!("{}{mark}", math(&format!("{} {}", cell.text, detail.replace('±', "\\pm"))))
+        }
+        // A hyphen before a digit is a minus sign only in mathematics.
+        Some(detail) => format!("{}{mark} {}", math(&cell.text), detail.replace('-', "$-$")),
     }
 }
 
 fn caption(table: &Table) -> String {
-    let mut caption = format!("\\textbf{{{}}}.", escape(&table.title));
-    for sentence in table.sentences() {
+    let title = escape(&table.title);
+    let mut caption = match table.look {
+        Look::Sheet => format!("\\textbf{{{title}}}."),
+        Look::Plain | Look::Ruled | Look::Framed => format!("\\textbf{{{title}.}}"),
+    };
+    for sentence in &table.sentences {
         caption.push(' ');
-        caption.push_str(&prose(sentence, &table.columns));
+        caption.push_str(&prose(sentence, &table.columns[table.names..]));
     }
     caption
 }
@@ -105,7 +106,7 @@ fn prose(text: &str, columns: &[Column]) -> String {
     words
         .map(|word| {
             let name = word.trim_end_matches(|c| !is_word(c));
-            match columns.iter().find(|column| column.metric == name) {
+            match columns.iter().find(|column| column.heading == name) {
                 Some(column) => column_name(column) + &escape(&word[name.len()..]),
                 None => escape(word),
             }

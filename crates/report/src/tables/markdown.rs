@@ -4,14 +4,13 @@ use std::fmt::Write as _;
 
 use unicode_width::UnicodeWidthStr;
 
-use super::marked_up;
-use crate::table::{Cell, Column, Row, RowGroup, Table};
+use super::{Align, Look, RowGroup, Table, TableCell};
 use exact::escape::visible;
 
 /// The whole table with its caption above.
 pub fn render(table: &Table) -> String {
     let mut text = format!("**{}.**", escape(&table.title));
-    for sentence in table.sentences() {
+    for sentence in &table.sentences {
         let _ = write!(text, " {}", escape(sentence));
     }
     text.push('\n');
@@ -25,51 +24,41 @@ fn push_group(text: &mut String, group: &RowGroup, table: &Table) {
     if let Some(heading) = &group.heading {
         let _ = write!(text, "\n### {}\n", escape(heading));
     }
-    let mut lines = vec![header(table)];
-    lines.extend(group.rows.iter().map(|row| cells(row, table)));
-    let widths: Vec<usize> = (0..=table.columns.len())
-        .map(|at| lines.iter().map(|line| line[at].width()).max().unwrap_or(0).max(3))
-        .collect();
+    let spelled = |cell: &TableCell| cell.marked_up(escape, ["**", "**"], ["<ins>", "</ins>"]);
+    let mut lines: Vec<Vec<String>> = vec![table.columns.iter().map(|column| column.spelled(escape)).collect()];
+    lines.extend(group.rows.iter().map(|row| row.iter().map(spelled).collect()));
     text.push('\n');
+    if table.look == Look::Sheet { push_aligned(text, &lines, table) } else { push_lines(text, &lines) }
+}
+
+/// Cells as wide as their text: the widest are too wide to align.
+fn push_lines(text: &mut String, lines: &[Vec<String>]) {
     for (at, line) in lines.iter().enumerate() {
-        push_line(text, line, &widths);
+        let _ = writeln!(text, "| {} |", line.join(" | "));
         if at == 0 {
-            push_rule(text, &widths);
+            let _ = writeln!(text, "|{}", "---|".repeat(line.len()));
         }
     }
 }
 
-fn push_line(text: &mut String, cells: &[String], widths: &[usize]) {
-    for (at, (cell, &width)) in cells.iter().zip(widths).enumerate() {
-        let room = " ".repeat(width.saturating_sub(cell.width()));
-        let _ = if at == 0 { write!(text, "| {cell}{room} |") } else { write!(text, " {room}{cell} |") };
+fn push_aligned(text: &mut String, lines: &[Vec<String>], table: &Table) {
+    let width = |at: usize| lines.iter().map(|line| line[at].width()).max().unwrap_or(0).max(3);
+    let widths: Vec<usize> = (0..table.columns.len()).map(width).collect();
+    let columns = || table.columns.iter().zip(&widths);
+    for (at, line) in lines.iter().enumerate() {
+        let cells = columns().zip(line).map(|((column, &width), cell)| {
+            let room = " ".repeat(width.saturating_sub(cell.width()));
+            if column.align == Align::Left { format!(" {cell}{room} |") } else { format!(" {room}{cell} |") }
+        });
+        let _ = writeln!(text, "|{}", cells.collect::<String>());
+        if at == 0 {
+            let rules = columns().map(|(column, width)| {
+                let dashes = "-".repeat(width - 1);
+                if column.align == Align::Left { format!(" :{dashes} |") } else { format!(" {dashes}: |") }
+            });
+            let _ = writeln!(text, "|{}", rules.collect::<String>());
+        }
     }
-    text.push('\n');
-}
-
-fn push_rule(text: &mut String, widths: &[usize]) {
-    for (at, width) in widths.iter().enumerate() {
-        let dashes = "-".repeat(width - 1);
-        let _ = if at == 0 { write!(text, "| :{dashes} |") } else { write!(text, " {dashes}: |") };
-    }
-    text.push('\n');
-}
-
-fn header(table: &Table) -> Vec<String> {
-    let of_column = |column: &Column| match column.better.arrow() {
-        Some(arrow) => format!("{} {arrow}", escape(&column.metric)),
-        None => escape(&column.metric),
-    };
-    std::iter::once(escape(&table.row_heading)).chain(table.columns.iter().map(of_column)).collect()
-}
-
-fn cells(row: &Row, table: &Table) -> Vec<String> {
-    std::iter::once(escape(&row.name)).chain(row.cells.iter().map(|cell| spell(cell, table))).collect()
-}
-
-/// Numbers need no escaping, only the style's word for undefined does.
-fn spell(cell: &Cell, table: &Table) -> String {
-    marked_up(cell, &escape(&table.undefined), ["**", "**"], ["<ins>", "</ins>"])
 }
 
 /// Text in which nothing is markup, a link, a mention or mathematics.

@@ -1,32 +1,255 @@
-//! The table model spelled out: one file per format.
+//! The one model of printed tables, and its formats: terminal, Markdown, LaTeX, CSV, HTML; a file each.
 //!
 //! Rule: whatever stands in a table (names from traces, titles, a style's own words) is text, never markup. Each
 //! format escapes it; the one exception is a style's `latex` header.
 
-pub mod csv;
-pub mod fit;
-pub mod html;
-pub mod latex;
-pub mod markdown;
-pub mod side_by_side;
-pub mod terminal;
+mod csv;
+mod html;
+mod latex;
+mod markdown;
+mod terminal;
 
-use super::table::{Cell, DAGGER, Emphasis, Value};
+use metric::catalog::Better;
 
-/// A cell in a markup whose words for bold and underlined text are pairs of marks; `undefined` is escaped already.
-fn marked_up(cell: &Cell, undefined: &str, bold: [&str; 2], underline: [&str; 2]) -> String {
-    let (estimate, detail) = cell.value.parts(undefined);
-    let mark = if cell.is_marked { DAGGER.to_string() } else { String::new() };
-    let is_whole = matches!(cell.value, Value::MeanSe { .. });
-    let (inside, after) = match detail {
-        Some(detail) if is_whole => (format!("{estimate} {detail}"), mark),
-        Some(detail) => (estimate, format!("{mark} {detail}")),
-        None => (estimate, mark),
-    };
-    let [before, behind] = match cell.emphasis {
-        Emphasis::Plain => ["", ""],
-        Emphasis::Bold => bold,
-        Emphasis::Underline => underline,
-    };
-    format!("{before}{inside}{behind}{after}")
+pub(crate) use csv::key_field;
+pub use csv::text_of;
+pub use markdown::escape as escape_markdown;
+pub(crate) use terminal::wrap::push_wrapped;
+pub use terminal::wrap::wrapped;
+pub use terminal::{Marks, Terminal};
+
+/// A table as text: all decisions are taken, a format only spells them.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Table {
+    /// The first words of its caption; empty for none.
+    pub title: String,
+    /// The sentences after the title: notes, then footnotes.
+    pub sentences: Vec<String>,
+    /// The LaTeX label.
+    pub label: Option<String>,
+    pub look: Look,
+    pub columns: Vec<Column>,
+    /// How many of the first columns name a row.
+    pub names: usize,
+    /// The rows, in groups that are headed together.
+    pub groups: Vec<RowGroup>,
+}
+
+/// The looks of a table. Captions stand above sheets and below no list.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Look {
+    /// Cells of metrics under headings of groups, as in a paper.
+    Sheet,
+    /// Lines without a rule.
+    Plain,
+    /// Lines with a rule below the header.
+    #[default]
+    Ruled,
+    /// Lines between rules.
+    Framed,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Column {
+    pub heading: String,
+    /// The heading as LaTeX, where the escaped text will not do.
+    pub latex: Option<String>,
+    /// Which way the arrow beside the heading points.
+    pub better: Better,
+    pub align: Align,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Align {
+    Left,
+    Right,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RowGroup {
+    /// `E1: Active mirror-based self-identification`; `None` where all rows are of one group.
+    pub heading: Option<String>,
+    pub rows: Vec<Vec<TableCell>>,
+}
+
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TableCell {
+    pub text: String,
+    /// How sure the text is: `± 0.11`, `[0.22, 0.47]`.
+    pub detail: Option<String>,
+    /// Whether emphasis covers the detail too.
+    pub is_whole: bool,
+    /// Whether LaTeX sets it as mathematics.
+    pub is_number: bool,
+    pub emphasis: Emphasis,
+    /// Whether a dagger marks it.
+    pub is_marked: bool,
+}
+
+/// How a cell stands out in its group.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Emphasis {
+    #[default]
+    Plain,
+    /// The best.
+    Bold,
+    /// The second best.
+    Underline,
+}
+
+/// The sign that marks a cell of few episodes.
+pub(crate) const DAGGER: char = '†';
+
+impl Table {
+    /// An empty list; the first `names` columns name a row.
+    pub fn list(look: Look, names: usize, columns: impl IntoIterator<Item = Column>) -> Self {
+        Self { look, names, columns: columns.into_iter().collect(), ..Self::default() }
+    }
+
+    /// An empty list without a rule: columns of text, which name a row, then columns of numbers.
+    pub fn plain<T: AsRef<str>>(texts: &[T], numbers: &[&str]) -> Self {
+        let texts_of = texts.iter().map(|text| Column::left(text.as_ref()));
+        Self::list(Look::Plain, texts.len(), texts_of.chain(numbers.iter().copied().map(Column::right)))
+    }
+
+    /// An empty list of text columns under a rule; the first column names a row.
+    pub fn of_texts(columns: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        Self::list(Look::Ruled, 1, columns.into_iter().map(Column::left))
+    }
+
+    #[must_use]
+    pub fn titled(self, title: impl Into<String>) -> Self {
+        Self { title: title.into(), ..self }
+    }
+
+    /// The table with these columns aligned to the right, as numbers are.
+    #[must_use]
+    pub fn aligned_right(mut self, columns: impl IntoIterator<Item = usize>) -> Self {
+        for column in columns {
+            self.columns[column].align = Align::Right;
+        }
+        self
+    }
+
+    /// The table with further rows in its last group.
+    #[must_use]
+    pub fn with<R: IntoIterator<Item: Into<TableCell>>>(mut self, rows: impl IntoIterator<Item = R>) -> Self {
+        rows.into_iter().for_each(|row| self.push(row));
+        self
+    }
+
+    pub fn push(&mut self, row: impl IntoIterator<Item: Into<TableCell>>) {
+        let row = row.into_iter().map(Into::into).collect();
+        match self.groups.last_mut() {
+            Some(group) => group.rows.push(row),
+            None => self.groups.push(RowGroup { heading: None, rows: vec![row] }),
+        }
+    }
+
+    pub fn rows(&self) -> impl Iterator<Item = &Vec<TableCell>> {
+        self.groups.iter().flat_map(|group| &group.rows)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.rows().next().is_none()
+    }
+
+    fn cells(&self) -> impl Iterator<Item = &TableCell> {
+        self.rows().flatten()
+    }
+
+    /// For a terminal or a pipe; lists have a title alone.
+    pub fn terminal(&self, terminal: Terminal) -> String {
+        terminal::render(self, terminal)
+    }
+
+    /// For a terminal of this width or a pipe, emphasis by signs.
+    pub fn within(&self, width: Option<usize>) -> String {
+        self.terminal(Terminal { width, ..Terminal::default() })
+    }
+
+    /// The lines alone, without title and sentences.
+    pub fn lines(&self, width: Option<usize>) -> String {
+        terminal::list::lines(self, width)
+    }
+
+    /// For a terminal, words wrapped so that all columns fit into `width`.
+    pub fn wrapped(&self, width: usize) -> String {
+        terminal::list::wrapped(self, width)
+    }
+
+    /// As GitHub's Markdown.
+    pub fn markdown(&self) -> String {
+        markdown::render(self)
+    }
+
+    /// As LaTeX; needs the packages booktabs and graphicx, a sheet also xcolor with its option `table`.
+    pub fn latex(&self) -> String {
+        latex::render(self)
+    }
+
+    /// As HTML for notebooks.
+    pub fn html(&self) -> String {
+        html::render(self)
+    }
+
+    /// As comma-separated values: the header, then the rows.
+    pub fn csv(&self) -> String {
+        csv::render(self)
+    }
+}
+
+impl Column {
+    pub fn left(heading: impl Into<String>) -> Self {
+        Self { heading: heading.into(), latex: None, better: Better::Neither, align: Align::Left }
+    }
+
+    pub fn right(heading: impl Into<String>) -> Self {
+        Self { align: Align::Right, ..Self::left(heading) }
+    }
+
+    /// The heading and its arrow, spelled by `escape`.
+    fn spelled(&self, escape: fn(&str) -> String) -> String {
+        let heading = escape(&self.heading);
+        self.better.arrow().map_or_else(|| heading.clone(), |arrow| format!("{heading} {arrow}"))
+    }
+}
+
+impl<T: Into<String>> From<T> for TableCell {
+    fn from(text: T) -> Self {
+        Self { text: text.into(), ..Self::default() }
+    }
+}
+
+impl TableCell {
+    /// In a markup whose words for bold and underlined text are pairs of marks.
+    fn marked_up(&self, escape: fn(&str) -> String, bold: [&str; 2], underline: [&str; 2]) -> String {
+        let mark = self.mark();
+        let (inside, after) = match &self.detail {
+            Some(detail) if self.is_whole => (format!("{} {detail}", self.text), mark.to_owned()),
+            Some(detail) => (self.text.clone(), format!("{mark} {detail}")),
+            None => (escape(&self.text), mark.to_owned()),
+        };
+        let [before, behind] = match self.emphasis {
+            Emphasis::Plain => ["", ""],
+            Emphasis::Bold => bold,
+            Emphasis::Underline => underline,
+        };
+        format!("{before}{inside}{behind}{after}")
+    }
+
+    fn mark(&self) -> &'static str {
+        if self.is_marked { "†" } else { "" }
+    }
+}
+
+impl Emphasis {
+    /// The word for it in CSV files; empty for none.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Plain => "",
+            Self::Bold => "bold",
+            Self::Underline => "underline",
+        }
+    }
 }

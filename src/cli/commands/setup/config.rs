@@ -8,9 +8,9 @@ use serde::Serialize;
 
 use crate::cli::config::{self, Setting};
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::text_table::listing;
 use crate::cli::{Cli, output};
 use exact::escape::visible;
+use report::tables::Table;
 
 /// Show the defaults that hold here, and where they come from
 ///
@@ -61,16 +61,16 @@ impl ConfigArgs {
             writeln!(out, "no option has another default than the one that its --help tells")?;
             return Ok(Outcome::Done);
         }
-        let mut table = listing(["command", "option", "default", "from"]);
+        let mut table = Table::of_texts(["command", "option", "default", "from"]);
         for setting in &all {
-            table.add_row([
+            table.push([
                 setting.command.clone().unwrap_or_else(|| "all that have it".to_owned()),
                 format!("--{}", setting.option),
-                visible(&setting.values.join(",")),
-                visible(&setting.origin.to_string()),
+                setting.values.join(","),
+                setting.origin.to_string(),
             ]);
         }
-        writeln!(out, "{table}")?;
+        write!(out, "{}", table.within(None))?;
         Ok(Outcome::Done)
     }
 }

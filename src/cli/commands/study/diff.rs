@@ -9,7 +9,7 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
 use report::cells::diff::Changes;
 use report::cells::group::DEFAULT_BY;
-use report::changes::{self, Limit};
+use report::changes::Limit;
 use study::{DiffRequest, Side, diff, resolve};
 
 /// Show which cells and episodes change under other definitions: two sets of definitions, or of scores
@@ -73,7 +73,7 @@ impl DiffArgs {
         if self.json {
             output::print_json(changes)?;
         } else {
-            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit), terminal::width()).as_bytes())?;
+            io::stdout().lock().write_all(changes.render(Limit(self.limit), terminal::width()).as_bytes())?;
         }
         let failed = self.fail_on_change && !changes.is_empty();
         Ok(if failed { Outcome::CheckFailed } else { Outcome::Done })

@@ -10,7 +10,7 @@ use crate::cli::{output, terminal};
 use exact::ratio::Ratio;
 use metric::definitions::Definitions;
 use report::plan::register::{NamedHash, RegisteredPlan};
-use report::plan::{Given, Plan, PlanRequest, plan, text};
+use report::plan::{Given, Plan, PlanRequest, plan};
 use score::score_traces::schema_columns;
 use statistics::sample_size::Clusters;
 use study::StudyError;
@@ -90,7 +90,7 @@ impl PlanArgs {
         if self.json {
             return output::print_json(&plan);
         }
-        std::io::stdout().lock().write_all(text::render(&plan, terminal::width()).as_bytes())?;
+        std::io::stdout().lock().write_all(plan.render(terminal::width()).as_bytes())?;
         Ok(Outcome::Done)
     }
 

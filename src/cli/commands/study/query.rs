@@ -64,15 +64,13 @@ mod rows {
 
     use super::{AnswerFormat, Failure, Outcome, QueryArgs};
     use crate::cli::args::GroupingArgs;
-    use crate::cli::text_table::listing;
     use crate::cli::{output, terminal};
     use engines::polars::answer::{Excerpt, Format, excerpt, write};
     use engines::polars::run::PolarsError;
     use engines::polars::shared_file::{WriteError, write_file};
     use engines::polars::statement;
-    use exact::escape::visible;
     use exact::replace::is_stream;
-    use report::tables::fit::fitted;
+    use report::tables::Table as Printed;
     use study::StudyError;
 
     /// What stands for null in a table.
@@ -144,23 +142,23 @@ mod rows {
 
     /// The rows for people: names, types, rows, how many there are.
     fn render(excerpt: &Excerpt, width: Option<usize>) -> String {
-        let mut table = listing(excerpt.columns.iter().map(|(name, _)| visible(name)));
-        table.add_row(excerpt.columns.iter().map(|(_, ty)| ty.clone()).collect::<Vec<_>>());
+        let mut table = Printed::of_texts(excerpt.columns.iter().map(|(name, _)| name.as_str()));
+        table.push(excerpt.columns.iter().map(|(_, ty)| ty.as_str()));
         let shown = |row: &Vec<Option<String>>| -> Vec<String> {
-            row.iter().map(|cell| cell.as_deref().map_or_else(|| NULL.to_owned(), visible)).collect()
+            row.iter().map(|cell| cell.clone().unwrap_or_else(|| NULL.to_owned())).collect()
         };
         for row in &excerpt.head {
-            table.add_row(shown(row));
+            table.push(shown(row));
         }
         let left_out = excerpt.rows - excerpt.head.len() - excerpt.tail.len();
         if left_out > 0 {
-            table.add_row(excerpt.columns.iter().map(|_| "·").collect::<Vec<_>>());
+            table.push(excerpt.columns.iter().map(|_| "·"));
         }
         for row in &excerpt.tail {
-            table.add_row(shown(row));
+            table.push(shown(row));
         }
         let count = if excerpt.rows == 1 { "1 row".to_owned() } else { format!("{} rows", excerpt.rows) };
         let note = if left_out > 0 { format!(" ({} shown)", excerpt.rows - left_out) } else { String::new() };
-        format!("{}\n{count}{note}\n", fitted(&table, 1, width))
+        format!("{}{count}{note}\n", table.within(width))
     }
 }

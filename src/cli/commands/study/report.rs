@@ -11,7 +11,6 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
 use report::bundle::Manifest;
-use report::tables::terminal;
 use study::{Report, ReportOptions, WrittenReport};
 
 /// Compute tables and figures of traces: print the main table, write all of them
@@ -73,11 +72,11 @@ impl ReportArgs {
     fn print(&self, report: &Report) -> Result<Outcome, Failure> {
         let mut out = io::stdout().lock();
         if let Some(table) = report.main_table() {
-            out.write_all(terminal::render(table, crate::cli::terminal::now()).as_bytes())?;
+            out.write_all(table.printed().terminal(crate::cli::terminal::now()).as_bytes())?;
         }
         if let Some(table) = report.other_table() {
             writeln!(out, "\n{}: what the style names nowhere", table.title)?;
-            out.write_all(terminal::render(table, crate::cli::terminal::now()).as_bytes())?;
+            out.write_all(table.printed().terminal(crate::cli::terminal::now()).as_bytes())?;
         }
         if let Some(replies) = &report.replies {
             writeln!(out, "\n{replies}")?;

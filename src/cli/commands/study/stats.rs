@@ -7,7 +7,7 @@ use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use exact::suggest::hint;
-use report::statistics::text::{self, Length};
+use report::statistics::text::Length;
 use report::statistics::{Options, Sequential, Statistics};
 
 /// The word that stands for every metric.
@@ -82,7 +82,7 @@ impl StatsArgs {
         }
         let metrics = statistics.cells.iter().map(|cell| cell.metric.as_str());
         let chosen = self.chosen("metric", metrics, &statistics.headline)?;
-        Ok(text::render(statistics, &chosen, self.length(), terminal::width()))
+        Ok(statistics.render(&chosen, self.length(), terminal::width()))
     }
 
     fn sequential_page(&self, sequential: &Sequential) -> Result<String, Failure> {
@@ -91,7 +91,7 @@ impl StatsArgs {
         }
         let rates = sequential.rates.iter().map(|rate| rate.metric.as_str());
         let chosen = self.chosen("rate", rates, &sequential.headline)?;
-        Ok(text::sequential::render(sequential, &chosen, terminal::width()))
+        Ok(sequential.render(&chosen, terminal::width()))
     }
 
     /// The metrics to print: those asked for, if they are among `all`, else the headline ones.

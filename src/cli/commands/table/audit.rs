@@ -9,7 +9,6 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::{output, terminal};
 use exact::rounding::Rounding;
 use report::audit::episodes::Episodes;
-use report::audit::text;
 use study::{AuditRequest, audit_tables};
 
 /// Name the cells of published tables that no data can give, and say why
@@ -46,7 +45,7 @@ impl AuditArgs {
         if self.json {
             output::print_json(&found)?;
         } else {
-            std::io::stdout().lock().write_all(text::render(&found, terminal::width()).as_bytes())?;
+            std::io::stdout().lock().write_all(found.render(terminal::width()).as_bytes())?;
         }
         Ok(if found.holds() { Outcome::Done } else { Outcome::CheckFailed })
     }

@@ -8,7 +8,6 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
 use report::comparison::Comparison;
 use report::errata::Errata;
-use report::tables::side_by_side;
 
 /// The style that printed the published tables.
 const PAPER_STYLE: &str = "paper";
@@ -67,7 +66,7 @@ fn print(comparison: &Comparison, json: bool) -> Result<(), Failure> {
         serde_json::to_writer_pretty(&mut out, comparison).map_err(io::Error::from)?;
         writeln!(out)?;
     } else {
-        out.write_all(side_by_side::render(comparison, terminal::width()).as_bytes())?;
+        out.write_all(comparison.render(terminal::width()).as_bytes())?;
     }
     Ok(())
 }

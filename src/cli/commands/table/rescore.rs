@@ -12,7 +12,7 @@ use crate::cli::text_table::counted;
 use crate::cli::{output, terminal};
 use report::bundle::Manifest;
 use report::cells::diff::Changes;
-use report::changes::{self, Limit};
+use report::changes::Limit;
 use study::{RescoreRequest, Rescored, WrittenReport, folder_of_rescored};
 
 /// Make a report again from the traces that it was made of, under other definitions
@@ -99,7 +99,7 @@ impl RescoreArgs {
             return output::print_json(&RescoreAnswer { out, files, episodes, manifest, changes });
         }
         if let Some(changes) = &changes {
-            io::stdout().lock().write_all(changes::render(changes, Limit(self.limit), terminal::width()).as_bytes())?;
+            io::stdout().lock().write_all(changes.render(Limit(self.limit), terminal::width()).as_bytes())?;
         }
         output::say(&format!("{}; the report is in {out}", counted(episodes as u64, "episode")));
         Ok(Outcome::Done)

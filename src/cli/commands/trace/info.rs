@@ -3,7 +3,6 @@
 use std::fmt::Display;
 use std::io::{self, Write};
 
-use comfy_table::Table;
 use schemars::JsonSchema;
 use serde::Serialize;
 
@@ -12,9 +11,9 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::quality;
 use crate::cli::terminal;
-use crate::cli::text_table::{aligned_right, counted, listing};
+use crate::cli::text_table::counted;
 use exact::escape::visible;
-use report::tables::fit::{fitted, wrapped};
+use report::tables::{Table, wrapped};
 use score::quality::QualityByCell;
 use study::CellAnswer;
 use trace::answered::by_others;
@@ -52,7 +51,7 @@ impl InfoCommand {
         output::notes(&by_others(study.traces()?.files()));
         let info = info(study.traces()?, listing, self.input.threads.count()).map_err(Failure::input)?;
         if let Some(episodes) = info.episode_list.as_ref().filter(|_| !self.json) {
-            writeln!(io::stdout().lock(), "{}", fitted(&list_of(episodes), 1, terminal::width()))?;
+            write!(io::stdout().lock(), "{}", list_of(episodes).within(terminal::width()))?;
             return Ok(Outcome::Done);
         }
         let quality = if study.has_quality()? { study.quality()? } else { QualityByCell::default() };
@@ -86,9 +85,9 @@ fn print(out: &mut impl Write, info: &Info, width: Option<usize>) -> io::Result<
         let (bad, all) = (replies.all_unreadable(), replies.replies);
         writeln!(out, "\n{bad} of {all} replies could not be read: {replies} (`reply_status`)")?;
     }
-    writeln!(out, "\nepisodes by experiment and model\n{}", fitted(&coverage(info), 1, width))?;
+    write!(out, "\nepisodes by experiment and model\n{}", coverage(info).within(width))?;
     gaps(out, info)?;
-    writeln!(out, "\nfiles\n{}", fitted(&files(info), 1, width))
+    write!(out, "\nfiles\n{}", files(info).within(width))
 }
 
 fn list(out: &mut impl Write, what: &str, values: &[impl Display], width: Option<usize>) -> io::Result<()> {
@@ -100,17 +99,17 @@ fn list(out: &mut impl Write, what: &str, values: &[impl Display], width: Option
 }
 
 fn coverage(info: &Info) -> Table {
-    let mut table =
-        listing(std::iter::once("model".to_owned()).chain(info.experiments.iter().map(|name| visible(name))));
+    let header = std::iter::once("model").chain(info.experiments.iter().map(String::as_str));
+    let mut table = Table::of_texts(header).aligned_right(1..=info.experiments.len());
     for (row, model) in info.models.iter().enumerate() {
         // Cells come experiment by experiment, each with all models.
         let counts = info.coverage.iter().skip(row).step_by(info.models.len()).map(|cell| match cell.episodes {
             0 => "none".to_owned(),
             episodes => episodes.to_string(),
         });
-        table.add_row([visible(model)].into_iter().chain(counts));
+        table.push(std::iter::once(model.clone()).chain(counts));
     }
-    aligned_right(table, 1..=info.experiments.len())
+    table
 }
 
 /// Seeds and runs that are listed for a cell.
@@ -146,40 +145,39 @@ fn pairs(pairs: &[SeedRun]) -> String {
 }
 
 fn list_of(episodes: &[EpisodeInfo]) -> Table {
-    let mut table = listing(["episode", "experiment", "model", "seed", "run", "steps", "file"]);
-    for episode in episodes {
-        table.add_row([
-            visible(&episode.episode_id),
-            visible(&episode.experiment),
-            visible(&episode.model),
+    let header = ["episode", "experiment", "model", "seed", "run", "steps", "file"];
+    let rows = episodes.iter().map(|episode| {
+        [
+            episode.episode_id.clone(),
+            episode.experiment.clone(),
+            episode.model.clone(),
             episode.seed.to_string(),
             episode.run.to_string(),
             episode.steps.to_string(),
-            visible(&episode.file),
-        ]);
-    }
-    aligned_right(table, 3..=5)
+            episode.file.clone(),
+        ]
+    });
+    Table::of_texts(header).aligned_right(3..=5).with(rows)
 }
 
 fn files(info: &Info) -> Table {
-    let mut table =
-        listing(["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "checksums", "writer"]);
-    for file in &info.files {
-        table.add_row([
-            visible(&file.name),
+    let header = ["file", "episodes", "steps", "row groups", "bytes", "sha256", "schema", "checksums", "writer"];
+    let rows = info.files.iter().map(|file| {
+        [
+            file.name.clone(),
             file.episodes.to_string(),
             file.steps.to_string(),
             file.row_groups.to_string(),
             file.bytes.to_string(),
             file.sha256.chars().take(12).collect(),
-            visible(file.schema_version.as_deref().unwrap_or("not named")),
+            file.schema_version.as_deref().unwrap_or("not named").to_owned(),
             match file.checksums {
                 Checksums::None => "none".to_owned(),
                 Checksums::Stale => "stale".to_owned(),
                 Checksums::Present => "present".to_owned(),
             },
-            visible(file.writer.as_deref().unwrap_or("not named")),
-        ]);
-    }
-    aligned_right(table, 1..=4)
+            file.writer.as_deref().unwrap_or("not named").to_owned(),
+        ]
+    });
+    Table::of_texts(header).aligned_right(1..=4).with(rows)
 }

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use crate::cli::args::TraceArgs;
 use crate::cli::outcome::{Failure, Outcome};
-use crate::cli::text_table::{aligned_right, counted, listing};
+use crate::cli::text_table::counted;
 use crate::cli::{output, terminal};
 use exact::escape::visible;
-use report::tables::fit::fitted;
+use report::tables::Table;
 use trace::renormalize::{RenormalizeAnswer, RenormalizeError, RenormalizedFile, renormalize};
 
 /// Make the attributions of old traces anew from the texts of `identification`
@@ -67,10 +67,11 @@ impl fmt::Display for Shown<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(answer) = self;
         if !answer.flips.is_empty() {
-            let mut table = listing(["episode", "t", "before", "after", "identification"]);
+            let header = ["episode", "t", "before", "after", "identification"];
+            let mut table = Table { names: 2, ..Table::of_texts(header).aligned_right([1]) };
             let name = |color: &Option<String>| visible(color.as_deref().unwrap_or("--"));
             for flip in &answer.flips {
-                table.add_row([
+                table.push([
                     visible(&flip.episode_id),
                     flip.t.to_string(),
                     name(&flip.before),
@@ -78,7 +79,7 @@ impl fmt::Display for Shown<'_> {
                     shortened(&flip.identification),
                 ]);
             }
-            writeln!(f, "{}\n", fitted(&aligned_right(table, [1]), 2, terminal::width()))?;
+            writeln!(f, "{}", table.within(terminal::width()))?;
         }
         let sum = |of: fn(&RenormalizedFile) -> u64| answer.files.iter().map(of).sum::<u64>();
         let (flips, texts) = (counted(answer.flips.len() as u64, "attribution"), sum(|file| file.texts));

@@ -3,13 +3,12 @@
 use std::io::{self, Write};
 
 use clap::ValueEnum as _;
-use comfy_table::{ContentArrangement, Table};
 use schemars::schema_for;
 use serde_json::{Value, json};
 
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
-use crate::cli::text_table::listing;
+use report::tables::Table;
 use trace::describe::SchemaDocument;
 use trace::import;
 use trace::schema::Column;
@@ -78,9 +77,9 @@ impl SchemaCommand {
 fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
     let sentences = schema.description.replace(". ", ".\n");
     writeln!(out, "{}, schema version {}\n\n{sentences}\n", schema.title, schema.version)?;
-    let mut columns = wrapped(["column", "type", "unit", "presence", "may be", "per", "meaning"]);
+    let mut columns = Table::of_texts(["column", "type", "unit", "presence", "may be", "per", "meaning"]);
     for column in schema.columns {
-        columns.add_row([
+        columns.push([
             column.name,
             column.stored.name(),
             column.unit.unwrap_or(""),
@@ -90,19 +89,20 @@ fn print(out: &mut impl Write, schema: &SchemaDocument) -> io::Result<()> {
             &meaning(column),
         ]);
     }
-    let mut metadata = wrapped(["footer key", "meaning"]);
-    metadata.add_rows(schema.metadata.iter().map(|entry| [entry.key, entry.doc]));
-    let mut rules = wrapped(["code", "rule"]);
-    rules.add_rows(schema.rules.iter().map(|rule| [rule.code.name(), rule.rule]));
-    writeln!(out, "{}\n\n{}\n\n{}", columns.trim_fmt(), metadata.trim_fmt(), rules.trim_fmt())?;
-    let mut others = wrapped(["JSON Schema", "of"]);
+    let metadata = schema.metadata.iter().map(|entry| [entry.key, entry.doc]);
+    let metadata = Table::of_texts(["footer key", "meaning"]).with(metadata);
+    let rules = schema.rules.iter().map(|rule| [rule.code.name(), rule.rule]);
+    let rules = Table::of_texts(["code", "rule"]).with(rules);
+    let [columns, metadata, rules] = [columns, metadata, rules].map(|table| table.wrapped(width()));
+    writeln!(out, "{columns}\n{metadata}\n{rules}")?;
+    let mut others = Table::of_texts(["JSON Schema", "of"]);
     for name in Name::value_variants().iter().filter(|name| **name != Name::Trace) {
         if let Some(value) = name.to_possible_value() {
             let of = value.get_help().map(ToString::to_string).unwrap_or_default();
-            others.add_row([format!("mirrorstats trace schema {}", value.get_name()), of]);
+            others.push([format!("mirrorstats trace schema {}", value.get_name()), of]);
         }
     }
-    writeln!(out, "\n{}", others.trim_fmt())
+    write!(out, "{}", others.wrapped(width()))
 }
 
 /// What a column means, its only values, what no value means, and the version that brought it.
@@ -114,12 +114,6 @@ fn meaning(column: &Column) -> String {
     [doc, values, default, since].into_iter().flatten().collect::<Vec<_>>().join(" ")
 }
 
-fn wrapped<const N: usize>(header: [&str; N]) -> Table {
-    let mut table = listing(header);
-    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width());
-    table
-}
-
-fn width() -> u16 {
-    u16::try_from(terminal::width().unwrap_or(WIDTH).min(WIDTH)).unwrap_or(u16::MAX)
+fn width() -> usize {
+    terminal::width().unwrap_or(WIDTH).min(WIDTH)
 }

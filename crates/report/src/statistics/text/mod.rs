@@ -2,7 +2,6 @@
 //!
 //! Rule: text from traces is shown, never obeyed ([`visible`]).
 
-mod grid;
 pub mod pairs;
 pub mod sequential;
 mod tables;
@@ -10,10 +9,9 @@ mod tables;
 use std::fmt::Write as _;
 
 use super::{Answer, FEW, Statistics};
-use crate::tables::fit::wrapped;
+use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
 use exact::format::fixed;
-use grid::Grid;
 
 /// How much is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,50 +22,53 @@ pub enum Length {
     Full,
 }
 
-/// The text, its tables about these metrics alone, in lines of at most `width` columns.
-///
-/// A table that has nothing to show is left out. [`Statistics::headline`] is what a reader wants who did not choose.
-pub fn render(statistics: &Statistics, metrics: &[String], length: Length, width: Option<usize>) -> String {
-    let shown = |metric: &str| metrics.iter().any(|name| name == metric);
-    let percent = percent(statistics.confidence);
-    let mut text = format!(
-        "{} episodes, definitions {}, {percent} confidence\n",
-        statistics.episodes,
-        visible(&statistics.definitions)
-    );
-    if let Some(selection) = &statistics.selection {
-        push_wrapped(&mut text, &selection.sentence(), width, 0);
-    }
-    push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
-    let is_chosen = statistics.selection.as_ref().is_some_and(|selection| selection.by_results);
-    let of = if is_chosen { ", of episodes that the filter chose by their results" } else { "" };
-    list(&mut text, &format!("Answers, after Holm's adjustment{of}"), &answers(&statistics.answers), width);
-    if length == Length::Full {
-        list(&mut text, "What can be concluded", &statistics.conclusions, width);
-    }
-    let design = format!("{}.", statistics.design_note);
-    let warnings: Vec<String> = statistics.warnings.iter().filter(|warning| **warning != design).cloned().collect();
-    list(&mut text, "What can not", &warnings, width);
-    for (title, grid) in sections(statistics, &shown, length, &percent) {
-        section(&mut text, &title, &grid, width);
-    }
-    if length == Length::Short {
-        text.push('\n');
-        push_wrapped(
-            &mut text,
-            "--full prints every interval, plain means, clusters, and what could have been shown.",
-            width,
-            0,
+impl Statistics {
+    /// The text, its tables about these metrics alone, in lines of at most `width` columns.
+    ///
+    /// A table that has nothing to show is left out. [`Statistics::headline`] has the metrics for a reader who did not choose.
+    pub fn render(&self, metrics: &[String], length: Length, width: Option<usize>) -> String {
+        let statistics = self;
+        let shown = |metric: &str| metrics.iter().any(|name| name == metric);
+        let percent = percent(statistics.confidence);
+        let mut text = format!(
+            "{} episodes, definitions {}, {percent} confidence\n",
+            statistics.episodes,
+            visible(&statistics.definitions)
         );
+        if let Some(selection) = &statistics.selection {
+            push_wrapped(&mut text, &selection.sentence(), width, 0);
+        }
+        push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
+        let is_chosen = statistics.selection.as_ref().is_some_and(|selection| selection.by_results);
+        let of = if is_chosen { ", of episodes that the filter chose by their results" } else { "" };
+        list(&mut text, &format!("Answers, after Holm's adjustment{of}"), &answers(&statistics.answers), width);
+        if length == Length::Full {
+            list(&mut text, "What can be concluded", &statistics.conclusions, width);
+        }
+        let design = format!("{}.", statistics.design_note);
+        let warnings: Vec<String> = statistics.warnings.iter().filter(|warning| **warning != design).cloned().collect();
+        list(&mut text, "What can not", &warnings, width);
+        for (title, table) in sections(statistics, &shown, length, &percent) {
+            section(&mut text, title, table, width);
+        }
+        if length == Length::Short {
+            text.push('\n');
+            push_wrapped(
+                &mut text,
+                "--full prints every interval, plain means, clusters, and what could have been shown.",
+                width,
+                0,
+            );
+        }
+        text
     }
-    text
 }
 
 fn answers(answers: &[Answer]) -> Vec<String> {
     answers.iter().map(|answer| format!("{} {}: {}.", answer.question, answer.metric, answer.answer)).collect()
 }
 
-fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, percent: &str) -> Vec<(String, Grid)> {
+fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, percent: &str) -> Vec<(String, Table)> {
     let is_full = length == Length::Full;
     let always = [
         (
@@ -140,12 +141,6 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
     always.into_iter().chain(is_full.then(further).into_iter().flatten()).collect()
 }
 
-fn push_wrapped(text: &mut String, words: &str, width: Option<usize>, indent: usize) {
-    for line in wrapped(words, width.unwrap_or(usize::MAX), indent) {
-        let _ = writeln!(text, "{line}");
-    }
-}
-
 fn list(text: &mut String, title: &str, sentences: &[String], width: Option<usize>) {
     if sentences.is_empty() {
         return;
@@ -156,17 +151,16 @@ fn list(text: &mut String, title: &str, sentences: &[String], width: Option<usiz
     }
 }
 
-fn section(text: &mut String, title: &str, rows: &Grid, width: Option<usize>) {
-    if rows.is_empty() {
+fn section(text: &mut String, title: impl Into<String>, table: Table, width: Option<usize>) {
+    if table.is_empty() {
         return;
     }
-    text.push('\n');
-    push_wrapped(text, title, width, 0);
-    text.push_str(&rows.render(width));
-    if rows.has(tables::FEW_MARK) {
-        let legend = format!("{} fewer than {FEW} defined episodes: not to be compared.", tables::FEW_MARK);
-        push_wrapped(text, &legend, width, 0);
+    let mut table = table.titled(title);
+    if table.rows().flatten().any(|cell| cell.text.contains(tables::FEW_MARK)) {
+        table.sentences.push(format!("{} fewer than {FEW} defined episodes: not to be compared.", tables::FEW_MARK));
     }
+    text.push('\n');
+    *text += &table.within(width);
 }
 
 pub(crate) fn percent(confidence: f64) -> String {

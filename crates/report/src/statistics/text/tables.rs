@@ -2,7 +2,7 @@
 
 use super::super::study::named;
 use super::super::{COMPLETED, CellRow, Comparison, Intervals, Method, OverallMethod, Role, Sign, Statistics, Verdict};
-use super::grid::Grid;
+use crate::tables::Table;
 use exact::format::{UNDEFINED, bounds, fixed, p_value};
 use metric::catalog::Kind;
 use statistics::coverage::Withheld;
@@ -14,7 +14,7 @@ pub(super) type Shown<'a> = &'a dyn Fn(&str) -> bool;
 pub(super) const FEW_MARK: char = '†';
 
 /// Rates with Wilson's interval; with the other two where `is_full`.
-pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Grid {
+pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
         let Intervals::Rate { wilson, clopper_pearson, jeffreys } = cell.intervals else { return None };
         let mut line = group(cell);
@@ -25,10 +25,10 @@ pub(super) fn rates(statistics: &Statistics, shown: Shown, is_full: bool) -> Gri
         Some(line)
     });
     let numbers = ["count", "rate", "Wilson", "Clopper-Pearson", "Jeffreys"];
-    Grid::new(&keys(statistics), if is_full { &numbers } else { &numbers[..3] }).with(lines)
+    Table::plain(&keys(statistics), if is_full { &numbers } else { &numbers[..3] }).with(lines)
 }
 
-pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.cells.iter().filter(|cell| shown(&cell.metric)).filter_map(|cell| {
         let Intervals::Quantity { student_t, student_t_withheld, bootstrap, bootstrap_withheld } = cell.intervals
         else {
@@ -39,7 +39,7 @@ pub(super) fn quantities(statistics: &Statistics, shown: Shown) -> Grid {
         line.extend([held(student_t, student_t_withheld, 2), held(bootstrap, bootstrap_withheld, 2)]);
         Some(line)
     });
-    Grid::new(&keys(statistics), &["n", "mean", "SE", "Student's t", "bootstrap"]).with(lines)
+    Table::plain(&keys(statistics), &["n", "mean", "SE", "Student's t", "bootstrap"]).with(lines)
 }
 
 fn keys(statistics: &Statistics) -> Vec<String> {
@@ -55,7 +55,7 @@ fn mark(cell: &CellRow) -> String {
 }
 
 /// Rates against their levels; where a rate is shown, so is the same among finished episodes.
-pub(super) fn chance(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn chance(statistics: &Statistics, shown: Shown) -> Table {
     let is_shown =
         |metric: &str| shown(metric) || COMPLETED.iter().any(|(whole, completed)| *completed == metric && shown(whole));
     let line = |row: &super::super::ChanceRow| {
@@ -76,22 +76,22 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown) -> Grid {
     };
     let rows = statistics.chance.iter().filter(|row| is_shown(&row.metric)).map(line);
     let numbers = ["count", "p", "mid-p", "p (Holm)", "p (T-H)", "verdict"];
-    Grid::new(&["experiment", "model", "metric", "level"], &numbers).with(rows)
+    Table::plain(&["experiment", "model", "metric", "level"], &numbers).with(rows)
 }
 
-pub(super) fn separated(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn separated(statistics: &Statistics, shown: Shown) -> Table {
     let families = statistics.models.iter().filter(|family| shown(&family.metric));
     let lines = families.flat_map(|family| {
         family.tests.iter().filter(|test| test.comparison.separated).map(|test| {
             let names = [&family.experiment, &family.metric, &test.first, &test.second].map(Clone::clone);
-            names.into_iter().chain(compared(&test.comparison)).collect()
+            names.into_iter().chain(compared(&test.comparison))
         })
     });
     let texts = ["experiment", "metric", "better", "than", "test"];
-    Grid::new(&texts, &["counts", "difference", "interval", "p", "mid-p", "p (Holm)", "p (T-H)"]).with(lines)
+    Table::plain(&texts, &["counts", "difference", "interval", "p", "mid-p", "p (Holm)", "p (T-H)"]).with(lines)
 }
 
-pub(super) fn conditions(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn conditions(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)).map(|contrast| {
         let pair = format!("{} - {}", contrast.baseline, contrast.against);
         let names = [named(&contrast.model, contrast.condition.as_deref()), contrast.metric.clone(), pair];
@@ -101,10 +101,10 @@ pub(super) fn conditions(statistics: &Statistics, shown: Shown) -> Grid {
             None if contrast.comparison.p.is_some() => "not told apart",
             None => UNDEFINED,
         };
-        names.into_iter().chain(compared(&contrast.comparison)).chain([verdict.to_owned()]).collect()
+        names.into_iter().chain(compared(&contrast.comparison)).chain([verdict.to_owned()])
     });
     let numbers = ["counts", "difference", "interval", "p", "mid-p", "p (Holm)", "p (T-H)", "verdict"];
-    Grid::new(&["model", "metric", "conditions", "test"], &numbers).with(lines)
+    Table::plain(&["model", "metric", "conditions", "test"], &numbers).with(lines)
 }
 
 /// The test, the counts, the difference with its interval, and the p values of a comparison.
@@ -136,7 +136,7 @@ pub(super) const fn method(method: Method) -> (&'static str, usize) {
 }
 
 /// Two models over all experiments: all of them where `is_full`, else those that are told apart.
-pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Grid {
+pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let rows = statistics.overall.iter().filter(|row| shown(&row.metric) && (is_full || row.separated));
     let lines = rows.map(|row| {
         let test = match row.method {
@@ -151,20 +151,20 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> G
         line
     });
     let numbers = ["experiments", "difference", "interval", "p", "mid-p", "p (Holm)", "verdict"];
-    Grid::new(&["metric", "first", "second", "test"], &numbers).with(lines)
+    Table::plain(&["metric", "first", "second", "test"], &numbers).with(lines)
 }
 
-pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn improvements(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.improvements.iter().filter(|row| shown(&row.metric)).map(|row| {
         let names = [&row.metric, &row.first, &row.second].map(Clone::clone);
         let found = row.improvement;
         let numbers = [row.experiments.len().to_string(), fixed(Some(found.probability), 3), plain(found.interval, 3)];
-        names.into_iter().chain(numbers).collect()
+        names.into_iter().chain(numbers)
     });
-    Grid::new(&["metric", "earlier", "than"], &["experiments", "probability", "interval"]).with(lines)
+    Table::plain(&["metric", "earlier", "than"], &["experiments", "probability", "interval"]).with(lines)
 }
 
-pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Table {
     let kind = |metric: &str| statistics.cells.iter().find(|cell| cell.metric == metric).map(|cell| cell.kind);
     let lines = statistics.clusters.iter().filter(|row| shown(&row.metric)).map(|row| {
         let places = if kind(&row.metric) == Some(Kind::Rate) { 3 } else { 2 };
@@ -180,13 +180,13 @@ pub(super) fn clusters(statistics: &Statistics, shown: Shown) -> Grid {
             fixed(by_seed.and_then(|by_seed| by_seed.design_effect), 2),
         ];
         let model = named(&row.model, row.condition.as_deref());
-        [row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers).collect()
+        [row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers)
     });
     let numbers = ["seeds", "n", "mean", "SE", "SE by seed", "interval by seed", "ICC", "design effect"];
-    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
 }
 
-pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.durations.iter().filter(|row| shown(&row.metric)).map(|row| {
         let restricted = row.restricted;
         let median_interval = row.median_interval.map(|found| match found.high {
@@ -202,13 +202,13 @@ pub(super) fn durations(statistics: &Statistics, shown: Shown) -> Grid {
             restricted.map_or_else(|| UNDEFINED.to_owned(), |restricted| restricted.horizon.to_string()),
         ];
         let model = named(&row.model, row.condition.as_deref());
-        [row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers).collect()
+        [row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers)
     });
     let numbers = ["finished", "median", "interval", "restricted mean", "interval", "up to"];
-    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
 }
 
-pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Table {
     let rows = statistics.durations.iter().filter(|row| shown(&row.metric));
     let lines = rows.filter_map(|row| {
         let correct = row.correct.as_ref()?;
@@ -221,13 +221,13 @@ pub(super) fn correct(statistics: &Statistics, shown: Shown) -> Grid {
             correct.restricted.horizon.to_string(),
         ];
         let model = named(&row.model, row.condition.as_deref());
-        Some([row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers).collect())
+        Some([row.experiment.clone(), model, row.metric.clone()].into_iter().chain(numbers))
     });
     let numbers = ["correct", "wrong", "half correct", "restricted mean", "interval", "up to"];
-    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
 }
 
-pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.retests.iter().filter(|row| shown(&row.metric)).map(|row| {
         let numbers = [
             row.scenes.to_string(),
@@ -236,22 +236,22 @@ pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Grid {
             fixed(Some(row.flipped), 3),
         ];
         let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
-        names.into_iter().chain(numbers).collect()
+        names.into_iter().chain(numbers)
     });
     let numbers = ["scenes", "episodes", "not always the same", "flipped from one time to the next"];
-    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
 }
 
-pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Grid {
+pub(super) fn losses(statistics: &Statistics, shown: Shown) -> Table {
     let lines = statistics.losses.rows.iter().filter(|row| shown(&row.metric)).map(|row| {
         let lossy = row.lossy;
         let (count, lost) = (format!("{}/{}", lossy.successes, lossy.n), lossy.lost.to_string());
         let bounds = [lossy.bounds, lossy.interval].map(|interval| plain(Some(interval), 3));
         let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
-        names.into_iter().chain([count, lost]).chain(bounds).collect()
+        names.into_iter().chain([count, lost]).chain(bounds)
     });
     let numbers = ["without them", "lost", "bounds", "interval around the bounds"];
-    Grid::new(&["experiment", "model", "metric"], &numbers).with(lines)
+    Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
 }
 
 fn reached(median: Option<i64>) -> String {

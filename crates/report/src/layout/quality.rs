@@ -1,103 +1,62 @@
-//! The table of data quality: what became of the replies, by experiment, model and condition, in every format.
+//! The table of data quality: what became of the replies, by experiment, model and condition, for people and in full.
 //!
 //! Rule: what no trace records prints as `--`, never as zero.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
-use super::tables::{csv, latex, markdown};
 use crate::cells::KeyValue;
+use crate::tables::{Column, Look, Table, key_field};
 use exact::escape::visible;
 use exact::format::fixed;
 use score::quality::{CellKey, Quality, QualityByCell, REPLY_STATUSES};
 
 /// The name of its files.
 pub const NAME: &str = "quality";
-/// What stands where nothing is recorded.
+/// The text of what is not recorded.
 const UNKNOWN: &str = "--";
 /// The shares of replies whose latency is told.
 const MEDIAN: f64 = 0.5;
 const SLOW: f64 = 0.95;
 const NANO: f64 = 1e9;
 
-/// The table, as text.
+/// Data quality by experiment, model and condition.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct QualityTable {
-    /// The header.
-    pub header: Vec<String>,
-    /// The rows, by experiment, model and condition.
-    pub rows: Vec<Vec<String>>,
-    /// How to read it, and what it cannot say.
-    pub notes: Vec<String>,
-    /// The same in full, for programs.
-    csv: String,
+    /// For people; its sentences say how to read it, and what it cannot say.
+    pub printed: Table,
+    /// The same in full, for programs: counts are exact, what is not recorded is empty.
+    pub records: Table,
 }
 
 impl QualityTable {
     /// The table of these cells; `None` without any.
-    pub fn of(cells: &QualityByCell) -> Option<Self> {
+    pub fn from_cells(cells: &QualityByCell) -> Option<Self> {
         if cells.0.is_empty() {
             return None;
         }
         let keys = if cells.has_conditions() { 3 } else { 2 };
-        let header = ["experiment", "model", "condition"].into_iter().take(keys).chain([
-            "episodes",
-            "lost",
-            "steps",
-            "no decision",
-            "reasons",
-            "repaired",
-            "latency, ms",
-            "tokens",
-            "cost, USD",
-        ]);
-        Some(Self {
-            header: header.map(str::to_owned).collect(),
-            rows: cells.0.iter().map(|(key, quality)| row(key, quality, keys)).collect(),
-            notes: notes(cells),
-            csv: csv_text(cells),
-        })
-    }
-
-    /// As comma-separated values: one line per cell, counts in full.
-    pub fn csv(&self) -> &str {
-        &self.csv
-    }
-
-    pub fn markdown(&self) -> String {
-        let line = |cells: &[String]| {
-            let cells: Vec<String> = cells.iter().map(|cell| markdown::escape(cell)).collect();
-            format!("| {} |\n", cells.join(" | "))
-        };
-        let mut text = format!("**Data quality.** {}\n\n", self.notes.join(" "));
-        text += &line(&self.header);
-        let _ = writeln!(text, "|{}", "---|".repeat(self.header.len()));
-        self.rows.iter().for_each(|row| text += &line(row));
-        text
-    }
-
-    /// As LaTeX; needs the packages booktabs and graphicx.
-    pub fn latex(&self) -> String {
-        let line = |cells: &[String]| {
-            let cells: Vec<String> = cells.iter().map(|cell| latex::escape(cell)).collect();
-            format!("{} \\\\\n", cells.join(" & "))
-        };
-        let columns = "l".repeat(self.header.len());
-        let mut text = format!(
-            "\\begin{{table*}}[t]\n\\centering\n\\resizebox{{\\textwidth}}{{!}}{{%\n\\begin{{tabular}}{{{columns}}}\n\\toprule\n"
-        );
-        text += &line(&self.header);
-        text.push_str("\\midrule\n");
-        self.rows.iter().for_each(|row| text += &line(row));
-        text.push_str("\\bottomrule\n\\end{tabular}%\n}\n");
-        let _ = writeln!(text, "\\caption{{\\textbf{{Data quality.}} {}}}", latex::escape(&self.notes.join(" ")));
-        text.push_str("\\label{tab:quality}\n\\end{table*}\n");
-        text
+        Some(Self { printed: printed(cells, keys), records: records(cells, keys) })
     }
 }
 
+fn keys_and<'a>(keys: usize, others: impl IntoIterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
+    ["experiment", "model", "condition"].into_iter().take(keys).chain(others)
+}
+
+fn printed(cells: &QualityByCell, keys: usize) -> Table {
+    let header =
+        ["episodes", "lost", "steps", "no decision", "reasons", "repaired", "latency, ms", "tokens", "cost, USD"];
+    let table = Table {
+        title: "Data quality".to_owned(),
+        sentences: notes(cells),
+        label: Some("tab:quality".to_owned()),
+        ..Table::list(Look::Ruled, keys, keys_and(keys, header).map(Column::left))
+    };
+    table.with(cells.0.iter().map(|(key, quality)| row(key, quality, keys)))
+}
+
 fn row(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
-    let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys).map(|name| visible(name));
+    let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys).cloned();
     let recorded = quality.replies() > 0;
     let if_recorded = |text: String| if recorded { text } else { UNKNOWN.to_owned() };
     names
@@ -165,11 +124,7 @@ fn notes(cells: &QualityByCell) -> Vec<String> {
     notes
 }
 
-/// One line per cell; what is not recorded is empty.
-fn csv_text(cells: &QualityByCell) -> String {
-    let keys = if cells.has_conditions() { 3 } else { 2 };
-    let head =
-        ["experiment", "model", "condition"].into_iter().take(keys).chain(["episodes", "lost", "steps", "replies"]);
+fn records(cells: &QualityByCell, keys: usize) -> Table {
     let tail = [
         "unusable",
         "other_status",
@@ -180,18 +135,15 @@ fn csv_text(cells: &QualityByCell) -> String {
         "completion_tokens",
         "cost_usd",
     ];
-    let mut writer = ::csv::Writer::from_writer(Vec::new());
-    csv::write(&mut writer, head.chain(REPLY_STATUSES).chain(tail).map(str::to_owned));
-    for (key, quality) in &cells.0 {
-        csv::write(&mut writer, csv_record(key, quality, keys));
-    }
-    csv::finish(writer)
+    let header = ["episodes", "lost", "steps", "replies"].into_iter().chain(REPLY_STATUSES).chain(tail);
+    let table = Table::of_texts(keys_and(keys, header));
+    table.with(cells.0.iter().map(|(key, quality)| record(key, quality, keys)))
 }
 
 #[expect(clippy::cast_precision_loss, reason = "nine decimal places of a cost")]
-fn csv_record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
+fn record(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
     let names = [&key.experiment, &key.model, &key.condition].into_iter().take(keys);
-    let names = names.map(|name| csv::key_field(&KeyValue::Text(name.clone())));
+    let names = names.map(|name| key_field(&KeyValue::Text(name.clone())));
     let recorded = quality.replies() > 0;
     let count = |count: u64| if recorded { count.to_string() } else { String::new() };
     let optional = |number: Option<i64>| number.map_or_else(String::new, |number| number.to_string());
@@ -245,22 +197,24 @@ mod tests {
 
     #[test]
     fn what_is_not_recorded_is_not_zero() {
-        let table = QualityTable::of(&cells("default")).unwrap();
-        assert_eq!(table.rows[1][2..], ["1", "--", "7", "--", "--", "--", "--", "--", "--"].map(str::to_owned));
-        assert_eq!(table.rows[0][5..8], ["4/40 (10.0 %)", "refusal 4", "6: case 2, fence 5"].map(str::to_owned));
-        assert_eq!(table.rows[0][8..], ["100; 95 % within 900", "1200 + 81", "0.0123"].map(str::to_owned));
-        assert!(QualityTable::of(&QualityByCell::default()).is_none());
+        let table = QualityTable::from_cells(&cells("default")).unwrap().printed;
+        let rows: Vec<Vec<&str>> =
+            table.rows().map(|row| row.iter().map(|cell| cell.text.as_str()).collect()).collect();
+        assert_eq!(rows[1][2..], ["1", "--", "7", "--", "--", "--", "--", "--", "--"]);
+        assert_eq!(rows[0][5..8], ["4/40 (10.0 %)", "refusal 4", "6: case 2, fence 5"]);
+        assert_eq!(rows[0][8..], ["100; 95 % within 900", "1200 + 81", "0.0123"]);
+        assert!(QualityTable::from_cells(&QualityByCell::default()).is_none());
     }
 
     #[test]
     fn every_format_escapes_its_names() {
-        let table = QualityTable::of(&cells("near")).unwrap();
-        insta::assert_snapshot!(table.csv(), @r"
+        let QualityTable { printed, records } = QualityTable::from_cells(&cells("near")).unwrap();
+        insta::assert_snapshot!(records.csv(), @r"
         experiment,model,condition,episodes,lost,steps,replies,ok,repaired,parse_failed,schema_invalid,refusal,truncated,empty,rate_limited,server_error,timeout,unusable,other_status,repairs,latency_median_ms,latency_95_ms,prompt_tokens,completion_tokens,cost_usd
         E1,'=m,near,2,1,40,40,30,6,0,0,4,0,0,0,0,0,4,0,case 2; fence 5,100,900,48000,3240,0.012345678
         E1,n_1,near,1,,7,,,,,,,,,,,,,,,,,,,
         ");
-        assert!(table.latex().contains(r"n\_1 & near & 1 & "), "{}", table.latex());
-        assert!(table.markdown().contains("| E1 | n\\_1 | near |"), "{}", table.markdown());
+        assert!(printed.latex().contains(r"n\_1 & near & 1 & "), "{}", printed.latex());
+        assert!(printed.markdown().contains("| E1 | n\\_1 | near |"), "{}", printed.markdown());
     }
 }

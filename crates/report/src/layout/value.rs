@@ -1,8 +1,8 @@
 //! Moments to what a cell shows, under a style's rules.
 
+use super::{Spread, Value};
 use crate::cells::Cell;
 use crate::style::{CellForm, Print, Rounding, SingleSe};
-use crate::table::{Spread, Value};
 use exact::moments::Moments;
 use exact::number::Decimal;
 use metric::catalog::{Kind, Metric, PPM, StandardError};

@@ -3,19 +3,27 @@
 //! The last key column, or the model where it is one, names the rows; the other keys head the groups. Every metric
 //! of the cells is in some table: those that the style names nowhere come in a table of their own.
 
+pub(crate) mod emphasis;
+mod metric_table;
+mod order;
+pub mod quality;
+pub mod value;
+
 use crate::cells::{Cells, Group, KeyValue};
-use crate::emphasis::emphasise;
-use crate::order::{TableOrder, row_key};
 use crate::style::{MAIN_TABLE, OTHER_TABLE, Print, Style, StyleError, TableSheet};
-use crate::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Spread, Table, Value};
-use crate::value;
+use crate::tables::{DAGGER, Emphasis};
 use metric::catalog::Catalog;
 use statistics::coverage::STUDENT;
+
+use self::emphasis::emphasise;
+pub use self::metric_table::{MetricCell, MetricColumn, MetricRow, MetricRows, MetricTable, Spread, Value};
+pub use self::order::TableOrder;
+pub(crate) use self::order::row_key;
 
 /// The tables of a report, in the order of the style; the first is `main`.
 ///
 /// A table none of whose metrics are there is left out, except that `main` takes every metric instead.
-pub fn tables(cells: &Cells, style: &Style) -> Result<Vec<Table>, StyleError> {
+pub fn tables(cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StyleError> {
     style.check_against(&cells.catalog)?;
     let sheets = sheets(cells, style);
     Ok(sheets.iter().map(|(name, sheet)| Layout::new(cells, style, sheet).table(name, sheet)).collect())
@@ -71,12 +79,12 @@ impl<'a> Layout<'a> {
         Self { cells, style, print: style.sheet.print_of(sheet), row_key: row_key(&cells.by) }
     }
 
-    fn table(&self, name: &str, sheet: &TableSheet) -> Table {
+    fn table(&self, name: &str, sheet: &TableSheet) -> MetricTable {
         let mut groups = self.groups(sheet);
         if self.cells.by.get(self.row_key).is_some_and(|key| key == "model") {
             self.emphasise(&mut groups, sheet);
         }
-        Table {
+        MetricTable {
             name: name.to_owned(),
             title: sheet.title.clone(),
             note: sheet.note.clone(),
@@ -91,7 +99,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    fn footnotes(&self, groups: &[RowGroup]) -> Vec<String> {
+    fn footnotes(&self, groups: &[MetricRows]) -> Vec<String> {
         let cells = || groups.iter().flat_map(|group| &group.rows).flat_map(|row| &row.cells);
         let mut notes = Vec::new();
         if cells().any(|cell| cell.emphasis != Emphasis::Plain) {
@@ -108,8 +116,8 @@ impl<'a> Layout<'a> {
         notes
     }
 
-    fn column(&self, metric: &str) -> Column {
-        Column {
+    fn column(&self, metric: &str) -> MetricColumn {
+        MetricColumn {
             metric: metric.to_owned(),
             latex: self.style.sheet.column.get(metric).and_then(|column| column.latex.clone()),
             better: self.style.sheet.better(metric, &self.cells.catalog),
@@ -117,12 +125,12 @@ impl<'a> Layout<'a> {
     }
 
     /// The rows in order, cut where a key that heads groups changes.
-    fn groups(&self, sheet: &TableSheet) -> Vec<RowGroup> {
+    fn groups(&self, sheet: &TableSheet) -> Vec<MetricRows> {
         let mut ordered: Vec<&Group> = self.cells.groups.iter().collect();
         let order = TableOrder { catalog: &self.cells.catalog, style: self.style };
         ordered.sort_by_cached_key(|group| order.of_key(&self.cells.by, &group.key));
         let runs = ordered.chunk_by(|a, b| self.heading_keys(a).eq(self.heading_keys(b)));
-        runs.map(|run| RowGroup {
+        runs.map(|run| MetricRows {
             heading: self.heading(run[0]),
             rows: run.iter().map(|group| self.row(group, sheet)).collect(),
         })
@@ -152,28 +160,28 @@ impl<'a> Layout<'a> {
         }
     }
 
-    fn row(&self, group: &Group, sheet: &TableSheet) -> Row {
-        Row {
+    fn row(&self, group: &Group, sheet: &TableSheet) -> MetricRow {
+        MetricRow {
             key: group.key.clone(),
             name: group.key.get(self.row_key).map(|value| self.name(value)).unwrap_or_default(),
             cells: sheet.columns.iter().filter_map(|metric| self.cell(group, metric, sheet)).collect(),
         }
     }
 
-    fn cell(&self, group: &Group, name: &str, sheet: &TableSheet) -> Option<Cell> {
+    fn cell(&self, group: &Group, name: &str, sheet: &TableSheet) -> Option<MetricCell> {
         let cell = self.cells.of_metric(group, name)?;
         let (metric, moments) = (cell.metric, cell.moments);
         let is_zero = moments.n == 0 && sheet.undefined_as_zero.iter().any(|zero| zero == name);
         let value =
             if is_zero { value::zero(metric, &self.print) } else { value::value(&cell, group.episodes, &self.print) };
         let is_marked = moments.n < self.print.mark_n_below && value != Value::Undefined;
-        Some(Cell { is_marked, ..Cell::plain(value, moments, group.episodes) })
+        Some(MetricCell { is_marked, ..MetricCell::plain(value, moments, group.episodes) })
     }
 
-    fn emphasise(&self, groups: &mut [RowGroup], sheet: &TableSheet) {
+    fn emphasise(&self, groups: &mut [MetricRows], sheet: &TableSheet) {
         for group in groups {
             for (at, metric) in sheet.columns.iter().enumerate() {
-                let mut column: Vec<&mut Cell> =
+                let mut column: Vec<&mut MetricCell> =
                     group.rows.iter_mut().filter_map(|row| row.cells.get_mut(at)).collect();
                 emphasise(&mut column, self.style.sheet.better(metric, &self.cells.catalog), self.print.emphasis);
             }
@@ -194,7 +202,7 @@ fn words(key: &str) -> String {
 }
 
 /// A key column in the words of a header: `Body color`.
-pub(super) fn heading(key: &str) -> String {
+pub(crate) fn heading(key: &str) -> String {
     let words = words(key);
     let mut letters = words.chars();
     letters.next().map(|first| first.to_uppercase().chain(letters).collect()).unwrap_or_default()

@@ -1,4 +1,4 @@
-//! Tables for a terminal, and for a pipe.
+//! Sheets of metrics.
 //!
 //! On a terminal the best is bold and the second best underlined; elsewhere they stand as `*0.91*` and `_0.86_`.
 //! A table wider than the terminal puts each cell's interval under its estimate; where that is not enough, long names
@@ -7,28 +7,10 @@
 
 use unicode_width::UnicodeWidthStr;
 
-use super::fit::{broken, wrapped};
-use crate::table::{Cell, Column, DAGGER, Emphasis, Row, RowGroup, Table, Value};
+use super::wrap::{broken, wrapped};
+use super::{Marks, Terminal};
+use crate::tables::{Emphasis, RowGroup, Table, TableCell};
 use exact::escape::visible;
-
-/// What the text is printed on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Terminal {
-    /// Columns of the terminal; none where lines may be of any length.
-    pub width: Option<usize>,
-    /// How emphasis is shown.
-    pub emphasis: Marks,
-}
-
-/// How emphasis is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Marks {
-    /// By `*` and `_` around it.
-    #[default]
-    Signs,
-    /// By ANSI escape sequences.
-    Ansi,
-}
 
 const GAP: &str = "  ";
 
@@ -45,12 +27,13 @@ pub fn render(table: &Table, terminal: Terminal) -> String {
         lines.extend(grid.lines(table, terminal.width.map(|_| room)));
         lines.push(String::new());
     }
-    for sentence in table.sentences() {
+    for sentence in &table.sentences {
         lines.extend(wrapped(&visible(sentence), room, 0));
     }
     if terminal.emphasis == Marks::Signs {
+        let has = |sign| table.cells().any(|cell| cell.emphasis == sign);
         let signs = [(Emphasis::Bold, "*best*"), (Emphasis::Underline, "_second best_")];
-        let used: Vec<&str> = signs.iter().filter(|(sign, _)| has(table, *sign)).map(|(_, words)| *words).collect();
+        let used: Vec<&str> = signs.iter().filter(|(sign, _)| has(*sign)).map(|(_, words)| *words).collect();
         lines.extend((!used.is_empty()).then(|| format!("Marked as {}.", used.join(", "))));
     }
     while lines.last().is_some_and(String::is_empty) {
@@ -156,12 +139,10 @@ impl Grid {
     }
 
     fn new(table: &Table, marks: Marks, shape: Shape) -> Self {
-        let header = header(table);
-        let groups: Vec<Vec<Vec<Vec<Piece>>>> = table
-            .groups
-            .iter()
-            .map(|group| group.rows.iter().map(|row| pieces(row, table, marks, shape)).collect())
-            .collect();
+        let header: Vec<Piece> = table.columns.iter().map(|column| Piece::new(column.spelled(visible))).collect();
+        let pieces = |row: &Vec<TableCell>| row.iter().map(|cell| spell(cell, marks, shape)).collect();
+        let groups: Vec<Vec<Vec<Vec<Piece>>>> =
+            table.groups.iter().map(|group| group.rows.iter().map(pieces).collect()).collect();
         let mut widths: Vec<usize> = header.iter().map(|piece| piece.width).collect();
         for row in groups.iter().flatten() {
             for (width, cell) in widths.iter_mut().zip(row) {
@@ -212,38 +193,15 @@ impl Grid {
     }
 }
 
-fn header(table: &Table) -> Vec<Piece> {
-    let of_column = |column: &Column| match column.better.arrow() {
-        Some(arrow) => format!("{} {arrow}", visible(&column.metric)),
-        None => visible(&column.metric),
-    };
-    std::iter::once(visible(&table.row_heading)).chain(table.columns.iter().map(of_column)).map(Piece::new).collect()
-}
-
-fn pieces(row: &Row, table: &Table, marks: Marks, shape: Shape) -> Vec<Vec<Piece>> {
-    let name = vec![Piece::new(visible(&row.name))];
-    std::iter::once(name).chain(row.cells.iter().map(|cell| spell(cell, table, marks, shape))).collect()
-}
-
-fn spell(cell: &Cell, table: &Table, marks: Marks, shape: Shape) -> Vec<Piece> {
-    let (estimate, detail) = cell.value.parts(&visible(&table.undefined));
-    let mark = if cell.is_marked { DAGGER.to_string() } else { String::new() };
-    let is_whole = matches!(cell.value, Value::MeanSe { .. });
-    match (detail, shape) {
-        (Some(detail), Shape::OneLine) if is_whole => {
-            vec![Piece::emphasised(&format!("{estimate} {detail}"), cell.emphasis, marks).followed_by(&mark)]
+fn spell(cell: &TableCell, marks: Marks, shape: Shape) -> Vec<Piece> {
+    let (text, mark) = (visible(&cell.text), cell.mark());
+    let emphasised = |text: &str| Piece::emphasised(text, cell.emphasis, marks);
+    match (&cell.detail, shape) {
+        (Some(detail), Shape::OneLine) if cell.is_whole => {
+            vec![emphasised(&format!("{text} {detail}")).followed_by(mark)]
         }
-        (Some(detail), Shape::OneLine) => {
-            vec![Piece::emphasised(&estimate, cell.emphasis, marks).followed_by(&format!("{mark} {detail}"))]
-        }
-        (Some(detail), Shape::TwoLines) => {
-            vec![Piece::emphasised(&estimate, cell.emphasis, marks).followed_by(&mark), Piece::new(detail)]
-        }
-        (None, _) => vec![Piece::emphasised(&estimate, cell.emphasis, marks).followed_by(&mark)],
+        (Some(detail), Shape::OneLine) => vec![emphasised(&text).followed_by(&format!("{mark} {detail}"))],
+        (Some(detail), Shape::TwoLines) => vec![emphasised(&text).followed_by(mark), Piece::new(detail.clone())],
+        (None, _) => vec![emphasised(&text).followed_by(mark)],
     }
-}
-
-fn has(table: &Table, emphasis: Emphasis) -> bool {
-    let rows = table.groups.iter().flat_map(|group| &group.rows);
-    rows.flat_map(|row| &row.cells).any(|cell| cell.emphasis == emphasis)
 }

@@ -5,22 +5,23 @@
 
 use std::cmp::Ordering;
 
+use super::MetricCell;
 use crate::style::EmphasisRule;
-use crate::table::{Cell, Emphasis};
+use crate::tables::Emphasis;
 use metric::catalog::Better;
 
 /// Sets the emphasis of the cells of one column in one group. The cells keep their places.
-pub fn emphasise(cells: &mut [&mut Cell], better: Better, rule: EmphasisRule) {
-    let compare: fn(&Cell, &Cell) -> Ordering = match rule {
+pub fn emphasise(cells: &mut [&mut MetricCell], better: Better, rule: EmphasisRule) {
+    let compare: fn(&MetricCell, &MetricCell) -> Ordering = match rule {
         EmphasisRule::None => return,
         EmphasisRule::PrintedMean => by_printed_mean,
         EmphasisRule::ExactMean => by_exact_mean,
     };
-    let best_first = |a: &Cell, b: &Cell| match better {
+    let best_first = |a: &MetricCell, b: &MetricCell| match better {
         Better::Higher => compare(b, a),
         Better::Lower | Better::Neither => compare(a, b),
     };
-    let mut ranked: Vec<&mut Cell> =
+    let mut ranked: Vec<&mut MetricCell> =
         cells.iter_mut().map(|cell| &mut **cell).filter(|cell| cell.value.mean().is_some()).collect();
     if better == Better::Neither || ranked.is_empty() {
         return;
@@ -39,7 +40,7 @@ pub fn emphasise(cells: &mut [&mut Cell], better: Better, rule: EmphasisRule) {
     }
 }
 
-fn by_printed_mean(a: &Cell, b: &Cell) -> Ordering {
+fn by_printed_mean(a: &MetricCell, b: &MetricCell) -> Ordering {
     match (a.value.mean(), b.value.mean()) {
         (Some(a), Some(b)) => a.cmp_value(b),
         (a, b) => a.is_some().cmp(&b.is_some()),
@@ -47,8 +48,8 @@ fn by_printed_mean(a: &Cell, b: &Cell) -> Ordering {
 }
 
 /// Exact also where products of the sums would leave 128 bits. A cell that prints as zero is zero.
-fn by_exact_mean(a: &Cell, b: &Cell) -> Ordering {
-    let fraction = |cell: &Cell| (cell.sum, i128::from(cell.n.max(1)));
+fn by_exact_mean(a: &MetricCell, b: &MetricCell) -> Ordering {
+    let fraction = |cell: &MetricCell| (cell.sum, i128::from(cell.n.max(1)));
     compare_fractions(fraction(a), fraction(b))
 }
 
@@ -71,8 +72,9 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{compare_fractions, emphasise};
+    use crate::layout::{MetricCell, Value};
     use crate::style::EmphasisRule::{self, ExactMean, PrintedMean};
-    use crate::table::{Cell, Emphasis, Value};
+    use crate::tables::Emphasis;
     use exact::moments::Moments;
     use exact::number::Decimal;
     use metric::catalog::Better::{self, Higher, Lower, Neither};
@@ -82,11 +84,11 @@ mod tests {
         let cell = |&(sum, n): &(i128, u64)| {
             let mean = Decimal::of_ratio(sum, n.into(), 2);
             let value = mean.map_or(Value::Undefined, |mean| Value::MeanSe { mean, se: None });
-            Cell::plain(value, &Moments { n, sum, sum_sq: sum }, n)
+            MetricCell::plain(value, &Moments { n, sum, sum_sq: sum }, n)
         };
-        let mut cells: Vec<Cell> = of.iter().map(cell).collect();
+        let mut cells: Vec<MetricCell> = of.iter().map(cell).collect();
         emphasise(&mut cells.iter_mut().collect::<Vec<_>>(), better, rule);
-        let letter = |cell: &Cell| match cell.emphasis {
+        let letter = |cell: &MetricCell| match cell.emphasis {
             Emphasis::Plain => '.',
             Emphasis::Bold => 'b',
             Emphasis::Underline => 'u',

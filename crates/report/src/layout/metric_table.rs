@@ -1,0 +1,249 @@
+//! A table of cells: metrics in columns, the keys of the episodes in rows.
+//!
+//! Rule: all decisions are taken here already (columns, order, rounding, emphasis, marks). [`MetricTable::printed`] is
+//! what people read, [`MetricTable::records`] what programs read.
+
+use crate::cells::KeyValue;
+use crate::style::CellForm;
+use crate::tables::{Align, Column, Emphasis, Look, RowGroup, Table, TableCell, key_field};
+use exact::moments::Moments;
+use exact::number::Decimal;
+use metric::catalog::Better;
+
+/// A table of cells under a style.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MetricTable {
+    /// `main`, `appendix`, ...: the name of its files.
+    pub name: String,
+    /// The first words of its caption.
+    pub title: String,
+    /// The sentences after them.
+    pub note: String,
+    /// Sentences that its cells call for, such as what the dagger means.
+    pub footnotes: Vec<String>,
+    /// The LaTeX label.
+    pub label: Option<String>,
+    /// The text of an undefined value.
+    pub undefined: String,
+    pub form: CellForm,
+    /// The key columns of a row, as the episodes were grouped.
+    pub keys: Vec<String>,
+    /// What a row is: `Model`.
+    pub row_heading: String,
+    pub columns: Vec<MetricColumn>,
+    /// The rows, in groups that are headed together and compete together.
+    pub groups: Vec<MetricRows>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MetricColumn {
+    pub metric: String,
+    /// The header as LaTeX, where the escaped name will not do.
+    pub latex: Option<String>,
+    pub better: Better,
+}
+
+/// Rows under one heading.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MetricRows {
+    /// `E1: Active mirror-based self-identification`; `None` where all rows are of one group.
+    pub heading: Option<String>,
+    pub rows: Vec<MetricRow>,
+}
+
+/// The cells of one key.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MetricRow {
+    /// A value for each of [`MetricTable::keys`].
+    pub key: Vec<KeyValue>,
+    /// The row's name within its group.
+    pub name: String,
+    /// One cell per column.
+    pub cells: Vec<MetricCell>,
+}
+
+/// One metric of one row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MetricCell {
+    pub value: Value,
+    pub emphasis: Emphasis,
+    /// Whether it rests on so few episodes that a dagger says so.
+    pub is_marked: bool,
+    /// All episodes of the row, defined or not.
+    pub episodes: u64,
+    /// The episodes where the metric is defined.
+    pub n: u64,
+    /// The sum of the metric's values.
+    pub sum: i128,
+}
+
+/// What a cell shows, rounded already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Value {
+    Undefined,
+    /// A mean and its standard error, where there is one.
+    MeanSe {
+        mean: Decimal,
+        se: Option<Decimal>,
+    },
+    /// A rate as a count of the episodes where it is defined, with Wilson's interval.
+    Count {
+        count: i128,
+        n: u64,
+        mean: Decimal,
+        spread: Spread,
+    },
+    /// The mean of a quantity with Student's interval; `n` if it is not defined in all episodes, or in a single one.
+    Mean {
+        mean: Decimal,
+        spread: Spread,
+        n: Option<u64>,
+    },
+}
+
+/// How far the truth may lie from the mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Spread {
+    /// Not to be said: too few values.
+    Unknown,
+    /// All values are equal, which is no evidence of certainty.
+    AllEqual,
+    /// A 95 % interval.
+    Interval { low: Decimal, high: Decimal },
+}
+
+impl MetricTable {
+    /// The caption without its title: note and footnotes.
+    pub fn sentences(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(self.note.as_str()).chain(self.footnotes.iter().map(String::as_str)).filter(|s| !s.is_empty())
+    }
+
+    pub(crate) fn rows(&self) -> impl Iterator<Item = &MetricRow> {
+        self.groups.iter().flat_map(|group| &group.rows)
+    }
+
+    /// For people: a line per row.
+    pub fn printed(&self) -> Table {
+        let columns = self.columns.iter().map(|column| Column {
+            heading: column.metric.clone(),
+            latex: column.latex.clone(),
+            better: column.better,
+            align: Align::Right,
+        });
+        let cells = |row: &MetricRow| {
+            let cells = row.cells.iter().map(|cell| cell.printed(&self.undefined));
+            std::iter::once(row.name.as_str().into()).chain(cells).collect()
+        };
+        let group = |group: &MetricRows| RowGroup {
+            heading: group.heading.clone(),
+            rows: group.rows.iter().map(cells).collect(),
+        };
+        Table {
+            title: self.title.clone(),
+            sentences: self.sentences().map(str::to_owned).collect(),
+            label: self.label.clone(),
+            look: Look::Sheet,
+            columns: std::iter::once(Column::left(&self.row_heading)).chain(columns).collect(),
+            names: 1,
+            groups: self.groups.iter().map(group).collect(),
+        }
+    }
+
+    /// For programs: a line per cell, numbers as printed.
+    ///
+    /// The key columns come first, then `metric`. Cells of mean and standard error go on with `mean,se,emphasis`, the form
+    /// of the published tables; cells of counts with `episodes,n,sum,mean,ci_low,ci_high,emphasis`. What is undefined is
+    /// empty.
+    pub fn records(&self) -> Table {
+        let tail = match self.form {
+            CellForm::MeanSe => &["mean", "se", "emphasis"][..],
+            CellForm::CountInterval => &["episodes", "n", "sum", "mean", "ci_low", "ci_high", "emphasis"],
+        };
+        let keys = self.keys.iter().map(String::as_str);
+        let records = self.rows().flat_map(|row| {
+            row.cells.iter().zip(&self.columns).map(|(cell, column)| {
+                let keys = row.key.iter().map(key_field);
+                keys.chain([column.metric.clone()]).chain(cell.fields(self.form)).collect::<Vec<_>>()
+            })
+        });
+        Table::of_texts(keys.chain(["metric"]).chain(tail.iter().copied())).with(records)
+    }
+}
+
+impl MetricCell {
+    /// A cell of these moments in a row of `episodes` episodes, without emphasis or mark.
+    pub fn plain(value: Value, moments: &Moments, episodes: u64) -> Self {
+        Self { value, emphasis: Emphasis::Plain, is_marked: false, episodes, n: moments.n, sum: moments.sum }
+    }
+
+    fn printed(&self, undefined: &str) -> TableCell {
+        let (text, detail) = self.value.parts(undefined);
+        TableCell {
+            text,
+            detail,
+            is_whole: matches!(self.value, Value::MeanSe { .. }),
+            is_number: self.value != Value::Undefined,
+            emphasis: self.emphasis,
+            is_marked: self.is_marked,
+        }
+    }
+
+    fn fields(&self, form: CellForm) -> Vec<String> {
+        let text = |number: Option<Decimal>| number.map(|number| number.to_string()).unwrap_or_default();
+        let (mean, emphasis) = (text(self.value.mean()), self.emphasis.word().to_owned());
+        match form {
+            CellForm::MeanSe => vec![mean, text(self.value.se()), emphasis],
+            CellForm::CountInterval => {
+                let [low, high] = match self.value {
+                    Value::Count { spread: Spread::Interval { low, high }, .. }
+                    | Value::Mean { spread: Spread::Interval { low, high }, .. } => [Some(low), Some(high)],
+                    _ => [None, None],
+                };
+                let sum = if self.n == 0 { String::new() } else { self.sum.to_string() };
+                vec![self.episodes.to_string(), self.n.to_string(), sum, mean, text(low), text(high), emphasis]
+            }
+        }
+    }
+}
+
+impl Value {
+    /// The part that is the estimate, and the part that says how sure it is, as plain text.
+    pub fn parts(&self, undefined: &str) -> (String, Option<String>) {
+        match self {
+            Self::Undefined => (undefined.to_owned(), None),
+            Self::MeanSe { mean, se } => (mean.to_string(), se.map(|se| format!("± {se}"))),
+            Self::Count { count, n, spread, .. } => (format!("{count}/{n}"), spread.text(Decimal::compact)),
+            Self::Mean { mean, spread, n } => {
+                let of = n.map(|n| format!("n={n}"));
+                let parts: Vec<String> = spread.text(|bound| bound.to_string()).into_iter().chain(of).collect();
+                (mean.to_string(), (!parts.is_empty()).then(|| parts.join(" ")))
+            }
+        }
+    }
+
+    /// The standard error as printed.
+    pub fn se(&self) -> Option<Decimal> {
+        match self {
+            Self::MeanSe { se, .. } => *se,
+            Self::Undefined | Self::Count { .. } | Self::Mean { .. } => None,
+        }
+    }
+
+    /// The mean as printed, or as it would be.
+    pub fn mean(&self) -> Option<Decimal> {
+        match self {
+            Self::Undefined => None,
+            Self::MeanSe { mean, .. } | Self::Count { mean, .. } | Self::Mean { mean, .. } => Some(*mean),
+        }
+    }
+}
+
+impl Spread {
+    fn text(self, bound: impl Fn(Decimal) -> String) -> Option<String> {
+        match self {
+            Self::Unknown => None,
+            Self::AllEqual => Some("(all equal)".to_owned()),
+            Self::Interval { low, high } => Some(format!("[{}, {}]", bound(low), bound(high))),
+        }
+    }
+}

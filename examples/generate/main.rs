@@ -24,7 +24,7 @@ struct Arguments {
     /// Another seed gives other episodes and another shuffled order.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Write optional columns too: those of a recording with a model, except texts.
+    /// Write optional columns too, with values that hardly repeat: poses, pixels, tokens, costs, times, reasons.
     #[arg(long)]
     optional: bool,
     /// Files, divided at episodes.

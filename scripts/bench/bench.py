@@ -2,7 +2,8 @@
 
 `make bench-scores` calls it; `--help` lists what may be changed. The data is generated in two orders: as a study is
 recorded, and shuffled. Every contender runs once before any is timed, and its result is compared with ours row by row;
-a difference is an error. Then all take turns.
+a difference is an error. Then all take turns. A third set has the optional columns of a recording, with values that
+hardly repeat: its pages are larger, and the columns that are read are a small part of each file.
 """
 
 import argparse
@@ -22,6 +23,12 @@ import timing
 
 REPOSITORY = Path(__file__).resolve().parent.parent.parent
 ORDERS = (table.SHUFFLED, table.STUDY)
+# How each set of data is generated.
+OPTIONS = {
+    table.SHUFFLED: ["--order", "shuffled"],
+    table.STUDY: ["--order", "study"],
+    table.RECORDED: ["--order", "shuffled", "--optional"],
+}
 
 
 class Bench:
@@ -34,17 +41,17 @@ class Bench:
         self.outputs = self.data / "outputs"
         self.outputs.mkdir(parents=True, exist_ok=True)
 
-    def generate(self, order, steps, files):
+    def generate(self, data, steps, files):
         """A folder of traces, made by this build of the generator; folders of other builds are removed."""
         generator = self.examples / "generate"
-        name = f"{order}-{steps}-in-{files}"
+        name = f"{data}-{steps}-in-{files}"
         folder = self.data / f"{name}-{digest(generator)}"
         if not folder.is_dir():
             for old in self.data.glob(f"{name}-*"):
                 timing.remove(old)
             partial = self.data / "partial"
             timing.remove(partial)
-            options = ["--order", order, "--steps", str(steps), "--files", str(files), "--out", partial]
+            options = [*OPTIONS[data], "--steps", str(steps), "--files", str(files), "--out", partial]
             subprocess.run([generator, *options], check=True)
             partial.rename(folder)
         return folder
@@ -99,15 +106,16 @@ def megabytes(folder):
 
 
 def preamble(bench, options, folders, episodes, load):
-    sizes = " and ".join(f"{megabytes(folder):.1f} MB in {order} order" for order, folder in folders.items())
+    sizes = ", ".join(f"{megabytes(folder):.1f} MB {data}" for data, folder in folders.items())
     return [
         "# Results of `make bench-scores`",
         "",
         f"Machine: {machine()}; load average {load:.2f} before the first round.  ",
         f"Versions: {versions(bench.program)}.  ",
-        f"Traces: {options.steps:,} steps, {episodes:,} episodes, {options.files} files, the required columns alone, zstd,",
-        f"{sizes} (`examples/generate`); warm cache.  ",
-        f"Rounds: {options.rounds}; in each, every line of the table has one turn on each order.",
+        f"Traces: {options.steps:,} steps, {episodes:,} episodes, {options.files} files, zstd: {sizes}",
+        "(`examples/generate`); warm cache. `shuffled` and `study` have the required columns alone, `recorded` is shuffled and",
+        "has the optional columns of a recording with a model, whose values hardly repeat.  ",
+        f"Rounds: {options.rounds}; in each, every line of the table has one turn on each set.",
         "",
         "Before the first round every line ran once and was checked: each episode table has the same rows in the same order as",
         "that of `score`, the cells of the query for cells are those of `report`, and `score` writes the same bytes for both",
@@ -151,13 +159,13 @@ def parsed():
 
 def measure(bench, options):
     """Checks and times everything; gives the lines of RESULTS.md and how many goals were missed."""
-    folders = {order: bench.generate(order, options.steps, options.files) for order in ORDERS}
+    folders = {data: bench.generate(data, options.steps, options.files) for data in table.ALL}
     skipped = options.skip.split(";")
     listed = bench.contenders(folders[table.SHUFFLED], options.polars)
     listed = [contender for contender in listed if contender.own or contender.name not in skipped]
     turns = timing.Turns()
-    for order, folder in folders.items():
-        episodes = checks.warm_up(turns, order, folder, listed, bench.outputs, options.steps)
+    for data, folder in folders.items():
+        episodes = checks.warm_up(turns, data, folder, listed, bench.outputs, options.steps)
     checks.same_in_every_order(bench.outputs, ORDERS)
     load = os.getloadavg()[0]
     timing.round_robin(turns, folders, listed, bench.outputs, options.rounds)

@@ -45,6 +45,7 @@ impl Pose {
 fn extra(step: &Step, pose: &Pose, frame_time: i64, draw: &mut Draw) -> Extra {
     let seen = |pixels: i32| Some(if step.mirror_visible { pixels } else { 0 });
     let reply_status = if step.action.is_some() { "ok" } else { "parse_failed" };
+    let (prompt_tokens, completion_tokens) = (1500 + draw.small(64), 60 + draw.small(120));
     Extra {
         mirror_self_px: seen(200 + draw.small(800)),
         mirror_other_px: seen(0),
@@ -57,11 +58,18 @@ fn extra(step: &Step, pose: &Pose, frame_time: i64, draw: &mut Draw) -> Extra {
         cube_distance: Some(pose.x.hypot(pose.y)),
         reply_status: Some(reply_status.to_owned()),
         latency_ms: Some(800 + draw.small(2000)),
-        prompt_tokens: Some(1500 + draw.small(64)),
-        completion_tokens: Some(60 + draw.small(120)),
+        prompt_tokens: Some(prompt_tokens),
+        completion_tokens: Some(completion_tokens),
+        cost_usd: Some(f64::from(3 * prompt_tokens + 15 * completion_tokens) / 1e6),
+        reasoning: step.action.map(|action| reasoning(action, pose, draw)),
         frame_time: Some(frame_time),
         ..Extra::default()
     }
+}
+
+fn reasoning(action: Action, pose: &Pose, draw: &mut Draw) -> String {
+    let seen = draw.one(&["a wall", "a mirror", "two cubes", "a body", "the door"]);
+    format!("{seen} at {:.1} m, so {}", pose.x.hypot(pose.y), action.name())
 }
 
 /// A coordinate in a room of 8 m, to the centimetre.

@@ -20,8 +20,8 @@ use trace::write::{OptionalColumns, TraceMetadata, TraceWriter};
 pub use episodes::Study;
 pub use order::Order;
 
-/// The optional columns of a generated trace: those of a recording with a model, except texts.
-const OPTIONAL_COLUMNS: [&str; 16] = [
+/// The optional columns of a generated trace: those of a recording with a model, except its longest texts.
+const OPTIONAL_COLUMNS: [&str; 18] = [
     "mirror_self_px",
     "mirror_other_px",
     "mirror_px",
@@ -37,6 +37,8 @@ const OPTIONAL_COLUMNS: [&str; 16] = [
     "latency_ms",
     "prompt_tokens",
     "completion_tokens",
+    "cost_usd",
+    "reasoning",
     "frame_time",
 ];
 

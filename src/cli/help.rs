@@ -163,7 +163,7 @@ pub fn with_examples_alone(command: Command) -> Command {
     let nouns: Vec<String> = command.get_subcommands().filter(|inner| inner.has_subcommands()).map(name_of).collect();
     nouns.iter().fold(command, |command, noun| {
         let of_noun = EXAMPLES.iter().filter(|(path, _)| path.split(' ').next() == Some(noun));
-        let first: Vec<_> = of_noun.flat_map(|(_, examples)| examples.first()).copied().collect();
+        let first: Vec<_> = of_noun.filter_map(|(_, examples)| examples.first()).copied().collect();
         with_examples(command, &[noun], &shown(&first))
     })
 }

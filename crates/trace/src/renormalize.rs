@@ -192,7 +192,7 @@ impl Old {
     ) -> Result<(RenormalizedFile, Vec<Flip>), RenormalizeError> {
         let mut recording = self.recording.clone();
         let mut texts =
-            Texts { name, version_before: put_version(&mut recording), steps: 0, texts: 0, flips: Vec::new() };
+            Normalizer { name, version_before: put_version(&mut recording), steps: 0, texts: 0, flips: Vec::new() };
         match to {
             None => drop(rewrite(&self.set, [SOURCE, TARGET], |step| texts.attribution(step), &recording, io::sink())?),
             Some((target, staged)) => {
@@ -206,7 +206,7 @@ impl Old {
 }
 
 /// The texts of a trace, as far as they are read.
-struct Texts<'a> {
+struct Normalizer<'a> {
     name: &'a str,
     version_before: Option<String>,
     steps: u64,
@@ -214,7 +214,7 @@ struct Texts<'a> {
     flips: Vec<Flip>,
 }
 
-impl Texts<'_> {
+impl Normalizer<'_> {
     fn into_file(self) -> (RenormalizedFile, Vec<Flip>) {
         let Self { name, version_before, steps, texts, flips } = self;
         let name = name.to_owned();

@@ -1,5 +1,7 @@
 //! A plan in words: the answer in one line, a row per test and level, what was assumed.
 
+use std::fmt::Write as _;
+
 use super::{Given, Plan, PlanRequest, PlannedTest};
 use crate::tables::{Table, push_wrapped};
 use exact::format::{UNDEFINED, fixed};
@@ -12,7 +14,7 @@ impl Plan {
         push_wrapped(&mut text, &self.answer, width, 2);
         let header = ["test", "level", "difference", "episodes", "runs per seed", "effective", "power"];
         let table = Table { names: 2, ..Table::of_texts(header).aligned_right(2..7) };
-        text += &format!("\n{}\n", table.with(self.tests.iter().map(record)).within(width));
+        let _ = writeln!(text, "\n{}", table.with(self.tests.iter().map(record)).within(width));
         for assumption in &self.assumptions {
             push_wrapped(&mut text, assumption, width, 2);
         }

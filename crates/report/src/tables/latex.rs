@@ -21,7 +21,8 @@ pub fn render(table: &Table) -> String {
     );
     for (at, group) in table.groups.iter().enumerate() {
         if at == 0 || group.heading.is_some() {
-            text += &if at == 0 { format!("\\midrule\n{blank}") } else { format!("{blank}\\midrule\n") };
+            let (before, after) = if at == 0 { ("", blank) } else { (blank, "") };
+            let _ = write!(text, "{before}\\midrule\n{after}");
         }
         push_group(&mut text, group, table);
     }
@@ -60,10 +61,10 @@ fn push_group(text: &mut String, group: &RowGroup, table: &Table) {
     }
     for row in &group.rows {
         let is_name = |at: usize| table.look == Look::Sheet && at < table.names;
-        *text += &line(row.iter().enumerate().map(|(at, cell)| match is_name(at) {
-            true => format!("\\texttt{{{}}}", escape(&cell.text)),
-            false => spell(cell),
-        }));
+        *text +=
+            &line(row.iter().enumerate().map(|(at, cell)| {
+                if is_name(at) { format!("\\texttt{{{}}}", escape(&cell.text)) } else { spell(cell) }
+            }));
     }
 }
 

@@ -44,15 +44,18 @@ pub enum AnswerFormat {
 }
 
 impl QueryArgs {
-    /// Refuses: the work needs Polars.
-    #[cfg(not(feature = "polars"))]
-    pub fn run(self) -> Result<Outcome, Failure> {
-        Err(study::StudyError::WithoutPolars { what: "query" }.into())
-    }
-
-    #[cfg(feature = "polars")]
     pub fn run(self) -> Result<Outcome, Failure> {
         rows::answer(&self)
+    }
+}
+
+/// Refuses: the work needs Polars.
+#[cfg(not(feature = "polars"))]
+mod rows {
+    use super::{Failure, Outcome, QueryArgs};
+
+    pub fn answer(_: &QueryArgs) -> Result<Outcome, Failure> {
+        Err(study::StudyError::WithoutPolars { what: "query" }.into())
     }
 }
 

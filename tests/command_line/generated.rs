@@ -5,7 +5,7 @@ use std::path::Path;
 
 use trace::schema::COLUMNS;
 
-use crate::generation::{self, Files, Order, Study};
+use crate::generation::{self, Files, OPTIONAL_COLUMNS, Order, Study};
 use crate::harness::traces::texts;
 use crate::{contents, run};
 
@@ -46,7 +46,7 @@ fn generated_traces_of_both_orders_keep_every_rule_and_score_the_same() {
         assert_eq!((info["steps"].as_u64(), info["episodes"].as_u64()), (Some(STEPS), Some(study.episodes())));
         let required = COLUMNS.iter().filter(|column| column.required).count();
         let columns = info["columns"].as_array().unwrap().len();
-        assert_eq!(columns, if optional { required + 16 } else { required }, "{name}");
+        assert_eq!(columns, if optional { required + OPTIONAL_COLUMNS.len() } else { required }, "{name}");
         scores.insert(run(at, &["score", name]).done());
     }
     assert_eq!(scores.len(), 1, "the order, or an optional column, changes a score");

@@ -48,6 +48,7 @@ fn the_library_promises_these_names_and_no_others() {
     KeyValue
     Manifest
     MetricColumn
+    MetricTable
     Moments
     Outputs
     Report

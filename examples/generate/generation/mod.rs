@@ -21,7 +21,7 @@ pub use episodes::Study;
 pub use order::Order;
 
 /// The optional columns of a generated trace: those of a recording with a model, except its longest texts.
-const OPTIONAL_COLUMNS: [&str; 18] = [
+pub const OPTIONAL_COLUMNS: [&str; 18] = [
     "mirror_self_px",
     "mirror_other_px",
     "mirror_px",

@@ -17,7 +17,7 @@ use world::sim::config::WorldConfig;
 use world::sim::contact_sheet;
 use world::sim::scene::Scene;
 
-/// Replay episodes, draw film strips, show scenes and configurations
+/// Replay episodes, draw film strips, show scenes
 #[derive(Clone, Debug, clap::Args)]
 pub struct WorldArgs {
     #[command(subcommand)]

@@ -28,6 +28,7 @@ pub fn run(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
 
 /// All findings of traces.
 #[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "Python's values become owned ones")]
 pub fn validate(
     py: Python<'_>,
     paths: Vec<OsString>,

@@ -1,7 +1,7 @@
 //! From cells to bytes: tables, their comparison with published ones, and the folder of a report.
 //!
 //! Rule: this crate sees no trace and no plan, only cells and the episode table. A [`style`] says how numbers look,
-//! [`layout`] makes [`table`]s of cells under it, [`tables`] spells them, [`figures`] draws, [`html`] makes the page of all
+//! [`layout`] makes [`tables::Table`]s of cells under it, [`tables`] spells them, [`figures`] draws, [`html`] makes the page of all
 //! of it, [`bundle`] writes the folder. [`audit`] asks of published tables whether any data gives them, [`plan`] how
 //! many episodes a comparison takes.
 

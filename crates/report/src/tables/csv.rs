@@ -23,7 +23,7 @@ pub fn key_field(value: &KeyValue) -> String {
     }
 }
 
-/// What [`key_field`] was given as text.
+/// The text behind a field of a key.
 pub fn text_of(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| is_formula(text)).unwrap_or(field)
 }

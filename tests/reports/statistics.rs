@@ -2,6 +2,7 @@
 
 mod design;
 mod durations;
+mod units;
 
 use exact::moments::Moments;
 use indexmap::IndexMap;
@@ -111,8 +112,11 @@ fn cells(table: &EpisodeTable) -> Cells {
     }
 }
 
+/// Recorded episodes without clusters.
+const RECORDED: Design = Design { kind: Some(DesignKind::Recording), cluster: None };
+
 /// Recorded episodes, of which those of one seed depend on each other.
-const RECORDED: Design = Design { kind: Some(DesignKind::Recording), cluster: Some(Cluster::Seed) };
+const CLUSTERED: Design = Design { cluster: Some(Cluster::Seed), ..RECORDED };
 
 /// What is said of traces that declare nothing.
 fn statistics(rows: &[Row]) -> Statistics {

@@ -38,6 +38,8 @@ pub enum Withheld {
     NoSpread,
     /// The method has no bounds for these values, or there are too many of them for it.
     Undefined,
+    /// Scenes, seeds or participants have several episodes, which the method takes as independent.
+    Dependent,
 }
 
 /// The interval of `n` values where it may be given, and otherwise why not.

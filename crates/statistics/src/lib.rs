@@ -28,4 +28,5 @@ pub mod sequential;
 pub mod stratified;
 pub mod survival;
 pub mod tarone;
+pub mod units;
 pub mod unpaired;

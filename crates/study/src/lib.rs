@@ -97,7 +97,7 @@ use inputs::Stamp;
 use losses::Counted;
 
 /// What scores say of each episode's recording, where the traces do.
-const STANDING_LABELS: [&str; 3] = [CONDITION, "scene", "fingerprint"];
+const STANDING_LABELS: [&str; 4] = [CONDITION, "scene", "fingerprint", "participant"];
 
 /// The definitions that are used where none are named.
 pub const DEFAULT_DEFINITIONS: &str = "paper";

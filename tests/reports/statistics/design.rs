@@ -4,7 +4,9 @@ use report::statistics::text::Length;
 use report::statistics::{Method, Options, OverallMethod, OverallRow, Sign, Statistics};
 use statistics::design::{Cluster, Design, DesignKind};
 
-use super::{RECORDED, Row, block, by_place, cells, contrast, labelled, recorded, statistics, study, with_scenes};
+use super::{
+    CLUSTERED, RECORDED, Row, block, by_place, cells, contrast, labelled, recorded, statistics, study, with_scenes,
+};
 
 #[test]
 fn models_are_paired_by_scene_and_tied_rather_than_ranked() {
@@ -51,7 +53,7 @@ fn equal_scenes_are_pairs_under_other_seeds_and_runs() {
         Some(if row.1 == "a" || place(row) < 4 { place(row) } else { 100 + place(row) }.to_string())
     });
     let test = &shuffled.models[0].tests[0];
-    assert_eq!((test.comparison.method, test.matching.pairs, test.matching.alone), (Method::Fisher, 4, 34), "{test:?}");
+    assert_eq!((test.comparison.method, test.matching.pairs, test.matching.alone), (Method::Units, 4, 34), "{test:?}");
 }
 
 #[test]
@@ -76,7 +78,7 @@ fn episodes_without_a_scene_are_counted_and_left_out_of_pairs() {
     let found = with_scenes(&rows, RECORDED, |row| if row.2 < 2 { by_place(row) } else { None });
     let test = &found.models[0].tests[0];
     assert_eq!((test.matching.pairs, test.matching.undeclared, test.matching.alone), (14, 14, 0));
-    assert_eq!((test.comparison.method, test.comparison.n), (Method::Mcnemar, [14, 14]));
+    assert_eq!((test.comparison.method, test.comparison.n), (Method::Units, [21, 21]));
 }
 
 #[test]
@@ -84,12 +86,8 @@ fn repeats_of_a_scene_are_counted_and_are_no_pairs() {
     let rows = [block("E1", "a", 21, 9), block("E1", "b", 7, 9)].concat();
     let found = with_scenes(&rows, RECORDED, |row| Some(row.2.to_string()));
     let test = &found.models[0].tests[0];
-    assert_eq!((test.matching.pairs, test.matching.repeated, test.comparison.method), (0, 42, Method::Fisher));
-    assert!(
-        found.warnings.iter().any(|line| line.contains("which repeats of a scene are not")),
-        "{:?}",
-        found.warnings
-    );
+    assert_eq!((test.matching.pairs, test.matching.repeated, test.comparison.method), (0, 42, Method::Units));
+    assert!(found.warnings.iter().any(|line| line.contains("counts each scene once")), "{:?}", found.warnings);
 }
 
 #[test]
@@ -154,11 +152,11 @@ fn models_are_compared_over_all_experiments() {
         };
         found.overall.iter().find(is_it).unwrap().clone()
     };
-    // E1 16:0 and E2 2:0, together 18:0, p = 2/2^18; Holm over three pairs
+    // E1 16:0 and E2 2:0, of which two scenes are the same: 16:0 by scene, p = 2/2^16; Holm over three pairs
     let paired = overall(&recorded(&study()));
     assert_eq!(
         (paired.method, paired.p, paired.p_adjusted),
-        (OverallMethod::PooledMcnemar, Some(2.0 / 262_144.0), Some(6.0 / 262_144.0))
+        (OverallMethod::Units, Some(2.0 / 65_536.0), Some(6.0 / 65_536.0))
     );
     assert_eq!(paired.experiments, ["E1", "E2"]);
     let apart = overall(&statistics(&study()));
@@ -174,13 +172,14 @@ fn three_seeds_are_not_enough_for_a_claim_about_seeds_and_six_are() {
     let warns = |found: &Statistics| {
         found.warnings.iter().any(|warning| warning.contains("too few for a claim about new seeds"))
     };
-    let three = recorded(&block("E1", "a", 10, 9));
+    let clustered = |rows: &[Row]| with_scenes(rows, CLUSTERED, by_place);
+    let three = clustered(&block("E1", "a", 10, 9));
     assert_eq!(three.clusters[0].by_seed.unwrap().clusters, 3);
     assert!(warns(&three));
     let six: Vec<Row> = (0..12).map(|at| ("E1", "a", at / 2, at % 2, at % 3 == 0, 9)).collect();
-    assert!(!warns(&recorded(&six)));
+    assert!(!warns(&clustered(&six)));
     let one: Vec<Row> = (0..3).map(|run| ("E1", "a", 0, run, true, 9)).collect();
-    assert_eq!(recorded(&one).clusters[0].by_seed, None);
+    assert_eq!(clustered(&one).clusters[0].by_seed, None);
     let undeclared = with_scenes(&block("E1", "a", 10, 9), Design { cluster: None, ..RECORDED }, by_place);
     assert!(undeclared.clusters.is_empty() && !warns(&undeclared));
 }
@@ -188,7 +187,7 @@ fn three_seeds_are_not_enough_for_a_claim_about_seeds_and_six_are() {
 #[test]
 fn the_level_of_a_warning_follows_the_confidence() {
     let table = labelled(&block("E1", "a", 10, 9), "scene", by_place);
-    let options = Options { confidence: 0.8, design: RECORDED, ..Options::default() };
+    let options = Options { confidence: 0.8, design: CLUSTERED, ..Options::default() };
     let found = Statistics::of(&table, &cells(&table), &options).unwrap();
     let said = found.warnings.iter().find(|warning| warning.contains("new seeds")).unwrap();
     assert!(said.contains("no test over fewer than 4 can reach p = 0.2."), "{said}");

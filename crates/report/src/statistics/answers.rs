@@ -8,9 +8,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::chance::COMPLETED;
-use super::compare::Sign;
+use super::compare::{Comparison, Sign};
 use super::study::named;
-use super::{ChanceRow, Contrast, Family, Role, Statistics, Verdict};
+use super::{ChanceRow, Contrast, Family, Role, Statistics, Units, Verdict};
 
 /// The most pairs that an experiment's answer names; more are counted.
 const MOST_NAMED: usize = 6;
@@ -74,11 +74,18 @@ fn above_in(experiment: &str, rows: &[&ChanceRow]) -> String {
     let rows: Vec<_> = rows.iter().filter(|row| Some((row.role, row.level)) == level).collect();
     let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect::<Vec<_>>();
     let (above, below) = (those(Verdict::Above), those(Verdict::Below));
+    let unsaid: Vec<(String, &Units)> =
+        rows.iter().filter_map(|row| Some((row.name(), row.units.as_ref().filter(|units| units.too_few)?))).collect();
     let reference = level.filter(|(role, _)| *role == Role::Reference);
     let about =
         reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));
+    if let Some((_, units)) = unsaid.iter().max_by_key(|(_, units)| units.n).filter(|_| unsaid.len() == rows.len()) {
+        return format!("{about} {}", cannot_say(units));
+    }
     let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
-    format!("{about} {}{below}", names(&above, rows.len()))
+    let unsaid = unsaid.iter().map(|(model, units)| format!("of {model} {}", cannot_say(units)));
+    let told = format!("{about} {}{below}", names(&above, rows.len()));
+    [told].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
 }
 
 /// The models, or how many where they are all.
@@ -90,7 +97,25 @@ fn names(models: &[String], all: usize) -> String {
     }
 }
 
+/// The answer where no outcome of these units could be significant.
+fn cannot_say(Units { n, name, .. }: &Units) -> String {
+    let name = if *n == 1 { name.trim_end_matches('s') } else { name };
+    format!("cannot say: {n} {name}")
+}
+
+/// Why none of these comparisons can show a difference; `None` where one can.
+fn untested(comparisons: &[&Comparison]) -> Option<String> {
+    let too_few = comparisons.iter().map(|it| it.units.as_ref().filter(|units| units.too_few));
+    if let Some(units) = too_few.collect::<Option<Vec<_>>>() {
+        return units.into_iter().max_by_key(|units| units.n).map(cannot_say);
+    }
+    comparisons.iter().all(|it| it.p.is_none()).then(|| "not tested".to_owned())
+}
+
 fn differing_in(family: &Family) -> String {
+    if let Some(why) = untested(&family.tests.iter().map(|test| &test.comparison).collect::<Vec<_>>()) {
+        return format!("{} {why}", family.experiment);
+    }
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
     differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)))
 }
@@ -129,6 +154,9 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast]) -> String {
         let models = those(Some(sign));
         (!models.is_empty()).then(|| format!("{what} {}", names(&models, group.len())))
     };
+    if let Some(why) = untested(&group.iter().map(|contrast| &contrast.comparison).collect::<Vec<_>>()) {
+        return format!("{baseline} - {against} {why}");
+    }
     let rest = those(None).len();
     let unshown = match (rest, group.len()) {
         (0, _) => None,

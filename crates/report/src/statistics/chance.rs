@@ -7,12 +7,15 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Block, Experiment, Study, named};
+use exact::moments::Moments;
 use exact::ratio::Ratio;
 use score::table::MetricColumn;
 use statistics::chance::{exact_test, least_p};
+use statistics::clustered::fewest_clusters;
 use statistics::holm::{holm, level};
 use statistics::outcomes::ExactTest;
 use statistics::tarone::{Attained, tarone_holm};
+use statistics::units::rate_test;
 
 /// One rate against one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -44,6 +47,27 @@ pub struct ChanceRow {
     pub p_tarone: f64,
     /// What the value adjusted by Holm says at the level of significance.
     pub verdict: Verdict,
+    /// The units of analysis where some have several episodes: the test counts each once.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+}
+
+/// Scenes, seeds or participants with several episodes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+pub struct Units {
+    /// How many there are.
+    pub n: u64,
+    /// Their name, in the plural.
+    pub name: String,
+    /// Whether they are too few for a verdict: no symmetric test of so many can reach the level of significance.
+    pub too_few: bool,
+}
+
+impl Units {
+    pub(super) fn new(study: &Study, block: &Block, n: usize, least: f64, confidence: f64) -> Self {
+        let too_few = level(confidence).is_none_or(|level| least > level || n < fewest_clusters(level));
+        Self { n: n as u64, name: study.unit_name(block).to_owned(), too_few }
+    }
 }
 
 /// What a level stands for.
@@ -94,25 +118,37 @@ impl ChanceRow {
         confidence: f64,
     ) -> Vec<Self> {
         let Some(column) = study.column(metric) else { return Vec::new() };
-        let tested: Vec<_> = experiment.blocks.iter().filter_map(|block| Tested::of(block, column, chance)).collect();
+        let tested: Vec<_> = experiment
+            .blocks
+            .iter()
+            .filter_map(|block| Tested::of(study, block, column, (chance, confidence)))
+            .collect();
         let adjusted = holm(&tested.iter().map(|tested| tested.test.p).collect::<Vec<_>>());
         let attained = |tested: &Tested| Attained { p: tested.test.p, least: tested.least };
         let by_tarone = tarone_holm(&tested.iter().map(attained).collect::<Vec<_>>());
-        let row = |(Tested { block, successes, n, test, .. }, (p_adjusted, p_tarone)): (Tested, (f64, f64))| Self {
-            experiment: experiment.name.to_owned(),
-            model: block.model.to_owned(),
-            condition: block.condition(),
-            metric: metric.to_owned(),
-            role,
-            level: chance,
-            successes,
-            n,
-            p: test.p,
-            mid_p: test.mid_p,
-            p_adjusted,
-            p_tarone,
-            verdict: Verdict::of(successes, n, chance, level(confidence).is_some_and(|level| p_adjusted <= level)),
-        };
+        let row =
+            |(Tested { block, successes, n, test, units, .. }, (p_adjusted, p_tarone)): (Tested, (f64, f64))| Self {
+                experiment: experiment.name.to_owned(),
+                model: block.model.to_owned(),
+                condition: block.condition(),
+                metric: metric.to_owned(),
+                role,
+                level: chance,
+                successes,
+                n,
+                p: test.p,
+                mid_p: test.mid_p,
+                p_adjusted,
+                p_tarone,
+                verdict: Verdict::of(
+                    successes,
+                    n,
+                    chance,
+                    level(confidence).is_some_and(|level| p_adjusted <= level)
+                        && !units.as_ref().is_some_and(|units: &Units| units.too_few),
+                ),
+                units,
+            };
         tested.into_iter().zip(adjusted.into_iter().zip(by_tarone)).map(row).collect()
     }
 
@@ -129,12 +165,31 @@ struct Tested<'s, 'a> {
     n: u64,
     test: ExactTest,
     least: f64,
+    units: Option<Units>,
 }
 
 impl<'s, 'a> Tested<'s, 'a> {
-    fn of(block: &'s Block<'a>, column: &MetricColumn, chance: Ratio) -> Option<Self> {
+    fn of(
+        study: &Study,
+        block: &'s Block<'a>,
+        column: &MetricColumn,
+        (chance, confidence): (Ratio, f64),
+    ) -> Option<Self> {
         let (successes, n) = block.moments(column).counts()?;
-        Some(Self { block, successes, n, test: exact_test(successes, n, chance)?, least: least_p(n, chance)? })
+        if study.repeats(block) {
+            let of_units: Vec<Moments> = study.by_unit(block, column).into_values().collect();
+            let (test, least) = rate_test(&of_units, chance)?;
+            let units = Units::new(study, block, of_units.len(), least, confidence);
+            return Some(Self { block, successes, n, test, least, units: Some(units) });
+        }
+        Some(Self {
+            block,
+            successes,
+            n,
+            test: exact_test(successes, n, chance)?,
+            least: least_p(n, chance)?,
+            units: None,
+        })
     }
 }
 

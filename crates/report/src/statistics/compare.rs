@@ -1,11 +1,15 @@
 //! One block minus another under one metric: by their pairs where they have pairs, else as independent samples.
 
+use std::collections::BTreeSet;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::chance::Units;
 use super::durations::{decided, is_duration};
 use super::matching::Matched;
-use super::study::{Block, Study};
+use super::study::{Block, Study, Unit};
+use super::units::Sides;
 use exact::moments::Moments;
 use metric::catalog::{Kind, StandardError};
 use score::table::MetricColumn;
@@ -35,6 +39,9 @@ pub enum Method {
     StudentPaired,
     /// Independent samples of another quantity: Welch's t interval; no test.
     Welch,
+    /// Rates of scenes, seeds or participants with several episodes, or of which some are pairs: the exact permutation
+    /// test within shared units and among the others; no interval.
+    Units,
 }
 
 /// The first minus the second.
@@ -70,6 +77,9 @@ pub struct Comparison {
     pub p_tarone: Option<f64>,
     /// Whether the value adjusted by Holm reaches the level of significance.
     pub separated: bool,
+    /// The units of analysis of both sides where the test counts each once, however many episodes it has.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
 }
 
 /// What two blocks are compared by.
@@ -85,6 +95,44 @@ pub(super) struct Compared<'s, 'a> {
 impl Compared<'_, '_> {
     /// The comparison under one metric, not adjusted yet.
     pub fn under(&self, column: &MetricColumn) -> Comparison {
+        let rates = self.study.kind(&column.name) == Kind::Rate;
+        let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
+        match sides {
+            Some(sides) if rates => self.rates_by_unit(column, &sides),
+            _ if !rates && self.is_dependent() => self.of_episodes(column).withheld_as_dependent(),
+            _ => self.of_episodes(column),
+        }
+    }
+
+    /// Whether a unit enters the comparison of episodes more than once.
+    fn is_dependent(&self) -> bool {
+        let Some(pairs) = &self.matched.pairs else {
+            return self.study.repeats(self.first) || self.study.repeats(self.second);
+        };
+        let units: BTreeSet<Unit> = pairs.iter().map(|&(row, _)| self.study.unit(row)).collect();
+        units.len() < pairs.len()
+    }
+
+    fn rates_by_unit(&self, column: &MetricColumn, sides: &Sides) -> Comparison {
+        let (a, b) = (self.first.moments(column), self.second.moments(column));
+        let test = sides.test();
+        let least = test.map_or(1.0, |test| test.least);
+        let table = |rows: &Vec<(usize, usize)>| {
+            Pairs::of(rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))))
+        };
+        Comparison {
+            successes: a.counts().zip(b.counts()).map(|(a, b)| [a.0, b.0]),
+            difference: a.mean().zip(b.mean()).map(|(a, b)| a - b),
+            withheld: Some(Withheld::Dependent),
+            pairs: self.matched.pairs.as_ref().filter(|_| !self.is_dependent()).map(table),
+            p: test.map(|test| test.p),
+            p_least: test.map(|test| test.least),
+            units: Some(Units::new(self.study, self.first, sides.len(), least, self.confidence)),
+            ..Comparison::of(Method::Units, [a.n, b.n])
+        }
+    }
+
+    fn of_episodes(&self, column: &MetricColumn) -> Comparison {
         if is_duration(self.study, &column.name) {
             return self.durations(column);
         }
@@ -184,7 +232,13 @@ impl Comparison {
             p_adjusted: None,
             p_tarone: None,
             separated: false,
+            units: None,
         }
+    }
+
+    /// Without interval and test, which take episodes as independent.
+    fn withheld_as_dependent(self) -> Self {
+        Self { interval: None, withheld: Some(Withheld::Dependent), p: None, ..self }
     }
 
     fn of_durations(method: Method, n: [u64; 2], found: Option<Difference>) -> Self {
@@ -233,8 +287,9 @@ pub(super) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confi
         tested.iter().map(|it| Some(Attained { p: it.p?, least: it.p_least? })).collect();
     let by_tarone = attained.map(|attained| tarone_holm(&attained));
     for (at, (comparison, adjusted)) in tested.iter_mut().zip(holm(&p_values)).enumerate() {
+        let too_few = comparison.units.as_ref().is_some_and(|units| units.too_few);
         comparison.p_adjusted = Some(adjusted);
         comparison.p_tarone = by_tarone.as_ref().map(|adjusted| adjusted[at]);
-        comparison.separated = level(confidence).is_some_and(|level| adjusted <= level);
+        comparison.separated = level(confidence).is_some_and(|level| adjusted <= level) && !too_few;
     }
 }

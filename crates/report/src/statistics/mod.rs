@@ -23,6 +23,7 @@ mod selection;
 mod sequential;
 mod study;
 pub mod text;
+mod units;
 mod warnings;
 
 use schemars::JsonSchema;
@@ -30,7 +31,7 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::Answer;
 pub use cells::{CellRow, FEW, Intervals};
-pub use chance::{COMPLETED, ChanceRow, Role, Verdict};
+pub use chance::{COMPLETED, ChanceRow, Role, Units, Verdict};
 pub use clusters::ClusterRow;
 pub use compare::{Comparison, Method, Sign};
 pub use conditions::Contrast;

@@ -11,8 +11,10 @@ use serde::{Deserialize, Serialize};
 use super::durations::{decided, is_duration};
 use super::matching::{Matched, Scenes};
 use super::study::{Block, Study};
+use super::units::Sides;
 use metric::catalog::Kind;
 use score::table::MetricColumn;
+use statistics::clustered::fewest_clusters;
 use statistics::competing::Outcome;
 use statistics::holm::{holm, level};
 use statistics::improvement::{Improvement, probability_of_improvement};
@@ -29,6 +31,8 @@ pub enum OverallMethod {
     MantelHaenszel,
     /// The exact test of `McNemar` over the pairs of all experiments; Newcombe's interval for pairs.
     PooledMcnemar,
+    /// The exact permutation test over scenes, seeds or participants, each of which counts once over all experiments.
+    Units,
 }
 
 /// Two models under one rate, over all experiments that both have.
@@ -115,7 +119,21 @@ impl<'s, 'a> Couple<'s, 'a> {
         self.strata.iter().map(matched).collect()
     }
 
-    fn rate(&self, column: &MetricColumn, pairs: Option<&[Vec<(usize, usize)>]>, confidence: f64) -> OverallRow {
+    fn rate(
+        &self,
+        study: &Study,
+        column: &MetricColumn,
+        pairs: Option<&[Vec<(usize, usize)>]>,
+        confidence: f64,
+    ) -> OverallRow {
+        let row = self.by_episodes(column, pairs, confidence);
+        let Some(sides) = Sides::of(study, column, &self.strata) else { return row };
+        let few = level(confidence).is_none_or(|level| sides.len() < fewest_clusters(level));
+        let p = sides.test().filter(|_| !few).map(|test| test.p);
+        OverallRow { method: OverallMethod::Units, interval: None, p, mid_p: None, ..row }
+    }
+
+    fn by_episodes(&self, column: &MetricColumn, pairs: Option<&[Vec<(usize, usize)>]>, confidence: f64) -> OverallRow {
         let row = |method, difference, interval, test: Option<ExactTest>| OverallRow {
             metric: column.name.clone(),
             first: self.first.clone(),
@@ -180,7 +198,7 @@ pub(super) fn rates(study: &Study, metrics: &[String], confidence: f64) -> Vec<O
     let is_rate = |metric: &&String| study.kind(metric) == Kind::Rate;
     let mut all = Vec::new();
     for column in metrics.iter().filter(is_rate).filter_map(|metric| study.column(metric)) {
-        let of = |(couple, pairs): (&Couple, &Option<Vec<_>>)| couple.rate(column, pairs.as_deref(), confidence);
+        let of = |(couple, pairs): (&Couple, &Option<Vec<_>>)| couple.rate(study, column, pairs.as_deref(), confidence);
         let mut rows: Vec<OverallRow> = couples.iter().zip(&pairs).map(of).collect();
         adjust(&mut rows, confidence);
         all.extend(rows.into_iter().map(|row| row.better_first(study)));

@@ -44,7 +44,7 @@ pub struct Sequential {
     pub models: Vec<SequentialPair>,
 }
 
-/// One rate of one model in one experiment.
+/// One rate of one model in one experiment; of scenes, seeds or participants with several episodes, the first of each.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SequentialRate {
     /// The experiment.
@@ -161,7 +161,7 @@ impl SequentialRate {
 fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec<SequentialRate> {
     let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
     each.filter_map(|(column, block)| {
-        let (successes, n) = block.moments(column).counts()?;
+        let (successes, n) = study.first_of_units(block, column).counts()?;
         Some(SequentialRate {
             experiment: experiment.name.to_owned(),
             model: block.model.to_owned(),

@@ -1,13 +1,13 @@
 //! The episode table seen by experiment, model and condition: the blocks that every statistic compares.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::cells::interval;
 use exact::moments::{MomentOverflow, Moments};
 use metric::catalog::{Better, Kind, Metric};
 use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
-use statistics::design::Design;
+use statistics::design::{Cluster, Design};
 use statistics::interval::Interval;
 
 /// What stands for no condition.
@@ -15,6 +15,18 @@ const DEFAULT_CONDITION: &str = "default";
 
 /// The label of the scene: room, body, cubes, start.
 const SCENE: &str = "scene";
+
+/// The label of the person who played.
+const PARTICIPANT: &str = "participant";
+
+/// What episodes share that depend on each other; the unit of analysis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Unit {
+    Seed(i32),
+    Participant(usize),
+    Scene(usize),
+    Episode(usize),
+}
 
 /// An episode table and its blocks, ordered by the catalog's experiments, then by model and condition.
 pub(super) struct Study<'a> {
@@ -66,6 +78,65 @@ impl<'a> Study<'a> {
     /// The scene of each row, where equal scenes make pairs.
     pub fn scenes(&self) -> Option<&'a TextColumn> {
         self.table.label(SCENE).filter(|_| self.design.has_pairs())
+    }
+
+    /// Whether episodes may share a unit: clusters, participants or scenes are declared.
+    pub fn has_units(&self) -> bool {
+        let labelled = || [SCENE, PARTICIPANT].iter().any(|label| self.table.label(label).is_some());
+        self.design.has_pairs() && (self.design.clusters().is_some() || labelled())
+    }
+
+    /// The unit of a row: the declared cluster, else the participant, else the scene, else the episode itself.
+    pub fn unit(&self, row: usize) -> Unit {
+        let code = |label: Option<&TextColumn>| label.and_then(|label| label.code(row));
+        if self.design.clusters() == Some(Cluster::Seed) {
+            return Unit::Seed(self.table.keys.seed(row));
+        }
+        let participants = self.table.label(PARTICIPANT).filter(|_| self.design.has_pairs());
+        let participant = code(participants).map(Unit::Participant);
+        participant.or_else(|| code(self.scenes()).map(Unit::Scene)).unwrap_or(Unit::Episode(row))
+    }
+
+    /// The defined values of each unit of a block.
+    pub fn by_unit(&self, block: &Block, column: &MetricColumn) -> BTreeMap<Unit, Moments> {
+        let mut units: BTreeMap<Unit, Moments> = BTreeMap::new();
+        for (row, value) in block.rows().filter_map(|row| Some((row, column.get(row)?))) {
+            let sum = units.entry(self.unit(row)).or_default();
+            *sum = sum.with(value).expect("a part of a block that was summed whole");
+        }
+        units
+    }
+
+    /// The moments of the first defined episode of each unit.
+    pub fn first_of_units(&self, block: &Block, column: &MetricColumn) -> Moments {
+        if !self.repeats(block) {
+            return block.moments(column);
+        }
+        let mut seen = BTreeSet::new();
+        let defined = block.rows().filter_map(|row| Some((row, column.get(row)?)));
+        let firsts = defined.filter(|(row, _)| seen.insert(self.unit(*row)));
+        firsts.fold(Moments::default(), |sum, (_, value)| {
+            sum.with(value).expect("a part of a block that was summed whole")
+        })
+    }
+
+    /// Whether a unit of the block has several episodes.
+    pub fn repeats(&self, block: &Block) -> bool {
+        if !self.has_units() {
+            return false;
+        }
+        let units: BTreeSet<Unit> = block.rows().map(|row| self.unit(row)).collect();
+        units.len() < block.rows().count()
+    }
+
+    /// What the units of a block are called, in the plural.
+    pub fn unit_name(&self, block: &Block) -> &'static str {
+        match block.rows().next().map(|row| self.unit(row)) {
+            Some(Unit::Seed(_)) => "seeds",
+            Some(Unit::Participant(_)) => "participants",
+            Some(Unit::Scene(_)) => "scenes",
+            _ => "episodes",
+        }
     }
 
     pub fn column(&self, metric: &str) -> Option<&'a MetricColumn> {

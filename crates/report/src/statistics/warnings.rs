@@ -99,7 +99,7 @@ fn repeated(statistics: &Statistics) -> Option<String> {
     let most = matchings(statistics).map(|matching| matching.repeated).max().filter(|&most| most > 0)?;
     let unpaired = matchings(statistics).any(|matching| matching.repeated > 0 && !matching.paired);
     let follows = if unpaired {
-        "; where a comparison is not by pairs they are taken as independent, which repeats of a scene are not"
+        "; a test of a rate counts each scene once, and durations with repeats are not tested"
     } else {
         ""
     };
@@ -120,7 +120,7 @@ fn few_seeds(statistics: &Statistics) -> Option<String> {
     let seeds = if fewest == 1 { "1 seed is".to_owned() } else { format!("{fewest} seeds are") };
     Some(format!(
         "{seeds} too few for a claim about new seeds: no test over fewer than {needed} can reach p = {}. \
-         Tests and intervals speak of new runs of these seeds; see the clustered intervals for how little is known beyond them.",
+         Rates are tested by seed, durations are not tested; intervals of cells speak of new runs of these seeds.",
         p_value(Some(level)).trim_end_matches('0')
     ))
 }

@@ -91,7 +91,7 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
         (
             format!(
                 "Models over all experiments: exact conditional test with the Mantel-Haenszel difference and Klingenberg's \
-                 {percent} interval, or McNemar's over the pairs of all; two-sided by minimum likelihood; Holm over all pairs"
+                 {percent} interval, McNemar's over the pairs of all, or permutation by scene or cluster; two-sided by minimum likelihood; Holm over all pairs"
             ),
             tables::overall(statistics, shown, is_full),
         ),

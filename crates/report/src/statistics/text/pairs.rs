@@ -96,6 +96,7 @@ impl<'a> PairText<'a> {
             test: match row.method {
                 OverallMethod::MantelHaenszel => "exact conditional",
                 OverallMethod::PooledMcnemar => "McNemar, pooled",
+                OverallMethod::Units => "by scene or cluster",
             },
             counts: [UNDEFINED, UNDEFINED].map(str::to_owned),
             differing: [UNDEFINED, UNDEFINED].map(str::to_owned),

@@ -128,6 +128,7 @@ pub(super) const fn method(method: Method) -> (&'static str, usize) {
     match method {
         Method::Mcnemar => ("McNemar", 3),
         Method::Fisher => ("Fisher", 3),
+        Method::Units => ("by scene or cluster", 3),
         Method::RestrictedMeanPaired => ("restricted means, pairs", 2),
         Method::RestrictedMean => ("restricted means", 2),
         Method::StudentPaired => ("Student's t, pairs", 2),
@@ -142,6 +143,7 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> T
         let test = match row.method {
             OverallMethod::MantelHaenszel => "exact conditional",
             OverallMethod::PooledMcnemar => "McNemar, pooled",
+            OverallMethod::Units => "by scene or cluster",
         };
         let verdict = if row.separated { "better" } else { "not told apart" };
         let mut line: Vec<String> = [&*row.metric, &row.first, &row.second, test].map(str::to_owned).to_vec();

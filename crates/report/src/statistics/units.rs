@@ -1,0 +1,67 @@
+//! Two models' rates by unit of analysis: a scene, a declared cluster or a participant counts once.
+
+use std::collections::BTreeMap;
+use std::mem::discriminant;
+
+use super::study::{Block, Study, Unit};
+use exact::moments::Moments;
+use score::table::MetricColumn;
+use statistics::units::{UnitTest, difference_test};
+
+/// The values of two sides by unit.
+pub(super) struct Sides {
+    units: BTreeMap<Unit, (Moments, Moments)>,
+}
+
+impl Sides {
+    /// The sides of all strata together, so that a unit of several strata counts once.
+    ///
+    /// `None` where each episode is a unit, or all units are pairs of one episode each.
+    pub fn of(study: &Study, column: &MetricColumn, strata: &[(&Block, &Block)]) -> Option<Self> {
+        if !study.has_units() {
+            return None;
+        }
+        let mut units: BTreeMap<Unit, (Moments, Moments)> = BTreeMap::new();
+        let add = |sum: &mut Moments, part: Moments| {
+            sum.n += part.n;
+            sum.sum += part.sum;
+            sum.sum_sq += part.sum_sq;
+        };
+        for (first, second) in strata {
+            for (unit, part) in study.by_unit(first, column) {
+                add(&mut units.entry(unit).or_default().0, part);
+            }
+            for (unit, part) in study.by_unit(second, column) {
+                add(&mut units.entry(unit).or_default().1, part);
+            }
+        }
+        let repeats = units.values().any(|(a, b)| a.n > 1 || b.n > 1);
+        let shared = units.values().filter(|(a, b)| a.n > 0 && b.n > 0).count();
+        let is_partly_shared = shared > 0 && shared < units.len();
+        (repeats || is_partly_shared).then_some(Self { units })
+    }
+
+    /// The number of units.
+    pub fn len(&self) -> usize {
+        self.units.len()
+    }
+
+    /// The exact test; `None` also where the units of the two sides are of different kinds.
+    pub fn test(&self) -> Option<UnitTest> {
+        let (mut shared, mut first, mut second) = (Vec::new(), Vec::new(), Vec::new());
+        let mut kinds = [None; 2];
+        for (unit, &(a, b)) in &self.units {
+            match (a.n, b.n) {
+                (0, _) => second.push(b),
+                (_, 0) => first.push(a),
+                _ => shared.push((a, b)),
+            }
+            for (kind, side) in kinds.iter_mut().zip([a, b]) {
+                if side.n > 0 {
+                    kind.get_or_insert(discriminant(unit));
+                }
+            }
+        }
+        (kinds[0] == kinds[1]).then(|| difference_test(&shared, &first, &second)).flatten()
+    }
+}

@@ -1,0 +1,89 @@
+//! What is said where scenes, seeds or participants have several episodes: each counts once.
+
+use report::statistics::{Method, Options, OverallMethod, Statistics, Verdict};
+
+use super::{CLUSTERED, RECORDED, Row, by_place, cells, labelled, with_scenes};
+
+/// Two models, one of which solves every episode and the other none, with `repeats` episodes of each scene.
+fn opposed(scenes: i32, repeats: i32) -> Vec<Row<'static>> {
+    let of = |model, solved| {
+        (0..scenes).flat_map(move |scene| (0..repeats).map(move |run| ("E1", model, scene, run, solved, 9)))
+    };
+    of("oracle", true).chain(of("random", false)).collect()
+}
+
+fn by_scene(row: &Row) -> Option<String> {
+    Some(row.2.to_string())
+}
+
+fn is_silent(found: &Statistics, units: &str) -> bool {
+    found.chance.iter().filter(|row| row.metric == "TSA").all(|row| row.verdict == Verdict::NotSeparated)
+        && found.models.iter().flat_map(|family| &family.tests).all(|test| !test.comparison.separated)
+        && found.answers.iter().any(|answer| answer.answer == format!("E1 cannot say: {units}"))
+}
+
+#[test]
+fn three_scenes_say_nothing_however_often_they_are_repeated() {
+    for repeats in [3, 7] {
+        let found = with_scenes(&opposed(3, repeats), RECORDED, by_scene);
+        assert!(is_silent(&found, "3 scenes"), "{:?}", found.answers);
+    }
+}
+
+// scipy 1.17.1: binomtest(7, 7, 1/3).pvalue; enumeration of 2^7 signs: 2/128
+#[test]
+fn seven_scenes_count_as_seven() {
+    let found = with_scenes(&opposed(7, 3), RECORDED, by_scene);
+    let row = found.chance.iter().find(|row| row.model == "oracle" && row.metric == "TSA").unwrap();
+    assert!((row.p - 1.0 / 2187.0).abs() < 1e-12, "{row:?}");
+    assert_eq!((row.units.as_ref().unwrap().n, row.verdict), (7, Verdict::Above));
+    let test = &found.models[0].tests[0].comparison;
+    assert_eq!((test.method, test.p, test.separated), (Method::Units, Some(2.0 / 128.0), true));
+}
+
+#[test]
+fn declared_seeds_are_the_unit_of_every_test() {
+    let three = with_scenes(&opposed(3, 7), CLUSTERED, by_place);
+    assert!(is_silent(&three, "3 seeds"), "{:?}", three.answers);
+    let one = with_scenes(&opposed(1, 21), CLUSTERED, by_place);
+    assert!(is_silent(&one, "1 seed"), "{:?}", one.answers);
+    let undeclared = with_scenes(&opposed(3, 7), RECORDED, by_place);
+    assert!(undeclared.models[0].tests[0].comparison.separated, "21 scenes of three seeds are 21");
+}
+
+#[test]
+fn one_participant_is_one() {
+    let table = labelled(&opposed(3, 7), "participant", |row| Some(row.1.to_owned()));
+    let options = Options { design: RECORDED, ..Options::default() };
+    let found = Statistics::of(&table, &cells(&table), &options).unwrap();
+    assert!(found.answers.iter().any(|answer| answer.answer == "E1 cannot say: 1 participant"), "{:?}", found.answers);
+    assert!(found.chance.iter().all(|row| row.verdict == Verdict::NotSeparated));
+}
+
+// Five scenes 4:0 and one 0:4 over four experiments. scipy 1.17.1: binomtest(1, 6).pvalue
+#[test]
+fn a_scene_of_four_experiments_counts_once() {
+    let mut rows: Vec<Row> = Vec::new();
+    for experiment in ["E1", "E2", "E3", "E4"] {
+        for scene in 0..6 {
+            rows.push((experiment, "a", scene, 0, scene < 5, 9));
+            rows.push((experiment, "b", scene, 0, scene == 5, 9));
+        }
+    }
+    let found = with_scenes(&rows, RECORDED, by_scene);
+    let row = found.overall.iter().find(|row| row.metric == "TSA").unwrap();
+    assert_eq!((row.method, row.p, row.separated), (OverallMethod::Units, Some(0.21875), false));
+}
+
+// 11 pairs 11:0, else 1 of 11 against 11 of 11.
+#[test]
+fn half_of_the_episodes_in_pairs_do_not_hide_the_other_half() {
+    let a = (0..22).map(|at| ("E1", "a", at, 0, at <= 11, 9));
+    let b = (0..22).map(|at| ("E1", "b", at, 0, at >= 11, 9));
+    let rows: Vec<Row> = a.chain(b).collect();
+    let scene = |row: &Row| Some(if row.2 < 11 { row.2.to_string() } else { format!("{} {}", row.1, row.2) });
+    let found = with_scenes(&rows, RECORDED, scene);
+    let test = &found.models[0].tests[0].comparison;
+    assert_eq!((test.method, test.n, test.separated), (Method::Units, [22, 22], false));
+    assert!((test.difference.unwrap() - 1.0 / 22.0).abs() < 1e-12 && test.p.unwrap() > 0.7, "{test:?}");
+}

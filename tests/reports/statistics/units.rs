@@ -12,6 +12,7 @@ fn opposed(scenes: i32, repeats: i32) -> Vec<Row<'static>> {
     of("oracle", true).chain(of("random", false)).collect()
 }
 
+#[expect(clippy::unnecessary_wraps, reason = "a label may be null, and others are")]
 fn by_scene(row: &Row) -> Option<String> {
     Some(row.2.to_string())
 }

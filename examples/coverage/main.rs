@@ -5,6 +5,7 @@
 mod errors;
 mod intervals;
 mod looks;
+mod units;
 
 use statistics::random::SplitMix64;
 
@@ -31,6 +32,7 @@ fn main() {
     intervals::improvements();
     looks::singles();
     looks::pairs();
+    units::repeats();
 }
 
 fn heading(title: &str, note: &str, columns: &[&str]) {

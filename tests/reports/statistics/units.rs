@@ -88,3 +88,19 @@ fn half_of_the_episodes_in_pairs_do_not_hide_the_other_half() {
     assert_eq!((test.method, test.n, test.separated), (Method::Units, [22, 22], false));
     assert!((test.difference.unwrap() - 1.0 / 22.0).abs() < 1e-12 && test.p.unwrap() > 0.7, "{test:?}");
 }
+
+// Two pairs: the least p of McNemar's test is 1/2. Two episodes against 1/3: the least p of the binomial test is 1/9.
+#[test]
+fn episodes_too_few_for_any_verdict_are_told_from_those_that_show_nothing() {
+    let rows = |n: i32| {
+        let of = |model, solved| (0..n).map(move |at| ("E1", model, at, 0, solved, 9));
+        of("a", true).chain(of("b", true)).collect::<Vec<Row>>()
+    };
+    let answers = |n: i32| {
+        let found = with_scenes(&rows(n), RECORDED, by_scene);
+        found.answers.iter().filter(|it| it.metric == "TSA").map(|it| it.answer.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(answers(2), ["E1 cannot say: 2 episodes", "E1 cannot say: 2 pairs"]);
+    assert_eq!(answers(5)[1], "E1 cannot say: 5 pairs");
+    assert_eq!(answers(6), ["E1 all 2", "E1 nobody"]);
+}

@@ -36,10 +36,11 @@ impl Answer {
 /// The answers about the headline metrics.
 pub(super) fn answers(statistics: &Statistics) -> Vec<Answer> {
     let mut answers = Vec::new();
+    let confidence = statistics.confidence;
     for metric in &statistics.headline {
         let completed = COMPLETED.iter().filter(|(whole, _)| whole == metric).map(|(_, completed)| *completed);
         for metric in [metric.as_str()].into_iter().chain(completed) {
-            answers.extend(Answer::new("Who is above chance?", metric, &above(&statistics.chance, metric)));
+            answers.extend(Answer::new("Who is above chance?", metric, &above(&statistics.chance, metric, confidence)));
         }
     }
     for metric in &statistics.headline {
@@ -47,26 +48,26 @@ pub(super) fn answers(statistics: &Statistics) -> Vec<Answer> {
         let overall: Vec<_> = statistics.overall.iter().filter(|row| row.metric == *metric).collect();
         let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
         let overall = (!overall.is_empty()).then(|| differing("over all experiments", overall.len(), separated));
-        let parts: Vec<String> = families.map(differing_in).chain(overall).collect();
+        let parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
         answers.extend(Answer::new("Who differs from whom?", metric, &parts));
     }
     for metric in &statistics.headline {
-        let parts = changes(&statistics.conditions, metric);
+        let parts = changes(&statistics.conditions, metric, confidence);
         answers.extend(Answer::new("What does the mirror change?", metric, &parts));
     }
     answers
 }
 
 /// Per experiment, the models above its chance level; above its highest reference where it has none.
-fn above(rows: &[ChanceRow], metric: &str) -> Vec<String> {
+fn above(rows: &[ChanceRow], metric: &str, confidence: f64) -> Vec<String> {
     let mut experiments: IndexMap<&str, Vec<&ChanceRow>> = IndexMap::new();
     for row in rows.iter().filter(|row| row.metric == metric) {
         experiments.entry(&row.experiment).or_default().push(row);
     }
-    experiments.into_iter().map(|(experiment, rows)| above_in(experiment, &rows)).collect()
+    experiments.into_iter().map(|(experiment, rows)| above_in(experiment, &rows, confidence)).collect()
 }
 
-fn above_in(experiment: &str, rows: &[&ChanceRow]) -> String {
+fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
     let highest = |a: &&&ChanceRow, b: &&&ChanceRow| a.level.value().total_cmp(&b.level.value());
     let level =
         rows.iter().filter(|row| row.role == Role::Chance).max_by(highest).or_else(|| rows.iter().max_by(highest));
@@ -74,8 +75,8 @@ fn above_in(experiment: &str, rows: &[&ChanceRow]) -> String {
     let rows: Vec<_> = rows.iter().filter(|row| Some((row.role, row.level)) == level).collect();
     let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect::<Vec<_>>();
     let (above, below) = (those(Verdict::Above), those(Verdict::Below));
-    let unsaid: Vec<(String, &Units)> =
-        rows.iter().filter_map(|row| Some((row.name(), row.units.as_ref().filter(|units| units.too_few)?))).collect();
+    let unsaid: Vec<(String, Units)> =
+        rows.iter().filter_map(|row| Some((row.name(), row.too_few(confidence)?))).collect();
     let reference = level.filter(|(role, _)| *role == Role::Reference);
     let about =
         reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));
@@ -104,16 +105,17 @@ fn cannot_say(Units { n, name, .. }: &Units) -> String {
 }
 
 /// Why none of these comparisons can show a difference; `None` where one can.
-fn untested(comparisons: &[&Comparison]) -> Option<String> {
-    let too_few = comparisons.iter().map(|it| it.units.as_ref().filter(|units| units.too_few));
-    if let Some(units) = too_few.collect::<Option<Vec<_>>>() {
-        return units.into_iter().max_by_key(|units| units.n).map(cannot_say);
+fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
+    let mut tested = comparisons.iter().filter(|found| found.p.is_some() || found.units.is_some()).peekable();
+    if tested.peek().is_none() {
+        return Some("not tested".to_owned());
     }
-    comparisons.iter().all(|it| it.p.is_none()).then(|| "not tested".to_owned())
+    let too_few = tested.map(|found| found.too_few(confidence)).collect::<Option<Vec<_>>>()?;
+    too_few.iter().max_by_key(|units| units.n).map(cannot_say)
 }
 
-fn differing_in(family: &Family) -> String {
-    if let Some(why) = untested(&family.tests.iter().map(|test| &test.comparison).collect::<Vec<_>>()) {
+fn differing_in(family: &Family, confidence: f64) -> String {
+    if let Some(why) = untested(&family.tests.iter().map(|test| &test.comparison).collect::<Vec<_>>(), confidence) {
         return format!("{} {why}", family.experiment);
     }
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
@@ -137,15 +139,15 @@ fn differing<'n>(about: &str, all: usize, separated: impl Iterator<Item = (&'n s
 }
 
 /// Per other experiment, the models that it shows a change of.
-fn changes(contrasts: &[Contrast], metric: &str) -> Vec<String> {
+fn changes(contrasts: &[Contrast], metric: &str, confidence: f64) -> Vec<String> {
     let mut groups: IndexMap<(&str, &str), Vec<&Contrast>> = IndexMap::new();
     for contrast in contrasts.iter().filter(|contrast| contrast.metric == metric) {
         groups.entry((&contrast.baseline, &contrast.against)).or_default().push(contrast);
     }
-    groups.into_iter().map(|((baseline, against), group)| changed(baseline, against, &group)).collect()
+    groups.into_iter().map(|((baseline, against), group)| changed(baseline, against, &group, confidence)).collect()
 }
 
-fn changed(baseline: &str, against: &str, group: &[&Contrast]) -> String {
+fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) -> String {
     let those = |sign| -> Vec<String> {
         let found = group.iter().filter(|contrast| contrast.comparison.sign() == sign);
         found.map(|contrast| named(&contrast.model, contrast.condition.as_deref())).collect()
@@ -154,7 +156,7 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast]) -> String {
         let models = those(Some(sign));
         (!models.is_empty()).then(|| format!("{what} {}", names(&models, group.len())))
     };
-    if let Some(why) = untested(&group.iter().map(|contrast| &contrast.comparison).collect::<Vec<_>>()) {
+    if let Some(why) = untested(&group.iter().map(|contrast| &contrast.comparison).collect::<Vec<_>>(), confidence) {
         return format!("{baseline} - {against} {why}");
     }
     let rest = those(None).len();

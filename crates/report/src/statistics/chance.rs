@@ -152,6 +152,16 @@ impl ChanceRow {
         tested.into_iter().zip(adjusted.into_iter().zip(by_tarone)).map(row).collect()
     }
 
+    /// The units or episodes where they are too few for any verdict; none where they are enough.
+    pub(super) fn too_few(&self, confidence: f64) -> Option<Units> {
+        let hopeless =
+            || least_p(self.n, self.level).zip(level(confidence)).is_some_and(|(least, level)| least > level);
+        match &self.units {
+            Some(units) => units.too_few.then(|| units.clone()),
+            None => hopeless().then(|| Units { n: self.n, name: "episodes".to_owned(), too_few: true }),
+        }
+    }
+
     /// The model as it is compared.
     pub fn name(&self) -> String {
         named(&self.model, self.condition.as_deref())

@@ -263,6 +263,25 @@ impl Comparison {
         Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), p_least: least, ..self }
     }
 
+    /// The units, pairs or episodes where they are too few for any verdict; none where they are enough, and without a test.
+    #[expect(clippy::cast_precision_loss, reason = "few episodes: more of them are never too few")]
+    pub(super) fn too_few(&self, confidence: f64) -> Option<Units> {
+        if let Some(units) = &self.units {
+            return units.too_few.then(|| units.clone());
+        }
+        let [m, n] = self.n;
+        let (least, name) = match self.method {
+            Method::Mcnemar => (0.5f64.powf(m as f64 - 1.0), "pairs"),
+            Method::Fisher => {
+                let divisions: f64 = (1..=m.min(n)).map(|k| (m.max(n) + k) as f64 / k as f64).product();
+                (if m == n { 2.0 / divisions } else { 1.0 / divisions }, "episodes")
+            }
+            _ => return None,
+        };
+        let is_hopeless = self.p.is_some() && level(confidence).is_some_and(|level| least > level);
+        is_hopeless.then(|| Units { n: m.min(n), name: name.to_owned(), too_few: true })
+    }
+
     /// Whether the first is shown to be above or below the second; none where neither is.
     pub fn sign(&self) -> Option<Sign> {
         let difference = self.difference.filter(|_| self.separated)?;

@@ -84,7 +84,7 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
         return format!("{about} {}", cannot_say(units));
     }
     let below = if below.is_empty() { String::new() } else { format!(" (below: {})", names(&below, rows.len())) };
-    let unsaid = unsaid.iter().map(|(model, units)| format!("of {model} {}", cannot_say(units)));
+    let unsaid = unsaid.iter().map(|(model, units)| format!("cannot say for {model}: {}", counted(units)));
     let told = format!("{about} {}{below}", names(&above, rows.len()));
     [told].into_iter().chain(unsaid).collect::<Vec<_>>().join(", ")
 }
@@ -99,9 +99,13 @@ fn names(models: &[String], all: usize) -> String {
 }
 
 /// The answer where no outcome of these units could be significant.
-fn cannot_say(Units { n, name, .. }: &Units) -> String {
+fn cannot_say(units: &Units) -> String {
+    format!("cannot say: {}", counted(units))
+}
+
+fn counted(Units { n, name, .. }: &Units) -> String {
     let name = if *n == 1 { name.trim_end_matches('s') } else { name };
-    format!("cannot say: {n} {name}")
+    format!("{n} {name}")
 }
 
 /// Why none of these comparisons can show a difference; `None` where one can.

@@ -31,7 +31,6 @@ impl Type {
 /// per step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Level {
-    /// The same value everywhere.
     Constant,
     /// One value per episode.
     Episode,

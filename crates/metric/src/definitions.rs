@@ -20,7 +20,6 @@ use exact::suggest::nearest;
 pub struct Definitions {
     /// What tables, figures and files of scores carry along.
     pub catalog: Catalog,
-    /// What computes the metrics.
     pub plan: Plan,
     document: Document,
 }

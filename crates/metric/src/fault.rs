@@ -21,14 +21,12 @@ pub(crate) const MOST: usize = 100;
 pub struct Source {
     /// What the reader knows it by: a file name, or `--where`.
     pub name: String,
-    /// All of it.
     pub text: String,
 }
 
 /// Some bytes of a source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// The text pointed into.
     pub source: Arc<Source>,
     /// The bytes pointed at.
     pub span: Range<usize>,
@@ -39,7 +37,6 @@ pub struct Place {
 pub struct Fault {
     /// What is wrong, lowercase, one line.
     pub message: String,
-    /// Where.
     pub place: Place,
     /// What to say right under the span; may be empty.
     pub label: String,

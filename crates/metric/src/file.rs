@@ -59,41 +59,29 @@ pub struct Document {
     pub columns: IndexMap<String, (Column, Place)>,
     /// Named expressions.
     pub lets: IndexMap<String, (Written, Place)>,
-    /// Metrics.
     pub metrics: IndexMap<String, MetricEntry>,
-    /// Experiments.
     pub experiments: IndexMap<String, ExperimentEntry>,
 }
 
 /// A `[metric.NAME]` table.
 #[derive(Clone, Debug)]
 pub struct MetricEntry {
-    /// Where its name stands.
     pub place: Place,
     /// `title`, the name itself if absent.
     pub title: Option<String>,
-    /// `unit`
     pub unit: Option<(String, Place)>,
-    /// `better`
     pub better: Better,
-    /// `section`
     pub section: String,
-    /// `help`
     pub help: String,
-    /// `value`
     pub value: Written,
-    /// `when`
     pub when: Option<Written>,
-    /// `se`
     pub se: StandardError,
-    /// `chance`
     pub chance: Option<Ratio>,
 }
 
 /// An `[experiment.NAME]` table.
 #[derive(Clone, Debug)]
 pub struct ExperimentEntry {
-    /// `title`
     pub title: String,
     /// `order`, the position in the file if absent.
     pub order: Option<i64>,

@@ -15,7 +15,6 @@ const ALL: Range = (i64::MIN as i128, i64::MAX as i128);
 /// A node whose value may leave 64 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Suspect {
-    /// The node.
     pub node: NodeId,
     /// Whether it does so in every trace, being made of constants alone.
     pub certain: bool,

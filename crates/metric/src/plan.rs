@@ -23,7 +23,6 @@ impl NodeId {
 /// One operation, its type and how often it has a value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// What is computed.
     pub op: Op,
     /// The type of the result.
     pub ty: Type,
@@ -41,7 +40,6 @@ pub enum Op {
     Time,
     /// The number of steps of the episode, T.
     Length,
-    /// The same value everywhere.
     Constant(Constant),
     /// An episode's value for each of its steps, or a constant for each episode or step.
     Spread(NodeId),
@@ -93,17 +91,13 @@ pub enum Op {
 pub enum Constant {
     /// Null of the node's type.
     Null,
-    /// A truth value.
     Bool(bool),
-    /// An integer.
     Int(i64),
     /// The bits of a double.
     Float(u64),
-    /// A text.
     Text(String),
 }
 
-/// Comparisons.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "the names say it")]
 pub enum Comparison {
@@ -130,7 +124,6 @@ impl Comparison {
     }
 }
 
-/// Arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Arithmetic {
     /// `x + y`

@@ -44,7 +44,6 @@ pub struct Bundle<'a> {
 pub struct OutputFile {
     /// Its path inside the folder.
     pub path: PathBuf,
-    /// Its content.
     pub bytes: Vec<u8>,
 }
 

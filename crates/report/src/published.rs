@@ -31,21 +31,18 @@ pub struct CellLabel {
     pub metric: String,
 }
 
-/// A cell as printed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PrintedCell {
     /// The mean; `None` where it is undefined.
     pub mean: Option<Decimal>,
     /// Its standard error; `None` where it is undefined.
     pub se: Option<Decimal>,
-    /// How it stands out.
     pub emphasis: Emphasis,
 }
 
 /// A published table, in the order of its file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Published {
-    /// The cells.
     pub cells: Vec<(CellLabel, PrintedCell)>,
 }
 

@@ -22,7 +22,6 @@ use trace::scan::EpisodeBatch;
 /// What two definitions give.
 #[derive(Clone, Debug)]
 pub struct ScoredPair {
-    /// A table per definitions.
     pub tables: [EpisodeTable; 2],
     /// Per definitions, what decided the metrics that differ, by episode: those episodes alone in which some differ and
     /// that both filters keep.

@@ -69,7 +69,6 @@ pub struct Total {
     pub sum: i128,
 }
 
-/// Quality by cell.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct QualityByCell(pub BTreeMap<CellKey, Quality>);
 

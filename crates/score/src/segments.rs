@@ -12,7 +12,7 @@ use arrow::datatypes::Int64Type;
 use arrow::error::ArrowError;
 
 use metric::plan::{Aggregate, Comparison};
-use trace::bits::{self, Bits};
+use parquet_pages::bits::{self, Bits};
 
 /// Where episodes begin and end among the rows of a batch.
 #[derive(Clone, Copy, Debug)]

@@ -81,7 +81,6 @@ pub struct TextColumn {
 pub struct LabelColumn {
     /// The column's name in the trace.
     pub name: String,
-    /// A value per episode.
     pub values: TextColumn,
 }
 
@@ -183,7 +182,6 @@ pub(super) fn narrow(row: usize) -> u32 {
 }
 
 impl EpisodeKeys {
-    /// The number of episodes.
     pub fn len(&self) -> usize {
         self.seed.len()
     }
@@ -300,7 +298,6 @@ impl EpisodeKey {
 }
 
 impl TextColumn {
-    /// The number of rows.
     pub fn len(&self) -> usize {
         self.codes.len()
     }

@@ -19,13 +19,11 @@ use trace::scan::EpisodeBatch;
 /// One episode along its time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Timeline {
-    /// The episode.
     pub key: EpisodeKey,
     /// The number of steps, T.
     pub length: u32,
     /// The runs of timesteps with mirror evidence in view, ascending, apart from each other.
     pub visible: Vec<RangeInclusive<u32>>,
-    /// The first of them.
     pub first_sight: Option<u32>,
     /// The first commitment to a colour before the end.
     pub claim: Option<u32>,

@@ -14,7 +14,7 @@ use arrow::datatypes::{ArrowNativeType, Float64Type, Int32Type, Int64Type, UInt3
 use super::segments::{Segments, Stretch};
 use metric::columns::Type;
 use metric::plan::Constant;
-use trace::bits;
+use parquet_pages::bits;
 use trace::scan::Texts;
 
 /// What one step gives. The physical plan knows which form it is.

@@ -15,7 +15,6 @@ const HALF: f64 = 0.5 - 1e-12;
 pub struct Ending {
     /// The steps until the decision, or until the recording stopped.
     pub steps: i64,
-    /// How it ended.
     pub outcome: Outcome,
 }
 

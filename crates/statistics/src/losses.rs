@@ -58,7 +58,6 @@ pub fn bounds(episodes: impl IntoIterator<Item = (Option<i64>, Fate)>, confidenc
 pub enum Fate {
     /// It ran as it should.
     Kept,
-    /// The infrastructure ended it.
     Lost,
 }
 

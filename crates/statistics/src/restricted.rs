@@ -17,7 +17,6 @@ pub struct Difference {
     pub horizon: i64,
     /// The first minus the second, in steps.
     pub difference: f64,
-    /// Its standard error.
     pub se: f64,
     /// Plus and minus deviates of Student's t, within the horizon; `None` where the standard error is zero.
     pub interval: Option<Interval>,

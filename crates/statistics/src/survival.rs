@@ -19,7 +19,6 @@ const HALF: f64 = 0.5 + 1e-12;
 pub struct Duration {
     /// The steps until the decision, or until the recording stopped.
     pub steps: i64,
-    /// How it ended.
     pub end: End,
 }
 
@@ -42,11 +41,9 @@ pub struct Survival {
 /// One step of the curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
-    /// The step.
     pub steps: i64,
     /// The episodes that lasted until here.
     pub at_risk: u64,
-    /// The episodes decided here.
     pub decided: u64,
     /// The share undecided after this step.
     pub undecided: f64,

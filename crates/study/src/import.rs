@@ -23,7 +23,6 @@ const LARGEST: Limit = Limit::new("bytes of a palette", 1 << 20);
 /// What an import takes its steps for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportRequest {
-    /// The trace to write.
     pub out: PathBuf,
     /// The definitions whose experiments are known, by name or path.
     pub definitions: PathBuf,

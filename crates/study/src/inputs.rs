@@ -21,12 +21,9 @@ pub enum Source {
     Scores(Vec<ScoreFile>),
 }
 
-/// A file of scores.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScoreFile {
-    /// Its name and place.
     pub input: Input,
-    /// How it is written.
     pub format: Format,
     /// Whether it says what it was computed with; text and what other engines write does not.
     pub carries_definitions: bool,

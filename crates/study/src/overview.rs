@@ -31,7 +31,6 @@ pub enum Part {
 pub struct Overview {
     /// Each as its element, in the order of the page.
     pub sections: Vec<String>,
-    /// How many episodes count.
     pub episodes: usize,
     /// The columns that cells are grouped by.
     pub by: Vec<String>,

@@ -71,7 +71,6 @@ impl FromStr for Thresholds {
 pub struct SensitivityReport {
     /// Cells and conclusions under each threshold.
     pub found: Sensitivity,
-    /// The same as curves.
     pub figure: Figure,
     /// What a reader must know of the data, one sentence each.
     pub notes: Vec<String>,
@@ -172,7 +171,6 @@ struct Trial {
     /// The metrics that depend on the evidence, and the others.
     moved: Vec<String>,
     unmoved: Vec<String>,
-    /// Whether the filter does.
     is_filter_moved: bool,
 }
 

@@ -89,7 +89,6 @@ impl Action {
     pub const HAND: [Self; 6] =
         [Self::HandUp, Self::HandDown, Self::HandLeft, Self::HandRight, Self::HandForward, Self::HandBackward];
 
-    /// All of them.
     pub const ALL: [Self; 11] = [
         Self::MoveForward,
         Self::MoveBackward,

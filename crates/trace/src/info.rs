@@ -10,7 +10,6 @@ use arrow::datatypes::{Int32Type, Int64Type};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::checksums::Checksums;
 use super::diagnostic::Finding;
 use super::error::TraceError;
 use super::read::in_order::in_order;
@@ -20,6 +19,7 @@ use super::scan::{EpisodeBatch, Projection};
 use super::schema::{self, Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
 use exact::budget::Limit;
 use exact::hash;
+use parquet_pages::checksums::Checksums;
 
 /// A summary of some traces.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
@@ -137,7 +137,6 @@ const MOST_COVERED: Limit = Limit::new("seeds and runs of models in experiments"
 /// Whether episodes are listed, beside being counted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Listing {
-    /// Each one.
     Episodes,
     /// None.
     Nothing,

@@ -24,7 +24,6 @@ pub struct Input {
     /// The path as typed if that was relative; relative to the current folder if below it; otherwise the file's name
     /// alone. Never absolute; `/` between its parts.
     pub name: String,
-    /// Where it is.
     pub path: PathBuf,
 }
 

@@ -14,7 +14,6 @@
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 pub mod answered;
-pub mod bits;
 pub mod catch_panic;
 pub mod checksums;
 pub mod declared;
@@ -24,8 +23,6 @@ pub mod episode;
 pub mod episode_hash;
 pub mod error;
 pub mod frame;
-#[cfg(feature = "fuzz")]
-pub mod fuzz;
 mod glob_paths;
 pub mod identification;
 pub mod import;
@@ -45,7 +42,6 @@ pub mod write;
 
 pub use read::flat::FlatRows;
 pub use read::flat::TableFile;
-pub use read::footer::shape as footer_shape;
 pub use read::{in_order, open, steps, verify};
 pub use schema::{colors, describe};
 pub use write::merge;

@@ -8,12 +8,11 @@ use arrow::datatypes::Int32Type;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::read::column::Column;
 use super::scan::EpisodeBatch;
 use super::schema::REPLY_STATUSES;
 use exact::escape::visible;
+use parquet_pages::Column;
 
-/// The column.
 pub const REPLY_STATUS: &str = "reply_status";
 /// The statuses of replies that gave a decision.
 const READ: [&str; 2] = ["ok", "repaired"];

@@ -70,7 +70,6 @@ pub struct EpisodeBatch {
 /// An Arrow dictionary would say the same; to make one is to look at each key once more.
 #[derive(Clone, Debug)]
 pub struct Texts {
-    /// The column.
     pub name: String,
     /// One key per row, the position of its text; null for null.
     pub keys: UInt8Array,

@@ -7,9 +7,7 @@ use super::{View, changes, compare, episode, list, map, overview};
 use study::Part;
 
 pub(super) enum Answer {
-    /// JSON.
     Json(Vec<u8>),
-    /// A picture, PNG.
     Png(Vec<u8>),
 }
 

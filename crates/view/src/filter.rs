@@ -34,7 +34,6 @@ pub(super) fn required<'q>(query: &'q Query, key: &str) -> Result<&'q str, ViewE
 pub(super) struct Filter {
     /// Chosen values of key columns; nothing chosen is everything.
     chosen: Vec<(&'static str, Vec<String>)>,
-    /// A condition on episodes.
     pub condition: Option<String>,
     /// Words that an id or a model's name has, in lower case.
     words: Option<String>,

@@ -25,7 +25,6 @@ const KEPT_INDICES: usize = 64;
 pub(super) struct Snapshot {
     /// Raised with each newer state.
     pub generation: u64,
-    /// What was asked.
     pub options: Options,
     /// What was scored; `None` where no episode is whole yet.
     pub scored: Option<Arc<Scored>>,
@@ -43,20 +42,17 @@ pub(super) struct Snapshot {
 
 #[derive(Debug)]
 pub(super) struct Scored {
-    /// The traces, opened.
     pub study: Study,
     /// The episode table and what goes with it.
     pub results: Results,
     /// Where each row of the table is, by the episode's id.
     pub rows: HashMap<String, usize>,
-    /// The files.
     pub inputs: Vec<Input>,
     places: HashMap<String, EpisodePlace>,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Running {
-    /// Its log.
     pub log: PathBuf,
     /// What is there of it.
     pub episode: Episode,
@@ -69,7 +65,6 @@ pub(super) struct Opened {
     pub episode: Episode,
     /// The log of an episode under way.
     pub running: Option<PathBuf>,
-    /// The trace.
     pub input: Option<Input>,
 }
 

@@ -6,6 +6,7 @@
 
 mod codec;
 pub mod mutate;
+mod one_column;
 mod reference;
 mod shape;
 pub mod stricter;
@@ -13,7 +14,6 @@ mod thrift;
 
 use std::sync::LazyLock;
 
-use ::trace::fuzz::{OneColumn, Refusal};
 use arrow::array::{Array as _, ArrayRef, AsArray as _, new_empty_array};
 use arrow::compute::{cast, concat};
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
@@ -21,6 +21,7 @@ use arrow::datatypes::{DataType, Float64Type, Int64Type};
 use crate::depth::reached;
 use crate::quiet;
 use mutate::{Mutant, START, mutant};
+use one_column::{OneColumn, Refusal};
 use stricter::{Depth, Reason};
 
 /// The columns that mutants are made of.

@@ -39,7 +39,6 @@ pub enum Format {
     Csv,
     /// A JSON object a line.
     JsonLines,
-    /// Parquet.
     Parquet,
 }
 

@@ -48,7 +48,6 @@ impl Table {
 /// A query that may be run.
 #[derive(Clone, Debug)]
 pub struct Checked {
-    /// What Polars is given.
     pub text: String,
     /// The tables that it names.
     pub tables: BTreeSet<Table>,

@@ -24,7 +24,6 @@ pub(super) enum Answer {
     Refused(Refused),
     /// Spark raised an error.
     Failed(Failed),
-    /// The time was up.
     Late {},
 }
 

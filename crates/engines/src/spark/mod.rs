@@ -51,11 +51,9 @@ pub struct Cluster {
 /// What to compute.
 #[derive(Clone, Copy, Debug)]
 pub struct Job<'a> {
-    /// The definitions, checked.
     pub definitions: &'a Definitions,
     /// Further columns that are constant in an episode.
     pub labels: &'a [String],
-    /// What to read.
     pub sources: &'a Sources,
 }
 

@@ -16,7 +16,6 @@ use trace::schema;
 const KEYS: [(&str, &str); 5] =
     [("episode_id", "string"), ("model", "string"), ("experiment", "string"), ("seed", "int"), ("run", "int")];
 
-/// The request.
 #[derive(Debug, Serialize)]
 pub(super) struct Request {
     /// Whose end is the end of the driver.

@@ -26,11 +26,9 @@ pub struct Implied {
 /// In which episodes a metric is defined.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Defined {
-    /// In all.
     Always,
     /// In those where a rate has this value.
     Where {
-        /// The rate.
         metric: String,
         /// 1 for true.
         is: bool,

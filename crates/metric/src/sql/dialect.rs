@@ -9,12 +9,10 @@ use crate::plan::{Arithmetic, Constant};
 /// Whose SQL to write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Dialect {
-    /// What all engines share.
     #[default]
     Portable,
     /// Spark SQL.
     Spark,
-    /// `DuckDB`.
     Duckdb,
     /// Polars SQL, which `--engine polars` runs.
     Polars,

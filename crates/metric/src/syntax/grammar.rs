@@ -17,11 +17,9 @@ const STACK: usize = 128 << 20;
 /// What is wrong with a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SyntaxFault {
-    /// What is wrong.
     pub message: String,
     /// Its bytes in the text.
     pub span: Range<usize>,
-    /// What to write instead.
     pub help: Option<String>,
 }
 

@@ -14,7 +14,6 @@ pub use self::expression::parse;
 /// An expression as written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expr {
-    /// What it is.
     pub kind: ExprKind,
     /// Its bytes in the text of the expression.
     pub span: Range<usize>,
@@ -25,7 +24,6 @@ pub struct Expr {
 pub enum ExprKind {
     /// A column, a `let` or a metric.
     Name(String),
-    /// A constant.
     Literal(Literal),
     /// `not x`
     Not(Box<Expr>),
@@ -34,33 +32,56 @@ pub enum ExprKind {
     /// `x op y`
     Binary(BinaryOp, Box<Expr>, Box<Expr>),
     /// `x is [not] null`
-    IsNull { operand: Box<Expr>, negated: bool },
+    IsNull {
+        operand: Box<Expr>,
+        negated: bool,
+    },
     /// `x is [not] true`, `x is [not] false`
-    IsTruth { operand: Box<Expr>, truth: bool, negated: bool },
+    IsTruth {
+        operand: Box<Expr>,
+        truth: bool,
+        negated: bool,
+    },
     /// `x is [not] distinct from y`
-    Distinct { left: Box<Expr>, right: Box<Expr>, negated: bool },
+    Distinct {
+        left: Box<Expr>,
+        right: Box<Expr>,
+        negated: bool,
+    },
     /// `x [not] between low and high`
-    Between { operand: Box<Expr>, low: Box<Expr>, high: Box<Expr>, negated: bool },
+    Between {
+        operand: Box<Expr>,
+        low: Box<Expr>,
+        high: Box<Expr>,
+        negated: bool,
+    },
     /// `x [not] in (a, b, ...)`
-    InList { operand: Box<Expr>, list: Vec<Expr>, negated: bool },
+    InList {
+        operand: Box<Expr>,
+        list: Vec<Expr>,
+        negated: bool,
+    },
     /// `case [x] when a then b ... [else c] end`
-    Case { operand: Option<Box<Expr>>, branches: Vec<(Expr, Expr)>, otherwise: Option<Box<Expr>> },
+    Case {
+        operand: Option<Box<Expr>>,
+        branches: Vec<(Expr, Expr)>,
+        otherwise: Option<Box<Expr>>,
+    },
     /// `name(a, b, ...)`, the name in lowercase
-    Call { name: String, arguments: Vec<Expr> },
+    Call {
+        name: String,
+        arguments: Vec<Expr>,
+    },
 }
 
 /// A constant.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Literal {
-    /// `null`
     Null,
     /// `true`, `false`
     Bool(bool),
-    /// `42`
     Int(i64),
-    /// `0.5`
     Float(f64),
-    /// `'text'`
     Text(String),
 }
 

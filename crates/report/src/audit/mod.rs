@@ -31,7 +31,6 @@ use statistics::feasible::attain::Search;
 /// What an audit goes by.
 #[derive(Clone, Copy, Debug)]
 pub struct Terms<'t> {
-    /// The metrics.
     pub catalog: &'t Catalog,
     /// What their definitions say of their values.
     pub implied: &'t IndexMap<String, Implied>,
@@ -48,7 +47,6 @@ pub struct Terms<'t> {
 pub struct NamedTable {
     /// The name of its file, never a path.
     pub name: String,
-    /// Its cells.
     pub published: Published,
 }
 

@@ -15,7 +15,6 @@ use statistics::feasible::{Print, Sample};
 pub(super) struct Reason {
     /// What of the cell is at fault.
     pub(super) field: Field,
-    /// The sentence.
     pub(super) words: String,
     /// The nearest prints that some data has, below first.
     pub(super) nearest: Vec<String>,

@@ -31,14 +31,11 @@ pub struct Cells {
     pub groups: Vec<Group>,
 }
 
-/// One cell of [`Cells`].
 #[derive(Clone, Copy, Debug)]
 pub struct Cell<'c> {
     /// A value for each column of [`Cells::by`].
     pub key: &'c [KeyValue],
-    /// The metric's name.
     pub name: &'c str,
-    /// Its definition.
     pub metric: &'c Metric,
     /// The moments of its values.
     pub moments: &'c Moments,

@@ -30,7 +30,6 @@ pub struct Outcomes {
 /// How the episodes of one model ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OutcomeRow {
-    /// The model.
     pub model: String,
     /// Episodes whose final self-attribution is the body's colour.
     pub correct: u64,

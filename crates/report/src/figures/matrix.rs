@@ -78,7 +78,6 @@ pub struct Matrix<'a> {
     groups: BTreeMap<(&'a str, &'a str), &'a Group>,
     /// The experiments that have episodes, in the order of the definitions, unknown ones last by name.
     pub experiments: Vec<&'a str>,
-    /// The models by name.
     pub models: Vec<&'a str>,
 }
 
@@ -197,9 +196,7 @@ impl<'a> Matrix<'a> {
 /// A metric that is there.
 #[derive(Clone, Copy, Debug)]
 pub struct MetricId<'a> {
-    /// Its name in tables.
     pub name: &'a str,
-    /// Its definition.
     pub metric: &'a Metric,
     at: usize,
 }

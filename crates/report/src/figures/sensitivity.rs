@@ -45,7 +45,6 @@ pub struct Stage<'a> {
 pub struct Input<'a> {
     /// The definitions as they are, then the thresholds, ascending.
     pub stages: &'a [Stage<'a>],
-    /// The metrics to show.
     pub metrics: &'a [String],
     /// Models in the order to show them; those not named follow in the palette's order, then by name.
     pub order: &'a [String],

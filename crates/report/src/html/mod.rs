@@ -41,7 +41,6 @@ pub struct Page<'a> {
     pub cells: &'a Cells,
     /// The episodes that the cells are of.
     pub episodes: &'a EpisodeTable,
-    /// Where everything comes from.
     pub manifest: &'a Manifest,
     /// The figures, in order; none leaves the section out.
     pub figures: &'a [Figure<'a>],

@@ -108,8 +108,10 @@ pub enum Spread {
     Unknown,
     /// All values are equal, which is no evidence of certainty.
     AllEqual,
-    /// A 95 % interval.
-    Interval { low: Decimal, high: Decimal },
+    Interval {
+        low: Decimal,
+        high: Decimal,
+    },
 }
 
 impl MetricTable {

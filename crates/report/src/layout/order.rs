@@ -11,9 +11,7 @@ use metric::catalog::Catalog;
 /// What decides the order.
 #[derive(Clone, Copy, Debug)]
 pub struct TableOrder<'a> {
-    /// The definitions.
     pub catalog: &'a Catalog,
-    /// The style.
     pub style: &'a Style,
 }
 

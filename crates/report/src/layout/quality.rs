@@ -74,7 +74,6 @@ fn row(key: &CellKey, quality: &Quality, keys: usize) -> Vec<String> {
         .collect()
 }
 
-/// `12/340 (3.5 %)`.
 #[expect(clippy::cast_precision_loss, reason = "a share for people")]
 fn share(count: u64, all: u64) -> String {
     let percent = 100.0 * count as f64 / all as f64;

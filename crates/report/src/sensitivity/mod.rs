@@ -26,7 +26,6 @@ pub use changes::{Change, Question, Says};
 pub struct Level {
     /// The least number of pixels that counts as evidence; `None` for the definitions as they are.
     pub px: Option<u32>,
-    /// The cells.
     pub cells: Cells,
     /// What can be concluded from the same episodes.
     pub statistics: Statistics,

@@ -35,7 +35,6 @@ pub struct Style {
     pub name: String,
     /// SHA-256 of the file, 64 hexadecimal digits.
     pub hash: String,
-    /// What the file says.
     pub sheet: Sheet,
     /// Every metric that a file of the user's names, and where. A built-in style may name metrics that a catalog has not.
     named: Vec<(String, Place)>,
@@ -64,7 +63,6 @@ pub struct Sheet {
 pub struct TableSheet {
     /// The first words of the caption, without a full stop.
     pub title: String,
-    /// The sentences after them.
     pub note: String,
     /// The LaTeX label; none if absent.
     pub label: Option<String>,

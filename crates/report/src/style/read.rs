@@ -35,7 +35,6 @@ const MOST_DECIMALS: u32 = exact::number::MOST_PLACES;
 
 /// A style file and all that it includes.
 pub(super) struct Read {
-    /// What they say.
     pub sheet: Sheet,
     /// Every metric that a file of the user's names, and where.
     pub named: Vec<(String, Place)>,

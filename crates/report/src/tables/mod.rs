@@ -91,7 +91,6 @@ pub struct TableCell {
 pub enum Emphasis {
     #[default]
     Plain,
-    /// The best.
     Bold,
     /// The second best.
     Underline,

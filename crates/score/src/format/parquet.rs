@@ -25,11 +25,12 @@ use crate::builder::TableBuilder;
 use crate::columns;
 use crate::table::{EpisodeTable, Header, KeyRef, TextColumn};
 use metric::catalog::Catalog;
+use parquet_pages::check_footer;
+use parquet_pages::checksums::{self, CREATED_BY, Held};
 use trace::catch_panic::contained;
-use trace::checksums::{self, CREATED_BY, Held};
 use trace::declared::Declared;
 use trace::schema::COLUMNS;
-use trace::{FlatRows, TableFile, footer_shape};
+use trace::{FlatRows, TableFile};
 
 /// The footer key that tells scores from traces.
 pub const KIND_KEY: &str = "mirrorstats.kind";
@@ -67,7 +68,7 @@ pub fn holds_definitions(file: &impl ChunkReader) -> bool {
 
 /// The footer of a file, if it has one that can be read.
 fn metadata(file: &impl ChunkReader) -> Option<ParquetMetaData> {
-    footer_shape::check_file(file).ok()?;
+    check_footer(file).ok()?;
     contained(|| ParquetMetaDataReader::new().parse_and_finish(file)).ok()?.ok()
 }
 
@@ -205,7 +206,7 @@ pub(super) fn read(input: TableFile, partition: &Partition<'_>) -> Result<Episod
 }
 
 fn decode(input: TableFile, partition: &Partition<'_>) -> Result<EpisodeTable, FormatError> {
-    footer_shape::check_file(&input).map_err(ParquetError::General)?;
+    check_footer(&input).map_err(ParquetError::General)?;
     if let Some(metadata) = metadata(&input) {
         checksums::verify_file(&input, &metadata).map_err(FormatError::Damaged)?;
     }

@@ -41,11 +41,9 @@ pub enum Shape {
 /// One kernel and its operands, which are earlier steps.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Step {
-    /// What computes the values.
     pub kernel: Kernel,
     /// Their type.
     pub ty: Type,
-    /// How many there are.
     pub shape: Shape,
 }
 
@@ -55,17 +53,14 @@ pub struct Step {
 pub enum Kernel {
     /// A column of the batch; a column of text gives keys into its dictionary.
     Column(String),
-    /// A constant.
     Constant(Constant),
     /// The timestep of each row.
     Times,
     /// The length of each episode.
     Lengths,
-    /// A constant, written out.
     Repeat(StepId),
     /// A value per episode, repeated for each of its timesteps.
     Spread(StepId),
-    /// The symbols of keys.
     Symbols(StepId),
     /// Negation.
     Not(StepId),
@@ -79,9 +74,7 @@ pub enum Kernel {
     CompareTexts(Comparison, StepId, StepId),
     /// Whether keys stand for a constant text, or whether they do not.
     KeysEqualText {
-        /// The keys.
         keys: StepId,
-        /// The constant.
         text: StepId,
         /// False for "do not".
         equal: bool,
@@ -90,7 +83,6 @@ pub enum Kernel {
     KeysEqualEpisode {
         /// The keys, per timestep.
         keys: StepId,
-        /// The symbols, per episode.
         texts: StepId,
         /// False for "do not".
         equal: bool,
@@ -153,7 +145,6 @@ pub enum Kernel {
     Lag(StepId),
     /// Values per episode, null where the episode has no such timestep.
     NullWhereAbsent {
-        /// The values, per episode.
         values: StepId,
         /// The timesteps, per episode.
         moments: StepId,
@@ -204,7 +195,6 @@ impl Kernel {
 /// A metric and the step that computes it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Metric {
-    /// Its name.
     pub name: String,
     /// A rate or a quantity.
     pub kind: Kind,

@@ -29,11 +29,9 @@ pub struct Sample {
 /// The numbers of a cell, and how they are taken to have been rounded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Print {
-    /// The mean.
     pub mean: Decimal,
     /// The standard error; `None` where none is printed, which constrains nothing.
     pub se: Option<Decimal>,
-    /// How both were rounded.
     pub rounding: Rounding,
 }
 

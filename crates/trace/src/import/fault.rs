@@ -23,13 +23,10 @@ impl fmt::Display for Place {
 pub struct Fault {
     /// The file, as it was named.
     pub file: String,
-    /// The line, from 1.
     pub line: Option<u64>,
     /// The key of the object.
     pub key: Option<String>,
-    /// What would do.
     pub expected: String,
-    /// What is there.
     pub found: String,
     /// What to do about it.
     pub help: String,

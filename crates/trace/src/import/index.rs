@@ -14,9 +14,7 @@ pub(super) struct Step {
     /// Which episode, in the order of their first lines.
     pub(super) episode: usize,
     t: i64,
-    /// Which text.
     pub(super) text: usize,
-    /// Where its line begins.
     pub(super) offset: u64,
     line: u64,
 }

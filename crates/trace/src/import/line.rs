@@ -21,9 +21,7 @@ pub enum Value {
     LargeInt(u64),
     Float(f64),
     Text(String),
-    /// A list, of whatever.
     List,
-    /// An object.
     Object(Members),
 }
 

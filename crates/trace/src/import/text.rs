@@ -30,7 +30,6 @@ pub struct Text {
 #[derive(Debug)]
 pub(super) struct Line {
     pub(super) place: Place,
-    /// Where it begins.
     pub(super) offset: u64,
     /// What it holds, without the byte order mark.
     pub(super) bytes: Vec<u8>,

@@ -24,7 +24,6 @@ pub(super) struct Messages<R> {
     channels: ChannelAccumulator<'static>,
     /// What is left of the chunk that was read last.
     chunk: Unpacked,
-    /// Where that chunk begins.
     at: u64,
     has_ended: bool,
 }

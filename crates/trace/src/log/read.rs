@@ -32,7 +32,6 @@ pub enum Event {
 pub struct Timed {
     /// ns; the step's `frame_time`.
     pub time: u64,
-    /// What it says.
     pub event: Event,
 }
 

@@ -31,7 +31,6 @@ pub struct Recovered {
     pub episodes: Vec<Episode>,
     /// How the recording was made, if the log still says so.
     pub recording: Option<Value>,
-    /// What is lost.
     pub losses: Losses,
 }
 

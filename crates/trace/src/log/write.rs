@@ -36,9 +36,7 @@ pub struct Placed {
 /// A shape in the frame of the room.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solid {
-    /// Its id.
     pub name: String,
-    /// Its form and sizes.
     pub form: Form,
     /// Of its centre, m.
     pub position: [f64; 3],
@@ -53,7 +51,6 @@ pub struct Solid {
 pub enum Form {
     /// Of these edges; an edge of 0 makes it a plane.
     Box([f64; 3]),
-    /// Of this radius.
     Sphere(f64),
     /// Along z: the radius, and the length of the cylinder between its round ends.
     Capsule {
@@ -69,7 +66,6 @@ pub enum Form {
 pub struct View<'a, C> {
     /// The frame, PNG; `None` where none was drawn.
     pub png: Option<&'a [u8]>,
-    /// What moves.
     pub placed: &'a [Placed],
     /// Everything, as shapes.
     pub solids: &'a [Solid],

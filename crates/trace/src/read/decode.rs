@@ -4,23 +4,26 @@
 
 use std::sync::Arc;
 
-use arrow::array::{Array, ArrayRef, AsArray as _, new_null_array};
-use arrow::compute::{cast, concat};
-use arrow::datatypes::{DataType, Int32Type, UInt64Type};
+use arrow::array::{Array, ArrayRef, new_null_array};
+use arrow::compute::concat;
+use arrow::datatypes::DataType;
 use arrow::error::ArrowError;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReader, RowSelection, RowSelector};
 use parquet::basic::Type as Physical;
 
-use super::budget::{INFLATED_PER_BYTE, check_names};
-use super::column::{Column, Runs, all_within};
-use super::footer::{plain, rows_of};
-use super::open::{Readable, TraceFile, text_type};
-use super::pages::{self, Cursor, FaultSlot, Form, Place, Store, Unsupported};
+use super::budget::check_names;
+use super::damaged::damaged;
+use super::footer::plain;
+use super::open::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout, LayoutColumn, T};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::schema::Kind;
+use parquet_pages::{
+    Column, Cursor, FaultSlot, Form, INFLATED_PER_BYTE, Place, Refused, Runs, Store, Unsupported, normal_column,
+    rows_of, text_type,
+};
 
 /// Rows that are decoded at a time: the columns of so many stay in a core's cache.
 const BATCH_ROWS: usize = 32 * 1024;
@@ -91,9 +94,10 @@ enum Source {
     Absent,
     /// The ids of the episodes, which are known already.
     Ahead,
-    /// Its pages.
-    Pages { root: usize, cursor: Box<Cursor> },
-    /// The Parquet library.
+    Pages {
+        root: usize,
+        cursor: Box<Cursor>,
+    },
     Library(Box<Library>),
 }
 
@@ -167,7 +171,7 @@ impl<'a> RowGroup<'a> {
 
     /// A column that the library cannot decode, or that it is not given because of a page.
     fn damaged(&self, at: usize, slot: &FaultSlot, error: &str) -> Box<Finding> {
-        let finding = pages::damaged(self.file.name(), slot, error).in_row_group(self.index);
+        let finding = damaged(self.file.name(), slot, error).in_row_group(self.index);
         Box::new(finding.in_column(&self.layout.columns[at].name))
     }
 
@@ -248,7 +252,7 @@ impl<'a> RowGroup<'a> {
             if count == 0 {
                 return Err(self.other_rows(self.first + held + batch.num_rows()));
             }
-            let column = contained(|| normal_column(batch.column(0), kind))
+            let column = contained(|| normal_column(batch.column(0), &held_as(kind)))
                 .unwrap_or_else(|panic| Err(Refused::Unreadable(panic)));
             match column {
                 Ok(column) => library.held.push(column),
@@ -286,7 +290,7 @@ impl<'a> RowGroup<'a> {
         let (store, slot) = (store(self.file).ok()?, FaultSlot::default());
         let read = || self.reader(store, root, first, &slot).ok()?.next()?.ok();
         let decoded = contained(read).ok()?;
-        normal_column(decoded?.column(0), self.layout.columns[at].kind).ok().map(Column::Flat)
+        normal_column(decoded?.column(0), &held_as(self.layout.columns[at].kind)).ok().map(Column::Flat)
     }
 
     /// A reader of one column, from a row on.
@@ -300,8 +304,14 @@ impl<'a> RowGroup<'a> {
         let Readable { footer, chunks } = &*self.readable;
         let rows = rows_of(footer.metadata().row_group(self.index));
         let (metadata, checksums, slot) = (Arc::clone(footer.metadata()), chunks.clone(), Arc::clone(slot));
-        let library =
-            pages::Library { store, metadata, checksums, row_groups: vec![self.index], slot, writes_out: false };
+        let library = parquet_pages::Library {
+            store,
+            metadata,
+            checksums,
+            row_groups: vec![self.index],
+            slot,
+            writes_out: false,
+        };
         let rest = vec![RowSelector::skip(first), RowSelector::select(rows.saturating_sub(first))];
         let selection = (first > 0).then(|| RowSelection::from(rest));
         let column = ProjectionMask::roots(footer.parquet_schema(), [root]);
@@ -384,7 +394,7 @@ fn rows_at_a_time(rows: usize, text: u64) -> usize {
 }
 
 fn corrupt(file: &TraceFile, row_group: usize, found: &str) -> Box<Finding> {
-    Box::new(pages::damaged(file.name(), &FaultSlot::default(), found).in_row_group(row_group))
+    Box::new(damaged(file.name(), &FaultSlot::default(), found).in_row_group(row_group))
 }
 
 /// How a column of this kind is held in memory.
@@ -396,66 +406,6 @@ pub(crate) fn held_as(kind: Kind) -> DataType {
         Kind::String => text_type(),
         Kind::Unsupported => DataType::Null,
     }
-}
-
-/// Why a decoded column is not taken.
-pub(crate) enum Refused {
-    Unreadable(String),
-    TooLarge { row: usize, value: u64 },
-}
-
-pub(crate) fn normal_column(column: &ArrayRef, kind: Kind) -> Result<ArrayRef, Refused> {
-    let held = held_as(kind);
-    match column.data_type() {
-        same if *same == held => {
-            if kind == Kind::String {
-                check_keys(column)?;
-                check_texts(column)?;
-            }
-            Ok(Arc::clone(column))
-        }
-        DataType::Null => Ok(new_null_array(&held, column.len())),
-        DataType::UInt64 => {
-            let values = column.as_primitive::<UInt64Type>();
-            let too_large =
-                (0..values.len()).find(|row| values.is_valid(*row) && i64::try_from(values.value(*row)).is_err());
-            match too_large {
-                Some(row) => Err(Refused::TooLarge { row, value: values.value(row) }),
-                None => cast(column, &held).map_err(|error| Refused::Unreadable(error.to_string())),
-            }
-        }
-        _ => cast(column, &held).map_err(|error| Refused::Unreadable(error.to_string())),
-    }
-}
-
-/// Every key that is not null leads to a value that is not null.
-fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
-    let column = column.as_dictionary::<Int32Type>();
-    let count = column.values().len();
-    let within = |key: i32| usize::try_from(key).is_ok_and(|key| key < count);
-    // What stands in the place of nulls is nearly always within, too, and then there is no need to look at them.
-    let good = column.values().null_count() == 0
-        && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
-    if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
-}
-
-/// Every text is UTF-8. The Parquet library looks at all texts of a delta-encoded page at once, and takes a character of
-/// which one text has the first bytes and the next text the rest.
-fn check_texts(column: &ArrayRef) -> Result<(), Refused> {
-    let texts = column.as_any_dictionary().values().as_string::<i32>();
-    let (bytes, offsets) = (texts.value_data(), texts.value_offsets());
-    let begins = |offset: &i32| {
-        let next = usize::try_from(*offset).ok().and_then(|at| bytes.get(at..))?.first();
-        // A byte that goes on with a character begins none.
-        Some(next.is_none_or(|byte| byte & 0xc0 != 0x80))
-    };
-    let (first, last) = (offsets.first().copied().unwrap_or(0), offsets.last().copied().unwrap_or(0));
-    let range = usize::try_from(first).ok().zip(usize::try_from(last).ok());
-    let is_text = range.and_then(|(first, last)| std::str::from_utf8(bytes.get(first..last)?).ok()).is_some();
-    if is_text && offsets.iter().all(|offset| begins(offset) == Some(true)) {
-        return Ok(());
-    }
-    Err(Refused::Unreadable("texts that are not UTF-8".into()))
 }
 
 #[cfg(test)]

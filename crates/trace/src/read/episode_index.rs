@@ -6,10 +6,10 @@
 
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-use super::column::{Column, Runs};
 use super::decode::{Ids, ids};
 use super::open::TraceFile;
 use super::projection::Layout;
+use parquet_pages::{Column, Runs};
 
 /// Row groups with more rows than that are not looked at ahead, for the sake of memory.
 const MOST_ROWS: usize = 4 << 20;

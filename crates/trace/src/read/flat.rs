@@ -8,12 +8,13 @@ use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 use parquet::file::metadata::ParquetMetaData;
 
-use super::budget::{Expansion, MOST_COLUMNS};
+use super::budget::MOST_COLUMNS;
+use super::damaged::damaged;
 use super::footer::{bounds, plain};
 use super::open::is_nested;
-use super::pages::{FaultSlot, Library, Store, damaged};
-use crate::checksums::ChunkChecksums;
 use crate::diagnostic::{Code, Finding};
+use parquet_pages::checksums::ChunkChecksums;
+use parquet_pages::{Expansion, FaultSlot, Library, Store};
 
 /// Rows that are decoded at a time.
 const BATCH_ROWS: usize = 1024;

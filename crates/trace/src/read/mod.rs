@@ -1,16 +1,14 @@
 //! From the bytes of traces to whole episodes, in the order of the files.
 
 pub(crate) mod budget;
-pub(crate) mod column;
+pub(crate) mod damaged;
 pub(crate) mod decode;
 mod episode_index;
 pub(crate) mod flat;
 pub(crate) mod footer;
 pub mod in_order;
 pub mod open;
-pub(crate) mod pages;
 pub(crate) mod parallel_scan;
 pub(crate) mod projection;
 pub mod steps;
-mod thrift;
 pub mod verify;

@@ -9,19 +9,17 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 
-use arrow::datatypes::{DataType, Schema};
-use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+use arrow::datatypes::DataType;
+use parquet::arrow::arrow_reader::ArrowReaderMetadata;
 use parquet::arrow::parquet_to_arrow_schema;
 use parquet::basic::ConvertedType;
 use parquet::file::metadata::{KeyValue, ParquetMetaData};
 use parquet::schema::types::SchemaDescriptor;
 
-use super::budget::{Expansion, MOST_COLUMNS};
+use super::budget::{EpisodeBudget, MOST_COLUMNS};
 use super::footer::bounds;
-use super::footer::{Extent, Footer, footer, plain, rows_of};
-use super::pages::Store;
+use super::footer::{Extent, Footer, footer, plain};
 use crate::catch_panic::contained;
-use crate::checksums::{Checksums, ChunkChecksums};
 use crate::declared_experiment::{self, DeclaredExperiment};
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
@@ -31,6 +29,8 @@ use crate::schema::{self, COLUMNS, Kind};
 use exact::escape::visible;
 use exact::input;
 use exact::suggest::nearest;
+use parquet_pages::checksums::{Checksums, ChunkChecksums};
+use parquet_pages::{Expansion, Store, rows_of, with_texts_as_keys};
 
 /// Traces that are open: every footer is read and good, no row is read yet.
 #[derive(Debug)]
@@ -56,6 +56,7 @@ pub struct TraceFile {
     footer: Mutex<Weak<Readable>>,
     /// What was made of its bytes.
     expansion: Arc<Expansion>,
+    episodes: EpisodeBudget,
 }
 
 /// What a reader of a file needs.
@@ -69,7 +70,6 @@ pub(crate) struct Readable {
 /// A column of one file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FileColumn {
-    /// Its name.
     pub name: String,
     /// Its logical type; `None` for a column that is declared to hold nothing but nulls, which goes with any type.
     pub kind: Option<Kind>,
@@ -179,8 +179,22 @@ impl TraceFile {
         readable(metadata, &columns)
             .map_err(|error| vec![Finding::new(Code::CorruptFooter, &input.name, "a readable schema", error)])?;
         let (name, path, footer) = (input.name.clone(), input.path.clone(), Mutex::default());
-        let expansion = Arc::new(Expansion::new(bytes));
-        Ok(Self { name, path, bytes, version, columns, rows, pairs, colors, experiments, checksums, footer, expansion })
+        let (expansion, episodes) = (Arc::new(Expansion::new(bytes)), EpisodeBudget::new(bytes));
+        Ok(Self {
+            name,
+            path,
+            bytes,
+            version,
+            columns,
+            rows,
+            pairs,
+            colors,
+            experiments,
+            checksums,
+            footer,
+            expansion,
+            episodes,
+        })
     }
 
     /// The name in messages and outputs.
@@ -201,6 +215,11 @@ impl TraceFile {
     /// What was made of its bytes so far.
     pub(crate) fn expansion(&self) -> &Arc<Expansion> {
         &self.expansion
+    }
+
+    /// The episodes that were read of it.
+    pub(crate) fn episodes(&self) -> &EpisodeBudget {
+        &self.episodes
     }
 
     /// Where it is, for an engine that reads files by itself.
@@ -401,19 +420,6 @@ fn check_columns(file: &str, columns: &[FileColumn], version: u32, absent: &[&st
 
 /// The footer with every text column to be read as a dictionary, whatever a writer's own hint says.
 pub(crate) fn readable(metadata: ParquetMetaData, columns: &[FileColumn]) -> Result<ArrowReaderMetadata, String> {
-    let make = || {
-        let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
-        let fields = plain_schema.fields().iter().zip(columns).map(|(field, column)| match column.kind {
-            Some(Kind::String) => Arc::new(field.as_ref().clone().with_data_type(text_type())),
-            _ => Arc::clone(field),
-        });
-        let wanted = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
-        ArrowReaderMetadata::try_new(Arc::new(metadata), ArrowReaderOptions::new().with_schema(wanted))
-    };
-    contained(make)?.map_err(|error| plain(&error))
-}
-
-/// How text is held in memory: keys into the distinct values.
-pub(crate) fn text_type() -> DataType {
-    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
+    let is_text: Vec<bool> = columns.iter().map(|column| column.kind == Some(Kind::String)).collect();
+    contained(|| with_texts_as_keys(metadata, &is_text))?.map_err(|error| plain(&error))
 }

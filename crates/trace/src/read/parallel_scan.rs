@@ -15,18 +15,17 @@ use arrow::array::{Array as _, AsArray as _};
 use arrow::datatypes::Int32Type;
 
 use super::budget::LONGEST_EPISODE;
-use super::column::Column;
 use super::decode::{Ids, RowGroup, Rows};
 use super::episode_index::Ahead;
 use super::open::{Readable, TraceFile};
 use super::projection::{EPISODE_ID, Layout};
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
+use parquet_pages::Column;
 
 /// Whole episodes of one file, one after the other.
 #[derive(Clone, Debug)]
 pub(crate) struct Episodes {
-    /// The file's position.
     pub(crate) file: usize,
     /// A column for each of the layout.
     pub(crate) columns: Vec<Column>,
@@ -377,7 +376,7 @@ fn too_long(file: &TraceFile, open: &[Rows]) -> Option<Box<Finding>> {
 fn too_many(file: &TraceFile, episodes: &Episodes) -> Option<Box<Finding>> {
     let (piece, rows) = (episodes.pieces.last()?, *episodes.offsets.last()?);
     let end = (piece.row + rows - piece.at) as u64;
-    let exceeded = file.expansion().episodes(piece.row_group, end, episodes.offsets.len() - 1).err()?;
+    let exceeded = file.episodes().spend(piece.row_group, end, episodes.offsets.len() - 1).err()?;
     Some(Box::new(Finding::over_budget(file.name(), &exceeded).in_row_group(piece.row_group)))
 }
 

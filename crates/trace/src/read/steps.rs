@@ -13,16 +13,16 @@ use arrow::datatypes::{DataType, Field, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReader;
 
-use super::budget::Expansion;
+use super::damaged::damaged;
 use super::footer::plain;
 use super::open::{Readable, TraceFile, TraceSet};
-use super::pages::{FaultSlot, Library, Store, damaged};
 use super::projection::Layout;
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::schema::{self, Kind, Stored};
 use exact::input;
+use parquet_pages::{Expansion, FaultSlot, Library, Store};
 
 const BATCH_ROWS: usize = 8 * 1024;
 /// The column by which episodes are told apart.

@@ -2,12 +2,13 @@
 
 use std::io;
 
+use super::damaged::damaged;
 use super::footer::plain;
 use super::open::{TraceFile, TraceSet};
-use super::pages::{FaultSlot, Place, damaged, verify};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
+use parquet_pages::{FaultSlot, Place, verify};
 
 /// Reads all pages of all files and checks their headers and, where they have any, their checksums. Nothing is decoded.
 pub fn verify_pages(set: &TraceSet) -> Result<(), TraceError> {

@@ -22,7 +22,6 @@ pub struct Column {
     pub constant: bool,
     /// What a number counts or measures.
     pub unit: Option<&'static str>,
-    /// What the column means.
     pub doc: &'static str,
     /// The only values that the column takes, where they are fixed.
     pub values: &'static [&'static str],

@@ -8,7 +8,6 @@ use crate::schema::{COLUMNS, Column, METADATA, MetadataKey, SCHEMA_VERSION};
 /// All that a writer or reader of traces must know.
 #[derive(Clone, Debug, Serialize)]
 pub struct SchemaDocument {
-    /// What this document is.
     pub title: &'static str,
     /// What the format is, in a few sentences.
     pub description: &'static str,
@@ -25,11 +24,9 @@ pub struct SchemaDocument {
 /// One rule and the code that its findings have.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Rule {
-    /// The stable code.
     pub code: Code,
     /// Whether breaking it makes a trace unusable.
     pub severity: Severity,
-    /// What must hold.
     pub rule: &'static str,
     /// What to do where it does not.
     pub help: &'static str,

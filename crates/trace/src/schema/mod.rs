@@ -215,7 +215,6 @@ pub fn column(name: &str) -> Option<&'static Column> {
 pub struct MetadataKey {
     /// The key in the footer.
     pub key: &'static str,
-    /// What stands there.
     pub doc: &'static str,
 }
 
@@ -226,7 +225,7 @@ pub const WRITER_KEY: &str = "mirrorstats.writer";
 /// Footer key: how the recording was made, JSON.
 pub const RECORDING_KEY: &str = "mirrorstats.recording";
 /// Footer key: checksums of the columns and of the footer, JSON.
-pub const CHECKSUMS_KEY: &str = "mirrorstats.checksums";
+pub const CHECKSUMS_KEY: &str = parquet_pages::checksums::KEY;
 
 /// The key-value metadata of a trace's footer.
 pub const METADATA: &[MetadataKey] = &[

@@ -13,13 +13,13 @@ use indexmap::IndexSet;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::palette::Color;
-use crate::read::column::Column;
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::{Episodes, Event, pass};
 use crate::read::projection::{Layout, T};
 use crate::schema::colors::palette::Palette;
 use crate::schema::colors::spelling::{WORDS, did_you_mean, meant_by, most_like, spelling_key};
 use crate::schema::colors::{ColorColumn, column};
+use parquet_pages::Column;
 
 /// A colour in one column of some episodes.
 pub(crate) struct Sighting {

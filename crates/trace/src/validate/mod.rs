@@ -14,7 +14,6 @@ use indexmap::IndexSet;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::checksums::Checksums;
 use super::diagnostic::{Code, Finding, Severity};
 use super::error::TraceError;
 use super::inputs::Input;
@@ -26,6 +25,7 @@ use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::schema::{self, COLUMNS};
 use color_set::{Tally, sightings};
 use duplicate_ids::{Ids, Start, starts};
+use parquet_pages::checksums::Checksums;
 use rules::{Located, Rules};
 
 /// What was checked and what was found.
@@ -55,11 +55,8 @@ pub struct CheckedFile {
 /// Findings that an abridged report leaves out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rest<'a> {
-    /// The file.
     pub file: &'a str,
-    /// The rule.
     pub code: Code,
-    /// How many there are.
     pub count: usize,
 }
 

@@ -7,13 +7,13 @@ use arrow::array::{Array as _, ArrayRef, AsArray as _, BooleanArray, Float64Arra
 use arrow::datatypes::{Float64Type, Int32Type, Int64Type};
 
 use crate::diagnostic::{Code, Finding};
-use crate::read::column::{Column as Held, text_at};
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;
 use crate::read::projection::{EPISODE_ID, Layout, LayoutColumn, T};
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use exact::escape::exact;
 use exact::suggest::nearest;
+use parquet_pages::{Column as Held, text_at};
 
 /// A finding and its row among the episodes'.
 pub(crate) struct Located {

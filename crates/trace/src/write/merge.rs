@@ -20,16 +20,16 @@ use crate::episode::Episode;
 use crate::episode_hash::{self, EPISODE_HASH};
 use crate::error::TraceError;
 use crate::inputs::Input;
-use crate::read::budget::Expansion;
+use crate::read::damaged::damaged;
 use crate::read::footer::bounds;
-use crate::read::footer::{Extent, Footer, footer, plain, rows_of};
+use crate::read::footer::{Extent, Footer, footer, plain};
 use crate::read::open::is_nested;
-use crate::read::pages::{FaultSlot, Library, Store, damaged};
 use crate::schema::{self, COLUMNS};
 use crate::write::row_groups::{Gathered, RowGroups, field};
 use crate::write::{self, OptionalColumns};
 use exact::input;
 use exact::replace::{self, NewFile};
+use parquet_pages::{Expansion, FaultSlot, Library, Store, rows_of};
 
 /// Rows that are decoded at a time.
 const BATCH_ROWS: usize = 8 << 10;
@@ -37,7 +37,6 @@ const BATCH_ROWS: usize = 8 << 10;
 /// The rows of one episode, with what it is ordered and found by.
 #[derive(Clone, Debug)]
 pub struct EpisodeRows {
-    /// The episode's id.
     pub episode_id: String,
     /// The seed of its block of runs.
     pub seed: i64,

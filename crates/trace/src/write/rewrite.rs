@@ -18,7 +18,6 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::{SchemaDescriptor, Type, TypePtr};
 
 use crate::catch_panic::contained;
-use crate::checksums::{self, CREATED_BY, Held};
 use crate::error::TraceError;
 use crate::read::decode::RowGroup;
 use crate::read::footer::Extent;
@@ -26,6 +25,7 @@ use crate::read::open::{TraceFile, TraceSet};
 use crate::read::projection::{Layout, T};
 use crate::read::verify::verify_pages;
 use crate::schema::RECORDING_KEY;
+use parquet_pages::checksums::{self, CREATED_BY, Held};
 
 /// What a text is made anew from: the episode's id, the timestep, the text to look at, and the text as it is.
 pub(crate) type Before<'a> = (&'a str, i64, Option<&'a str>, Option<&'a str>);

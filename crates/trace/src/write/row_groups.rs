@@ -16,8 +16,8 @@ use parquet::errors::Result;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{WriterProperties, WriterPropertiesBuilder};
 
-use crate::checksums::{self, CREATED_BY, Held};
 use crate::schema::{self, Column, Kind, Stored, Value};
+use parquet_pages::checksums::{self, CREATED_BY, Held};
 
 /// Rows after which a row group is closed, at the next end of an episode.
 const ROW_GROUP_ROWS: usize = 128 * 1024;

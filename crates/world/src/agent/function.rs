@@ -24,11 +24,9 @@ pub type Listeners = dyn Fn() -> Result<Listener, String> + Send + Sync;
 
 /// What plays, and how it is dealt with.
 pub struct Function {
-    /// The name in tables.
     pub model: String,
     /// The text of the function, if it has one: recordings carry its hash.
     pub source: Option<String>,
-    /// How frames are passed.
     pub images: Images,
     /// The folder in which each episode gets one for its frames.
     pub scratch: PathBuf,

@@ -62,7 +62,6 @@ pub struct Observation {
     pub history: Option<(Option<Action>, Option<String>)>,
     /// All steps before, the first one first; a prompt may tell them all.
     pub past: Arc<Vec<Past>>,
-    /// What the eye sees.
     pub frame: Arc<Frame>,
     /// The vertical field of view of the frame, degrees: 110 in the study. For scripted agents alone: models and programs
     /// are not told.
@@ -74,7 +73,6 @@ pub struct Observation {
 pub struct Past {
     /// What was decided; `None` where the reply gave no decision.
     pub action: Option<Action>,
-    /// The move was stopped.
     pub bumped: bool,
     /// The summary of its reply.
     pub thought: Option<String>,
@@ -99,7 +97,6 @@ pub struct Reply {
     pub words: Words,
     /// The whole reply, as it came.
     pub raw: Option<String>,
-    /// What it cost.
     pub usage: Usage,
     /// The id of the model as the provider returned it; `None` where no provider answers.
     pub model: Option<String>,
@@ -108,9 +105,7 @@ pub struct Reply {
 /// The free text of a reply; the keys of the reply's JSON object in the paper.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Words {
-    /// `view-description`.
     pub view_description: Option<String>,
-    /// `reasoning`.
     pub reasoning: Option<String>,
     /// `summary`; comes back as the history of the next step.
     pub summary: Option<String>,
@@ -142,7 +137,6 @@ pub enum Status {
     ParseFailed,
     /// A JSON object, but not the one asked for.
     SchemaInvalid,
-    /// The model declined.
     Refusal,
     /// Cut off by the limit of tokens.
     Truncated,

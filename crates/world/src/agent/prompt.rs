@@ -20,7 +20,6 @@ pub struct Prompt {
 /// What a model is sent beside the frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rendered {
-    /// The system prompt.
     pub system: String,
     /// The user prompt: task, history, position, warning.
     pub user: String,

@@ -31,11 +31,9 @@ pub enum FileError {
 /// An experiment that is known now, and where it stands in its file.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// The experiment.
     pub experiment: Experiment,
     /// Where its cubes stand, or its name where it says nothing of them.
     pub cubes: Place,
-    /// Where its name stands.
     pub name: Place,
 }
 

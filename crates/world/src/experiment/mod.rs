@@ -46,7 +46,6 @@ pub struct Experiment(u16);
 /// What is known of an experiment.
 #[derive(Debug)]
 pub struct Known {
-    /// What it is.
     pub spec: Spec,
     /// Its prompt; empty where it comes from a trace's footer, which has the hash alone.
     pub templates: Templates,
@@ -83,7 +82,6 @@ impl Experiment {
     /// A mirror, one to six others and clutter; no cube to select.
     pub const E5: Self = Self(4);
 
-    /// The paper's five.
     pub const PAPER: [Self; 5] = [Self::E1, Self::E2, Self::E3, Self::E4, Self::E5];
 
     /// The built-in experiment of this name.

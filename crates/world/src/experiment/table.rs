@@ -24,9 +24,7 @@ use trace::palette::Color;
 /// An experiment as read, and where its parts stand, for faults that only a drawing shows.
 #[derive(Debug)]
 pub struct Entry {
-    /// What it is.
     pub known: Known,
-    /// Where its name stands.
     pub name: Place,
     /// Where its cubes stand; its name where it says nothing of them.
     pub cubes: Place,

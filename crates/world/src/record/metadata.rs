@@ -83,7 +83,6 @@ fn recording(
 pub(super) struct Difference {
     /// The key of the metadata.
     pub what: String,
-    /// What this recording has.
     pub expected: String,
     /// What the other one has.
     pub found: String,

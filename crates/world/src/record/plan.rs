@@ -28,11 +28,8 @@ pub struct Plan {
 /// What tells an episode from the others of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Key {
-    /// Of which experiment.
     pub experiment: Experiment,
-    /// The block of runs.
     pub seed: i32,
-    /// The run within it.
     pub run: i32,
     /// Which time its scene is played, from 1.
     pub repetition: i32,
@@ -126,7 +123,6 @@ pub struct Shard {
 }
 
 impl Shard {
-    /// All of it.
     pub const WHOLE: Self = Self { index: 1, count: 1 };
 
     const fn has(self, at: usize) -> bool {
@@ -162,9 +158,7 @@ pub struct Experiments(pub Vec<Named>);
 /// One of several experiments as typed.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Named {
-    /// Built in.
     BuiltIn(Experiment),
-    /// All of a file.
     File(PathBuf),
 }
 

@@ -44,7 +44,6 @@ struct Outcomes {
 /// An experiment of which no episode is left.
 #[derive(Debug)]
 pub struct Complete {
-    /// Which of them.
     pub experiment: Experiment,
     /// Its episodes that are recorded now.
     pub recorded: Vec<Key>,
@@ -71,7 +70,6 @@ impl Waiting {
 /// What a thread does next.
 #[derive(Debug)]
 pub enum Next {
-    /// Play this episode.
     Play(Key, EpisodeLock),
     /// Ask again later: other processes have all that are left.
     Held(Held),
@@ -86,7 +84,6 @@ pub struct Held {
     pub key: Key,
     /// The id of the process that has it, as far as it is known.
     pub process: Option<u32>,
-    /// How many they are.
     pub count: usize,
 }
 

@@ -49,13 +49,11 @@ impl Observer for Nobody {
 /// What an episode is played with, besides its key.
 #[derive(Debug)]
 pub struct Stage<'a> {
-    /// The world's configuration.
     pub config: &'a WorldConfig,
     /// The thread's eye; `None` where nobody looks at pictures.
     pub eye: Option<&'a RefCell<Camera>>,
     /// The recording is to stop.
     pub stop: &'a AtomicBool,
-    /// Where the time goes.
     pub shares: &'a Shares,
 }
 
@@ -93,7 +91,6 @@ pub fn head(config: &WorldConfig, scene: &Scene, key: Key, subject: &Subject) ->
 /// An episode that was played to its end.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Played {
-    /// Its rows.
     pub episode: Episode,
     /// The id of the model as the provider returned it with the first answer; `None` where nothing is returned.
     pub model: Option<String>,

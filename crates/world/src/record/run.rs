@@ -89,21 +89,15 @@ pub struct Tally {
 
 /// One recording under way: what its threads share.
 pub struct Recording<'a> {
-    /// The world's configuration.
     pub config: &'a WorldConfig,
-    /// Who plays.
     pub player: &'a dyn Player,
-    /// Whose episodes they are.
     pub subject: &'a Subject,
-    /// Where it goes.
     pub store: &'a Store,
     /// Told of everything.
     pub progress: &'a dyn Progress,
     /// The recording is to stop.
     pub stop: &'a AtomicBool,
-    /// Where the time goes.
     pub shares: &'a Shares,
-    /// How it is run.
     pub settings: Settings,
 }
 

@@ -21,7 +21,6 @@ pub struct GivenUp {
     pub model: String,
     /// How many replies in a row gave no decision.
     pub in_a_row: u32,
-    /// The last of them.
     pub last: UnreadableReply,
 }
 

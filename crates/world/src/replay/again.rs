@@ -20,7 +20,6 @@ pub const MOST_RAYS: u32 = 4096;
 pub struct Recipe {
     /// The experiment, as the trace has it.
     pub experiment: Experiment,
-    /// The world's configuration.
     pub config: WorldConfig,
     /// The same with the grid and the threshold that the trace's pixels were counted with: the recorded ones, unless they
     /// were counted anew since.

@@ -25,9 +25,7 @@ const LARGEST_FRAME: Limit = Limit::new("pixels in a frame", 1 << 22);
 /// The strip that is asked for.
 #[derive(Clone, Debug)]
 pub struct Strip {
-    /// The episode's id.
     pub episode: String,
-    /// Which of its steps.
     pub steps: Steps,
 }
 

@@ -25,7 +25,6 @@ pub struct Seen<'a> {
     pub world: &'a World,
     /// The picture, where one was drawn.
     pub frame: Option<&'a Arc<Frame>>,
-    /// What could be seen.
     pub visibility: &'a Visibility,
 }
 

@@ -9,7 +9,6 @@ pub enum Moment {
     FirstSight,
     /// A colour is claimed for the first time.
     FirstClaim,
-    /// The decision.
     Decision,
 }
 

@@ -26,9 +26,7 @@ use trace::schema::RECORDING_KEY;
 
 /// One trace to replay.
 pub struct Recorded {
-    /// Its file.
     pub path: PathBuf,
-    /// The episodes to replay.
     pub rows: Vec<EpisodeRows>,
     recording: Option<Value>,
     recipe: Recipe,
@@ -48,7 +46,6 @@ pub struct Outputs {
 /// How visibility is decided anew.
 #[derive(Clone, Debug)]
 pub struct Recount {
-    /// The trace to write.
     pub out: PathBuf,
     /// The threshold, pixels of the grid; the recorded one, scaled to the grid, where there is none.
     pub threshold: Option<u32>,

@@ -11,7 +11,6 @@ use super::scene::Other;
 /// Another agent in motion.
 #[derive(Clone, Debug)]
 pub struct Distractor {
-    /// Where it is.
     pub figure: Figure,
     chance: Rng,
     /// Turns to make before it walks on; to the right where negative.

@@ -19,7 +19,6 @@ pub(super) struct Place<'a> {
     pub patch: Patch,
     pub hand: HandStart,
     pub config: &'a WorldConfig,
-    /// Where the body stands.
     pub body: Pose,
 }
 

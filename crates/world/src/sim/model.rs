@@ -50,7 +50,6 @@ pub mod group {
     pub const ROOM: i32 = 0;
     /// Cubes and other agents.
     pub const THINGS: i32 = 1;
-    /// The agent's own body.
     pub const EGO: i32 = 2;
     /// The ceiling, through which the view from above looks.
     pub const CEILING: i32 = 3;

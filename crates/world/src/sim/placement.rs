@@ -65,9 +65,7 @@ impl Scene {
 /// Why an experiment does not fit into a room.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DoesNotFit {
-    /// What has no place.
     pub what: String,
-    /// What to do.
     pub help: String,
 }
 

@@ -34,7 +34,6 @@ pub struct Solid {
     pub name: String,
     /// What it is part of.
     pub item: Item,
-    /// Its form and sizes.
     pub shape: Shape,
     /// Of its centre, m.
     pub position: [f64; 3],
@@ -49,7 +48,6 @@ pub struct Solid {
 pub enum Shape {
     /// A rectangle of these whole sides along x and y, its front to +z.
     Plane([f64; 2]),
-    /// Of this radius.
     Sphere(f64),
     /// About z: the radius, and the whole length of the cylinder between its round ends.
     Capsule {
@@ -58,7 +56,6 @@ pub enum Shape {
         /// Between the centres of the two ends.
         length: f64,
     },
-    /// Of these whole edges.
     Box([f64; 3]),
 }
 

@@ -299,7 +299,6 @@ pub struct Recorded {
     pub gave_up: Option<String>,
     /// The list of episodes that were lost.
     lost_list: PathBuf,
-    /// How long it took.
     elapsed: Duration,
     /// Where the threads' time went.
     times: Spent,

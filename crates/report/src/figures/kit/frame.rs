@@ -6,9 +6,7 @@ pub type Point = (f64, f64);
 /// An upright rectangle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// The left edge.
     pub left: f64,
-    /// The upper edge.
     pub top: f64,
     /// From the left edge to the right one.
     pub width: f64,

@@ -24,7 +24,6 @@ type Drawn = Result<(), DrawingErrorKind<Infallible>>;
 /// Elements of an SVG in the order drawn.
 #[derive(Debug, Default)]
 pub struct Ink {
-    /// The elements so far.
     pub body: String,
     /// Attributes of the next shapes that plotters does not pass on, each with a space before it.
     pub extra: String,

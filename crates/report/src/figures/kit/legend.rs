@@ -20,23 +20,18 @@ const COLUMN_GAP: f64 = 16.0;
 pub enum Swatch {
     /// A model's line with its marker.
     Line(&'static ModelStyle),
-    /// A model's marker alone.
     Marker(&'static ModelStyle),
-    /// An area.
     Tile(Fill),
     /// A cell with episodes and no value.
     Undefined,
-    /// A cell without episodes.
     Empty,
     /// The mark of chance on an axis.
     Chance,
     /// A line across a plot.
     Rule(Stroke),
-    /// A short upright stroke.
     Tick(Stroke),
     /// A ring of that radius, px.
     Ring(f64),
-    /// A small full circle.
     Dot(Fill),
     /// Nothing: a note.
     None,

@@ -16,11 +16,9 @@ pub const NAME_ROOM: f64 = 210.0;
 /// Where text stands about its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Align {
-    /// The text begins there.
     Start,
     /// The text's middle is there.
     Middle,
-    /// The text ends there.
     End,
 }
 
@@ -31,11 +29,9 @@ pub struct Lettering {
     pub size: f64,
     /// Regular, or semibold for headings.
     pub weight: Weight,
-    /// Its colour.
     pub color: Rgb,
     /// Where it stands about its point.
     pub align: Align,
-    /// Whether it reads upwards.
     pub upwards: bool,
 }
 

@@ -37,7 +37,6 @@ impl From<Rgb> for RGBColor {
 /// How a line looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stroke {
-    /// Its colour.
     pub color: Rgb,
     /// Its width, px.
     pub width: f64,
@@ -54,7 +53,6 @@ impl Stroke {
 /// How an area looks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fill {
-    /// Its colour.
     pub color: Rgb,
     /// 1 is opaque.
     pub opacity: f64,

@@ -19,7 +19,6 @@ pub static PALETTE: LazyLock<Palette> = LazyLock::new(|| {
 pub struct Palette {
     /// The models whose style is the one at their place.
     pub pinned: Vec<String>,
-    /// What is not data.
     pub surface: Surface,
     /// Values as colours.
     pub ramp: Ramps,
@@ -27,7 +26,6 @@ pub struct Palette {
     pub outcome: Outcome,
     /// Landmarks of an episode.
     pub gaze: Gaze,
-    /// The styles of models.
     pub style: Vec<ModelStyle>,
 }
 
@@ -43,7 +41,6 @@ pub struct Surface {
     pub rule: Rgb,
     /// Axes and frames.
     pub axis: Rgb,
-    /// What is drawn upon.
     pub paper: Rgb,
     /// Hatches and crosses of missing values.
     pub hatch: Rgb,
@@ -69,7 +66,6 @@ pub struct Ramps {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Outcome {
-    /// The body's colour.
     pub correct: Rgb,
     /// Another colour.
     pub wrong: Rgb,
@@ -85,7 +81,6 @@ pub struct Gaze {
     pub episode: Rgb,
     /// Steps with the mirror in view.
     pub visible: Rgb,
-    /// The first of these.
     pub first_sight: Rgb,
     /// The first claim of a colour.
     pub claim: Rgb,

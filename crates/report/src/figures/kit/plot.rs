@@ -17,7 +17,6 @@ use exact::number::Decimal;
 
 /// Two linear axes over a frame; y grows upwards.
 pub struct Plot {
-    /// Where it lies.
     pub frame: Frame,
     spec: Cartesian2d<RangedCoordf64, RangedCoordf64>,
 }
@@ -25,7 +24,6 @@ pub struct Plot {
 /// A place on an axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tick {
-    /// The value.
     pub at: f64,
     /// Its text; empty for a grid line alone.
     pub text: String,

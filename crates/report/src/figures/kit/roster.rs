@@ -8,7 +8,6 @@ use super::palette::{ModelStyle, PALETTE};
 /// A model and how it is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Member<'a> {
-    /// The model's name.
     pub model: &'a str,
     /// Its colour, marker and dash.
     pub style: &'static ModelStyle,

@@ -27,7 +27,6 @@ pub enum Verdict {
 pub struct PairText<'a> {
     /// The model with the better mean.
     pub first: &'a str,
-    /// The other one.
     pub second: &'a str,
     /// The name of the test.
     pub test: &'static str,
@@ -43,16 +42,13 @@ pub struct PairText<'a> {
     pub p: String,
     /// The same, adjusted by Holm's method.
     pub p_adjusted: String,
-    /// What follows.
     pub verdict: Verdict,
 }
 
 /// All tests under one metric in one experiment; without an experiment over all of them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FamilyText<'a> {
-    /// The experiment.
     pub experiment: Option<&'a str>,
-    /// The metric.
     pub metric: &'a str,
     /// Every two models.
     pub tests: Vec<PairText<'a>>,

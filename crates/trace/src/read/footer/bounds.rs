@@ -3,9 +3,9 @@
 
 use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 
-use crate::checksums::range;
 use crate::diagnostic::{Code, Finding};
 use crate::read::budget::most_rows;
+use parquet_pages::checksums::range;
 
 /// The most rows for which a byte of a row group, of all columns together, is enough. Each episode has an id of its own
 /// and each of its steps another `t`; the densest traces in use have about one row in a byte.

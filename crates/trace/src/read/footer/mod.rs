@@ -1,22 +1,22 @@
 //! Reads footers: where a file's columns lie, and what stands in its key-value metadata.
 
 pub(crate) mod bounds;
-pub mod shape;
 
 use std::fs::File;
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 
 use parquet::errors::ParquetError;
 use parquet::file::metadata::{
-    ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy, RowGroupMetaData,
+    ParquetMetaData, ParquetMetaDataOptions, ParquetMetaDataReader, ParquetStatisticsPolicy,
 };
 
 use crate::catch_panic::contained;
-use crate::checksums::{self, Checksums, ChunkChecksums, Fault};
 use crate::diagnostic::{Code, Finding};
 use crate::inputs::Input;
 use crate::schema::CHECKSUMS_KEY;
 use exact::input;
+use parquet_pages::checksums::{self, Checksums, ChunkChecksums, Fault};
+use parquet_pages::{check_footer, footer_bytes};
 
 const MAGIC: [u8; 4] = *b"PAR1";
 const ENCRYPTED_MAGIC: [u8; 4] = *b"PARE";
@@ -26,7 +26,6 @@ const SMALLEST: u64 = 12;
 /// How much of a footer is decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Extent {
-    /// What reading takes.
     Pages,
     /// Statistics too.
     Whole,
@@ -78,7 +77,7 @@ pub(crate) fn footer(input: &Input, extent: Extent) -> Result<Footer, Box<Findin
         let found = format!("{bytes} bytes that end without it");
         return Err(finding(Code::Truncated, "a footer at the end, closed with `PAR1`", found));
     }
-    shape::check_file(&file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
+    check_footer(&file).map_err(|found| finding(Code::CorruptFooter, "a readable footer", found))?;
     let reader = || ParquetMetaDataReader::new().with_metadata_options(Some(extent.options()));
     let metadata = match contained(|| reader().parse_and_finish(&file)) {
         Ok(Ok(metadata)) => metadata,
@@ -95,7 +94,7 @@ fn verified(
     file: &File,
     metadata: &ParquetMetaData,
 ) -> Result<(Checksums, ChunkChecksums), Box<Finding>> {
-    let Some((start, footer)) = shape::bytes(file) else { return Ok(<_>::default()) };
+    let Some((start, footer)) = footer_bytes(file) else { return Ok(<_>::default()) };
     checksums::of_file(file, (start, &footer), metadata).map_err(|fault| {
         let finding = |code, expected: String, found| Box::new(Finding::new(code, &input.name, expected, found));
         match fault {
@@ -133,9 +132,4 @@ pub(crate) fn plain(error: &ParquetError) -> String {
         other => other.to_string(),
     };
     text.split_whitespace().collect::<Vec<_>>().join(" ")
-}
-
-/// The rows of a row group; opening refuses a number that is none.
-pub(crate) fn rows_of(row_group: &RowGroupMetaData) -> usize {
-    usize::try_from(row_group.num_rows()).unwrap_or_default()
 }

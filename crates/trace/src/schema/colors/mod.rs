@@ -18,7 +18,6 @@ use self::palette::Palette;
 use self::spelling::{WORDS, did_you_mean, is_well_spelled, meant_by, normal, spelling_key, study_color};
 use crate::schema;
 
-/// A column of colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColorColumn {
     pub name: &'static str,
@@ -28,7 +27,6 @@ pub struct ColorColumn {
     advice: &'static str,
 }
 
-/// All columns of colours.
 pub const COLOR_COLUMNS: [ColorColumn; 7] = [
     ColorColumn { name: "body_color", word: None, advice: "give the true colour of the body" },
     ColorColumn { name: "self_color", word: Some("unknown"), advice: "`unknown`, or null where the reply gave none" },

@@ -61,11 +61,9 @@ impl Images {
 /// A command, and how it is dealt with.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Settings {
-    /// The name in tables.
     pub model: String,
     /// The command, for the shell.
     pub command: String,
-    /// How frames are passed.
     pub images: Images,
     /// How long a reply may take; the first one includes the program's start.
     pub timeout: Duration,

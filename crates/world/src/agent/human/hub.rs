@@ -15,11 +15,8 @@ use trace::palette::Color;
 /// What a person is asked at a step: what a model is sent.
 #[derive(Clone, Debug)]
 pub struct Question {
-    /// What the eye sees.
     pub frame: Arc<Frame>,
-    /// The system prompt.
     pub system: String,
-    /// The user prompt.
     pub user: String,
     /// The step, from 1.
     pub t: i32,
@@ -76,7 +73,6 @@ struct Seat {
 /// The end of a recording, as a page is told.
 #[derive(Clone, Copy, Debug)]
 struct End {
-    /// All episodes were played.
     is_complete: bool,
     is_told: bool,
 }

@@ -24,7 +24,6 @@ const LONGEST_LINE: Limit = Limit::new("bytes in a line of the journal of partic
 pub struct Entry {
     /// The code of who answered.
     pub participant: String,
-    /// The episode.
     pub episode_id: String,
     /// The step, from 1.
     pub t: i32,
@@ -34,7 +33,6 @@ pub struct Entry {
     pub reply: String,
 }
 
-/// A line.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 enum Line {

@@ -102,7 +102,6 @@ struct HumanAgent {
     seat: usize,
     code: String,
     task: Task,
-    /// What is practised now.
     practice: Option<Task>,
     prompt: Prompt,
     episode_id: String,

@@ -25,7 +25,6 @@ const SCRIPT: &str = include_str!("../../../../../assets/player/player.js");
 /// The most bytes of a reply.
 const LONGEST: usize = 1 << 20;
 
-/// Whose link it is.
 #[derive(Debug, Deserialize)]
 struct Link {
     p: Option<String>,

@@ -39,9 +39,7 @@ impl Place {
 pub struct Heading(u8);
 
 impl Heading {
-    /// How many there are.
     pub const COUNT: u8 = 12;
-    /// All of them.
     pub const ALL: [Self; 12] = {
         let mut all = [Self(0); 12];
         let mut at = 0;
@@ -93,7 +91,6 @@ impl Heading {
 /// Where a body stands and where it faces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// The body's axis.
     pub place: Place,
     /// The direction of its eye.
     pub heading: Heading,

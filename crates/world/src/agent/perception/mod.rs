@@ -29,11 +29,8 @@ const LEAST_OF_PATCH: usize = 6;
 /// One picture, read.
 #[derive(Clone, Debug)]
 pub struct View {
-    /// Where it was taken.
     pub pose: Pose,
-    /// How it was taken.
     pub camera: Camera,
-    /// The picture.
     pub frame: Arc<Frame>,
     /// Cubes that are whole in view.
     pub cubes: Vec<Thing>,

@@ -12,15 +12,10 @@ use super::paint;
 pub struct Patch {
     /// Their colour.
     pub color: Color,
-    /// How many there are.
     pub pixels: usize,
-    /// The first column.
     pub left: usize,
-    /// The last column.
     pub right: usize,
-    /// The first row.
     pub top: usize,
-    /// The last row.
     pub bottom: usize,
 }
 

@@ -14,7 +14,6 @@ use super::patches::Patch;
 /// A thing of one colour that stands on the floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Thing {
-    /// Its colour.
     pub color: Color,
     /// Its middle on the floor.
     pub place: Place,

@@ -34,7 +34,6 @@ use trace::palette::Color;
 /// How a provider says that a reply ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Ending {
-    /// The model was done.
     Whole,
     /// The limit of tokens cut it off.
     Truncated,
@@ -51,7 +50,6 @@ pub struct Reading {
     pub repairs: Vec<Repair>,
     /// Why there is no decision, for people; `None` where there is one.
     pub fault: Option<String>,
-    /// The action.
     pub action: Option<Action>,
     /// The cube: a colour or `none`.
     pub selected_cube: Option<String>,
@@ -59,7 +57,6 @@ pub struct Reading {
     pub mark_report: Option<String>,
     /// The attribution: the normal form of the identification.
     pub self_color: Option<String>,
-    /// The free text.
     pub words: Words,
 }
 

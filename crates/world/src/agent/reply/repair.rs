@@ -10,7 +10,6 @@ use super::object::Object;
 use super::surrogates::without_lone_surrogates;
 use super::thoughts::{self, Thoughts};
 
-/// What was repaired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Repair {
     /// The object stood in a Markdown code fence.

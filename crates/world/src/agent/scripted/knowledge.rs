@@ -32,7 +32,6 @@ const BUMP: (f64, f64, i32) = (0.7, 0.55, 6);
 /// What has been gathered so far.
 #[derive(Clone, Debug)]
 pub struct Knowledge {
-    /// Where one stands.
     pub pose: Pose,
     /// The walls and the mirror.
     pub room: Room,

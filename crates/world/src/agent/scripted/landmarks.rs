@@ -12,9 +12,7 @@ use super::room::Room;
 /// A cube and how it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Landmark {
-    /// Its colour.
     pub color: Color,
-    /// Its middle.
     pub place: Place,
     /// From how near it was seen, m.
     pub nearest: f64,

@@ -29,7 +29,6 @@ pub struct Lookouts {
     goal: Option<Place>,
     /// The headings seen from where one stands.
     seen: Vec<Heading>,
-    /// Where that is.
     here: Option<Place>,
     /// Steps on the way to the goal.
     walked: u32,

@@ -134,9 +134,7 @@ impl crate::agent::Player for Scripted {
 /// A script under a name of its own.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Renamed {
-    /// What plays.
     pub script: Scripted,
-    /// The name in tables.
     pub model: String,
 }
 
@@ -178,7 +176,6 @@ pub struct Move {
     pub selected: Option<Color>,
     /// The mark on the own body; `None` is `none`.
     pub mark: Option<Color>,
-    /// The words around it.
     pub words: Words,
 }
 

@@ -22,7 +22,6 @@ use super::room::{Room, Side};
 /// A test that found a body where one's own would be.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {
-    /// The mirror's wall.
     pub side: Side,
     /// The colour of the body.
     pub color: Color,
@@ -83,7 +82,6 @@ enum Test {
     Unclear,
     /// What is behind it is seen.
     Nobody,
-    /// One of this colour.
     Body(Color),
 }
 

@@ -14,7 +14,6 @@ use trace::episode::Action;
 /// Something to walk around: a circle that the body's axis stays out of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Obstacle {
-    /// Its middle.
     pub place: Place,
     /// m.
     pub radius: f64,
@@ -24,7 +23,6 @@ pub struct Obstacle {
 pub struct Ground<'a> {
     /// Whether the body's axis may be at a place, as far as walls go.
     pub is_open: &'a dyn Fn(Place) -> bool,
-    /// What stands there.
     pub obstacles: &'a [Obstacle],
     /// How far one step leads, m.
     pub step: f64,

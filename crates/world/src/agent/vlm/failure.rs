@@ -11,7 +11,6 @@ use crate::agent::Status;
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// What it counts as.
     pub kind: FailureKind,
     /// What happened, without any key.
     pub detail: String,
@@ -19,7 +18,6 @@ pub struct Failure {
     pub after: Option<Duration>,
 }
 
-/// The kinds of failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FailureKind {
     /// Too many requests.

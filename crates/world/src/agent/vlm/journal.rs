@@ -32,7 +32,6 @@ pub enum Entry {
     Request {
         /// The step.
         t: i32,
-        /// Which attempt, from 1.
         attempt: u32,
         /// SHA-256 of the request's body, its frame left out.
         question: String,
@@ -43,9 +42,7 @@ pub enum Entry {
     Answer {
         /// The step.
         t: i32,
-        /// Which attempt, from 1.
         attempt: u32,
-        /// As in the request.
         question: String,
         /// From sending to the whole answer, ms.
         latency_ms: i32,
@@ -59,15 +56,11 @@ pub enum Entry {
     Failure {
         /// The step.
         t: i32,
-        /// Which attempt, from 1.
         attempt: u32,
-        /// What it counts as.
         status: String,
-        /// What happened.
         detail: String,
         /// The step was given up, and the episode went on without a decision.
         is_final: bool,
-        /// As in the request.
         question: String,
     },
 }
@@ -75,22 +68,14 @@ pub enum Entry {
 /// What an episode has of a step.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Recorded {
-    /// An answer.
     Answer {
-        /// The request's hash.
         question: String,
         /// From sending to the whole answer, ms.
         latency_ms: i32,
-        /// The body.
         body: String,
     },
     /// The step was given up with this status.
-    GivenUp {
-        /// The request's hash.
-        question: String,
-        /// What it counts as.
-        status: Status,
-    },
+    GivenUp { question: String, status: Status },
 }
 
 impl Recorded {

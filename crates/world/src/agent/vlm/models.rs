@@ -151,11 +151,8 @@ impl Contract {
 /// A model that was chosen, with its backend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// The name in tables.
     pub name: String,
-    /// The model.
     pub model: Model,
-    /// Who serves it.
     pub backend: Backend,
 }
 

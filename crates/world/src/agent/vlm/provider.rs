@@ -56,7 +56,6 @@ impl Default for Patience {
 /// An answer, and how it came.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Received {
-    /// What it says.
     pub answer: Answer,
     /// The body, without any key.
     pub body: String,

@@ -35,9 +35,7 @@ pub enum Dialect {
 pub struct Question<'a> {
     /// The provider's id of the model.
     pub model: &'a str,
-    /// The system prompt.
     pub system: &'a str,
-    /// The user prompt.
     pub user: &'a str,
     /// The frame as PNG in base64.
     pub png_base64: &'a str,
@@ -78,7 +76,6 @@ pub struct Answer {
     pub text: String,
     /// Whether the body had a lone surrogate in it, for which the text has U+FFFD.
     pub has_lone_surrogate: bool,
-    /// How it ended.
     pub ending: Ending,
     /// Tokens of the request, where counted.
     pub prompt_tokens: Option<u32>,

@@ -13,7 +13,7 @@ thread_local! {
 }
 
 /// The bytes of a page: the first `levels` as they are stored, the rest decompressed; `whole` together.
-pub(super) fn inflated(stored: &[u8], levels: usize, whole: usize) -> Result<Vec<u8>, String> {
+pub(crate) fn inflated(stored: &[u8], levels: usize, whole: usize) -> Result<Vec<u8>, String> {
     let (plain, frame) = stored.split_at_checked(levels).ok_or_else(|| format!("{} bytes", stored.len()))?;
     let mut page = Vec::with_capacity(whole);
     page.extend_from_slice(plain);

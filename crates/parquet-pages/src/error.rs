@@ -3,26 +3,35 @@
 use std::fmt;
 use std::sync::{Arc, OnceLock};
 
-use crate::diagnostic::{Code, Finding};
-
 /// Pages that the short cut does not take.
-pub(crate) struct Unsupported;
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("pages that only the Parquet library decodes")]
+pub struct Unsupported;
+
+/// What kind of fault a page has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FaultKind {
+    /// Its bytes contradict the footer, its header or a checksum.
+    Corrupt,
+    /// It asks for more than a file of its size may.
+    OverBudget,
+}
 
 /// What is wrong with a page, or with the chunk of pages.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{part}: expected {expected}, found {found}")]
-pub(crate) struct PageFault {
-    pub(crate) code: Code,
-    pub(crate) row_group: usize,
-    pub(crate) column: String,
-    pub(crate) part: Part,
-    pub(crate) expected: String,
-    pub(crate) found: String,
+pub struct PageFault {
+    pub kind: FaultKind,
+    pub row_group: usize,
+    pub column: String,
+    pub part: Part,
+    pub expected: String,
+    pub found: String,
 }
 
 /// The bytes that something is wrong with.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Part {
+pub enum Part {
     /// The page that starts here, with its header.
     Page(u64),
     /// All pages of the column in the row group: from the first byte to before the last.
@@ -39,15 +48,4 @@ impl fmt::Display for Part {
 }
 
 /// Where the first fault of a column is left for whoever asked for its pages.
-pub(crate) type FaultSlot = Arc<OnceLock<PageFault>>;
-
-/// The finding about a column that could not be decoded: the fault of its page, or else what the decoder said.
-pub(crate) fn damaged(file: &str, slot: &FaultSlot, error: &str) -> Finding {
-    if let Some(PageFault { code, row_group, column, part, expected, found }) = slot.get() {
-        let expected = format!("{expected} in {part}");
-        Finding::new(*code, file, expected, found).in_row_group(*row_group).in_column(column)
-    } else {
-        let found = error.split_whitespace().collect::<Vec<_>>().join(" ");
-        Finding::new(Code::CorruptData, file, "data that decodes", found)
-    }
-}
+pub type FaultSlot = Arc<OnceLock<PageFault>>;

@@ -34,7 +34,6 @@ fn wide(data: &[u8], start: usize, length: usize, at: usize) -> u128 {
 pub struct Bits {
     /// As Arrow holds them: little-endian.
     words: Vec<u64>,
-    /// The bits behind those.
     open: u64,
     length: usize,
 }

@@ -8,7 +8,7 @@
 use bytes::Bytes;
 use parquet::file::reader::ChunkReader;
 
-use crate::read::thrift::{Compact, Fault, Wire};
+use crate::thrift::{Compact, Fault, Wire};
 
 /// The fields of a structure, that of number 1 first.
 type Shape = &'static [Value];
@@ -94,12 +94,12 @@ const KEY_VALUE: Shape = &[TEXT, TEXT];
 
 /// Whether the footer of a file keeps within its bytes, before the Parquet library follows it; else what it is. Where there
 /// is none, the library has the better words.
-pub fn check_file(file: &impl ChunkReader) -> Result<(), String> {
-    bytes(file).map_or(Ok(()), |(_, footer)| check(&footer).map_err(|fault| fault.to_string()))
+pub fn check_footer(file: &impl ChunkReader) -> Result<(), String> {
+    footer_bytes(file).map_or(Ok(()), |(_, footer)| check(&footer).map_err(|fault| fault.to_string()))
 }
 
 /// Where the footer of a file starts, and its bytes without its length; `None` where there is none.
-pub(crate) fn bytes(file: &impl ChunkReader) -> Option<(u64, Bytes)> {
+pub fn footer_bytes(file: &impl ChunkReader) -> Option<(u64, Bytes)> {
     let end = file.len().checked_sub(8)?;
     let length = u32::from_le_bytes(*file.get_bytes(end, 4).ok()?.first_chunk()?);
     let start = end.checked_sub(length.into())?;
@@ -144,7 +144,7 @@ fn elements<'a>(
 #[cfg(test)]
 mod tests {
     use super::check;
-    use crate::read::thrift::Fault;
+    use crate::thrift::Fault;
 
     #[test]
     fn a_field_of_another_type_than_its_number_is_refused() {

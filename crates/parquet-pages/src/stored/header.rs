@@ -5,29 +5,29 @@
 
 use parquet::basic::{Compression, Type as Physical};
 
-use crate::read::thrift::{Compact, Fault, Field, Wire};
+use crate::thrift::{Compact, Fault, Field, Wire};
 
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Header {
+pub(crate) struct Header {
     /// How long it is itself, in bytes.
-    pub(super) length: usize,
+    pub(crate) length: usize,
     /// The page's bytes as stored and when decompressed, both without the header.
-    pub(super) stored: usize,
-    pub(super) whole: usize,
+    pub(crate) stored: usize,
+    pub(crate) whole: usize,
     /// The CRC-32 of the bytes as stored.
-    pub(super) checksum: Option<u32>,
-    pub(super) kind: Kind,
+    pub(crate) checksum: Option<u32>,
+    pub(crate) kind: Kind,
     /// Values, the nulls among them; keys of a dictionary.
-    pub(super) values: usize,
+    pub(crate) values: usize,
     /// What only a page of version 2 declares; the levels, in bytes, are not compressed.
     nulls: usize,
     rows: usize,
-    pub(super) levels: usize,
+    pub(crate) levels: usize,
     is_plain: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(crate) enum Kind {
     #[default]
     Data,
     Index,
@@ -37,19 +37,19 @@ pub(super) enum Kind {
 
 /// What the footer says of a column of a row group.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct About {
-    pub(super) codec: Compression,
-    pub(super) physical: Physical,
+pub(crate) struct About {
+    pub(crate) codec: Compression,
+    pub(crate) physical: Physical,
     /// The bytes of a value of `FIXED_LEN_BYTE_ARRAY`.
-    pub(super) width: usize,
+    pub(crate) width: usize,
     /// Whether there may be nulls.
-    pub(super) optional: bool,
-    pub(super) rows: usize,
+    pub(crate) optional: bool,
+    pub(crate) rows: usize,
 }
 
 impl Header {
     /// The header at the start of some bytes.
-    pub(super) fn parse(data: &[u8]) -> Result<Self, Fault> {
+    pub(crate) fn parse(data: &[u8]) -> Result<Self, Fault> {
         let mut compact = Compact::new(data);
         let (mut header, mut code, mut seen, mut last) = (Self::default(), 0, 0_u16, 0);
         while let Some(field) = compact.field(last)? {
@@ -107,7 +107,7 @@ impl Header {
     }
 
     /// What is wrong with a page of a flat column of which `read` values came before: expected and found.
-    pub(super) fn fault(&self, about: &About, read: usize) -> Option<(String, String)> {
+    pub(crate) fn fault(&self, about: &About, read: usize) -> Option<(String, String)> {
         let fault = |expected: String, found: String| Some((expected, found));
         if self.whole > most(about.codec, self.stored) || (self.is_stored_plain(about) && self.whole != self.stored) {
             return fault(format!("a size that {} bytes can hold", self.stored), format!("{} bytes", self.whole));
@@ -138,7 +138,7 @@ impl Header {
     }
 
     /// Whether the page, but for its levels, is a Zstandard frame.
-    pub(super) fn is_zstd(&self, about: &About) -> bool {
+    pub(crate) fn is_zstd(&self, about: &About) -> bool {
         matches!(about.codec, Compression::ZSTD(_)) && !self.is_stored_plain(about)
     }
 
@@ -155,7 +155,7 @@ impl Header {
 }
 
 /// The bytes of a value of fixed size.
-pub(super) fn width(physical: Physical, declared: usize) -> usize {
+pub(crate) fn width(physical: Physical, declared: usize) -> usize {
     match physical {
         Physical::INT32 | Physical::FLOAT => 4,
         Physical::INT64 | Physical::DOUBLE => 8,

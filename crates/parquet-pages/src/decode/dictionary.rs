@@ -8,17 +8,17 @@ use arrow::array::{
 use arrow::buffer::{NullBuffer, ScalarBuffer};
 use arrow::datatypes::{Int32Type, Int64Type};
 
-use super::error::Unsupported;
-use crate::read::column::Keys;
+use crate::column::Keys;
+use crate::error::Unsupported;
 
 /// What the keys of a column stand for.
-pub(super) enum Dictionary {
+pub(crate) enum Dictionary {
     Texts(ArrayRef),
     Ints(ArrayRef),
 }
 
 impl Dictionary {
-    pub(super) fn texts(mut data: &[u8], count: usize) -> Result<Self, Unsupported> {
+    pub(crate) fn texts(mut data: &[u8], count: usize) -> Result<Self, Unsupported> {
         let mut texts = StringBuilder::with_capacity(count.min(data.len()), data.len());
         for _ in 0..count {
             let (length, rest) = data.split_first_chunk().ok_or(Unsupported)?;
@@ -31,7 +31,7 @@ impl Dictionary {
     }
 
     /// Integers of 32 or 64 bits.
-    pub(super) fn ints(data: &[u8], count: usize, long: bool) -> Result<Self, Unsupported> {
+    pub(crate) fn ints(data: &[u8], count: usize, long: bool) -> Result<Self, Unsupported> {
         let ints: Vec<i64> = if long {
             data.chunks_exact(8)
                 .filter_map(|bytes| bytes.first_chunk())
@@ -46,20 +46,20 @@ impl Dictionary {
     }
 
     /// Whether a byte is enough for a key.
-    pub(super) fn is_small(&self) -> bool {
+    pub(crate) fn is_small(&self) -> bool {
         let (Self::Texts(values) | Self::Ints(values)) = self;
         values.len() <= 1 << u8::BITS
     }
 
     /// Keys of a byte and their values; a null's key is 0.
-    pub(super) fn keys(&self, keys: Vec<u8>, nulls: Option<NullBuffer>) -> Result<Keys, Unsupported> {
+    pub(crate) fn keys(&self, keys: Vec<u8>, nulls: Option<NullBuffer>) -> Result<Keys, Unsupported> {
         let (Self::Texts(values) | Self::Ints(values)) = self;
         let keys = UInt8Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;
         Keys::new(keys, values.clone()).ok_or(Unsupported)
     }
 
     /// The values of keys; a null's key is 0.
-    pub(super) fn values(&self, keys: Vec<i32>, nulls: Option<NullBuffer>) -> Result<ArrayRef, Unsupported> {
+    pub(crate) fn values(&self, keys: Vec<i32>, nulls: Option<NullBuffer>) -> Result<ArrayRef, Unsupported> {
         match self {
             Self::Texts(texts) => {
                 let keys = Int32Array::try_new(keys.into(), nulls).map_err(|_| Unsupported)?;

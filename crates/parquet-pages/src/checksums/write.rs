@@ -27,7 +27,7 @@ impl<W: Write> Held<W> {
     }
 
     /// How many row groups are summed.
-    pub(crate) fn row_groups(&self) -> usize {
+    pub fn row_groups(&self) -> usize {
         self.chunks.len()
     }
 
@@ -54,7 +54,7 @@ impl<W: Write> Held<W> {
     }
 
     /// Passes on what is held, without checksums.
-    pub(crate) fn release(mut self) -> Result<W> {
+    pub fn release(mut self) -> Result<W> {
         self.out.write_all(&self.bytes)?;
         self.out.flush()?;
         Ok(self.out)

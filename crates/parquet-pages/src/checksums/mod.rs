@@ -13,13 +13,12 @@ mod write;
 use parquet::file::metadata::ColumnChunkMetaData;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-pub use read::Checksums;
-pub use read::verify_file;
-pub(crate) use read::{ChunkChecksums, Fault, of_file, sum};
+pub(crate) use read::sum;
+pub use read::{Checksums, ChunkChecksums, Fault, of_file, verify_file};
 pub use write::{Held, finish, pass_on};
 
-use crate::open::TraceFile;
-use crate::schema::CHECKSUMS_KEY as KEY;
+/// The key of the checksums in a footer.
+pub const KEY: &str = "mirrorstats.checksums";
 
 /// What footers name as the program that wrote the file.
 pub const CREATED_BY: &str = concat!("mirrorstats version ", env!("CARGO_PKG_VERSION"));
@@ -62,32 +61,6 @@ impl<'de> Deserialize<'de> for Checksum {
     }
 }
 
-/// A sentence about the files whose checksums are another file's; `None` if there are none.
-pub fn stale_note(files: &[TraceFile]) -> Option<String> {
-    let stale = named(files, Checksums::Stale)?;
-    Some(format!(
-        "{stale}: another program wrote the rows again and copied the checksums of the file that it read; they are not \
-         checked, and damage is not found; use that file where you have it"
-    ))
-}
-
-/// A sentence about the files without checksums; `None` if there are none.
-pub fn missing_note(files: &[TraceFile]) -> Option<String> {
-    let missing = named(files, Checksums::None)?;
-    Some(format!("{missing}: no checksums; damage to the data may not be found"))
-}
-
-/// The first of the files in this state, without its folder, and how many others there are.
-fn named(files: &[TraceFile], state: Checksums) -> Option<String> {
-    let mut of_state = files.iter().filter(|file| file.checksums() == state);
-    let first = of_state.next()?.path().file_name()?.to_string_lossy();
-    Some(match of_state.count() {
-        0 => first.into_owned(),
-        1 => format!("{first} and one other file"),
-        more => format!("{first} and {more} other files"),
-    })
-}
-
 impl Stated {
     fn json(&self) -> String {
         serde_json::to_string(self).expect("texts and lists of them are JSON")
@@ -100,7 +73,7 @@ fn digits(length: usize) -> std::ops::Range<usize> {
 }
 
 /// The bytes of a column chunk: from the first to before the last.
-pub(crate) fn range(chunk: &ColumnChunkMetaData) -> Option<(u64, u64)> {
+pub fn range(chunk: &ColumnChunkMetaData) -> Option<(u64, u64)> {
     let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
     let (start, length) = u64::try_from(start).ok().zip(u64::try_from(chunk.compressed_size()).ok())?;
     start.checked_add(length).map(|end| (start, end))

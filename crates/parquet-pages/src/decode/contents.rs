@@ -11,12 +11,12 @@ use parquet::column::page::Page;
 use parquet::schema::types::ColumnDescriptor;
 
 use super::delta;
-use super::error::Unsupported;
-use super::header::width;
 use super::rle::{Hybrid, Span, prefixed};
+use crate::error::Unsupported;
+use crate::stored::header::width;
 
 /// The pages of one flat column of one row group, in their order.
-pub(super) struct Contents {
+pub(crate) struct Contents {
     physical: Physical,
     /// The bytes of a value of fixed size.
     width: usize,
@@ -84,7 +84,7 @@ struct Declared {
 }
 
 impl Contents {
-    pub(super) fn new(column: &ColumnDescriptor, writes_out: bool) -> Self {
+    pub(crate) fn new(column: &ColumnDescriptor, writes_out: bool) -> Self {
         let declared = usize::try_from(column.type_length()).unwrap_or_default();
         let physical = column.physical_type();
         Self {
@@ -97,7 +97,7 @@ impl Contents {
     }
 
     /// Checks the next page: the bytes that its texts take when they are written out, beyond its own.
-    pub(super) fn check(&mut self, page: &Page) -> Result<u64, Fault> {
+    pub(crate) fn check(&mut self, page: &Page) -> Result<u64, Fault> {
         self.check_page(page)?;
         Ok(self.texts.take())
     }

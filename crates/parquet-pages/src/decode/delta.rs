@@ -2,23 +2,23 @@
 //!
 //! Source: the Parquet format's "Delta Strings" and "Delta Encoding".
 
-use super::error::Unsupported;
 use super::rle::varint;
+use crate::error::Unsupported;
 
 /// More small blocks in a block than any writer makes; the Parquet library makes room for them before it has any.
 const MOST_SMALL_BLOCKS: u64 = 1024;
 
 /// What a delta encoding of integers says before its blocks: values in a block, small blocks in a block, values at all,
 /// and where the first value stands.
-pub(super) struct Opening {
+pub(crate) struct Opening {
     block: u64,
     small_blocks: u64,
-    pub(super) count: u64,
+    pub(crate) count: u64,
     at: usize,
 }
 
 impl Opening {
-    pub(super) fn read(data: &[u8]) -> Result<Self, Unsupported> {
+    pub(crate) fn read(data: &[u8]) -> Result<Self, Unsupported> {
         let (block, at) = varint(data, 0)?;
         let (small_blocks, at) = varint(data, at)?;
         let (count, at) = varint(data, at)?;
@@ -28,7 +28,7 @@ impl Opening {
 }
 
 /// The sum of the integers in a delta encoding, none of them below zero.
-pub(super) fn sum(data: &[u8]) -> Result<u64, Unsupported> {
+pub(crate) fn sum(data: &[u8]) -> Result<u64, Unsupported> {
     let Opening { block, small_blocks, count, at } = Opening::read(data)?;
     let (first, mut at) = zigzag(data, at)?;
     if count == 0 {

@@ -5,34 +5,32 @@ use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::sync::Arc;
 
 use bytes::Bytes;
-use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
+use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData, RowGroupMetaData};
 
 use crate::checksums::{self, ChunkChecksums};
-use crate::read::budget::Expansion;
-use crate::read::footer::rows_of;
+use crate::expansion::Expansion;
 
 /// One column of one row group of a file.
 #[derive(Clone, Copy)]
-pub(crate) struct Place<'a> {
-    /// The file's footer.
-    pub(crate) metadata: &'a ParquetMetaData,
-    pub(crate) checksums: &'a ChunkChecksums,
-    pub(crate) row_group: usize,
+pub struct Place<'a> {
+    pub metadata: &'a ParquetMetaData,
+    pub checksums: &'a ChunkChecksums,
+    pub row_group: usize,
     /// The column, counted among the leaves of the schema.
-    pub(crate) column: usize,
+    pub column: usize,
 }
 
 impl<'a> Place<'a> {
-    pub(super) fn chunk(self) -> &'a ColumnChunkMetaData {
+    pub(crate) fn chunk(self) -> &'a ColumnChunkMetaData {
         self.metadata.row_group(self.row_group).column(self.column)
     }
 
     /// The CRC-32 of the chunk's bytes, where the file has checksums.
-    pub(super) fn checksum(self) -> Option<u32> {
+    pub(crate) fn checksum(self) -> Option<u32> {
         self.checksums.of(self.row_group, self.column)
     }
 
-    pub(super) fn rows(self) -> usize {
+    pub(crate) fn rows(self) -> usize {
         rows_of(self.metadata.row_group(self.row_group))
     }
 }
@@ -41,7 +39,7 @@ impl<'a> Place<'a> {
 const LARGEST: u64 = 8 << 20;
 
 /// A file, or part of one in memory, addressed as the file is.
-pub(crate) struct Store {
+pub struct Store {
     held: Held,
     expansion: Arc<Expansion>,
 }
@@ -53,19 +51,18 @@ enum Held {
 
 impl Store {
     /// A file, and what was made of it so far.
-    pub(crate) fn new(file: File, expansion: Arc<Expansion>) -> Self {
+    pub fn new(file: File, expansion: Arc<Expansion>) -> Self {
         Self { held: Held::File(file), expansion }
     }
 
-    /// Bytes that start at a place of a file, of which nothing was made so far; a fuzz target gives any.
-    #[cfg(feature = "fuzz")]
-    pub(crate) fn of_memory(start: u64, bytes: Bytes) -> Self {
+    /// Bytes that start at a place of a file, of which nothing was made so far.
+    pub fn of_memory(start: u64, bytes: Bytes) -> Self {
         let expansion = Arc::new(Expansion::new(bytes.len() as u64));
         Self { held: Held::Memory { start, bytes }, expansion }
     }
 
     /// What was made of the file so far.
-    pub(super) fn expansion(&self) -> &Arc<Expansion> {
+    pub(crate) fn expansion(&self) -> &Arc<Expansion> {
         &self.expansion
     }
 
@@ -82,7 +79,7 @@ impl Store {
     }
 
     /// A range of bytes, held in memory if it is small.
-    pub(super) fn part(&self, start: u64, length: u64) -> io::Result<Self> {
+    pub(crate) fn part(&self, start: u64, length: u64) -> io::Result<Self> {
         if length > LARGEST {
             return self.again();
         }
@@ -91,7 +88,7 @@ impl Store {
     }
 
     /// The CRC-32 of `length` bytes from `start` on, or of fewer where the end comes before.
-    pub(super) fn sum(&self, start: u64, length: u64) -> io::Result<u32> {
+    pub(crate) fn sum(&self, start: u64, length: u64) -> io::Result<u32> {
         match &self.held {
             Held::File(file) => {
                 checksums::sum(file, start, length).map_err(|fault| io::Error::other(fault.to_string()))
@@ -103,7 +100,7 @@ impl Store {
     }
 
     /// `length` bytes from `start` on, or fewer where the end comes before.
-    pub(super) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
+    pub(crate) fn read(&self, start: u64, length: usize) -> io::Result<Bytes> {
         match &self.held {
             Held::File(file) => {
                 let mut file = file;
@@ -121,4 +118,9 @@ impl Store {
             }
         }
     }
+}
+
+/// The rows of a row group; opening refuses a number that is none.
+pub fn rows_of(row_group: &RowGroupMetaData) -> usize {
+    usize::try_from(row_group.num_rows()).unwrap_or_default()
 }

@@ -10,30 +10,27 @@ use parquet::column::page::{PageIterator, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 
-use super::bytes::{Place, Store};
-use super::error::FaultSlot;
-use super::reader::Pages;
 use crate::checksums::ChunkChecksums;
-use crate::read::footer::rows_of;
+use crate::error::FaultSlot;
+use crate::stored::bytes::{Place, Store, rows_of};
+use crate::stored::reader::Pages;
 
 /// Some row groups of a file, to be read by the library.
-pub(crate) struct Library {
-    /// The file.
-    pub(crate) store: Store,
-    /// Its footer.
-    pub(crate) metadata: Arc<ParquetMetaData>,
-    pub(crate) checksums: ChunkChecksums,
+pub struct Library {
+    pub store: Store,
+    pub metadata: Arc<ParquetMetaData>,
+    pub checksums: ChunkChecksums,
     /// The row groups, in this order.
-    pub(crate) row_groups: Vec<usize>,
+    pub row_groups: Vec<usize>,
     /// Where the first fault of a page is left.
-    pub(crate) slot: FaultSlot,
+    pub slot: FaultSlot,
     /// Whether texts are asked for row by row, not as keys into a dictionary.
-    pub(crate) writes_out: bool,
+    pub writes_out: bool,
 }
 
 impl Library {
     /// A reader of some columns, as `fields` wants them held.
-    pub(crate) fn reader(
+    pub fn reader(
         &self,
         columns: ProjectionMask,
         fields: Option<&Fields>,

@@ -14,11 +14,10 @@ use parquet::errors::{ParquetError, Result};
 use parquet::file::reader::{ChunkReader, Length};
 
 use super::bytes::{Place, Store};
-use super::error::{FaultSlot, PageFault, Part};
 use super::header::{About, Header, Kind};
 use super::zstd;
-use crate::diagnostic::Code;
-use crate::read::thrift;
+use crate::error::{FaultKind, FaultSlot, PageFault, Part};
+use crate::thrift;
 use exact::budget::Exceeded;
 
 /// How much of a file is read to find a header in; most are shorter than 100 bytes.
@@ -27,7 +26,7 @@ const HEADER: usize = 1 << 10;
 const LONGEST_HEADER: usize = 16 << 20;
 
 /// The pages of a column as they are stored.
-pub(super) struct Verified {
+pub(crate) struct Verified {
     store: Store,
     /// The row group and the column.
     place: (usize, usize),
@@ -53,7 +52,7 @@ struct Progress {
 
 impl Verified {
     /// The pages of a column of a row group.
-    pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
+    pub(crate) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
         let column = place.chunk();
         let (start, length) = column.byte_range();
         let described = column.column_descr();
@@ -89,7 +88,7 @@ impl Verified {
     }
 
     /// Reads all pages, and decodes none.
-    pub(super) fn walk(&self) -> Result<()> {
+    pub(crate) fn walk(&self) -> Result<()> {
         let mut at = self.start;
         while at < self.end {
             let header = self.enter(at)?.1;
@@ -101,7 +100,7 @@ impl Verified {
     }
 
     /// At the end of the column: whether it had a value for each row.
-    pub fn finish(&self) -> Result<()> {
+    pub(crate) fn finish(&self) -> Result<()> {
         let values = self.progress.lock().unwrap_or_else(PoisonError::into_inner).values;
         if self.flat && values != self.about.rows {
             return Err(self.fault(self.start, format!("pages of {} values", self.about.rows), values));
@@ -110,33 +109,33 @@ impl Verified {
     }
 
     /// Where the page of which the bytes were read last starts.
-    pub(super) fn offset(&self) -> u64 {
+    pub(crate) fn offset(&self) -> u64 {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner).page.as_ref().map_or(self.start, |page| page.0)
     }
 
     /// The error of a page at `offset`, kept for whoever asked for the column.
-    pub(super) fn fault(&self, offset: u64, expected: impl Into<String>, found: impl fmt::Display) -> ParquetError {
-        self.keep(Code::CorruptData, Part::Page(offset), expected.into(), found.to_string())
+    pub(crate) fn fault(&self, offset: u64, expected: impl Into<String>, found: impl fmt::Display) -> ParquetError {
+        self.keep(FaultKind::Corrupt, Part::Page(offset), expected.into(), found.to_string())
     }
 
     /// The error of a page that asks for more than the budget of its file.
-    pub(super) fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
-        self.keep(Code::OverBudget, Part::Page(offset), exceeded.expected(), "more".to_owned())
+    pub(crate) fn over(&self, offset: u64, exceeded: &Exceeded) -> ParquetError {
+        self.keep(FaultKind::OverBudget, Part::Page(offset), exceeded.expected(), "more".to_owned())
     }
 
     fn fault_of(&self, part: Part, expected: String, found: String) -> ParquetError {
-        self.keep(Code::CorruptData, part, expected, found)
+        self.keep(FaultKind::Corrupt, part, expected, found)
     }
 
-    fn keep(&self, code: Code, part: Part, expected: String, found: String) -> ParquetError {
+    fn keep(&self, kind: FaultKind, part: Part, expected: String, found: String) -> ParquetError {
         let (row_group, column) = (self.place.0, self.column.clone());
-        let fault = PageFault { code, row_group, column, part, expected, found };
+        let fault = PageFault { kind, row_group, column, part, expected, found };
         let _ = self.slot.set(fault.clone());
         ParquetError::External(Box::new(fault))
     }
 
     /// The texts of a page take so many bytes when they are written out.
-    pub(super) fn texts(&self, bytes: u64) -> Result<()> {
+    pub(crate) fn texts(&self, bytes: u64) -> Result<()> {
         let offset = self.offset();
         self.store.expansion().texts(self.place, offset, bytes).map_err(|exceeded| self.over(offset, &exceeded))
     }

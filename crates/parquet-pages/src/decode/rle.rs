@@ -6,11 +6,11 @@ use std::convert::Infallible;
 
 use bytes::Bytes;
 
-use super::error::Unsupported;
 use crate::bits::word;
+use crate::error::Unsupported;
 
 /// Numbers of a fixed width, as they are stored: runs of one number, and packed ones.
-pub(super) struct Hybrid {
+pub(crate) struct Hybrid {
     data: Bytes,
     at: usize,
     width: usize,
@@ -29,21 +29,21 @@ enum Run {
 }
 
 /// Some numbers, one after the other.
-pub(super) enum Span<'a> {
+pub(crate) enum Span<'a> {
     Same { value: u32, count: usize },
     Packed(Packed<'a>),
 }
 
-pub(super) struct Packed<'a> {
+pub(crate) struct Packed<'a> {
     data: &'a [u8],
     bit: usize,
     width: usize,
-    pub(super) count: usize,
+    pub(crate) count: usize,
 }
 
 impl Hybrid {
     /// At most `most` numbers of `width` bits, which are at most 32.
-    pub(super) fn new(data: Bytes, width: u8, most: usize) -> Result<Self, Unsupported> {
+    pub(crate) fn new(data: Bytes, width: u8, most: usize) -> Result<Self, Unsupported> {
         let width = usize::from(width);
         if width > 32 {
             return Err(Unsupported);
@@ -53,7 +53,7 @@ impl Hybrid {
 
     /// The next numbers, `most` of them at most and one at least.
     #[inline]
-    pub(super) fn span(&mut self, most: usize) -> Result<Span<'_>, Unsupported> {
+    pub(crate) fn span(&mut self, most: usize) -> Result<Span<'_>, Unsupported> {
         while self.count == 0 {
             self.next_run()?;
         }
@@ -70,7 +70,7 @@ impl Hybrid {
     }
 
     /// The next `count` numbers, behind those of `out`.
-    pub(super) fn append<N: Number>(&mut self, count: usize, out: &mut Vec<N>) -> Result<(), Unsupported> {
+    pub(crate) fn append<N: Number>(&mut self, count: usize, out: &mut Vec<N>) -> Result<(), Unsupported> {
         if self.width > N::WIDTH {
             return Err(Unsupported);
         }
@@ -122,7 +122,7 @@ impl Hybrid {
     }
 
     /// When all levels are taken: whether that was all. The last packed run may be filled up, and zeros may follow it.
-    pub fn finish(&self) -> Result<(), Unsupported> {
+    pub(crate) fn finish(&self) -> Result<(), Unsupported> {
         let is_over = matches!(self.run, Run::Packed(_)) || self.count == 0;
         if is_over && self.data[self.at..].iter().all(|byte| *byte == 0) { Ok(()) } else { Err(Unsupported) }
     }
@@ -130,7 +130,7 @@ impl Hybrid {
     /// When all values are taken: whether that was all. Any bytes may follow the last group. DuckDB fills its last run up to
     /// 256 values: behind such a run, which damage to its length may have made, there is nothing. Nor is there where there
     /// are no values.
-    pub fn finish_values(&self) -> Result<(), Unsupported> {
+    pub(crate) fn finish_values(&self) -> Result<(), Unsupported> {
         let is_last_group = match self.run {
             Run::Same(_) => self.count == 0 && self.at > 0,
             Run::Packed(_) => self.count < GROUP,
@@ -140,7 +140,7 @@ impl Hybrid {
 }
 
 /// The number of variable length at a place, and the place behind it.
-pub(super) fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unsupported> {
+pub(crate) fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unsupported> {
     let mut value = 0;
     for shift in (0..35).step_by(7) {
         let byte = *data.get(at).ok_or(Unsupported)?;
@@ -154,7 +154,7 @@ pub(super) fn varint(data: &[u8], mut at: usize) -> Result<(u64, usize), Unsuppo
 }
 
 /// The length that stands before some bytes, what it bounds, and what comes after.
-pub(super) fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unsupported> {
+pub(crate) fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unsupported> {
     let length = data.first_chunk().map(|length| u32::from_le_bytes(*length)).ok_or(Unsupported)?;
     let end = usize::try_from(length).ok().and_then(|length| length.checked_add(4)).ok_or(Unsupported)?;
     if end > data.len() {
@@ -164,7 +164,7 @@ pub(super) fn prefixed(data: &Bytes) -> Result<(Bytes, Bytes), Unsupported> {
 }
 
 impl Span<'_> {
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         match self {
             Self::Same { count, .. } => *count,
             Self::Packed(packed) => packed.count,
@@ -178,7 +178,7 @@ const GROUP: usize = 8;
 const MOST_GROUPS: usize = i32::MAX as usize / GROUP;
 
 /// What stored numbers are made into.
-pub(super) trait Number: Copy + Default + From<u8> {
+pub(crate) trait Number: Copy + Default + From<u8> {
     const WIDTH: usize;
 
     fn of(stored: u32) -> Self;
@@ -203,7 +203,7 @@ impl Number for i32 {
 
 impl Packed<'_> {
     /// Gives each number to `take`.
-    pub(super) fn each(&self, mut take: impl FnMut(u32)) {
+    pub(crate) fn each(&self, mut take: impl FnMut(u32)) {
         let Ok(()) = self.blocks(|some| {
             for number in some {
                 take(number.cast_unsigned());
@@ -213,7 +213,7 @@ impl Packed<'_> {
     }
 
     /// Gives all numbers to `take`, some at a time.
-    pub(super) fn blocks<E>(&self, mut take: impl FnMut(&[i32]) -> Result<(), E>) -> Result<(), E> {
+    pub(crate) fn blocks<E>(&self, mut take: impl FnMut(&[i32]) -> Result<(), E>) -> Result<(), E> {
         let mut numbers = [0_i32; 64];
         for first in (0..self.count).step_by(numbers.len()) {
             let count = numbers.len().min(self.count - first);
@@ -261,7 +261,7 @@ impl Packed<'_> {
     }
 
     /// The data and the bit at which the numbers begin, for numbers of one bit.
-    pub(super) fn bits(&self) -> (&[u8], usize) {
+    pub(crate) fn bits(&self) -> (&[u8], usize) {
         debug_assert_eq!(self.width, 1, "bits are numbers of one bit");
         (self.data, self.bit)
     }

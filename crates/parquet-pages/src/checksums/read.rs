@@ -11,7 +11,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::{ALGORITHM, CREATED_BY, FIRST, KEY, Stated, digits, range};
-use crate::read::footer::shape;
+use crate::footer_shape::footer_bytes;
 
 /// How much is read at a time to be summed.
 const BLOCK: usize = 256 << 10;
@@ -31,14 +31,14 @@ pub enum Checksums {
 
 /// The checksums of the column chunks of a file; none where it has none that apply.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct ChunkChecksums {
+pub struct ChunkChecksums {
     all: Option<Arc<[u32]>>,
     columns: usize,
 }
 
 /// Why the checksums of a footer are refused.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Fault {
+pub enum Fault {
     /// They cannot be read, or are not those of the file's chunks: what is there.
     Malformed(String),
     /// The footer contradicts its own: expected and found.
@@ -49,13 +49,13 @@ pub(crate) enum Fault {
 
 impl ChunkChecksums {
     /// The checksum of a column chunk.
-    pub(crate) fn of(&self, row_group: usize, column: usize) -> Option<u32> {
+    pub fn of(&self, row_group: usize, column: usize) -> Option<u32> {
         self.all.as_ref()?.get(row_group * self.columns + column).copied()
     }
 }
 
 /// The checksums of a file, of which the footer's is verified; `footer` are its bytes from `start` on.
-pub(crate) fn of_file(
+pub fn of_file(
     file: &impl ChunkReader,
     (start, footer): (u64, &[u8]),
     metadata: &ParquetMetaData,
@@ -188,7 +188,7 @@ fn is_hidden(footer: &[u8]) -> bool {
 
 /// Verifies all checksums of a file that another room reads; whether it has any is for the file to say.
 pub fn verify_file(file: &impl ChunkReader, metadata: &ParquetMetaData) -> Result<(), String> {
-    let (start, footer): (u64, Bytes) = shape::bytes(file).ok_or("the footer cannot be read")?;
+    let (start, footer): (u64, Bytes) = footer_bytes(file).ok_or("the footer cannot be read")?;
     let (_, sums) = of_file(file, (start, &footer), metadata).map_err(|fault| fault.to_string())?;
     for (row_group, group) in metadata.row_groups().iter().enumerate() {
         for (column, chunk) in group.columns().iter().enumerate() {

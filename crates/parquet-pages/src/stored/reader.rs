@@ -8,12 +8,12 @@ use parquet::errors::Result;
 use parquet::file::serialized_reader::SerializedPageReader;
 
 use super::bytes::{Place, Store};
-use super::contents::Contents;
-use super::error::FaultSlot;
 use super::verified::Verified;
+use crate::decode::contents::Contents;
+use crate::error::FaultSlot;
 
 /// The pages of one column of one row group.
-pub(super) struct Pages {
+pub(crate) struct Pages {
     stored: Arc<Verified>,
     inner: SerializedPageReader<Verified>,
     /// The page that was looked at and not taken.
@@ -24,7 +24,7 @@ pub(super) struct Pages {
 
 impl Pages {
     /// The pages of a column, for a decoder that checks what they hold.
-    pub(super) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
+    pub(crate) fn new(store: &Store, place: Place<'_>, slot: FaultSlot) -> Result<Self> {
         let stored = Arc::new(Verified::new(store, place, slot)?);
         let inner = match place.chunk().compression() {
             // They come decompressed.
@@ -38,7 +38,7 @@ impl Pages {
     }
 
     /// The same for a decoder that does not check what they hold.
-    pub(super) fn checked(store: &Store, place: Place<'_>, slot: FaultSlot, writes_out: bool) -> Result<Self> {
+    pub(crate) fn checked(store: &Store, place: Place<'_>, slot: FaultSlot, writes_out: bool) -> Result<Self> {
         let about = place.chunk().column_descr();
         let flat = about.max_rep_level() == 0 && about.max_def_level() <= 1;
         let contents = flat.then(|| Contents::new(about, writes_out));

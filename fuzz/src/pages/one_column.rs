@@ -1,5 +1,4 @@
-//! One column of pages out of memory, for the fuzz targets of the member `fuzz` (feature `fuzz`): the decoders that a scan
-//! uses, and neither a file nor a footer of bytes around them.
+//! One column of pages out of memory: the decoders that a scan uses, and neither a file nor a footer of bytes around them.
 //!
 //! A scan takes rows from the short cut until that gives up, and the rest from the library. A target asks for both parts
 //! one by one, because each of them must agree with another reader of the same bytes.
@@ -7,24 +6,27 @@
 use std::sync::Arc;
 
 use arrow::array::ArrayRef;
+use arrow::datatypes::DataType;
 use bytes::Bytes;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, RowSelection, RowSelector};
+use parquet::arrow::parquet_to_arrow_schema;
+use parquet::basic::ConvertedType;
+use parquet::errors::ParquetError;
 use parquet::file::metadata::ParquetMetaData;
 
-use super::catch_panic::contained;
-use super::checksums::ChunkChecksums;
-use super::read::column::Column;
-use super::read::decode::{Refused, normal_column};
-use super::read::footer::{plain, rows_of};
-use super::read::open::{columns_of, readable};
-use super::read::pages::{self, Cursor, FaultSlot, Form, Library, Place, Store};
-use super::schema::Kind;
+use parquet_pages::checksums::ChunkChecksums;
+use parquet_pages::{
+    Column, Cursor, FaultSlot, Form, Library, Place, Refused, Store, normal_column, rows_of, text_type, verify,
+    with_texts_as_keys,
+};
+
+use crate::quiet::contained;
 
 /// Row group 0 of a file with one column.
 pub struct OneColumn {
     footer: ArrowReaderMetadata,
-    kind: Kind,
+    held: DataType,
     /// Where the bytes start in the file.
     start: u64,
     bytes: Bytes,
@@ -48,11 +50,14 @@ impl Refusal {
 impl OneColumn {
     /// The column of a file with this footer whose bytes from `start` on are these.
     pub fn new(metadata: ParquetMetaData, start: u64, bytes: Bytes) -> Result<Self, Refusal> {
-        let columns = columns_of("column", metadata.file_metadata().schema_descr())
-            .map_err(|findings| Refusal::library(format!("{findings:?}")))?;
-        let kind = columns.first().and_then(|column| column.kind).unwrap_or(Kind::Unsupported);
-        let footer = readable(metadata, &columns).map_err(Refusal::library)?;
-        Ok(Self { footer, kind, start, bytes })
+        let schema = metadata.file_metadata().schema_descr();
+        let plain = |error: ParquetError| Refusal::library(error.to_string());
+        let fields = contained(|| parquet_to_arrow_schema(schema, None)).map_err(Refusal::library)?.map_err(plain)?;
+        let is_text = schema.column(0).converted_type() == ConvertedType::UTF8;
+        let held = fields.fields().first().map_or(DataType::Null, |field| held_as(field.data_type(), is_text));
+        let texts = [held == text_type()];
+        let footer = contained(|| with_texts_as_keys(metadata, &texts)).map_err(Refusal::library)?.map_err(plain)?;
+        Ok(Self { footer, held, start, bytes })
     }
 
     fn store(&self) -> Store {
@@ -99,12 +104,12 @@ impl OneColumn {
         let fields = Some(self.footer.schema().fields());
         let reader = contained(|| library.reader(ProjectionMask::all(), fields, at_once.max(1), selection))
             .map_err(refused)?
-            .map_err(|error| refused(plain(&error)))?;
+            .map_err(|error| refused(error.to_string()))?;
         let mut reader = reader;
         let mut columns = Vec::new();
         while let Some(batch) = contained(|| reader.next()).map_err(refused)? {
             let batch = batch.map_err(|error| refused(error.to_string()))?;
-            let column = contained(|| normal_column(batch.column(0), self.kind)).map_err(refused)?;
+            let column = contained(|| normal_column(batch.column(0), &self.held)).map_err(refused)?;
             columns.push(column.map_err(|refused| match refused {
                 Refused::Unreadable(why) => Refusal::library(why),
                 Refused::TooLarge { value, .. } => {
@@ -124,9 +129,20 @@ impl OneColumn {
         let (slot, metadata) = (FaultSlot::default(), self.footer.metadata());
         let checksums = &ChunkChecksums::default();
         let place = Place { metadata, checksums, row_group: 0, column: 0 };
-        pages::verify(&self.store(), place, &slot).map_err(|error| match slot.get() {
+        verify(&self.store(), place, &slot).map_err(|error| match slot.get() {
             Some(fault) => Refusal { expected: Some(fault.expected.clone()), found: fault.found.clone() },
-            None => Refusal::library(plain(&error)),
+            None => Refusal::library(error.to_string()),
         })
+    }
+}
+
+/// How a trace holds a column that is stored as `stored`.
+fn held_as(stored: &DataType, is_text: bool) -> DataType {
+    match stored {
+        DataType::Boolean => DataType::Boolean,
+        integer if integer.is_integer() => DataType::Int64,
+        float if float.is_floating() => DataType::Float64,
+        DataType::Utf8 if is_text => text_type(),
+        _ => DataType::Null,
     }
 }

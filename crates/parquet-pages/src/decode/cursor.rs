@@ -9,18 +9,18 @@ use bytes::Bytes;
 use parquet::basic::{Encoding, Type as Physical};
 use parquet::column::page::{Page, PageReader as _};
 
-use super::bytes::{Place, Store};
 use super::dictionary::Dictionary;
-use super::error::{FaultSlot, Unsupported};
-use super::reader::Pages;
 use super::rle::{Hybrid, Number, Span, prefixed};
 use super::spread::{spread_bits, spread_keys};
 use crate::bits::Bits;
-use crate::read::column::{Column, Runs};
+use crate::column::{Column, Runs};
+use crate::error::{FaultSlot, Unsupported};
+use crate::stored::bytes::{Place, Store};
+use crate::stored::reader::Pages;
 
 /// How rows are to be held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Form {
+pub enum Form {
     /// One value per row, or one key per row.
     Rows,
     /// One value per run.
@@ -28,7 +28,7 @@ pub(crate) enum Form {
 }
 
 /// Where the reading of a column is.
-pub(crate) struct Cursor {
+pub struct Cursor {
     pages: Pages,
     physical: Physical,
     /// Whether there may be nulls.
@@ -68,7 +68,7 @@ struct Stretches {
 
 impl Cursor {
     /// A column that is stored as `stored`.
-    pub(crate) fn open(store: &Store, place: Place<'_>, stored: &DataType, form: Form) -> Result<Self, Unsupported> {
+    pub fn open(store: &Store, place: Place<'_>, stored: &DataType, form: Form) -> Result<Self, Unsupported> {
         let (column, rows) = (place.chunk(), place.rows());
         let about = column.column_descr();
         let physical = about.physical_type();
@@ -96,7 +96,7 @@ impl Cursor {
         })
     }
 
-    pub(crate) fn read(&mut self, count: usize) -> Result<Column, Unsupported> {
+    pub fn read(&mut self, count: usize) -> Result<Column, Unsupported> {
         if count > 0 {
             // The dictionary stands before the first values.
             self.page()?;

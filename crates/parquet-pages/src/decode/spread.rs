@@ -6,7 +6,7 @@ use super::rle::Number;
 use crate::bits::Bits;
 
 /// The keys of rows that have one, at their rows.
-pub(super) fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {
+pub(crate) fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N> {
     let mut spread = vec![N::default(); valid.len()];
     let mut keys = keys;
     for (start, end) in valid.set_slices() {
@@ -18,7 +18,7 @@ pub(super) fn spread_keys<N: Number>(keys: &[N], valid: &BooleanBuffer) -> Vec<N
 }
 
 /// The bits of rows that have one, at their rows.
-pub(super) fn spread_bits(bits: &BooleanBuffer, valid: &BooleanBuffer) -> BooleanBuffer {
+pub(crate) fn spread_bits(bits: &BooleanBuffer, valid: &BooleanBuffer) -> BooleanBuffer {
     let mut spread = Bits::with_capacity(valid.len());
     let mut taken = bits.offset();
     for (start, end) in valid.set_slices() {

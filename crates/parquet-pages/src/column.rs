@@ -16,7 +16,7 @@ use arrow::datatypes::{ArrowNativeType as _, DataType, Int32Type, Int64Type};
 use arrow::error::ArrowError;
 
 #[derive(Clone, Debug)]
-pub(crate) enum Column {
+pub enum Column {
     /// One value per row.
     Flat(ArrayRef),
     /// One value per run.
@@ -26,7 +26,7 @@ pub(crate) enum Column {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct Keys {
+pub struct Keys {
     keys: UInt8Array,
     /// A value for each key, none of them null: integers or texts.
     values: ArrayRef,
@@ -34,7 +34,7 @@ pub(crate) struct Keys {
 
 /// Rows of which many in a row are equal: columns that are constant in an episode.
 #[derive(Clone, Debug)]
-pub(crate) struct Runs {
+pub struct Runs {
     /// A value for each run; neighbours may be equal.
     values: ArrayRef,
     /// The row before which each run ends, counted from the first row of the first run; ascending.
@@ -45,7 +45,7 @@ pub(crate) struct Runs {
 }
 
 impl Column {
-    pub(crate) fn len(&self) -> usize {
+    pub fn len(&self) -> usize {
         match self {
             Self::Flat(values) => values.len(),
             Self::Runs(runs) => runs.length,
@@ -54,13 +54,13 @@ impl Column {
     }
 
     /// How the values behind the rows are held.
-    pub(crate) fn data_type(&self) -> &DataType {
+    pub fn data_type(&self) -> &DataType {
         let (Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. })) = self;
         values.data_type()
     }
 
     /// `length` rows from row `start`; nothing is copied.
-    pub(crate) fn slice(&self, start: usize, length: usize) -> Self {
+    pub fn slice(&self, start: usize, length: usize) -> Self {
         match self {
             Self::Flat(values) => Self::Flat(values.slice(start, length)),
             Self::Runs(runs) => Self::Runs(runs.slice(start, length)),
@@ -70,7 +70,7 @@ impl Column {
         }
     }
 
-    pub(crate) fn flat(&self) -> Result<ArrayRef, ArrowError> {
+    pub fn flat(&self) -> Result<ArrayRef, ArrowError> {
         match self {
             Self::Flat(values) => Ok(values.clone()),
             Self::Runs(runs) => runs.at(0..runs.length),
@@ -79,7 +79,7 @@ impl Column {
     }
 
     /// The values of some rows, ascending.
-    pub(crate) fn at(&self, rows: &[usize]) -> Result<ArrayRef, ArrowError> {
+    pub fn at(&self, rows: &[usize]) -> Result<ArrayRef, ArrowError> {
         match self {
             Self::Flat(values) => {
                 let rows: UInt32Array = rows.iter().map(|row| narrow(*row)).collect::<Vec<_>>().into();
@@ -94,7 +94,7 @@ impl Column {
     }
 
     /// The values that stand behind the rows; those of no row, or of two keys, may be among them.
-    pub(crate) fn entries(&self) -> &ArrayRef {
+    pub fn entries(&self) -> &ArrayRef {
         let values = match self {
             Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. }) => values,
         };
@@ -102,13 +102,13 @@ impl Column {
     }
 
     /// The keys and texts of a text column that is held as keys.
-    pub(crate) fn byte_texts(&self) -> Option<(&UInt8Array, &StringArray)> {
+    pub fn byte_texts(&self) -> Option<(&UInt8Array, &StringArray)> {
         let Self::Keys(Keys { keys, values }) = self else { return None };
         values.as_string_opt().map(|texts| (keys, texts))
     }
 
     /// The text at a row of a text column; `None` for null.
-    pub(crate) fn text(&self, row: usize) -> Option<&str> {
+    pub fn text(&self, row: usize) -> Option<&str> {
         match self {
             Self::Flat(values) => text_at(values, row),
             Self::Runs(runs) => runs.text(row),
@@ -117,7 +117,7 @@ impl Column {
     }
 
     /// The texts at some rows, which ascend, of a text column; `None` for null.
-    pub(crate) fn texts<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = Option<&'a str>> {
+    pub fn texts<'a>(&'a self, rows: &'a [usize]) -> impl Iterator<Item = Option<&'a str>> {
         let runs = if let Self::Runs(runs) = self { Some((runs, DictionaryTexts::of(&runs.values))) } else { None };
         let mut run = runs.map_or(0, |(runs, _)| runs.run_of(0));
         rows.iter().map(move |row| match runs {
@@ -130,7 +130,7 @@ impl Column {
     }
 
     /// The integer at a row of an integer column; `None` for null.
-    pub(crate) fn int(&self, row: usize) -> Option<i64> {
+    pub fn int(&self, row: usize) -> Option<i64> {
         let (values, row) = match self {
             Self::Flat(values) => (values, row),
             Self::Runs(runs) => (&runs.values, runs.run_of(row)),
@@ -141,7 +141,7 @@ impl Column {
     }
 
     /// The rows of some columns of one kind, one after the other.
-    pub(crate) fn concat<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Result<Self, ArrowError> {
+    pub fn concat<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Result<Self, ArrowError> {
         let parts: Vec<&Self> = parts.into_iter().collect();
         if parts.iter().all(|part| part.holds_texts()) {
             return joined_texts(&parts).map(Self::Flat);
@@ -192,19 +192,19 @@ impl From<ArrayRef> for Column {
 
 impl Keys {
     /// Rows with these keys, a null's being any; `None` where a key has no value.
-    pub(crate) fn new(keys: UInt8Array, values: ArrayRef) -> Option<Self> {
+    pub fn new(keys: UInt8Array, values: ArrayRef) -> Option<Self> {
         // What stands in the place of nulls is within, too, but where there is no value at all.
         let largest = keys.values().iter().copied().fold(0, u8::max);
         let within = keys.null_count() == keys.len() || usize::from(largest) < values.len();
         (within && values.null_count() == 0).then_some(Self { keys, values })
     }
 
-    pub(crate) fn keys(&self) -> &UInt8Array {
+    pub fn keys(&self) -> &UInt8Array {
         &self.keys
     }
 
     /// A value for each key.
-    pub(crate) fn values(&self) -> &ArrayRef {
+    pub fn values(&self) -> &ArrayRef {
         &self.values
     }
 
@@ -222,7 +222,7 @@ impl Keys {
 
     /// Whether the integers of each stretch of rows, bounded by `offsets`, are 1, 2, and so on. May say no where they
     /// are, if a value has two keys.
-    pub(crate) fn count_from_one(&self, offsets: &[usize]) -> bool {
+    pub fn count_from_one(&self, offsets: &[usize]) -> bool {
         let stretches = || offsets.windows(2).map(|ends| ends[0]..ends[1]);
         // The keys of 1, 2, and so on, as far as there are any.
         let values = self.values.as_primitive::<Int64Type>().values();
@@ -235,13 +235,13 @@ impl Keys {
 
 impl Runs {
     /// Runs of these values; each ends before the row of `ends` at its place.
-    pub(crate) fn new(values: ArrayRef, ends: Vec<u32>) -> Self {
+    pub fn new(values: ArrayRef, ends: Vec<u32>) -> Self {
         let length = ends.last().map_or(0, |end| *end as usize);
         Self { values, ends: ends.into(), start: 0, length }
     }
 
     /// `length` rows from row `start`; nothing is copied.
-    pub(crate) fn slice(&self, start: usize, length: usize) -> Self {
+    pub fn slice(&self, start: usize, length: usize) -> Self {
         Self { start: self.start + start, length, ..self.clone() }
     }
 
@@ -258,20 +258,20 @@ impl Runs {
     }
 
     /// The rows at which the text is another one than in the row before; row 0 is none of them.
-    pub(crate) fn text_changes(&self) -> impl Iterator<Item = usize> + '_ {
+    pub fn text_changes(&self) -> impl Iterator<Item = usize> + '_ {
         let texts = DictionaryTexts::of(&self.values);
         let differs = move |(_, run): &(usize, usize)| !texts.same(*run, run - 1);
         self.starts().skip(1).filter(differs).map(|(start, _)| start)
     }
 
     /// The text at a row; `None` for null.
-    pub(crate) fn text(&self, row: usize) -> Option<&str> {
+    pub fn text(&self, row: usize) -> Option<&str> {
         text_at(&self.values, self.run_of(row))
     }
 
     /// How many rows from `first` on, `most` of them at most, end with a run or with the last row; `most`
     /// where none ends.
-    pub(crate) fn until(&self, first: usize, most: usize) -> usize {
+    pub fn until(&self, first: usize, most: usize) -> usize {
         if most >= self.length - first {
             return self.length - first;
         }
@@ -282,7 +282,7 @@ impl Runs {
     }
 
     /// The row at which each run starts, and the position of its value; the first starts at row 0.
-    pub(crate) fn starts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+    pub fn starts(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let ends = self.ends.values();
         let first = self.run_of(0);
         let start = move |run: usize| if run == first { 0 } else { ends[run - 1] as usize - self.start };
@@ -290,12 +290,12 @@ impl Runs {
     }
 
     /// The values of the runs, those of which no row is left included.
-    pub(crate) fn values(&self) -> &ArrayRef {
+    pub fn values(&self) -> &ArrayRef {
         &self.values
     }
 
     /// Whether a run starts at nothing but these rows, which ascend.
-    pub(crate) fn start_only_at(&self, rows: &[usize]) -> bool {
+    pub fn start_only_at(&self, rows: &[usize]) -> bool {
         let mut rows = rows.iter();
         self.starts().skip(1).all(|(start, _)| rows.by_ref().find(|row| **row >= start) == Some(&start))
     }
@@ -318,7 +318,7 @@ pub(crate) fn all_within(keys: &[i32], count: usize) -> bool {
 }
 
 /// The text at a row of a dictionary; `None` for null.
-pub(crate) fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
+pub fn text_at(column: &ArrayRef, row: usize) -> Option<&str> {
     DictionaryTexts::of(column).at(row)
 }
 

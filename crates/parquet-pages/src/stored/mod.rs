@@ -1,0 +1,7 @@
+//! Pages as they are stored: read, held against the footer and their checksums, decompressed.
+
+pub(crate) mod bytes;
+pub(crate) mod header;
+pub(crate) mod reader;
+pub(crate) mod verified;
+mod zstd;

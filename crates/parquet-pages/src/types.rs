@@ -1,0 +1,97 @@
+//! The few types that columns are held in: truth values, integers and floats of 64 bits, texts under a dictionary.
+
+use std::sync::Arc;
+
+use arrow::array::{Array as _, ArrayRef, AsArray as _, new_null_array};
+use arrow::compute::cast;
+use arrow::datatypes::{DataType, Int32Type, Schema, UInt64Type};
+use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ArrowReaderOptions};
+use parquet::arrow::parquet_to_arrow_schema;
+use parquet::errors::Result as ParquetResult;
+use parquet::file::metadata::ParquetMetaData;
+
+use crate::column::all_within;
+
+/// How text is held in memory: keys into the distinct values.
+pub fn text_type() -> DataType {
+    DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8))
+}
+
+/// A footer of which the text columns are read as dictionaries, whatever a writer's own hint says; `is_text` says for each
+/// column of the schema whether it holds text.
+pub fn with_texts_as_keys(metadata: ParquetMetaData, is_text: &[bool]) -> ParquetResult<ArrowReaderMetadata> {
+    let plain_schema = parquet_to_arrow_schema(metadata.file_metadata().schema_descr(), None)?;
+    let fields = plain_schema.fields().iter().zip(is_text).map(|(field, is_text)| match is_text {
+        true => Arc::new(field.as_ref().clone().with_data_type(text_type())),
+        false => Arc::clone(field),
+    });
+    let wanted = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+    ArrowReaderMetadata::try_new(Arc::new(metadata), ArrowReaderOptions::new().with_schema(wanted))
+}
+
+/// Why a decoded column is not taken.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// What is wrong with it.
+    Unreadable(String),
+    /// An integer that does not fit, and its row.
+    TooLarge { row: usize, value: u64 },
+}
+
+/// A column as the Parquet library decodes it, held as `held`: truth values, 64 bits, or [`text_type`]. Keys lead to values,
+/// and texts are UTF-8.
+///
+/// # Errors
+/// For a column of another kind, or an integer above the largest of 64 bits with a sign.
+pub fn normal_column(column: &ArrayRef, held: &DataType) -> Result<ArrayRef, Refused> {
+    match column.data_type() {
+        same if same == held => {
+            if *held == text_type() {
+                check_keys(column)?;
+                check_texts(column)?;
+            }
+            Ok(Arc::clone(column))
+        }
+        DataType::Null => Ok(new_null_array(held, column.len())),
+        DataType::UInt64 => {
+            let values = column.as_primitive::<UInt64Type>();
+            let too_large =
+                (0..values.len()).find(|row| values.is_valid(*row) && i64::try_from(values.value(*row)).is_err());
+            match too_large {
+                Some(row) => Err(Refused::TooLarge { row, value: values.value(row) }),
+                None => cast(column, held).map_err(|error| Refused::Unreadable(error.to_string())),
+            }
+        }
+        _ => cast(column, held).map_err(|error| Refused::Unreadable(error.to_string())),
+    }
+}
+
+/// Every key that is not null leads to a value that is not null.
+fn check_keys(column: &ArrayRef) -> Result<(), Refused> {
+    let column = column.as_dictionary::<Int32Type>();
+    let count = column.values().len();
+    let within = |key: i32| usize::try_from(key).is_ok_and(|key| key < count);
+    // What stands in the place of nulls is nearly always within, too, and then there is no need to look at them.
+    let good = column.values().null_count() == 0
+        && (all_within(column.keys().values(), count) || column.keys().iter().flatten().all(within));
+    if good { Ok(()) } else { Err(Refused::Unreadable("a dictionary key without a value".into())) }
+}
+
+/// Every text is UTF-8. The Parquet library looks at all texts of a delta-encoded page at once, and takes a character of
+/// which one text has the first bytes and the next text the rest.
+fn check_texts(column: &ArrayRef) -> Result<(), Refused> {
+    let texts = column.as_any_dictionary().values().as_string::<i32>();
+    let (bytes, offsets) = (texts.value_data(), texts.value_offsets());
+    let begins = |offset: &i32| {
+        let next = usize::try_from(*offset).ok().and_then(|at| bytes.get(at..))?.first();
+        // A byte that goes on with a character begins none.
+        Some(next.is_none_or(|byte| byte & 0xc0 != 0x80))
+    };
+    let (first, last) = (offsets.first().copied().unwrap_or(0), offsets.last().copied().unwrap_or(0));
+    let range = usize::try_from(first).ok().zip(usize::try_from(last).ok());
+    let is_text = range.and_then(|(first, last)| std::str::from_utf8(bytes.get(first..last)?).ok()).is_some();
+    if is_text && offsets.iter().all(|offset| begins(offset) == Some(true)) {
+        return Ok(());
+    }
+    Err(Refused::Unreadable("texts that are not UTF-8".into()))
+}

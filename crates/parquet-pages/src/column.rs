@@ -53,6 +53,10 @@ impl Column {
         }
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// How the values behind the rows are held.
     pub fn data_type(&self) -> &DataType {
         let (Self::Flat(values) | Self::Runs(Runs { values, .. }) | Self::Keys(Keys { values, .. })) = self;
@@ -60,6 +64,7 @@ impl Column {
     }
 
     /// `length` rows from row `start`; nothing is copied.
+    #[must_use]
     pub fn slice(&self, start: usize, length: usize) -> Self {
         match self {
             Self::Flat(values) => Self::Flat(values.slice(start, length)),
@@ -241,6 +246,7 @@ impl Runs {
     }
 
     /// `length` rows from row `start`; nothing is copied.
+    #[must_use]
     pub fn slice(&self, start: usize, length: usize) -> Self {
         Self { start: self.start + start, length, ..self.clone() }
     }

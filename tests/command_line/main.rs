@@ -14,7 +14,6 @@ mod generated;
 mod generation;
 #[path = "../harness/mod.rs"]
 mod harness;
-mod help;
 mod hostile;
 mod options;
 #[cfg(target_os = "linux")]
@@ -26,6 +25,8 @@ mod plan;
 mod quality;
 #[cfg(all(target_os = "linux", feature = "polars", feature = "raster", feature = "sim"))]
 mod readme;
+#[cfg(all(feature = "polars", feature = "raster", feature = "sim", feature = "view"))]
+mod reference;
 mod refusals;
 #[cfg(unix)]
 mod renamed;

@@ -15,7 +15,7 @@ use polars::sql::SQLContext;
 
 use super::run::{self, PolarsError};
 use super::statement::{Checked, Table};
-use metric::fault::Faults;
+use toml_spec::Faults;
 use trace::catch_panic::contained_on_all_threads;
 
 /// Rows of one batch at most.

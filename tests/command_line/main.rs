@@ -5,6 +5,7 @@ mod battery;
 #[cfg(target_os = "linux")]
 mod budgets;
 mod colors;
+mod comparable;
 mod config;
 mod declared;
 mod extended;

@@ -29,6 +29,7 @@ pub fn patience() -> Patience {
         first_delay: Duration::from_millis(2),
         longest_delay: Duration::from_millis(4),
         longest_asked_delay: Duration::from_millis(30),
+        longest_wait: Duration::from_millis(200),
         largest_answer: 100_000,
         ..Patience::default()
     }

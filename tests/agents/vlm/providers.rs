@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use world::agent::Status;
+use world::agent::reply::Repair;
 use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
@@ -80,6 +81,65 @@ fn the_quota_of_a_day_stops_the_recording_with_what_to_do() {
         let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err().cause;
         assert!(lost.contains("quota of the day is used up") && lost.contains("\n  help: "), "{lost}");
         assert_eq!((vlm.stopped(), server.count()), (Some(lost.as_str()), 1));
+    }
+}
+
+#[test]
+fn a_wait_of_hours_stops_the_recording_with_what_to_do() {
+    for (wait, seconds) in [("7200", "7200 s"), ("999999999999999999999", "s: HTTP 429")] {
+        let answer = http("429 Too Many Requests", &format!("retry-after: {wait}\r\n"), b"slow down");
+        let server = Server::start(move |_, _| answer.clone());
+        let bench = Bench::new(Limits::default());
+        let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
+        let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err().cause;
+        assert!(lost.contains("asks to wait") && lost.contains(seconds) && lost.contains("\n  help: "), "{lost}");
+        assert_eq!((vlm.stopped(), server.count()), (Some(lost.as_str()), 1));
+    }
+}
+
+#[test]
+fn no_request_goes_out_before_a_used_up_limit_is_renewed() {
+    // OpenAI: <https://platform.openai.com/docs/guides/rate-limits>, "Rate limits in headers".
+    let headers = "content-type: application/json\r\nx-ratelimit-remaining-requests: 0\r\n\
+                   x-ratelimit-reset-requests: 100ms\r\n";
+    let body = spoken(Dialect::OpenaiChat, &decision("w"), "stop").to_string();
+    let server = Server::start(move |_, _| http("200 OK", headers, body.as_bytes()));
+    let bench = Bench::new(Limits::default());
+    let start = Instant::now();
+    let replies = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 3);
+    assert!(replies.iter().all(|reply| reply.as_ref().is_ok_and(|reply| reply.status == Status::Ok)));
+    assert_eq!(server.count(), 3);
+    assert!(start.elapsed() >= Duration::from_millis(200), "the provider was asked too early");
+}
+
+#[test]
+fn a_call_of_a_function_in_place_of_a_text_is_a_repair_with_every_provider() {
+    let arguments: Value = serde_json::from_str(&decision("w")).unwrap();
+    for dialect in PROVIDERS {
+        let mut body = spoken(dialect, "", endings(dialect).0);
+        match dialect {
+            Dialect::OpenaiChat | Dialect::OpenaiCompatible => {
+                let call = json!({ "type": "function", "function": { "name": "reply", "arguments": decision("w") } });
+                body["choices"][0]["message"] = json!({ "content": null, "tool_calls": [call] });
+            }
+            Dialect::Gemini => {
+                let call = json!({ "functionCall": { "name": "reply", "args": arguments } });
+                body["candidates"][0]["content"]["parts"] = json!([call]);
+            }
+            Dialect::AnthropicMessages => {
+                body["content"] = json!([{ "type": "tool_use", "id": "1", "name": "reply", "input": arguments }]);
+            }
+        }
+        let server = Server::start(move |_, _| ok(&body));
+        let bench = Bench::new(Limits::default());
+        // The second time from the journal.
+        for _ in 0..2 {
+            let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+            let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
+            assert_eq!((reply.status, reply.repairs), (Status::Repaired, vec![Repair::ToolCall]), "{dialect:?}");
+            assert_eq!(reply.self_color.as_deref(), Some("red"), "{dialect:?}");
+        }
+        assert_eq!(server.count(), 1);
     }
 }
 

@@ -97,8 +97,7 @@ impl VlmAgent {
                     completion_tokens: count(answer.completion_tokens),
                     cost_usd,
                 };
-                let reading = reply::read(&answer.text, &self.task.experiment, answer.ending);
-                let reading = if answer.has_lone_surrogate { reading.with_surrogate_repaired() } else { reading };
+                let reading = reply::read(&answer.text, &self.task.experiment, answer.ending).after(&answer.repairs);
                 Ok(Reply { model: answer.model, ..reading.into_reply(answer.text, usage) })
             }
         }

@@ -14,6 +14,7 @@
 //! | [`provider`] | sending one request |
 //! | `preflight` | whether the provider can be reached |
 //! | [`failure`] | the names of what can go wrong |
+//! | `rate_limit`, `waiting` | the waits that providers state; how long a step waits |
 //! | `step` | what is done then: another attempt, a lost episode, the end |
 //! | [`concurrency`] | how many requests are out at once |
 //! | [`limits`] | what a run may spend |
@@ -34,8 +35,10 @@ mod model;
 pub mod models;
 mod preflight;
 pub mod provider;
+mod rate_limit;
 pub mod secrets;
 mod step;
+mod waiting;
 pub mod wire_format;
 
 pub use agent::VlmAgent;

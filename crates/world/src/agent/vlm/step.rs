@@ -2,9 +2,7 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
-use backon::{ExponentialBuilder, Retryable as _};
 use serde_json::Value;
 
 use super::failure::{Failure, FailureKind};
@@ -12,6 +10,7 @@ use super::journal::{Entry, Journal, Recorded};
 use super::limits::Reached;
 use super::model::{OnOutage, Vlm, tokens};
 use super::provider::Provider;
+use super::waiting::Waiting;
 use crate::agent::Lost;
 
 /// What helps where a model takes no images.
@@ -43,38 +42,41 @@ enum Ended {
     Stopped(Lost),
 }
 
+/// Whether a busy provider asks for a longer wait than any step has.
+fn is_too_long(failure: &Failure, provider: &Provider) -> bool {
+    failure.kind.is_busy() && failure.after.is_some_and(|asked| asked > provider.patience().longest_wait)
+}
+
 impl Step {
-    /// Asks until there is an answer, the attempts are used up, or there is no point in asking.
+    /// Asks until there is an answer, the attempts or the time for waiting are used up, or there is no point in asking.
     pub(super) async fn ask(self) -> Result<Recorded, Lost> {
         let Some(provider) = &self.vlm.provider else {
             return Err(Lost::because("nothing is sent from a cassette".to_owned()));
         };
-        let patience = provider.patience();
-        let backoff = ExponentialBuilder::default()
-            .with_min_delay(patience.first_delay)
-            .with_max_delay(patience.longest_delay)
-            .with_max_times(patience.attempts.saturating_sub(1) as usize)
-            .with_jitter();
+        let mut waiting = Waiting::new(provider.patience());
         let mut attempt = 0;
-        let asked = (|| {
+        loop {
             attempt += 1;
-            self.attempt_in_turn(provider, attempt)
-        })
-        .retry(backoff)
-        .when(|ended| matches!(ended, Ended::Failed(failure) if failure.kind.may_pass()))
-        .adjust(|ended, delay| match ended {
-            Ended::Failed(Failure { after: Some(after), .. }) => {
-                delay.map(|_| (*after).min(patience.longest_asked_delay))
+            let failure = match self.attempt(provider, attempt).await {
+                Ok(recorded) => return Ok(recorded),
+                Err(Ended::Stopped(lost)) => return Err(lost),
+                Err(Ended::Failed(failure)) if !failure.kind.may_pass() => return Err(self.rejected(&failure)),
+                Err(Ended::Failed(failure)) => failure,
+            };
+            match waiting.next(&failure) {
+                Some(wait) => tokio::time::sleep(wait).await,
+                None if is_too_long(&failure, provider) => return Err(self.put_off(&failure)),
+                None => return self.give_up(attempt, &failure),
             }
-            _ => delay,
-        })
-        .await;
-        match asked {
-            Ok(recorded) => Ok(recorded),
-            Err(Ended::Stopped(lost)) => Err(lost),
-            Err(Ended::Failed(failure)) if failure.kind.may_pass() => self.give_up(attempt, &failure),
-            Err(Ended::Failed(failure)) => Err(self.rejected(&failure)),
         }
+    }
+
+    /// A provider that takes nothing for hours takes no other request of this recording either.
+    fn put_off(&self, failure: &Failure) -> Lost {
+        let seconds = failure.after.unwrap_or_default().as_secs();
+        let (detail, help) = (&failure.detail, "the same command continues then; what was answered is not asked again");
+        let reason = format!("the provider asks to wait {seconds} s: {detail}\n  help: {help}");
+        self.vlm.halt(Lost::because(reason))
     }
 
     /// A request that the provider will not take costs its episode if the model has taken others; else no request of this
@@ -93,24 +95,6 @@ impl Step {
             _ => format!("the provider refuses the request: {}", failure.detail),
         };
         self.vlm.halt(Lost::because(reason))
-    }
-
-    /// An attempt, made again when the provider says when: a rate limit is no fault, and uses up no attempts.
-    async fn attempt_in_turn(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
-        let patience = provider.patience();
-        let mut waited = Duration::ZERO;
-        loop {
-            let ended = self.attempt(provider, attempt).await;
-            let Err(Ended::Failed(Failure { kind: FailureKind::RateLimited, after: Some(after), .. })) = &ended else {
-                return ended;
-            };
-            let is_over = waited + *after > patience.longest_wait || *after > patience.longest_asked_delay;
-            if after.is_zero() || is_over {
-                return ended;
-            }
-            tokio::time::sleep(*after).await;
-            waited += *after;
-        }
     }
 
     async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {

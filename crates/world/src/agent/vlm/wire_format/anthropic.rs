@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Question, text, tokens};
+use super::{Answer, Question, text, text_or_call, tokens};
 use crate::agent::reply::Ending;
 
 pub(super) fn body(question: &Question<'_>) -> Value {
@@ -40,9 +40,12 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
         _ => Ending::Whole,
     };
     let usage = &body["usage"];
+    let calls: Vec<_> =
+        blocks.iter().filter(|block| block["type"] == "tool_use").map(|block| block["input"].to_string()).collect();
+    let (text_of_reply, repairs) = text_or_call(words.collect(), &calls);
     Some(Answer {
-        text: words.collect(),
-        has_lone_surrogate: false,
+        text: text_of_reply,
+        repairs,
         ending,
         prompt_tokens: tokens(&usage["input_tokens"]),
         completion_tokens: tokens(&usage["output_tokens"]),

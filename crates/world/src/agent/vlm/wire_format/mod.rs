@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::agent::reply::{Ending, without_lone_surrogates};
+use crate::agent::reply::{Ending, Repair, without_lone_surrogates};
 use exact::names;
 
 /// A language.
@@ -74,8 +74,9 @@ names!(Effort { None: "none", Minimal: "minimal", Low: "low", Medium: "medium", 
 pub struct Answer {
     /// The text of the reply; empty where there is none.
     pub text: String,
-    /// Whether the body had a lone surrogate in it, for which the text has U+FFFD.
-    pub has_lone_surrogate: bool,
+    /// Repairs of what carried the text: a lone surrogate in the body, for which the text has U+FFFD; a call of a function,
+    /// whose arguments are the text.
+    pub repairs: Vec<Repair>,
     pub ending: Ending,
     /// Tokens of the request, where counted.
     pub prompt_tokens: Option<u32>,
@@ -133,8 +134,12 @@ impl Dialect {
             Err(fault) => fault,
         };
         let value = without_lone_surrogates(body).and_then(|body| serde_json::from_str(&body).ok()).ok_or(fault)?;
-        let of_reply = |answer: Answer| Answer { has_lone_surrogate: answer.text.contains('\u{fffd}'), ..answer };
-        Ok(self.answer(&value).map(of_reply))
+        Ok(self.answer(&value).map(|mut answer| {
+            if answer.text.contains('\u{fffd}') {
+                answer.repairs.push(Repair::Surrogate);
+            }
+            answer
+        }))
     }
 
     /// What the body of an answer says; `None` if it is not of this language. An error that refuses what the request is
@@ -146,6 +151,14 @@ impl Dialect {
             Self::AnthropicMessages => anthropic::answer(body),
         };
         answer.or_else(|| refusal::answer(body))
+    }
+}
+
+/// The text of a reply, or else the arguments of the one function that it calls, and the repair that this is.
+fn text_or_call(text: String, calls: &[String]) -> (String, Vec<Repair>) {
+    match calls {
+        [arguments] if text.trim().is_empty() => (arguments.clone(), vec![Repair::ToolCall]),
+        _ => (text, Vec::new()),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Question, text, tokens};
+use super::{Answer, Question, text, text_or_call, tokens};
 use crate::agent::reply::Ending;
 
 pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
@@ -39,9 +39,13 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     }
     let usage = &body["usage"];
     let (reply, ending) = choices.first().map_or((String::new(), Ending::Whole), reply);
+    let calls = choices.first().and_then(|choice| choice["message"]["tool_calls"].as_array());
+    let arguments = |call: &Value| call["function"]["arguments"].as_str().map(str::to_owned);
+    let calls: Vec<_> = calls.into_iter().flatten().filter_map(arguments).collect();
+    let (reply, repairs) = text_or_call(reply, &calls);
     Some(Answer {
         text: reply,
-        has_lone_surrogate: false,
+        repairs,
         ending,
         prompt_tokens: tokens(&usage["prompt_tokens"]),
         completion_tokens: tokens(&usage["completion_tokens"]),

@@ -191,7 +191,7 @@ fn a_call_of_a_function_with_the_right_arguments_is_a_repair() {
         call.replace("\"reply\"", "1"),
         call.replace("\"action\"", "\"move\""),
         call.replace("\"action\"", "\"action\": \"w\", \"action\""),
-        format!("{{\"name\": \"reply\", \"arguments\": \"{{}}\"}}"),
+        r#"{"name": "reply", "arguments": "{}"}"#.to_owned(),
     ] {
         assert_eq!(read(&raw).status, Status::SchemaInvalid, "{raw}");
     }

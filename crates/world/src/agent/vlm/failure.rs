@@ -15,6 +15,8 @@ pub struct Failure {
     pub detail: String,
     /// How long the provider asks to wait.
     pub after: Option<Duration>,
+    /// The provider may have made an answer, and may bill it.
+    pub may_be_paid: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,8 +60,9 @@ impl FailureKind {
     }
 }
 
+/// A whole status of success without an answer.
 pub(super) fn server(detail: String) -> Failure {
-    Failure { kind: FailureKind::Server, detail, after: None }
+    Failure { kind: FailureKind::Server, detail, after: None, may_be_paid: true }
 }
 
 pub(super) fn shortened(text: &str) -> String {
@@ -74,6 +77,7 @@ pub(super) fn shortened(text: &str) -> String {
 /// A failure below HTTP. The address is left out: it may be a private one.
 pub(super) fn broken(error: reqwest::Error) -> Failure {
     let kind = if error.is_timeout() { FailureKind::Timeout } else { FailureKind::Server };
+    let may_be_paid = !error.is_connect();
     let error = error.without_url();
     let mut detail = error.to_string();
     let mut cause = std::error::Error::source(&error);
@@ -84,7 +88,7 @@ pub(super) fn broken(error: reqwest::Error) -> Failure {
         }
         cause = inner.source();
     }
-    Failure { kind, detail, after: None }
+    Failure { kind, detail, after: None, may_be_paid }
 }
 
 /// A status that is not success.
@@ -108,14 +112,15 @@ pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
         said if said.is_empty() => format!("HTTP {status}"),
         said => format!("HTTP {status}: {said}"),
     };
-    Failure { kind, detail, after }
+    // A gateway that gave up does not know what the model behind it did.
+    Failure { kind, detail, after, may_be_paid: kind == FailureKind::Timeout }
 }
 
 /// A successful status with a body that is no answer.
 pub(super) fn no_answer(body: &str) -> Failure {
     let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
     let detail = format!("the answer is not of the provider's language: {}", shortened(body));
-    Failure { kind, detail, after: None }
+    Failure { kind, detail, after: None, may_be_paid: false }
 }
 
 /// Words by which servers say that they cannot pass images to the model, lower case.

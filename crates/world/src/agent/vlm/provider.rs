@@ -10,7 +10,7 @@ use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
 
-use super::concurrency::Pace;
+use super::concurrency::{Pace, Turn};
 use super::failure::{Failure, broken, failed, no_answer, server};
 use super::preflight::{Unreachable, connect};
 use super::rate_limit::{retry_after, retry_info, used_up};
@@ -154,9 +154,13 @@ impl Provider {
         self.secret.as_ref().map_or_else(|| text.to_owned(), |secret| secret.without(text))
     }
 
-    /// Sends a request once, when its turn comes.
-    pub async fn ask(&self, body: &Value) -> Result<Received, Failure> {
-        let turn = self.pace.turn().await;
+    /// Waits until a request may go out.
+    pub async fn turn(&self) -> Turn<'_> {
+        self.pace.turn().await
+    }
+
+    /// Sends a request once, in its turn.
+    pub async fn ask(&self, turn: Turn<'_>, body: &Value) -> Result<Received, Failure> {
         let result = self.exchange(body).await;
         drop(turn);
         match &result {

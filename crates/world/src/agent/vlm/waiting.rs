@@ -65,7 +65,7 @@ mod tests {
     use crate::agent::vlm::failure::FailureKind;
 
     fn failure(kind: FailureKind, seconds: Option<u64>) -> Failure {
-        Failure { kind, detail: String::new(), after: seconds.map(Duration::from_secs) }
+        Failure { kind, detail: String::new(), after: seconds.map(Duration::from_secs), may_be_paid: false }
     }
 
     #[test]

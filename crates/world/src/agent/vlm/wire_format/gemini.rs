@@ -12,11 +12,11 @@ pub(super) fn body(question: &Question<'_>) -> Value {
             { "text": question.user },
         ] }],
         "systemInstruction": { "parts": [{ "text": question.system }], "role": "user" },
-        "generationConfig": {
-            "temperature": question.temperature,
-            "maxOutputTokens": question.max_output_tokens,
-        },
+        "generationConfig": { "maxOutputTokens": question.max_output_tokens },
     });
+    if let Some(temperature) = question.temperature {
+        body["generationConfig"]["temperature"] = json!(temperature);
+    }
     if let Some(schema) = question.schema {
         body["generationConfig"]["responseMimeType"] = json!("application/json");
         body["generationConfig"]["responseJsonSchema"] = schema.clone();
@@ -37,7 +37,7 @@ fn thinking(model: &str, effort: Effort) -> Value {
         Effort::None => 0,
         Effort::Minimal | Effort::Low => 1_024,
         Effort::Medium => 8_192,
-        Effort::High | Effort::Xhigh => 24_576,
+        Effort::High | Effort::Xhigh | Effort::Max => 24_576,
     };
     json!({ "thinkingBudget": budget })
 }
@@ -78,6 +78,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
         repairs,
         ending,
         prompt_tokens: tokens(&usage["promptTokenCount"]),
+        cached_tokens: tokens(&usage["cachedContentTokenCount"]),
         completion_tokens: match completion {
             [None, None] => None,
             [candidates, thoughts] => Some(candidates.unwrap_or(0).saturating_add(thoughts.unwrap_or(0))),

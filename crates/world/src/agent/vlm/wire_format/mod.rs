@@ -41,8 +41,8 @@ pub struct Question<'a> {
     pub png_base64: &'a str,
     /// The JSON Schema that the provider is asked to enforce; `None` if the prompt alone has to do.
     pub schema: Option<&'a Value>,
-    /// The sampling temperature (0.2 in the paper).
-    pub temperature: f64,
+    /// The sampling temperature (0.2 in the paper); `None` leaves it to the provider.
+    pub temperature: Option<f64>,
     /// The most tokens that a reply may have, those of hidden reasoning included.
     pub max_output_tokens: u32,
     /// How much the model is asked to reason; `None` leaves it to the provider.
@@ -63,11 +63,21 @@ pub enum Effort {
     Medium,
     /// Much.
     High,
-    /// As much as it can.
+    /// More than that.
     Xhigh,
+    /// As much as it can.
+    Max,
 }
 
-names!(Effort { None: "none", Minimal: "minimal", Low: "low", Medium: "medium", High: "high", Xhigh: "xhigh" });
+names!(Effort {
+    None: "none",
+    Minimal: "minimal",
+    Low: "low",
+    Medium: "medium",
+    High: "high",
+    Xhigh: "xhigh",
+    Max: "max"
+});
 
 /// What an answer says.
 #[derive(Clone, Debug, PartialEq)]
@@ -78,8 +88,10 @@ pub struct Answer {
     /// whose arguments are the text.
     pub repairs: Vec<Repair>,
     pub ending: Ending,
-    /// Tokens of the request, where counted.
+    /// Tokens of the request, where counted; those from the provider's cache included.
     pub prompt_tokens: Option<u32>,
+    /// Those of them that came from the provider's cache, where counted.
+    pub cached_tokens: Option<u32>,
     /// Tokens of the reply, where counted; those of hidden reasoning included.
     pub completion_tokens: Option<u32>,
     /// What it cost in US dollars, where the provider says so.

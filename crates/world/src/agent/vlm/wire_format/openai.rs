@@ -16,8 +16,10 @@ pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
                 { "type": "text", "text": question.user },
             ] },
         ],
-        "temperature": question.temperature,
     });
+    if let Some(temperature) = question.temperature {
+        body["temperature"] = json!(temperature);
+    }
     body[limit] = json!(question.max_output_tokens);
     if let Some(effort) = question.reasoning_effort {
         body["reasoning_effort"] = json!(effort.name());
@@ -48,6 +50,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
         repairs,
         ending,
         prompt_tokens: tokens(&usage["prompt_tokens"]),
+        cached_tokens: tokens(&usage["prompt_tokens_details"]["cached_tokens"]),
         completion_tokens: tokens(&usage["completion_tokens"]),
         cost_usd: usage["cost"].as_f64().filter(|cost| *cost >= 0.0),
         model: text(&body["model"]),

@@ -56,6 +56,7 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
         repairs: Vec::new(),
         ending: Ending::Refused,
         prompt_tokens: None,
+        cached_tokens: None,
         completion_tokens: None,
         cost_usd: None,
         model: text(&body["model"]),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use serde_json::{Value, json};
-use trace::episode::{Action, Episode, Step};
+use trace::episode::{Action, Episode, Extra, Step};
 use trace::write::write_episodes;
 
 use crate::harness;
@@ -23,6 +23,10 @@ pub struct Cell<'a> {
     pub named: Option<&'a str>,
     /// How many of the episodes declare it.
     pub declared: usize,
+    /// How many scenes there are; the episodes play them by turns.
+    pub scenes: usize,
+    /// How many of the last episodes ended for want of an answer.
+    pub lost: usize,
     /// Whether each episode is solved.
     pub solved: Vec<bool>,
 }
@@ -35,6 +39,8 @@ pub const LIKE: Cell<'_> = Cell {
     prompt: "p",
     named: None,
     declared: usize::MAX,
+    scenes: usize::MAX,
+    lost: 0,
     solved: Vec::new(),
 };
 
@@ -64,23 +70,26 @@ impl Cell<'_> {
 
     fn episode(&self, at: usize) -> Episode {
         let choice = if self.solved[at] { "red" } else { "blue" };
-        let step = |action, mirror_visible| Step {
+        let is_lost = at + self.lost >= self.solved.len();
+        let status = |is_last| if is_lost && is_last { "timeout" } else { "ok" };
+        let step = |action, is_last: bool| Step {
             action: Some(action),
             self_color: Some(choice.into()),
             selected_cube: Some(choice.into()),
-            mirror_visible,
-            ..Step::default()
+            mirror_visible: !is_last,
+            extra: Extra { reply_status: Some(status(is_last).into()), ..Extra::default() },
         };
+        let last = if is_lost { Action::TurnLeft } else { Action::Done };
         let (model, experiment, run) = (self.model, self.experiment, i32::try_from(at).unwrap() + 1);
         Episode {
             model: model.into(),
             experiment: experiment.into(),
             run,
-            scene: Some(format!("scene {at}")),
+            scene: Some(format!("scene {}", at % self.scenes)),
             fingerprint: (at < self.declared).then(|| self.fingerprint()),
             ..harness::traces::episode(
                 &format!("{experiment}/{model}/s1/r{run}"),
-                vec![step(Action::MoveForward, true), step(Action::Done, false)],
+                vec![step(Action::MoveForward, false), step(last, true)],
             )
         }
     }
@@ -111,11 +120,14 @@ fn differs(folder: &Path, words: &[&str]) -> (String, Value) {
     (differs.map(|answer| answer["answer"].as_str().unwrap()).collect(), found)
 }
 
+/// A change of what a cell was recorded with.
+type Change = fn(&mut Cell);
+
 #[test]
 fn models_of_two_worlds_prompts_or_step_budgets_are_not_compared() {
     let like = two(|_| ());
     assert_eq!(differs(like.path(), &["runs"]).0, "E1 ant better than bee");
-    let changes: [(fn(&mut Cell), &str); 5] = [
+    let changes: [(Change, &str); 5] = [
         (|cell| cell.mirror = 1.2, "world.mirror.width is 3.0 and 1.2"),
         (|cell| cell.steps = 60, "world.episode.steps is 40 and 60"),
         (|cell| cell.prompt = "q", "prompts (E1 p, E1 q)"),

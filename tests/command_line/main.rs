@@ -10,6 +10,7 @@ mod config;
 mod declared;
 mod extended;
 mod filters;
+mod gate;
 mod generated;
 #[path = "../../examples/generate/generation/mod.rs"]
 mod generation;

@@ -17,6 +17,7 @@ pub mod improvement;
 pub mod interval;
 pub mod letter_display;
 pub mod losses;
+pub mod margin;
 pub mod outcomes;
 pub mod paired;
 pub mod power;

@@ -229,6 +229,14 @@ pub enum StudyError {
         /// The nearest of them, in words; may be empty.
         hint: String,
     },
+    /// A metric of which neither direction is better.
+    #[error(
+        "{metric}: expected a metric with `better = \"higher\"` or \"lower\", found none\n  help: name another metric with --metric"
+    )]
+    NoDirection {
+        /// The metric.
+        metric: String,
+    },
     /// A filter that keeps no episode.
     #[error("{words}\n  help: give a filter that holds for some of them, or none")]
     EmptyFilter {

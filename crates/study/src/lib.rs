@@ -21,6 +21,7 @@ mod error;
 mod experiment_findings;
 mod figure_inputs;
 mod findings;
+mod gate;
 mod import;
 mod input_hashes;
 mod inputs;

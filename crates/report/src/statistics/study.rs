@@ -75,7 +75,12 @@ impl<'a> Study<'a> {
         Ok(Self { table, design, experiments, pool: false, ranges })
     }
 
-    /// The setting that keeps two blocks from being compared, whether it matters or not; `None` where nothing is known to.
+    /// The setting in which two blocks differ though the comparison does not vary it; `None` where nothing is known to.
+    pub fn setting_between(&self, first: &Block, second: &Block, varied: Varied) -> Option<String> {
+        difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
+    }
+
+    /// The same, of two blocks of one study.
     pub fn setting_apart(&self, first: &Block, second: &Block) -> Option<String> {
         let varied = if first.experiment != second.experiment {
             Varied::Experiment
@@ -84,7 +89,7 @@ impl<'a> Study<'a> {
         } else {
             Varied::Model
         };
-        difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
+        self.setting_between(first, second, varied)
     }
 
     /// The same, unless it does not matter.

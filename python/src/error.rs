@@ -4,10 +4,10 @@ use std::error::Error;
 use std::io;
 use std::path::Path;
 
-use metric::fault::FaultRecord;
 use mirrorstats::StudyError;
 use mirrorstats::cli::{ErrorAnswer, Failure};
 use pyo3::prelude::*;
+use toml_spec::FaultRecord;
 use trace::import::{Fault, ImportError};
 
 /// An error of a study, of the kind that says what is to be changed.

@@ -7,13 +7,13 @@ use indexmap::IndexMap;
 use super::bind::{self, Binding};
 use super::catalog::{Catalog, Experiment, Kind, Metric, by_order};
 use super::columns::{Columns, Level, Type};
-use super::fault::{Fault, Faults, Source};
 use super::file::{self, Document, FileError};
-use super::origin::Written;
 use super::plan::{NodeId, Output, Plan};
 use exact::hash;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
+use toml_spec::Written;
+use toml_spec::{Fault, Faults, Source};
 
 /// Checked definitions.
 #[derive(Clone, Debug)]

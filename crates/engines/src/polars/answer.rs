@@ -18,7 +18,7 @@ use sqlparser::ast::{Query, Value};
 use super::rewrite::{self, substitute};
 use super::run::{self, PolarsError};
 use super::statement::{Asked, Checked, Table};
-use metric::fault::Faults;
+use toml_spec::Faults;
 use trace::catch_panic::contained_on_all_threads;
 
 /// Rows of one batch at most.

@@ -14,8 +14,8 @@ use sqlparser::tokenizer::Span;
 
 use super::rewrite::{bare_column, rewrite};
 use exact::suggest::nearest;
-use metric::fault::{Fault, Faults, Place, Source};
 pub use metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened, with_stack};
+use toml_spec::{Fault, Faults, Place, Source};
 
 /// A table that a query may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

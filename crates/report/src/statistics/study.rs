@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::cells::interval;
+use crate::comparable::{Recorded, Varied, difference};
 use exact::moments::{MomentOverflow, Moments};
 use metric::catalog::{Better, Kind, Metric};
 use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
@@ -33,6 +34,8 @@ pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
+    /// Whether settings that differ do not matter.
+    pub pool: bool,
     ranges: BTreeMap<&'a str, Interval>,
 }
 
@@ -49,6 +52,7 @@ pub(super) struct Block<'a> {
     pub condition: Option<&'a str>,
     /// The rows of the table, in runs.
     rows: Vec<Range<usize>>,
+    recorded: Recorded<'a>,
     moments: BTreeMap<&'a str, Moments>,
 }
 
@@ -68,7 +72,24 @@ impl<'a> Study<'a> {
         let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
         let names = table.metrics.iter().map(|column| column.name.as_str());
         let ranges = names.zip(interval::ranges(table)).collect();
-        Ok(Self { table, design, experiments, ranges })
+        Ok(Self { table, design, experiments, pool: false, ranges })
+    }
+
+    /// The setting that keeps two blocks from being compared, whether it matters or not; `None` where nothing is known to.
+    pub fn setting_apart(&self, first: &Block, second: &Block) -> Option<String> {
+        let varied = if first.experiment != second.experiment {
+            Varied::Experiment
+        } else if first.model == second.model {
+            Varied::Condition
+        } else {
+            Varied::Model
+        };
+        difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
+    }
+
+    /// The same, unless it does not matter.
+    pub fn incomparable(&self, first: &Block, second: &Block) -> Option<String> {
+        if self.pool { None } else { self.setting_apart(first, second) }
     }
 
     pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {
@@ -180,7 +201,8 @@ impl<'a> Block<'a> {
             Ok((column.name.as_str(), moments))
         };
         let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
-        Ok(Self { experiment, model, condition, rows, moments })
+        let recorded = Recorded::of(table, rows.iter().cloned().flatten());
+        Ok(Self { experiment, model, condition, rows, recorded, moments })
     }
 
     /// The model as it is compared: `model`, or `model [condition]` where there are several.

@@ -16,7 +16,7 @@ from ._error import ArgumentError, DefinitionError, Error, InputError, OutputErr
 from ._example import example_runs
 from ._import import import_steps
 from ._native import ArrowSteps, ArrowTable, Figure, Table, __version__
-from ._record import record
+from ._record import Message, record
 from ._study import Study, compare, open
 from ._validate import validate
 
@@ -29,6 +29,7 @@ __all__ = [
     "Error",
     "Figure",
     "InputError",
+    "Message",
     "OutputError",
     "QueryError",
     "RecordError",

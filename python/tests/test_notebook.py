@@ -1,9 +1,11 @@
 """A notebook in the words of a user: frames in, frames out, an agent that raises, questions in SQL."""
 
+import pathlib
 import pickle
 
 import agent
 import duckdb
+import fsspec
 import mirrorstats as ms
 import numpy
 import pandas
@@ -85,6 +87,11 @@ def test_paths_of_every_kind_are_inputs(paper, tmp_path, monkeypatch):
     monkeypatch.setenv("HOME", paper)
     for path in [f"file://{paper}", "~", "~/*.parquet"]:
         assert len(ms.open(path).episodes) == 840
+    memory = fsspec.filesystem("memory")
+    file = sorted(pathlib.Path(paper).glob("*.parquet"))[0]
+    memory.put_file(str(file), "/one.parquet")
+    for opened in [fsspec.open("memory://one.parquet"), fsspec.open(str(file)), file]:
+        assert len(ms.open(opened).episodes) == 21
     for given, error in [([], ms.ArgumentError), (7, TypeError), ([None], TypeError)]:
         with pytest.raises(error, match="inputs: expected"):
             ms.open(given)

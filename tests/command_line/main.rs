@@ -7,6 +7,7 @@ mod budgets;
 mod colors;
 mod config;
 mod declared;
+mod domains;
 mod extended;
 mod filters;
 mod generated;

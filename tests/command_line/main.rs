@@ -8,6 +8,7 @@ mod colors;
 mod comparable;
 mod config;
 mod declared;
+mod domains;
 mod extended;
 mod filters;
 mod gate;

@@ -19,6 +19,9 @@ pub struct Catalog {
     pub name: String,
     /// SHA-256 of the resolved definitions, 64 hexadecimal digits.
     pub hash: String,
+    /// What the traces are about; absent where that is the mirror.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub domain: Option<String>,
     /// Whether experiments that are not listed are accepted.
     pub open: bool,
     /// Named expressions, as written.

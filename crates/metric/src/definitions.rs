@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use super::bind::{self, Binding};
 use super::catalog::{Catalog, Experiment, Kind, Metric, by_order};
 use super::columns::{Columns, Level, Type};
-use super::file::{self, Document, FileError};
+use super::file::{self, ColumnEntry, Document, FileError};
 use super::plan::{NodeId, Output, Plan};
 use exact::hash;
 use exact::ratio::Ratio;
@@ -106,7 +106,8 @@ impl Definitions {
         let names: Vec<&str> = parts.iter().map(|(part, _)| part.document.name.as_str()).collect();
         let mut whole = Document { name: names.join("+"), open: true, ..Document::default() };
         for (part, experiments) in parts {
-            let Document { columns, lets, metrics, experiments: known, built_on, .. } = part.document.clone();
+            let Document { domain, columns, lets, metrics, experiments: known, built_on, .. } = part.document.clone();
+            whole.domain = whole.domain.or(domain);
             let same = |(name, (written, _)): (&String, &(Written, _))| {
                 whole.lets.get(name).is_none_or(|(other, _): &(Written, _)| other.text == written.text)
             };
@@ -130,12 +131,20 @@ impl Definitions {
         Some(Self::check(whole, columns, None))
     }
 
+    /// The columns that the definitions declare.
+    pub fn declared_columns(&self) -> impl Iterator<Item = (&str, &ColumnEntry)> {
+        self.document.columns.iter().map(|(name, entry)| (name.as_str(), entry))
+    }
+
     pub(super) fn document(&self) -> &Document {
         &self.document
     }
 
     fn check(document: Document, columns: &Columns, filter: Option<&Written>) -> Result<Self, Faults> {
         let mut columns = columns.clone();
+        if document.domain.is_some() {
+            columns.leave_mirror();
+        }
         let mut faults = declare(&document, &mut columns);
         faults.extend(experiment_faults(&document));
         let binding = match bind::bind(&document, &columns, filter) {
@@ -222,7 +231,7 @@ fn advice(near: Option<&str>, known: &[String]) -> String {
 /// Adds the columns that a document declares; they must not contradict the schema or the traces.
 fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
     let mut faults = Vec::new();
-    for (name, (declared, place)) in &document.columns {
+    for (name, ColumnEntry { place, column: declared, values, .. }) in &document.columns {
         if name == "t" || columns.of_schema(name).is_some_and(|known| known != *declared) {
             let message = format!("`{name}` is a column of every trace and cannot be declared as another");
             faults.push(
@@ -233,7 +242,7 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
             let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");
             faults.push(Fault::new(place.clone(), message).help("declare it as the traces have it"));
         } else {
-            columns.set_own(name.clone(), *declared);
+            columns.set_own(name.clone(), *declared, values.clone());
         }
     }
     faults
@@ -278,6 +287,7 @@ fn catalog(document: &Document, binding: &Binding) -> Catalog {
     let mut catalog = Catalog {
         name: document.name.clone(),
         hash: String::new(),
+        domain: document.domain.clone(),
         // A file that lists no experiment at all restricts none.
         open: document.open || document.experiments.is_empty(),
         lets: document.lets.iter().map(|(name, (written, _))| (name.clone(), written.text.clone())).collect(),

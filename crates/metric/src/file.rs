@@ -5,8 +5,14 @@
 //! ```toml
 //! include = ["paper"]              # built-in names, or paths relative to this file
 //! open = false                     # whether unlisted experiments are accepted
-//! [column.grip_force]              # a column of your own traces, for `definitions check`
+//! domain = "robots"                # what the traces are about; `mirror` if absent
+//! [column.grip_force]              # a column of your own traces
 //! type = "float"                   # bool, int, float or text
+//! unit = "N"
+//! [column.outcome]
+//! type = "text"
+//! constant = true                  # the same in all rows of an episode
+//! values = ["success", "timeout"]  # the only texts that it holds, null apart
 //! [let]
 //! done = "first(action = 'done')"
 //! [experiment.E1]
@@ -55,12 +61,26 @@ pub struct Document {
     pub built_on: Vec<&'static str>,
     /// Whether unlisted experiments are accepted.
     pub open: bool,
+    /// What the traces are about, where that is not the mirror: any name.
+    pub domain: Option<String>,
     /// Declared columns of the user's own.
-    pub columns: IndexMap<String, (Column, Place)>,
+    pub columns: IndexMap<String, ColumnEntry>,
     /// Named expressions.
     pub lets: IndexMap<String, (Written, Place)>,
     pub metrics: IndexMap<String, MetricEntry>,
     pub experiments: IndexMap<String, ExperimentEntry>,
+}
+
+/// A `[column.NAME]` table.
+#[derive(Clone, Debug)]
+pub struct ColumnEntry {
+    pub place: Place,
+    pub column: Column,
+    /// The only texts that it holds, null apart; any if empty.
+    pub values: Vec<String>,
+    pub unit: String,
+    /// For a reader of the column; may be empty.
+    pub help: String,
 }
 
 /// A `[metric.NAME]` table.
@@ -139,6 +159,8 @@ pub fn read_source(name: String, source: Source, folder: Option<&Path>) -> Resul
     Reading::of(name, DefinitionFile { source, folder: folder.map(Path::to_owned), place: None })
 }
 
+/// The domain of definitions that name none: the columns of the mirror are known, with their rules.
+const MIRROR: &str = "mirror";
 /// Definitions are written by hand, or by a program that spells out a family of metrics.
 const LARGEST: Limit = Limit::new("bytes of a definition file", 1 << 20);
 /// Keys of a file, tables included.
@@ -215,6 +237,9 @@ impl Reading {
         if let Some(open) = root.truth("open", &mut self.faults) {
             self.document.open = open;
         }
+        if let Some((domain, _)) = root.text("domain", &mut self.faults) {
+            self.document.domain = Some(domain).filter(|name| name != MIRROR);
+        }
         self.columns(&mut root);
         self.lets(&mut root);
         self.experiments(&mut root);
@@ -246,11 +271,20 @@ impl Reading {
             let types = [("bool", Type::Bool), ("int", Type::Int), ("float", Type::Float), ("text", Type::Text)];
             let ty = keys.choice("type", &types, &mut self.faults);
             let constant = keys.truth("constant", &mut self.faults).unwrap_or(false);
+            let values = keys.texts("values", &mut self.faults).unwrap_or_default();
+            let [unit, help] =
+                ["unit", "help"].map(|key| keys.text(key, &mut self.faults).map_or_else(String::new, |(text, _)| text));
             keys.refuse_the_rest(&mut self.faults);
+            if let Some((_, place)) = values.first().filter(|_| ty.is_some_and(|ty| ty != Type::Text)) {
+                let fault = Fault::new(place.clone(), "`values` lists the texts of a column that is not text");
+                self.faults.push(fault.help("give the column `type = \"text\"`, or leave the list out"));
+            }
             match ty {
                 Some(ty) => {
                     let level = if constant { Level::Episode } else { Level::Step };
-                    self.document.columns.insert(name, (Column { ty, level }, place));
+                    let values = values.into_iter().map(|(text, _)| text).collect();
+                    let entry = ColumnEntry { place, column: Column { ty, level }, values, unit, help };
+                    self.document.columns.insert(name, entry);
                 }
                 None => self.missing(place, "type", "a column"),
             }

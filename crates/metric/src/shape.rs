@@ -20,6 +20,8 @@ pub struct DefinitionFile {
     /// Whether experiments that are not listed are accepted. A file that lists none accepts all.
     #[serde(default)]
     pub open: bool,
+    /// What the traces are about: `mirror`, or any other name, where the columns of the mirror mean nothing.
+    pub domain: Option<String>,
     /// Columns of your own traces that expressions use.
     #[serde(default)]
     pub column: IndexMap<String, ColumnShape>,
@@ -44,6 +46,15 @@ pub struct ColumnShape {
     /// Whether it is constant in an episode.
     #[serde(default)]
     pub constant: bool,
+    /// The only texts that it holds, null apart; any if absent.
+    #[serde(default)]
+    pub values: Vec<String>,
+    /// What a number counts or measures.
+    #[serde(default)]
+    pub unit: String,
+    /// For a reader of the column.
+    #[serde(default)]
+    pub help: String,
 }
 
 /// The type of a column.

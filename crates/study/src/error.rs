@@ -199,6 +199,17 @@ pub enum StudyError {
         /// Those that the experiment names.
         own: String,
     },
+    /// The definitions are about a mirror, and the traces about something else.
+    #[error(
+        "`{file}` has no column of the domain `mirror`: expected definitions of its own domain, found `{definitions}`\n  \
+         help: give --definitions a file that says `domain = \"NAME\"` and declares the columns that it reads, `[column.NAME]`"
+    )]
+    OtherDomain {
+        /// The first trace.
+        file: String,
+        /// The definitions that were asked for, or the default ones.
+        definitions: String,
+    },
     /// Definitions to compare, and nothing to score with them.
     #[error(
         "`{name}` are definitions: expected traces to score with them, found none\n  \

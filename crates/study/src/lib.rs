@@ -18,6 +18,7 @@ mod design;
 mod diff;
 mod empty_filter;
 mod error;
+mod expected;
 mod experiment_findings;
 mod figure_inputs;
 mod findings;
@@ -189,15 +190,6 @@ impl Question {
         }
         Ok(definitions)
     }
-}
-
-/// The experiments that some definitions know; any if `None`.
-///
-/// # Errors
-/// Every fault of the definitions.
-pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
-    let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
-    Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
 }
 
 impl Study {

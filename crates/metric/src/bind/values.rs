@@ -83,9 +83,9 @@ impl Binder<'_> {
 }
 
 impl Possible {
-    fn add_column(&mut self, name: &str, values: &[&str]) {
+    fn add_column(&mut self, name: &str, values: &[String]) {
         self.columns.push(name.to_owned());
-        self.texts.extend(values.iter().map(|value| (*value).to_owned()));
+        self.texts.extend_from_slice(values);
     }
 
     /// That this is none of them.

@@ -33,6 +33,7 @@ fn catalog() -> Catalog {
     };
     Catalog {
         name: "test".into(),
+        domain: None,
         hash: "0".repeat(64),
         open: false,
         lets: IndexMap::new(),

@@ -160,6 +160,7 @@ fn catalog() -> Catalog {
     };
     Catalog {
         name: "test".to_owned(),
+        domain: None,
         hash: "0".repeat(64),
         open: false,
         lets: IndexMap::new(),

@@ -22,11 +22,13 @@ mod functions;
 pub mod implied;
 pub mod include;
 pub mod keys;
+mod measure;
 pub mod names;
 pub mod origin;
 pub mod overflow;
 pub mod plan;
 mod print;
+pub mod relations;
 pub mod restore;
 #[cfg(test)]
 mod schema_columns;

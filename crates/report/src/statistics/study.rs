@@ -6,6 +6,7 @@ use std::ops::Range;
 use crate::cells::interval;
 use exact::moments::{MomentOverflow, Moments};
 use metric::catalog::{Better, Kind, Metric};
+use metric::relations::Relations;
 use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use statistics::design::{Cluster, Design};
 use statistics::interval::Interval;
@@ -33,6 +34,8 @@ pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
+    /// Which metrics belong together.
+    pub relations: Relations,
     ranges: BTreeMap<&'a str, Interval>,
 }
 
@@ -68,7 +71,7 @@ impl<'a> Study<'a> {
         let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
         let names = table.metrics.iter().map(|column| column.name.as_str());
         let ranges = names.zip(interval::ranges(table)).collect();
-        Ok(Self { table, design, experiments, ranges })
+        Ok(Self { table, design, experiments, relations: Relations::of(&table.catalog), ranges })
     }
 
     pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {

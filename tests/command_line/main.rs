@@ -16,6 +16,7 @@ mod generation;
 mod harness;
 mod help;
 mod hostile;
+mod new_names;
 mod options;
 #[cfg(target_os = "linux")]
 mod outputs;

@@ -9,7 +9,8 @@ use super::kit::{
 use super::matrix::MetricId;
 use super::{Drawn, FigureError, FigureName, Scene};
 use score::table::{EpisodeTable, MetricColumn};
-use statistics::survival::{Duration, End, Survival};
+use statistics::competing::{Ending, Outcome};
+use statistics::survival::Survival;
 
 const COLUMNS: usize = 3;
 const PLOT_HEIGHT: f64 = 130.0;
@@ -56,13 +57,13 @@ fn signs() -> Vec<(Swatch, String)> {
 fn endings<'e>(
     episodes: &'e EpisodeTable,
     metrics: &[MetricId<'_>],
-) -> Result<BTreeMap<(&'e str, &'e str), Vec<Duration>>, FigureError> {
+) -> Result<BTreeMap<(&'e str, &'e str), Vec<Ending>>, FigureError> {
     let (duration, finished) = (column(episodes, metrics[0].name)?, column(episodes, metrics[1].name)?);
-    let mut endings: BTreeMap<(&str, &str), Vec<Duration>> = BTreeMap::new();
+    let mut endings: BTreeMap<(&str, &str), Vec<Ending>> = BTreeMap::new();
     for ((key, step), finished) in episodes.keys.iter().zip(duration.iter()).zip(finished.iter()) {
         let group = endings.entry((key.experiment, key.model)).or_default();
-        let end = if finished.is_some() { End::Finished } else { End::Unfinished };
-        group.extend(step.map(|steps| Duration { steps, end }));
+        let outcome = if finished.is_some() { Outcome::Correct } else { Outcome::Unfinished };
+        group.extend(step.map(|steps| Ending { steps, outcome }));
     }
     Ok(endings)
 }

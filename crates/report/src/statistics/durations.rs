@@ -8,7 +8,7 @@ use score::table::MetricColumn;
 use statistics::competing::{Ending, Incidence, Outcome};
 use statistics::coverage::{self, Withheld};
 use statistics::interval::Interval;
-use statistics::survival::{Duration, End, MedianInterval, RestrictedMean, Survival, common_horizon};
+use statistics::survival::{MedianInterval, RestrictedMean, Survival, common_horizon};
 
 /// One duration of one experiment and model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -89,13 +89,7 @@ pub(super) fn restricted(study: &Study, block: &Block, column: &MetricColumn, ho
 }
 
 fn curve(study: &Study, block: &Block, column: &MetricColumn) -> Option<Survival> {
-    let end = |outcome| if outcome == Outcome::Unfinished { End::Unfinished } else { End::Finished };
-    let durations: Vec<Duration> = block
-        .rows()
-        .filter_map(|row| ending(study, column, row))
-        .map(|Ending { steps, outcome }| Duration { steps, end: end(outcome) })
-        .collect();
-    Survival::of(&durations)
+    Survival::of(&block.rows().filter_map(|row| ending(study, column, row)).collect::<Vec<_>>())
 }
 
 impl DurationRow {
@@ -119,7 +113,7 @@ impl DurationRow {
         let endings: Vec<Ending> = block.rows().filter_map(|row| ending(study, column, row)).collect();
         let finished = endings.iter().filter(|ending| ending.outcome != Outcome::Unfinished).count() as u64;
         let n = endings.len() as u64;
-        let curve = curve(study, block, column);
+        let curve = Survival::of(&endings);
         let restricted = curve.as_ref().zip(horizon).and_then(|(curve, at)| curve.restricted_mean(at, confidence));
         let (restricted, withheld) = restricted.map_or((None, None), |found| {
             let (found, withheld) = held(found, n);

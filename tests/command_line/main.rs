@@ -5,6 +5,7 @@ mod battery;
 #[cfg(target_os = "linux")]
 mod budgets;
 mod colors;
+mod comparable;
 mod config;
 mod declared;
 mod extended;
@@ -14,7 +15,6 @@ mod generated;
 mod generation;
 #[path = "../harness/mod.rs"]
 mod harness;
-mod help;
 mod hostile;
 mod new_names;
 mod options;
@@ -27,6 +27,8 @@ mod plan;
 mod quality;
 #[cfg(all(target_os = "linux", feature = "polars", feature = "raster", feature = "sim"))]
 mod readme;
+#[cfg(all(feature = "polars", feature = "raster", feature = "sim", feature = "view"))]
+mod reference;
 mod refusals;
 #[cfg(unix)]
 mod renamed;

@@ -7,14 +7,14 @@ use indexmap::IndexMap;
 use super::bind::{self, Binding};
 use super::catalog::{Catalog, Experiment, Kind, Metric, by_order};
 use super::columns::{Columns, Level, Type};
-use super::fault::{Fault, Faults, Place, Source};
 use super::file::{self, Document, FileError};
 use super::measure;
-use super::origin::Written;
 use super::plan::{NodeId, Output, Plan};
 use exact::hash;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
+use toml_spec::Written;
+use toml_spec::{Fault, Faults, Place, Source};
 
 /// Checked definitions.
 #[derive(Clone, Debug)]

@@ -26,15 +26,15 @@ use indexmap::IndexMap;
 
 use super::catalog::{Better, StandardError};
 use super::columns::{Column, Level, Type};
-use super::fault::{Fault, Faults, Place, Source};
-use super::include::{Includes, Kind};
-use super::keys::{Keys, key_count, parse_toml};
 use super::measure::{Measures, ValueRange};
-use super::origin::Written;
 use exact::budget::Limit;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
 use exact::{hash, input};
+use toml_spec::Written;
+use toml_spec::{Fault, Faults, Place, Source};
+use toml_spec::{IncludeKind, Includes};
+use toml_spec::{Keys, key_count, parse_toml};
 
 /// The built-in definition files, by name.
 const BUILT_IN: [(&str, &str); 5] = [
@@ -149,7 +149,7 @@ const LARGEST: Limit = Limit::new("bytes of a definition file", 1 << 20);
 /// Keys of a file, tables included.
 const MOST_KEYS: Limit = Limit::new("keys in a definition file", 10_000);
 /// How definition files include others.
-const INCLUDED: Kind = Kind {
+const INCLUDED: IncludeKind = IncludeKind {
     name: "definition file",
     check: "mirrorstats definitions check FILE",
     most: Limit::new("includes, those of included files counted", 256),

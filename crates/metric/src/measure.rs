@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::catalog::{Kind, Metric};
 use super::definitions::unknown_metric;
-use super::fault::{Fault, Place};
 use super::file::{Document, MetricEntry};
+use toml_spec::{Fault, Place};
 
 /// What the integers of a metric measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

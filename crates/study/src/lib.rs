@@ -346,7 +346,7 @@ impl Study {
     pub fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
         let by = self.question.by_over(episodes);
         if !self.question.pool {
-            pooled::check(episodes, &by, self.source.traces().ok())?;
+            pooled::check(episodes, &by)?;
         }
         size::check_comparisons(episodes)?;
         let cells = group(episodes, &by)?;
@@ -357,10 +357,10 @@ impl Study {
     /// The tables of these episodes, each with the filter that chose them.
     fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StudyError> {
         let mut tables = layout::tables(cells, style)?;
-        if let Some(selection) = self.selection(episodes) {
-            for table in &mut tables {
-                table.footnotes.push(selection.sentence());
-            }
+        let chosen = self.selection(episodes).map(|selection| selection.sentence());
+        let pooled = self.pooled(episodes)?.unwrap_or_default();
+        for table in &mut tables {
+            table.footnotes.extend(chosen.iter().chain(&pooled).cloned());
         }
         Ok(tables)
     }
@@ -385,6 +385,11 @@ impl Study {
         self.statistics_of(&counted, &cells, options)
     }
 
+    /// What cells mix though it was recorded differently, where that does not matter.
+    fn pooled(&self, episodes: &EpisodeTable) -> Result<Option<Vec<String>>, StudyError> {
+        self.question.pool.then(|| pooled::told(episodes, &self.question.by_over(episodes))).transpose()
+    }
+
     /// A sentence about traces whose checksums are another file's.
     pub fn stale_checksums(&self) -> Option<String> {
         self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
@@ -399,7 +404,8 @@ impl Study {
         let (design, selection) = (design_of(declared), self.selection(&results.episodes));
         let replies = results.quality.as_ref().and_then(Replies::of);
         let lost = is_known.then_some(beside);
-        let options = Options { lost, design, selection, replies, ..options.clone() };
+        let pooled = self.pooled(&results.episodes)?;
+        let options = Options { lost, design, selection, pooled, replies, ..options.clone() };
         let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
         if self.question.lost == LostAs::Failure && total > 0 {
             let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
@@ -419,7 +425,7 @@ impl Study {
         let episodes = self.counted(results).results.episodes;
         size::check_comparisons(&episodes)?;
         let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
-        let options = Options { design, selection, ..options.clone() };
+        let options = Options { design, selection, pooled: self.pooled(&episodes)?, ..options.clone() };
         Ok(Sequential::of(&episodes, &options)?)
     }
 

@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use exact::escape::visible_lines;
-use metric::fault::{FaultRecord, Faults};
+use toml_spec::{FaultRecord, Faults};
 use trace::diagnostic::{MORE_FILES, is_short_of_files};
 
 /// Which form errors have, where no option says it: decided before anything is parsed.

@@ -225,7 +225,14 @@ fn spent(spend: &Spend) -> String {
         (_, true) => format!("{} and what {answers} cost, which is unknown,", dollars(spend.cost_usd)),
         (_, false) => "an unknown cost".to_owned(),
     };
-    format!("{known} for {requests} and {}", counted(spend.tokens, "token"))
+    let unanswered = match spend.unanswered {
+        0 => String::new(),
+        count => {
+            let (requests, most) = (counted(count, "request"), dollars(spend.uncosted_usd_at_most));
+            format!("; {requests} without an answer may have been paid: at most {most}, as far as prices are known")
+        }
+    };
+    format!("{known} for {requests} and {}{unanswered}", counted(spend.tokens, "token"))
 }
 
 /// An amount to the cent, smaller ones to two digits that count.
@@ -397,12 +404,16 @@ mod tests {
 
     #[test]
     fn what_is_not_known_of_a_cost_is_said() {
-        let spend = Spend { cost_usd: 1.5, uncosted: 0, tokens: 2_000, requests: 3 };
+        let spend = Spend { cost_usd: 1.5, tokens: 2_000, requests: 3, ..Spend::default() };
         assert_eq!(spent(&spend), "1.50 US dollars for 3 requests and 2000 tokens");
         let partly = Spend { uncosted: 2, ..spend };
         assert!(spent(&partly).starts_with("1.50 US dollars and what 2 answers cost, which is unknown, for"));
         let nothing = Spend { cost_usd: 0.0, ..partly };
         assert_eq!(spent(&nothing), "an unknown cost for 3 requests and 2000 tokens");
+        let killed = Spend { unanswered: 1, uncosted_usd_at_most: 0.25, ..spend };
+        let words =
+            "; 1 request without an answer may have been paid: at most 0.2500 US dollars, as far as prices are known";
+        assert_eq!(spent(&killed), spent(&spend) + words);
         assert_eq!([dollars(0.0), dollars(0.00123)], ["0.00 US dollars", "0.0012 US dollars"]);
     }
 

@@ -7,12 +7,12 @@
 
 use std::collections::HashSet;
 
-use super::super::fault::Fault;
 use super::super::plan::{Comparison, Constant, NodeId, Op};
 use super::super::syntax::Expr;
 use super::scope::Scope;
 use super::{Binder, Bound};
 use exact::suggest::nearest;
+use toml_spec::Fault;
 
 /// The texts that a node can be.
 #[derive(Debug, Default)]

@@ -110,18 +110,29 @@ fn counted(Units { n, name, .. }: &Units) -> String {
 fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
     let mut tested = comparisons.iter().filter(|found| found.p.is_some() || found.units.is_some()).peekable();
     if tested.peek().is_none() {
-        return Some("not tested".to_owned());
+        return Some(apart(comparisons).unwrap_or_else(|| "not tested".to_owned()));
     }
     let too_few = tested.map(|found| found.too_few(confidence)).collect::<Option<Vec<_>>>()?;
     too_few.iter().max_by_key(|units| units.n).map(cannot_say)
 }
 
+/// How many of these comparisons a setting keeps from being made, and the first such setting.
+fn apart(comparisons: &[&Comparison]) -> Option<String> {
+    let settings: Vec<&String> = comparisons.iter().filter_map(|found| found.incomparable.as_ref()).collect();
+    let setting = settings.first()?;
+    let (count, all) = (settings.len(), comparisons.len());
+    let count = if count == all { String::new() } else { format!("{count} of {all} ") };
+    Some(format!("{count}not comparable ({setting})"))
+}
+
 fn differing_in(family: &Family, confidence: f64) -> String {
-    if let Some(why) = untested(&family.tests.iter().map(|test| &test.comparison).collect::<Vec<_>>(), confidence) {
+    let comparisons: Vec<&Comparison> = family.tests.iter().map(|test| &test.comparison).collect();
+    if let Some(why) = untested(&comparisons, confidence) {
         return format!("{} {why}", family.experiment);
     }
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
-    differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)))
+    let told = differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
+    [told].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
 }
 
 /// The separated pairs of `all`, by the better model.
@@ -158,7 +169,8 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
         let models = those(Some(sign));
         (!models.is_empty()).then(|| format!("{what} {}", names(&models, group.len())))
     };
-    if let Some(why) = untested(&group.iter().map(|contrast| &contrast.comparison).collect::<Vec<_>>(), confidence) {
+    let comparisons: Vec<&Comparison> = group.iter().map(|contrast| &contrast.comparison).collect();
+    if let Some(why) = untested(&comparisons, confidence) {
         return format!("{baseline} - {against} {why}");
     }
     let rest = those(None).len();
@@ -168,6 +180,6 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
         (rest, _) => Some(format!("no change shown for {rest} more")),
     };
     let parts = [phrase("higher for", Sign::Higher), phrase("lower for", Sign::Lower), unshown];
-    let parts: Vec<String> = parts.into_iter().flatten().collect();
+    let parts: Vec<String> = parts.into_iter().flatten().chain(apart(&comparisons)).collect();
     format!("{baseline} - {against} {}", parts.join(", "))
 }

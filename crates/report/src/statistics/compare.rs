@@ -80,6 +80,9 @@ pub struct Comparison {
     /// The units of analysis of both sides where the test counts each once, however many episodes it has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Units>,
+    /// The setting in which the two sides were recorded differently, so that nothing is compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub incomparable: Option<String>,
 }
 
 /// What two blocks are compared by.
@@ -233,7 +236,17 @@ impl Comparison {
             p_tarone: None,
             separated: false,
             units: None,
+            incomparable: None,
         }
+    }
+
+    /// Without any result where a setting differs.
+    pub(super) fn unless(self, incomparable: Option<String>) -> Self {
+        if incomparable.is_none() {
+            return self;
+        }
+        let Self { method, n, successes, .. } = self;
+        Self { successes, withheld: Some(Withheld::Incomparable), incomparable, ..Self::of(method, n) }
     }
 
     /// Without interval and test, which take episodes as independent.

@@ -69,6 +69,8 @@ pub struct Options {
     pub design: Design,
     /// Which episodes were chosen; all by default.
     pub selection: Option<Selection>,
+    /// What cells mix though it was recorded differently, a sentence each; `None` unless such settings do not matter.
+    pub pooled: Option<Vec<String>>,
     /// How many replies gave no decision; `None` where that is not recorded.
     pub replies: Option<Replies>,
     /// Whether probabilities of improvement are computed, each of which resamples all episodes of two models.
@@ -83,6 +85,7 @@ impl Default for Options {
             lost: None,
             design: Design::default(),
             selection: None,
+            pooled: None,
             replies: None,
             improvements: false,
         }
@@ -105,6 +108,9 @@ pub struct Statistics {
     /// The filter that chose the episodes; null without one.
     #[serde(default, rename = "where")]
     pub selection: Option<Selection>,
+    /// Settings that differ within a cell or between cells that are compared, and were declared not to matter.
+    #[serde(default)]
+    pub pooled: Vec<String>,
     /// What the traces declare about their design.
     pub design: Design,
     /// What follows from the design, in a sentence.
@@ -153,7 +159,8 @@ impl Statistics {
     ///
     /// With a confidence outside (0, 1) no interval and no verdict is defined.
     pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
-        let study = Study::of(table, options.design)?;
+        let mut study = Study::of(table, options.design)?;
+        study.pool = options.pooled.is_some();
         let (confidence, horizon) = (options.confidence, options.horizon);
         let headline = conclusions::headline(&study);
         let asked: &[String] = if options.improvements { &headline } else { &[] };
@@ -165,6 +172,7 @@ impl Statistics {
             by: cells.by.clone(),
             episodes: table.len(),
             selection: options.selection.clone(),
+            pooled: pooled(&study, options),
             design: options.design,
             design_note: String::new(),
             answers: Vec::new(),
@@ -183,13 +191,33 @@ impl Statistics {
             losses: Losses::of(&study, options.lost.as_ref(), confidence),
             replies: options.replies.clone(),
             headline,
-            relations: study.relations,
+            relations: study.relations.clone(),
         };
         let from_text = table.declared.from_text;
         statistics.design_note = warnings::design_note(&statistics, from_text);
         statistics.answers = answers::answers(&statistics);
         statistics.conclusions = conclusions::conclusions(&statistics);
         statistics.warnings = warnings::warnings(&statistics, from_text);
+        statistics.warnings.extend(statistics.pooled.iter().cloned());
+        statistics.warnings.extend(Contrast::left_out(&study));
         Ok(statistics)
     }
+}
+
+/// What was taken together though it was recorded differently, each setting once.
+fn pooled(study: &Study, options: &Options) -> Vec<String> {
+    let Some(mut sentences) = options.pooled.clone() else { return Vec::new() };
+    let models = study.experiments.iter().flat_map(|experiment| {
+        let blocks = &experiment.blocks;
+        (0..blocks.len()).flat_map(move |at| blocks[at + 1..].iter().map(move |other| (&blocks[at], other)))
+    });
+    let contrasts = Contrast::couples(study).into_iter();
+    for (first, second) in models.chain(contrasts) {
+        let Some(setting) = study.setting_apart(first, second) else { continue };
+        let sentence = format!("Compared though they differ (--pool): {setting}.");
+        if !sentences.contains(&sentence) {
+            sentences.push(sentence);
+        }
+    }
+    sentences
 }

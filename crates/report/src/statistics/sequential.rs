@@ -124,7 +124,8 @@ impl Sequential {
     ///
     /// With a confidence outside (0, 1) no sequence and no verdict is defined.
     pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
-        let study = Study::of(table, options.design)?;
+        let mut study = Study::of(table, options.design)?;
+        study.pool = options.pooled.is_some();
         Ok(Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),

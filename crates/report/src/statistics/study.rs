@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::cells::interval;
+use crate::comparable::{Recorded, Varied, difference};
 use exact::moments::{MomentOverflow, Moments};
 use metric::catalog::{Better, Kind, Metric};
 use metric::relations::Relations;
@@ -36,6 +37,8 @@ pub(super) struct Study<'a> {
     pub experiments: Vec<Experiment<'a>>,
     /// Which metrics belong together.
     pub relations: Relations,
+    /// Whether settings that differ do not matter.
+    pub pool: bool,
     ranges: BTreeMap<&'a str, Interval>,
 }
 
@@ -52,6 +55,7 @@ pub(super) struct Block<'a> {
     pub condition: Option<&'a str>,
     /// The rows of the table, in runs.
     rows: Vec<Range<usize>>,
+    recorded: Recorded<'a>,
     moments: BTreeMap<&'a str, Moments>,
 }
 
@@ -71,7 +75,25 @@ impl<'a> Study<'a> {
         let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
         let names = table.metrics.iter().map(|column| column.name.as_str());
         let ranges = names.zip(interval::ranges(table)).collect();
-        Ok(Self { table, design, experiments, relations: Relations::of(&table.catalog), ranges })
+        let relations = Relations::of(&table.catalog);
+        Ok(Self { table, design, experiments, relations, pool: false, ranges })
+    }
+
+    /// The setting that keeps two blocks from being compared, whether it matters or not; `None` where nothing is known to.
+    pub fn setting_apart(&self, first: &Block, second: &Block) -> Option<String> {
+        let varied = if first.experiment != second.experiment {
+            Varied::Experiment
+        } else if first.model == second.model {
+            Varied::Condition
+        } else {
+            Varied::Model
+        };
+        difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
+    }
+
+    /// The same, unless it does not matter.
+    pub fn incomparable(&self, first: &Block, second: &Block) -> Option<String> {
+        if self.pool { None } else { self.setting_apart(first, second) }
     }
 
     pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {
@@ -183,7 +205,8 @@ impl<'a> Block<'a> {
             Ok((column.name.as_str(), moments))
         };
         let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
-        Ok(Self { experiment, model, condition, rows, moments })
+        let recorded = Recorded::of(table, rows.iter().cloned().flatten());
+        Ok(Self { experiment, model, condition, rows, recorded, moments })
     }
 
     /// The model as it is compared: `model`, or `model [condition]` where there are several.

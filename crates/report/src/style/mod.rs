@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use crate::figures::shown::FigureSheets;
 use exact::suggest::nearest;
 use metric::catalog::{Better, Catalog, Kind};
-use metric::fault::{Fault, Faults, Place};
+use toml_spec::{Fault, Faults, Place};
 
 /// The table that every report has.
 pub const MAIN_TABLE: &str = "main";

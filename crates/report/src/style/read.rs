@@ -20,15 +20,15 @@ use exact::budget::Limit;
 use exact::suggest::{hint, nearest};
 use exact::{hash, input};
 use metric::catalog::Better;
-use metric::fault::{Fault, Faults, Place, Source};
-use metric::include::{Includes, Kind};
-use metric::keys::{Keys, key_count, parse_toml};
+use toml_spec::{Fault, Faults, Place, Source};
+use toml_spec::{IncludeKind, Includes};
+use toml_spec::{Keys, key_count, parse_toml};
 
 /// A style is written by hand.
 const LARGEST: Limit = Limit::new("bytes of a style", 1 << 20);
 /// Keys of a file, tables included.
 const MOST_KEYS: Limit = Limit::new("keys in a style", 10_000);
-const INCLUDED: Kind = Kind {
+const INCLUDED: IncludeKind = IncludeKind {
     name: "style",
     check: "mirrorstats style check FILE",
     most: Limit::new("includes of a style, those of included files counted", 32),

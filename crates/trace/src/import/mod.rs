@@ -91,7 +91,7 @@ fn survey(
     text.rewind()?;
     while let Some(line) = text.next_line()? {
         is_empty = false;
-        let members = match line::members(&line.bytes, line.ended) {
+        let members = match text.members(&line.bytes, line.ended) {
             Ok(members) => members,
             Err(fault) => {
                 faults.add(fault.at(&line.place));
@@ -132,7 +132,7 @@ fn write(
         for step in episode {
             let text = &mut texts[step.text];
             let bytes = text.line_at(step.offset)?;
-            let members = line::members(&bytes, true).map_err(|_| ImportError::changed(text.name()))?;
+            let members = text.members(&bytes, true).map_err(|_| ImportError::changed(text.name()))?;
             rows.add(&members).map_err(|()| ImportError::changed(text.name()))?;
         }
         rows.end_episode().map_err(failed)?;

@@ -268,6 +268,7 @@ pub(super) fn held(interval: Option<Interval>, withheld: Option<Withheld>, place
     match (interval, withheld) {
         (None, Some(Withheld::TooFew { fewest })) => format!("{UNDEFINED} (n < {fewest})"),
         (None, Some(Withheld::NoSpread)) => format!("{UNDEFINED} (no spread)"),
+        (None, Some(Withheld::Incomparable)) => format!("{UNDEFINED} (not comparable)"),
         _ => plain(interval, places),
     }
 }

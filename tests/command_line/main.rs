@@ -18,6 +18,7 @@ mod generation;
 #[path = "../harness/mod.rs"]
 mod harness;
 mod hostile;
+mod new_names;
 mod options;
 #[cfg(target_os = "linux")]
 mod outputs;

@@ -21,6 +21,10 @@ fn metric(kind: Kind) -> Metric {
         when: None,
         se: StandardError::Sample,
         chance: None,
+        measures: None,
+        range: None,
+        finished: None,
+        completes: None,
     }
 }
 

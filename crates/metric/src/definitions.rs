@@ -8,12 +8,13 @@ use super::bind::{self, Binding};
 use super::catalog::{Catalog, Experiment, Kind, Metric, by_order};
 use super::columns::{Columns, Level, Type};
 use super::file::{self, ColumnEntry, Document, FileError};
+use super::measure;
 use super::plan::{NodeId, Output, Plan};
 use exact::hash;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
 use toml_spec::Written;
-use toml_spec::{Fault, Faults, Source};
+use toml_spec::{Fault, Faults, Place, Source};
 
 /// Checked definitions.
 #[derive(Clone, Debug)]
@@ -147,9 +148,11 @@ impl Definitions {
         }
         let mut faults = declare(&document, &mut columns);
         faults.extend(experiment_faults(&document));
+        faults.extend(measure::relation_faults(&document));
         let binding = match bind::bind(&document, &columns, filter) {
             Ok(binding) => {
                 faults.extend(level_faults(&document, &binding));
+                faults.extend(measure::faults(&document, |metric| binding.metrics[metric].1));
                 binding
             }
             Err(more) => {
@@ -254,13 +257,20 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
     for entry in document.experiments.values() {
         let chance = entry.chance.iter().map(|(name, (_, place))| (name, place));
         let reference = entry.reference.iter().map(|(name, (_, place))| (name, place));
-        for (name, place) in chance.chain(reference).filter(|(name, _)| !document.metrics.contains_key(*name)) {
-            let near = nearest(name, document.metrics.keys().map(String::as_str));
-            let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
-            faults.push(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))));
-        }
+        faults.extend(chance.chain(reference).filter_map(|(name, place)| unknown_metric(document, name, place)));
     }
     faults
+}
+
+/// The fault of a name that is no metric of the document.
+pub(super) fn unknown_metric(document: &Document, name: &str, place: &Place) -> Option<Fault> {
+    let metrics = &document.metrics;
+    if metrics.contains_key(name) {
+        return None;
+    }
+    let near = nearest(name, metrics.keys().map(String::as_str));
+    let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
+    Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
 }
 
 /// A level of chance of a rate is a probability.
@@ -320,6 +330,10 @@ fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
             when: entry.when.as_ref().map(|when| when.text.clone()),
             se: entry.se,
             chance: entry.chance,
+            measures: entry.measures,
+            range: entry.range,
+            finished: entry.finished.as_ref().map(|(name, _)| name.clone()),
+            completes: entry.completes.as_ref().map(|(name, _)| name.clone()),
         };
         (name.clone(), metric)
     };

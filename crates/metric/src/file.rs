@@ -32,6 +32,7 @@ use indexmap::IndexMap;
 
 use super::catalog::{Better, StandardError};
 use super::columns::{Column, Level, Type};
+use super::measure::{Measures, ValueRange};
 use exact::budget::Limit;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
@@ -97,6 +98,10 @@ pub struct MetricEntry {
     pub when: Option<Written>,
     pub se: StandardError,
     pub chance: Option<Ratio>,
+    pub measures: Option<Measures>,
+    pub range: Option<ValueRange>,
+    pub finished: Option<(String, Place)>,
+    pub completes: Option<(String, Place)>,
 }
 
 /// An `[experiment.NAME]` table.
@@ -313,13 +318,32 @@ impl Reading {
             let help = keys.text("help", faults).map_or_else(String::new, |(text, _)| text);
             let se = keys.choice("se", &se, faults).unwrap_or_default();
             let chance = keys.ratio("chance", faults);
+            let measures = keys.choice("measures", &Measures::NAMES, faults);
+            let range = keys.table("range", faults).map(|range| value_range(range, faults));
+            let finished = keys.text("finished", faults);
+            let completes = keys.text("completes", faults);
             let when = keys.expression("when", faults);
             let present = keys.has("value");
             let value = keys.expression("value", faults);
             keys.refuse_the_rest(faults);
             match value {
                 Some(value) => {
-                    let entry = MetricEntry { place, title, unit, better, section, help, value, when, se, chance };
+                    let entry = MetricEntry {
+                        place,
+                        title,
+                        unit,
+                        better,
+                        section,
+                        help,
+                        value,
+                        when,
+                        se,
+                        chance,
+                        measures,
+                        range,
+                        finished,
+                        completes,
+                    };
                     self.document.metrics.insert(name, entry);
                 }
                 None if present => {}
@@ -349,4 +373,10 @@ impl Reading {
     fn missing(&mut self, place: Place, key: &str, what: &str) {
         self.faults.push(Fault::new(place, format!("{what} needs `{key}`")).help(format!("add `{key} = \"...\"`")));
     }
+}
+
+fn value_range(mut keys: Keys, faults: &mut Vec<Fault>) -> ValueRange {
+    let range = ValueRange { least: keys.integer("least", faults), most: keys.integer("most", faults) };
+    keys.refuse_the_rest(faults);
+    range
 }

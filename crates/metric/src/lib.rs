@@ -19,10 +19,12 @@ pub mod explain;
 pub mod file;
 mod functions;
 pub mod implied;
+mod measure;
 pub mod names;
 pub mod overflow;
 pub mod plan;
 mod print;
+pub mod relations;
 pub mod restore;
 #[cfg(test)]
 mod schema_columns;

@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::catalog::{Better, StandardError};
+use super::catalog::{Better, Measures, StandardError, ValueRange};
 use exact::ratio::Ratio;
 
 /// A definition file.
@@ -110,6 +110,14 @@ pub struct MetricShape {
     pub se: StandardError,
     /// The value of blind guessing, as a fraction such as `1/3`.
     pub chance: Option<Ratio>,
+    /// What the metric measures; as its unit says if absent.
+    pub measures: Option<Measures>,
+    /// The values that it can have, as integers; on a fraction `most` is the whole.
+    pub range: Option<ValueRange>,
+    /// On a duration: the metric that is defined in finished episodes, 1 where the decision was correct.
+    pub finished: Option<String>,
+    /// The rate that counts unfinished episodes as failures; this one is the same among finished ones.
+    pub completes: Option<String>,
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ pub mod competing;
 pub mod contrast;
 pub mod coverage;
 pub mod design;
+mod endings;
 pub mod feasible;
 pub mod holm;
 pub mod improvement;

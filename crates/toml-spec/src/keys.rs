@@ -298,7 +298,7 @@ impl<'a> Keys<'a> {
 
 fn describe(what: &str) -> String {
     match what {
-        "column" | "metric" | "mirror" | "mark" | "table" => format!("a {what}"),
+        "column" | "figure" | "metric" | "mirror" | "mark" | "table" => format!("a {what}"),
         "experiment" => format!("an {what}"),
         other => other.to_owned(),
     }

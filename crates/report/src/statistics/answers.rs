@@ -7,7 +7,6 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::chance::COMPLETED;
 use super::compare::{Comparison, Sign};
 use super::study::named;
 use super::{ChanceRow, Contrast, Family, Role, Statistics, Units, Verdict};
@@ -38,8 +37,7 @@ pub(super) fn answers(statistics: &Statistics) -> Vec<Answer> {
     let mut answers = Vec::new();
     let confidence = statistics.confidence;
     for metric in &statistics.headline {
-        let completed = COMPLETED.iter().filter(|(whole, _)| whole == metric).map(|(_, completed)| *completed);
-        for metric in [metric.as_str()].into_iter().chain(completed) {
+        for metric in [metric.as_str()].into_iter().chain(statistics.relations.completed(metric)) {
             answers.extend(Answer::new("Who is above chance?", metric, &above(&statistics.chance, metric, confidence)));
         }
     }

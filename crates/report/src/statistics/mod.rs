@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::Answer;
 pub use cells::{CellRow, FEW, Intervals};
-pub use chance::{COMPLETED, ChanceRow, Role, Units, Verdict};
+pub use chance::{ChanceRow, Role, Units, Verdict};
 pub use clusters::ClusterRow;
 pub use compare::{Comparison, Method, Sign};
 pub use conditions::Contrast;
@@ -50,9 +50,9 @@ pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRat
 pub use warnings::TEXT_SCORES;
 
 use crate::cells::Cells;
-pub use crate::cells::interval::CENSORED;
 use crate::cells::interval::CONFIDENCE;
 use exact::moments::MomentOverflow;
+use metric::relations::Relations;
 use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
 use statistics::design::Design;
@@ -151,6 +151,9 @@ pub struct Statistics {
     /// Replies that gave no decision; null where no status of a reply is recorded.
     #[serde(default)]
     pub replies: Option<Replies>,
+    /// Which metrics belong together, for the text.
+    #[serde(skip)]
+    relations: Relations,
 }
 
 impl Statistics {
@@ -190,6 +193,7 @@ impl Statistics {
             losses: Losses::of(&study, options.lost.as_ref(), confidence),
             replies: options.replies.clone(),
             headline,
+            relations: study.relations.clone(),
         };
         let from_text = table.declared.from_text;
         statistics.design_note = warnings::design_note(&statistics, from_text);

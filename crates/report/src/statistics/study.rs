@@ -7,6 +7,7 @@ use crate::cells::interval;
 use crate::comparable::{Recorded, Varied, difference};
 use exact::moments::{MomentOverflow, Moments};
 use metric::catalog::{Better, Kind, Metric};
+use metric::relations::Relations;
 use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use statistics::design::{Cluster, Design};
 use statistics::interval::Interval;
@@ -34,6 +35,8 @@ pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
+    /// Which metrics belong together.
+    pub relations: Relations,
     /// Whether settings that differ do not matter.
     pub pool: bool,
     ranges: BTreeMap<&'a str, Interval>,
@@ -72,7 +75,8 @@ impl<'a> Study<'a> {
         let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
         let names = table.metrics.iter().map(|column| column.name.as_str());
         let ranges = names.zip(interval::ranges(table)).collect();
-        Ok(Self { table, design, experiments, pool: false, ranges })
+        let relations = Relations::of(&table.catalog);
+        Ok(Self { table, design, experiments, relations, pool: false, ranges })
     }
 
     /// The setting in which two blocks differ though the comparison does not vary it; `None` where nothing is known to.

@@ -13,6 +13,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::figures::shown::FigureSheets;
 use exact::suggest::nearest;
 use metric::catalog::{Better, Catalog, Kind};
 use toml_spec::{Fault, Faults, Place};
@@ -56,6 +57,8 @@ pub struct Sheet {
     pub column: IndexMap<String, ColumnSheet>,
     /// The tables by name; a name becomes a file name. `main` must be one of them.
     pub table: IndexMap<String, TableSheet>,
+    /// What figures show.
+    pub figure: FigureSheets,
 }
 
 /// One table of a style file.

@@ -1,7 +1,7 @@
 //! The tables of `stats`, one function each: a line per row of the statistics whose metric is shown.
 
 use super::super::study::named;
-use super::super::{COMPLETED, CellRow, Comparison, Intervals, Method, OverallMethod, Role, Sign, Statistics, Verdict};
+use super::super::{CellRow, Comparison, Intervals, Method, OverallMethod, Role, Sign, Statistics, Verdict};
 use crate::tables::Table;
 use exact::format::{UNDEFINED, bounds, fixed, p_value};
 use metric::catalog::Kind;
@@ -56,8 +56,7 @@ fn mark(cell: &CellRow) -> String {
 
 /// Rates against their levels; where a rate is shown, so is the same among finished episodes.
 pub(super) fn chance(statistics: &Statistics, shown: Shown) -> Table {
-    let is_shown =
-        |metric: &str| shown(metric) || COMPLETED.iter().any(|(whole, completed)| *completed == metric && shown(whole));
+    let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
     let line = |row: &super::super::ChanceRow| {
         let role = match row.role {
             Role::Chance => "chance",

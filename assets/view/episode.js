@@ -7,7 +7,7 @@ import { listQuery } from "./list.js";
 
 const PLAY = 250;
 const WORDS = [["view_description", "What it says it sees"], ["reasoning", "Reasoning"], ["identification", "How it says it is"], ["summary", "Notes for the next step"], ["reply", "The whole reply"]];
-const FACTS = ["action", "self_color", "selected_cube", "mark_report", "reply_status", "reply_repair", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
+const FACTS = ["action", "self_color", "selected_cube", "mark_report", "reply_status", "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 const TRUTH = ["mirror_visible", "mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_mark_px", "mark_color", "bumped", "cube_distance", "target_distance", "pose_x", "pose_y", "pose_yaw"];
 const ACTIONS = {
   move_forward: "--accent", move_backward: "--strip", turn_left: "--firm", turn_right: "--quiet", done: "--ink",

@@ -10,7 +10,7 @@ use trace::episode::Episode;
 use trace::schema::{COLUMNS, Column};
 
 /// Columns that differ between any two recordings, and say nothing of what was done.
-const BY_CHANCE: [&str; 11] = [
+const BY_CHANCE: [&str; 12] = [
     "latency_ms",
     "prompt_tokens",
     "completion_tokens",
@@ -22,6 +22,7 @@ const BY_CHANCE: [&str; 11] = [
     "identification",
     "reply_status",
     "reply_repair",
+    "reply_fault",
 ];
 
 /// Where the frame is in a log, not what the step was.

@@ -5,6 +5,7 @@ pub mod exec;
 #[cfg(feature = "view")]
 pub mod human;
 pub mod registration;
+pub mod several;
 pub mod vlm;
 
 use std::collections::BTreeMap;
@@ -156,7 +157,7 @@ impl Progress for Bar<'_> {
     fn step(&self, episode: Key, t: i32, row: &Step) {
         self.line.inc(1);
         if let Some(first) = self.replies.add(self.subject, episode, t, row) {
-            self.say(&format!("a reply could not be read: {}: {}", first.status, quoted(&first)));
+            self.say(&format!("a reply could not be read: {}: {}", first.status, first.words()));
         }
         if self.is_shown {
             self.line.set_message(self.message());
@@ -212,12 +213,6 @@ fn unreadable(counts: &ReplyCounts) -> Option<String> {
     (bad > 0).then(|| format!("{bad} of {all} {noun} could not be read: {counts}"))
 }
 
-/// What an unreadable reply says, and where it is.
-fn quoted(reply: &UnreadableReply) -> String {
-    let words = reply.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
-    format!("{words} ({}, step {})", visible(&reply.episode_id), reply.step)
-}
-
 fn spent(spend: &Spend) -> String {
     let (requests, answers) = (counted(spend.requests, "request"), counted(spend.uncosted, "answer"));
     let known = match (spend.uncosted, spend.cost_usd > 0.0) {
@@ -268,7 +263,7 @@ pub(crate) fn say(
         writeln!(out, "another process recorded {episodes} into the same folder meanwhile")?;
     }
     if let Some(words) = unreadable(&answer.replies.counts) {
-        let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, quoted);
+        let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, UnreadableReply::words);
         writeln!(out, "{words}; first: {first}")?;
     }
     if let Some(shares) = shares(times) {

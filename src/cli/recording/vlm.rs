@@ -24,9 +24,10 @@ use world::record::plan::slug;
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent vlm")]
 pub struct VlmArgs {
-    /// The model: a name of the paper's table, an id, or one of --models; of any other agent its name in tables
+    /// The model: a name of the paper's table, an id, or one of --models; of any other agent its name in tables. Several are
+    /// recorded one after the other
     #[arg(long, value_name = "NAME|ID")]
-    model: Option<String>,
+    model: Vec<String>,
     /// A file with more models, in the shape of assets/models.toml
     #[arg(long, value_name = "FILE")]
     models: Option<PathBuf>,
@@ -86,7 +87,15 @@ const LEDGERS: &str = "ledger";
 impl VlmArgs {
     /// The name that was typed.
     pub fn name(&self) -> Option<&str> {
-        self.model.as_deref()
+        self.model.first().map(String::as_str)
+    }
+
+    /// The same for each of the models that were typed; once if none was.
+    pub fn each(&self) -> Vec<Self> {
+        match self.model.as_slice() {
+            [] | [_] => vec![self.clone()],
+            several => several.iter().map(|model| Self { model: vec![model.clone()], ..self.clone() }).collect(),
+        }
     }
 
     /// The player, whose journals are in the folder of the recording.
@@ -135,7 +144,7 @@ impl VlmArgs {
     }
 
     fn choice(&self) -> Result<Choice, Failure> {
-        let Some(name) = &self.model else {
+        let Some(name) = self.name() else {
             return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
         };
         let models = Models::load(self.models.as_deref()).map_err(Failure::input)?;

@@ -174,6 +174,12 @@ pub const COLUMNS: &[Column] = &[
         "The repairs that made a `repaired` reply valid, in order, joined with `+`; null where there was none."
     )
     .since(2),
+    extra!(
+        reply_fault,
+        String,
+        "Why a reply gave no decision, in the words of its parser; null where it gave one, or its status says all."
+    )
+    .since(2),
     extra!(view_description, String, "What the agent says it sees, as replied."),
     extra!(reasoning, String, "Why it acts, as replied."),
     extra!(summary, String, "Its notes for the next step, as replied."),

@@ -93,6 +93,7 @@ impl Reading {
         Reply {
             status: self.status,
             repairs: self.repairs,
+            fault: self.fault,
             action: self.action,
             self_color: self.self_color,
             selected_cube: self.selected_cube,

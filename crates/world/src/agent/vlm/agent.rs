@@ -138,6 +138,7 @@ fn without_decision(status: Status) -> Reply {
     Reply {
         status,
         repairs: Vec::new(),
+        fault: None,
         action: None,
         self_color: None,
         selected_cube: None,

@@ -6,6 +6,8 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+#[cfg(feature = "view")]
+use crate::harness::files::contents;
 use crate::harness::files::{fixture, repository};
 use crate::harness::traces::recording;
 use crate::run;
@@ -142,4 +144,22 @@ fn values_and_types_that_definitions_declare_are_rules() {
         "{}",
         told.stdout
     );
+}
+
+#[cfg(feature = "view")]
+#[test]
+fn the_viewer_shows_the_columns_of_any_domain() {
+    let folder = folder();
+    let at = folder.path();
+    run(at, &["view", "robots.parquet", "--definitions", "robots.toml", "--export", "page"]).done();
+    let written = contents(&at.join("page"));
+    let of_episode = |bytes: &&Vec<u8>| String::from_utf8_lossy(bytes).contains("\"action_change\"");
+    let shown = written.values().filter(of_episode).map(|bytes| String::from_utf8_lossy(bytes)).collect::<Vec<_>>();
+    assert_eq!(
+        shown.iter().filter(|text| text.contains("\"values\":[7,14,21,28,35,42]")).count(),
+        12,
+        "{:?}",
+        written.keys()
+    );
+    assert!(shown.iter().all(|text| !text.contains("body_color")));
 }

@@ -79,6 +79,11 @@ pub struct DeclaredColumn {
     pub constant: bool,
 }
 
+/// Whether every trace has the column, whatever its domain.
+pub fn is_identity(name: &str) -> bool {
+    IDENTITY.contains(&name)
+}
+
 /// Whether a column of the schema is that of every domain.
 pub fn is_general(name: &str) -> bool {
     IDENTITY.contains(&name) || GENERAL.contains(&name)

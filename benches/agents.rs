@@ -96,9 +96,12 @@ impl Behind {
             contract: Contract::Schema,
             max_output_tokens: None,
             reasoning_effort: None,
+            temperature: None,
+            extra_body: serde_json::Map::new(),
         };
-        let backend = Backend { dialect, base_url: Some(address), key: "UNUSED".into() };
-        let choice = Choice { name: "a second".into(), model, backend };
+        let backend =
+            Backend { dialect, base_url: Some(address), key: "UNUSED".into(), extra_body: serde_json::Map::new() };
+        let choice = Choice { name: "a second".into(), model, backend, is_known: true };
         let (handle, account) = (network.handle().clone(), Arc::<Account>::default());
         let vlm = Vlm::online(choice, provider, handle, folder.join("journal"), account, OnOutage::Lose);
         Self { vlm: Arc::new(vlm), _network: network }

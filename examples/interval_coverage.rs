@@ -12,7 +12,7 @@ use statistics::competing::{Ending, Incidence, Outcome};
 use statistics::contrast::welch;
 use statistics::interval::{Interval, student_t};
 use statistics::restricted::{independent, paired};
-use statistics::survival::{Duration, End, Survival};
+use statistics::survival::Survival;
 
 const SEED: u64 = 20_260_115;
 const SAMPLES: usize = 4_000;
@@ -216,12 +216,7 @@ fn to_correct(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Inte
 
 #[expect(clippy::cast_precision_loss, reason = "steps are small")]
 fn median(scenario: Scenario, n: usize, random: &mut Random) -> (Option<Interval>, Option<f64>) {
-    let of = |ending: &Ending| Duration {
-        steps: ending.steps,
-        end: if ending.outcome == Outcome::Unfinished { End::Unfinished } else { End::Finished },
-    };
-    let durations: Vec<Duration> = scenario.sample(n, random).iter().map(of).collect();
-    let found = Survival::of(&durations).and_then(|curve| curve.median_interval(LEVEL));
+    let found = Survival::of(&scenario.sample(n, random)).and_then(|curve| curve.median_interval(LEVEL));
     // A bound of the same step is an interval of one step.
     let interval = |low: i64, high: Option<i64>| Interval {
         low: low as f64 - 0.5,

@@ -7,7 +7,7 @@ import { listQuery } from "./list.js";
 
 const PLAY = 250;
 const WORDS = [["view_description", "What it says it sees"], ["reasoning", "Reasoning"], ["identification", "How it says it is"], ["summary", "Notes for the next step"], ["reply", "The whole reply"]];
-const FACTS = ["action", "self_color", "selected_cube", "mark_report", "reply_status", "reply_repair", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
+const FACTS = ["action", "self_color", "selected_cube", "mark_report", "reply_status", "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 const TRUTH = ["mirror_visible", "mirror_self_px", "mirror_other_px", "mirror_px", "direct_other_px", "mirror_mark_px", "mark_color", "bumped", "cube_distance", "target_distance", "pose_x", "pose_y", "pose_yaw"];
 const ACTIONS = {
   move_forward: "--accent", move_backward: "--strip", turn_left: "--firm", turn_right: "--quiet", done: "--ink",
@@ -96,7 +96,7 @@ export async function sight(episode) {
 
 /** Strips over time, one colour a step; canvases, as an episode may have thousands of steps. */
 function strips(episode, jump) {
-  const values = (name) => episode.steps[name]?.values ?? null;
+  const values = (name) => (episode.own ? null : (episode.steps[name]?.values ?? null));
   const largest = (list) => Math.max(1, ...list.map((value) => value ?? 0));
   const rows = [];
   const add = (title, list, color, height = () => 1) => list !== null && rows.push({ title, list, color, height });
@@ -112,6 +112,19 @@ function strips(episode, jump) {
   add("Reply", values("reply_status"), (status) => (status === null ? null : status === "ok" ? "--strip" : status === "repaired" ? "--firm" : "--warn"));
   const latency = values("latency_ms");
   if (latency !== null && largest(latency) > 1) add("Time taken", latency, (ms) => (ms === null ? null : "--firm"), (ms) => (ms ?? 0) / largest(latency));
+  if (episode.own) for (const [name, { values: list }] of Object.entries(episode.steps)) addOwn(name, list);
+  /** A column of any type: the height of a number, whether something holds, and a tone for each text. */
+  function addOwn(name, list) {
+    const numbers = list.filter((value) => typeof value === "number");
+    if (numbers.length > 0) {
+      const [least, most] = [Math.min(0, ...numbers), Math.max(0, ...numbers)];
+      add(name, list, (value) => (value === null ? null : "--firm"), (value) => (value - least) / (most - least || 1));
+      return;
+    }
+    const texts = [...new Set(list.filter((value) => value !== null && value !== false))];
+    const tones = ["--accent", "--firm", "--strip", "--quiet", "--ink"];
+    add(name, list, (value) => (value === null || value === false ? null : tones[texts.indexOf(value) % tones.length]));
+  }
   return rows.map(({ title, list, color, height }) => {
     const canvas = make("canvas", { height: 16, "aria-hidden": "true", title });
     const row = make("div", { class: "strip" }, make("span", { class: "strip-name" }, title), canvas);
@@ -216,6 +229,13 @@ function words(episode, name, title, t) {
 
 /** What was said at a step, beside what was true. */
 export function stepPanel(episode, t) {
+  if (episode.own) {
+    const names = Object.keys(episode.steps);
+    const isLong = (name) => typeof valueAt(episode, name, t) === "object" && valueAt(episode, name, t) !== null;
+    return make("div", { class: "step" },
+      make("div", { class: "columns" }, make("div", {}, make("h3", {}, "Columns"), factList(episode, names.filter((name) => !isLong(name)), t))),
+      names.filter(isLong).map((name) => words(episode, name, name, t)));
+  }
   const body = constant(episode, "body_color");
   const claim = valueAt(episode, "self_color", t);
   const verdict = claim === null || claim === "unknown" || body === null ? "open" : claim === body ? "right" : "wrong";

@@ -230,13 +230,15 @@ fn journal() -> Vec<u8> {
     let mut lines = Vec::new();
     for (t, body) in (1..).zip(bodies()) {
         let question = format!("q{t}");
-        let request = Entry::Request { t, attempt: 1, question: question.clone(), frame: "f".into() };
+        let (question_of, at_most) = (question.clone(), Some([100, 50]));
+        let request = Entry::Request { t, attempt: 1, question: question_of, frame: "f".into(), at_most };
         let failure = Entry::Failure {
             t,
             attempt: 1,
             status: "timeout".into(),
             detail: "d".into(),
             is_final: t == 3,
+            may_be_paid: t == 2,
             question: question.clone(),
         };
         let (latency_ms, model) = (5, (t == 2).then(|| "m".to_owned()));

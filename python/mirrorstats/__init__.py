@@ -6,28 +6,38 @@
     study.table("main")                 # shows itself in a notebook
     study.episodes                      # Arrow: polars.DataFrame(study.episodes), pyarrow.table(study.episodes)
 
-Every answer is the one that the command `mirrorstats` gives, and every error is an `Error` with its words. Work that
-takes time releases the interpreter's lock.
+Every answer is the one that the command `mirrorstats` gives, in words of arguments. Each kind of error has a class under
+`Error`. Settings of the command line (`mirrorstats.toml`, `MIRRORSTATS_...`) do not apply. Work that takes time releases the
+interpreter's lock.
 """
 
-from ._answer import Answer
-from ._error import Error
+from ._answer import Answer, Statistics
+from ._error import ArgumentError, DefinitionError, Error, InputError, OutputError, QueryError, RecordError
 from ._example import example_runs
 from ._import import import_steps
 from ._native import ArrowSteps, ArrowTable, Figure, Table, __version__
-from ._record import record
-from ._study import Study, open
+from ._record import Message, record
+from ._study import Study, compare, open
 from ._validate import validate
 
 __all__ = [
     "Answer",
+    "ArgumentError",
     "ArrowSteps",
     "ArrowTable",
+    "DefinitionError",
     "Error",
     "Figure",
+    "InputError",
+    "Message",
+    "OutputError",
+    "QueryError",
+    "RecordError",
+    "Statistics",
     "Study",
     "Table",
     "__version__",
+    "compare",
     "example_runs",
     "import_steps",
     "open",

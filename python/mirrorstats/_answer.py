@@ -1,29 +1,119 @@
-"""Answers: what a command prints as JSON, and what it prints for people."""
+"""Answers: dicts that show themselves as text."""
 
 from __future__ import annotations
 
 import html
 import json
+from collections.abc import Mapping
 from typing import Any
+
+from . import _native
+from ._error import in_python
 
 
 class Answer(dict[str, Any]):
-    """An answer with the keys that `--json` has; what is undefined or unknown is None.
+    """An answer with the keys that the command line prints with `--json`; what is undefined or unknown is None.
 
-    `print(answer)` prints what the command prints; a notebook shows the same.
+    `print(answer)` prints it for people; a notebook shows the same.
 
     Attributes:
-        text: what the command prints for people.
+        text: the answer for people.
     """
 
     text: str
 
     def __init__(self, parts: tuple[str, str]) -> None:
         super().__init__(json.loads(parts[0]))
-        self.text = parts[1]
+        self.text = in_python(parts[1])
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), ((json.dumps(self), self.text),)
 
     def __str__(self) -> str:
         return self.text or super().__str__()
 
     def _repr_html_(self) -> str:
-        return f"<pre>{html.escape(str(self))}</pre>"
+        style = "font-family: monospace; white-space: pre; overflow-x: auto; max-height: 40em; line-height: 1.3"
+        return f'<pre style="{style}">{html.escape(str(self))}</pre>'
+
+
+class Statistics(Answer):
+    """Intervals, tests and comparisons, with long frames for programs that go on with them.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> stats = ms.open(ms.example_runs(), where="experiment = 'E1'").stats()
+        >>> stats.cells.column_names[:5]
+        ['experiment', 'model', 'metric', 'kind', 'episodes']
+        >>> len(stats.durations)
+        8
+    """
+
+    @property
+    def cells(self) -> _native.ArrowTable:
+        """One row per group and metric: counts, mean, standard error, and each interval by its method.
+
+        Columns: the key columns (text), `metric`, `kind` (text), `episodes`, `n`, `sum` (int64), `mean`, `se` (float64), and
+        `intervals_wilson_low`, `intervals_wilson_high` and so on (float64); null where undefined.
+        """
+        return long(self["cells"])
+
+    @property
+    def tests(self) -> _native.ArrowTable:
+        """One row per test: `family` says of what (`chance`, `models`, `overall`, `conditions`, `gaps`).
+
+        Columns: `family`, `experiment`, `metric`, the two sides (`first` and `second`, or `baseline` and `against`),
+        `difference`, `interval_low`, `interval_high`, `p`, `mid_p`, `p_adjusted` and others; null where a family has none.
+        """
+        pairs = ({**group, **test, "tests": None} for group in self["models"] for test in group["tests"])
+        families = {"chance": self["chance"], "models": pairs}
+        families.update({name: self[name] for name in ("overall", "conditions", "gaps") if name in self})
+        rows = [{"family": name, **row} for name, tests in families.items() for row in tests]
+        return long([{key: value for key, value in row.items() if key not in _OF_FAMILY} for row in rows])
+
+    @property
+    def durations(self) -> _native.ArrowTable:
+        """One row per group and duration: medians and restricted means with their intervals, in steps."""
+        return long(self["durations"])
+
+    @property
+    def families(self) -> _native.ArrowTable:
+        """One row per family of model comparisons: how many tests share an adjustment, and which difference is detectable."""
+        return long([{**group, "tests": len(group["tests"])} for group in self["models"]])
+
+
+# What all tests of a family share.
+_OF_FAMILY = ("models", "tied", "tests", "detectable")
+
+
+def long(rows: list[dict[str, Any]]) -> _native.ArrowTable:
+    """Nested answers as rows of a table: keys of keys joined by `_`, lists as text."""
+    flat = [dict(_flat(row)) for row in rows]
+    names = list(dict.fromkeys(name for row in flat for name in row))
+    kinds = [(name, _kind([row.get(name) for row in flat])) for name in names]
+    texts = {name for name, kind in kinds if kind == "text"}
+    lines = (
+        {name: str(value) if name in texts and value is not None else value for name, value in row.items()} for row in flat
+    )
+    return _native.table_of(kinds, "\n".join(map(json.dumps, lines)).encode())
+
+
+def _flat(row: Mapping[str, Any], before: str = "") -> Any:
+    for name, value in row.items():
+        if name == "key" and isinstance(value, dict):
+            yield from value.items()
+        elif isinstance(value, dict):
+            yield from _flat(value, f"{before}{name}_")
+        elif isinstance(value, list) and name in ("n", "successes", "pairs") and len(value) == 2:
+            yield from ((f"{before}{name}_first", value[0]), (f"{before}{name}_second", value[1]))
+        elif isinstance(value, list):
+            yield before + name, json.dumps(value) if any(isinstance(one, list) for one in value) else ", ".join(map(str, value))
+        else:
+            yield before + name, value
+
+
+def _kind(values: list[Any]) -> str:
+    kinds = {type(value) for value in values if value is not None}
+    if kinds <= {bool}:
+        return "bool" if kinds else "text"
+    return "int" if kinds <= {int} else "float" if kinds <= {int, float} else "text"

@@ -1,38 +1,109 @@
-"""The one exception of the package."""
+"""The exceptions of the package: one class per kind of error, all of them `Error`."""
 
 from __future__ import annotations
 
 import json
-from typing import Any
+import re
+from typing import Any, Optional
+
+# An option of the command line, and its value where there is one.
+_OPTION = re.compile(
+    r"""`?(?<![\w-])--([a-z][a-z-]+)(?:[ =]("[^"]*"|'[^']*'|[A-Z]+\b|\d+\b|[\w./-]+\.\w+|paper|extended|default|as-failure))?`?"""
+)
+_COMMAND = re.compile(r"(`mirrorstats [^`]*`)")
+# Where definitions, styles and frames without a file are kept.
+_SPOOLED = re.compile(r"(?:[^\s`]*/)?mirrorstats-[a-z0-9_]{8}/")
+_FLAGS = {"full", "keep_going", "no_frames", "no_log", "pool"}
+
+
+def in_python(words: str) -> str:
+    """Words that name options of the command line, with arguments in their place; whole commands stay."""
+    words = _SPOOLED.sub("", words).replace("--> --where", "--> where")
+
+    def argument(option: re.Match[str]) -> str:
+        name, value = option[1].replace("-", "_"), option[2]
+        if name in _FLAGS:
+            return f"`{name}=True`"
+        if value is None:
+            return f"`{name}`"
+        is_plain = value[0] in "\"'" or value.isupper() or value.isdigit()
+        return f"`{name}={value}`" if is_plain else f'`{name}="{value}"`'
+
+    parts = _COMMAND.split(words)
+    return "".join(part if at % 2 else _OPTION.sub(argument, part) for at, part in enumerate(parts))
 
 
 class Error(Exception):
-    """What the command line says of an input, a definition or an option that is not as it must be.
+    """What is wrong with an argument, an input or a definition, in words for people; `str(error)` is all of it.
 
-    `str(error)` is all of it.
+    Each kind has a class of its own: `ArgumentError`, `DefinitionError`, `InputError`, `OutputError`, `QueryError`,
+    `RecordError`.
 
     Attributes:
         message: what, where, expected and found, without the remedy.
-        hint: what to do about it; None where there is nothing to add.
-        code: the code that the command would end with.
-        faults: each fault of a definition file or a condition with its place, as dicts with the keys `file`, `line`,
-            `column` (both from 1), `text`, `message`, `label` and `help`; empty for other errors.
+        hint: what to do about it; None if there is nothing to add.
+        faults: each fault of a definition file, a condition or a query with its place, as dicts with the keys `file`,
+            `line`, `column` (both from 1), `text`, `message`, `label` and `help`; empty for other errors.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> study = ms.open(ms.example_runs())
+        >>> try:
+        ...     study.table("mian")
+        ... except ms.Error as error:
+        ...     print(type(error).__name__, "-", error.message)
+        ArgumentError - no table of the style `default` is named `mian`; it has main, appendix; did you mean `main`?
     """
 
     message: str
-    hint: str | None
-    code: int
+    hint: Optional[str]
     faults: list[dict[str, Any]]
 
-    def __init__(self, words: str, code: int = 2, faults: list[dict[str, Any]] | None = None) -> None:
+    def __init__(self, words: str, faults: Optional[list[dict[str, Any]]] = None) -> None:
+        words = in_python(words)
         super().__init__(words)
         message, _, hint = words.partition("\n  help: ")
         self.message = message
         self.hint = hint or next((fault["help"] for fault in faults or [] if fault["help"]), None)
-        self.code = code
-        self.faults = faults or []
+        self.faults = [{**fault, "file": in_python(fault["file"]).strip("`")} for fault in faults or []]
 
 
-def of_words(words: str, code: int, faults: str) -> Error:
+class ArgumentError(Error, ValueError):
+    """An argument with a value that it cannot have: no such table, figure, metric, column or episode, a number out of range."""
+
+
+class DefinitionError(Error):
+    """Faults of definitions, a condition, a style or an experiment; `faults` has each with its place."""
+
+
+class InputError(Error):
+    """Files or frames that are missing, damaged, mixed, or changed while they were open."""
+
+
+class OutputError(Error):
+    """An output that cannot be written, or may not be written there."""
+
+
+class QueryError(Error):
+    """A query that cannot be run; `faults` has each fault with its place."""
+
+
+class RecordError(Error):
+    """A recording that could not begin, or could not go on."""
+
+
+def of_words(kind: str, words: str, faults: str) -> Error:
     """The error that the native library raises; `faults` is JSON."""
-    return Error(words, code, json.loads(faults))
+    return next(each for each in Error.__subclasses__() if each.__name__ == kind)(words, json.loads(faults))
+
+
+def check_number(name: str, value: Any, least: int) -> None:
+    """Refuses what is no integer of at least this size; None is no number and passes."""
+    if value is not None and (not isinstance(value, int) or isinstance(value, bool) or value < least):
+        raise ArgumentError(f"{name}: expected an integer of at least {least}, found {value!r}")
+
+
+def check_name(name: str, value: Any, known: tuple[str, ...]) -> None:
+    """Refuses what is none of these."""
+    if value not in known:
+        raise ArgumentError(f"{name}: expected {', '.join(map(repr, known))}, found {value!r}")

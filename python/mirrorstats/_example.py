@@ -12,6 +12,11 @@ def example_runs() -> pathlib.Path:
     They are reconstructed from the paper's published tables, and are not the original recordings. On the command line,
     `mirrorstats report "$(mirrorstats-example-runs)"` reports on them.
 
+    Example:
+        >>> import mirrorstats as ms
+        >>> len(sorted(ms.example_runs().glob("*.parquet")))
+        40
+
     Raises:
         FileNotFoundError: in a package that was not built by `make wheel`.
     """

@@ -2,87 +2,130 @@
 
 from __future__ import annotations
 
-import atexit
 import json
+import math
 import os
-import pathlib
-import shutil
-import tempfile
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, Optional, Union
 
 from . import _native
 from ._answer import Answer
-from ._paths import Path
+from ._error import OutputError, check_name
+from ._paths import Path, Spool, Toml, is_frame, text, toml_file
+
+# Traces that nobody named stay until the interpreter ends.
+_unnamed = Spool()
 
 
 def import_steps(
-    rows: Iterable[Mapping[str, Any]] | Any,
-    out: Path | None = None,
+    rows: Union[Iterable[Mapping[str, Any]], Any],
+    out: Optional[Path] = None,
     *,
-    definitions: Path = "paper",
-    palette: str | Iterable[str] | None = None,
-    cluster: str | None = None,
+    definitions: Toml = "paper",
+    palette: Union[str, Iterable[str], None] = None,
+    cluster: Optional[str] = None,
     reconstruction: bool = False,
 ) -> Answer:
     """Makes a trace of steps, so that episodes of any harness can be scored.
 
     Args:
         rows: one row per step, with the columns of the schema (`mirrorstats trace schema step`): an iterable of dicts, or a
-            data frame of any library that gives Arrow streams (`__arrow_c_stream__`: Polars, pandas, pyarrow, DuckDB).
-            None and null stand for a value that is not there. Other columns are kept. Rows may be in any order.
-        out: the trace to write, a name that ends in .parquet. Where none is given, the trace is a temporary file until
-            the interpreter ends.
-        definitions: the definitions whose experiments are known: `paper`, `extended`, or a TOML file.
+            data frame of Polars, pandas, pyarrow or DuckDB. None, NaN, NA and null stand for a value that is not there. A
+            whole number is an integer, also where pandas made it a float. Other columns are kept. Rows may be in any order.
+        out: the trace to write, a name that ends in .parquet; if None, a temporary file until the interpreter ends.
+        definitions: the definitions whose experiments are known: `paper`, `extended`, a TOML file, TOML text or a dict.
         palette: the colours that there are, which the trace then declares: names, or `default`, the ten of the study.
-        cluster: `seed` where episodes of one seed are more alike than chance.
+        cluster: `seed` if episodes of one seed are more alike than chance.
         reconstruction: whether the steps are rebuilt from published numbers, so that statistics take no pairs from them.
 
     Returns:
         `out` (the trace), `episodes` and `steps` (how many), `columns` (those of the schema), `own_columns` (others).
 
     Raises:
-        Error: every row that is no step and every episode that is not whole, by row; nothing is written then.
-        TypeError: a value that JSON does not have, such as a date.
-        ValueError: a number that is not finite; another `cluster`, or one with `reconstruction`.
+        InputError: every column with a value that it cannot have, once, with the first row and the number of rows; every
+            episode that is not whole. Nothing is written then.
+        OutputError: an `out` that does not end in .parquet, or cannot be written.
+        TypeError: a value that is no text, number, truth value or null, such as a date, with its row and column.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> step = {"episode_id": "E1/me/s1/r1", "model": "me", "experiment": "E1", "seed": 1, "run": 1,
+        ...         "body_color": "red", "self_color": "red", "selected_cube": "red", "mirror_visible": True}
+        >>> steps = [{**step, "t": 1, "action": "turn_left"}, {**step, "t": 2, "action": "done"}]
+        >>> print(ms.import_steps(steps))
+        imported 1 episode, 2 steps into steps.parquet
+        <BLANKLINE>
     """
-    out = os.fspath(out) if out is not None else _temporary()
-    if cluster not in (None, "seed"):
-        raise ValueError(f"cluster: expected 'seed' or None, found {cluster!r}")
+    check_name("cluster", cluster, (None, "seed"))  # type: ignore[arg-type]
     if cluster is not None and reconstruction:
         raise ValueError("cluster and reconstruction exclude each other")
     if palette is not None and not isinstance(palette, str):
         # With a comma it is no name of a file.
         palette = ",".join([*palette, ""])
+    spool = Spool()
+    target = _unnamed.new("steps.parquet") if out is None else text(out, spool)
+    if not target.endswith(".parquet"):
+        raise OutputError(f"out: expected a name that ends in .parquet, found {target!r}\n  help: a trace is a Parquet file")
+    known = toml_file(definitions, "definitions", spool)
+    return trace_of(lines(rows)[1], target, known, palette, cluster == "seed", reconstruction)
+
+
+def trace_of(
+    rows: bytes,
+    out: str,
+    definitions: str,
+    palette: Optional[str] = None,
+    clusters_by_seed: bool = False,
+    reconstruction: bool = False,
+) -> Answer:
+    """Makes a trace of rows that are lines of JSON."""
     asked = {
         "out": out,
-        "definitions": os.fspath(definitions),
+        "definitions": definitions,
         "palette": palette,
-        "clusters_by_seed": cluster == "seed",
+        "clusters_by_seed": clusters_by_seed,
         "reconstruction": reconstruction,
     }
-    answer = Answer(_native.import_text("rows", _lines(rows), asked))
+    answer = Answer(_native.import_text("rows", rows, asked))
     # Where it is, not how messages call it.
     answer["out"] = out
     return answer
 
 
-def _lines(rows: Any) -> bytes:
-    """The rows as lines of JSON."""
+def lines(rows: Any) -> tuple[list[str], bytes]:
+    """The columns of some rows, and the rows as lines of JSON."""
+    if not hasattr(rows, "__arrow_c_stream__") and is_frame(rows):
+        rows = rows.collect()
     if hasattr(rows, "__arrow_c_stream__"):
-        return _native.lines_of(rows.__arrow_c_stream__())
-    lines = (json.dumps(dict(row), allow_nan=False, ensure_ascii=False, default=_plain) for row in rows)
-    return "".join(f"{line}\n" for line in lines).encode()
+        try:
+            stream = rows.__arrow_c_stream__()
+        except ImportError:
+            # pandas without pyarrow.
+            rows = rows.to_dict("records")
+        else:
+            columns, found = _native.lines_of(stream)
+            return columns, found
+    names: dict[str, None] = {}
+    texts = []
+    for at, row in enumerate(rows):
+        if not isinstance(row, Mapping):
+            raise TypeError(f"row {at} (from 0): expected a dict, found {type(row).__name__}")
+        names.update(dict.fromkeys(row))
+        texts.append(json.dumps({key: _plain(value, at, key) for key, value in row.items()}, ensure_ascii=False) + "\n")
+    return list(names), "".join(texts).encode()
 
 
-def _plain(value: Any) -> Any:
-    """A number or a truth value of NumPy as one of Python."""
+def _plain(value: Any, at: int, key: str) -> Any:
+    """A value as JSON has it; what is no number is null."""
+    if value is None or type(value).__name__ in ("NAType", "NaTType"):
+        return None
     if hasattr(value, "item") and getattr(value, "ndim", None) == 0:
-        return value.item()
-    raise TypeError(f"expected text, a number, a truth value or None, found {type(value).__name__}")
-
-
-def _temporary() -> str:
-    folder = tempfile.mkdtemp(prefix="mirrorstats-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return str(pathlib.Path(folder) / "steps.parquet")
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        if math.isnan(value):
+            return None
+        raise ValueError(f"row {at} (from 0), column `{key}`: expected a finite number, found {value}")
+    if isinstance(value, (str, bool, int, float)):
+        return value
+    expected = "expected a text, a number, a truth value or None"
+    raise TypeError(f"row {at} (from 0), column `{key}`: {expected}, found {type(value).__name__}")

@@ -1,16 +1,110 @@
-"""Paths as the native library takes them."""
+"""Inputs as the native library takes them: paths as text, and data frames, text and dicts as files of this process."""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Iterable
-from typing import Union
+import pathlib
+import tempfile
+import urllib.parse
+import urllib.request
+from collections.abc import Iterable, Mapping
+from typing import Any, Optional, Union
 
 Path = Union[str, "os.PathLike[str]"]
-Paths = Union[Path, Iterable[Path]]
+# A definition file, a style or an experiment: a name, a path, TOML text, or a dict with the keys of the file.
+Toml = Union[str, "os.PathLike[str]", Mapping[str, Any]]
 
 
-def texts(paths: Paths) -> list[str]:
-    """One path or several, as texts."""
-    several = [paths] if isinstance(paths, (str, os.PathLike)) else paths
-    return [os.fspath(path) for path in several]
+class Spool:
+    """A temporary folder for what is not yet a file; it is there as long as this object."""
+
+    def __init__(self, files: Optional[dict[str, bytes]] = None) -> None:
+        self._folder: Optional[tempfile.TemporaryDirectory[str]] = None
+        for name, content in (files or {}).items():
+            self.keep(name, content)
+
+    @property
+    def path(self) -> str:
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="mirrorstats-", ignore_cleanup_errors=True)
+        return self._folder.name
+
+    def keep(self, name: str, content: bytes) -> str:
+        """Writes a file and gives its path."""
+        path = pathlib.Path(self.path, name)
+        path.write_bytes(content)
+        return str(path)
+
+    def new(self, name: str) -> str:
+        """The path of a file that is not there yet."""
+        ending, at = pathlib.Path(name), 1
+        while os.path.exists(os.path.join(self.path, name)):
+            at += 1
+            name = f"{ending.stem}-{at}{ending.suffix}"
+        return os.path.join(self.path, name)
+
+    def files(self) -> dict[str, bytes]:
+        """All of its files, by name."""
+        found = sorted(pathlib.Path(self.path).iterdir()) if self._folder else []
+        return {file.name: file.read_bytes() for file in found if file.is_file()}
+
+
+def text(path: Any, spool: Spool) -> str:
+    """A path as text: `~` and `file://` stand for what they mean; what fsspec has opened elsewhere is copied here."""
+    filesystem, place = getattr(path, "fs", None), getattr(path, "path", None)
+    if filesystem is not None and isinstance(place, str):
+        protocol = filesystem.protocol if isinstance(filesystem.protocol, str) else filesystem.protocol[0]
+        if protocol in ("file", "local"):
+            return place
+        copy = spool.new(pathlib.PurePosixPath(place).name)
+        filesystem.get_file(place, copy)
+        return copy
+    path = os.fspath(path)
+    named = str(os.fsdecode(path))
+    if named.startswith("file://"):
+        named = urllib.request.url2pathname(urllib.parse.urlsplit(named).path)
+    return os.path.expanduser(named)
+
+
+def is_frame(value: Any) -> bool:
+    """Whether it is a data frame of Polars, pandas, Arrow or DuckDB."""
+    return hasattr(value, "__arrow_c_stream__") or (hasattr(value, "collect") and hasattr(value, "collect_schema"))
+
+
+def several(paths: Any) -> list[Any]:
+    """One input or several."""
+    is_one = isinstance(paths, (str, os.PathLike)) or is_frame(paths) or hasattr(paths, "fs")
+    return [paths] if is_one or not isinstance(paths, Iterable) else list(paths)
+
+
+def toml_file(value: Toml, noun: str, spool: Spool) -> str:
+    """A name or a path as it is; TOML text or a dict as a file."""
+    if isinstance(value, Mapping):
+        return spool.keep(f"{noun}.toml", "\n".join(_tables(value)).encode())
+    path = text(value, spool)
+    is_toml = "\n" in path or ("=" in path and not path.endswith(".toml"))
+    return spool.keep(f"{noun}.toml", path.encode()) if is_toml else path
+
+
+def _tables(table: Mapping[str, Any], name: str = "") -> Iterable[str]:
+    """The lines of a TOML table: values first, then the tables in it."""
+    inner = {key: value for key, value in table.items() if isinstance(value, Mapping)}
+    if name and (len(inner) < len(table) or not table):
+        yield f"[{name}]"
+    for key, value in table.items():
+        if key not in inner and value is not None:
+            yield f"{json.dumps(key)} = {_value(value)}"
+    for key, value in inner.items():
+        yield from _tables(value, f"{name}.{json.dumps(key)}" if name else json.dumps(key))
+
+
+def _value(value: Any) -> str:
+    """A value of TOML: the same as in JSON but for tables in lists."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{json.dumps(key)} = {_value(one)}" for key, one in value.items()) + "}"
+    if isinstance(value, (list, tuple)):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, (str, bool, int, float)):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    raise TypeError(f"expected a text, a number, a truth value, a list or a dict, found {type(value).__name__}")

@@ -2,85 +2,116 @@
 
 from __future__ import annotations
 
+import asyncio
+import base64
+import difflib
 import inspect
 import json
-import os
 import textwrap
 import warnings
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal, Optional, Union
 
 from . import _native
 from ._answer import Answer
-from ._paths import Path
+from ._error import ArgumentError, check_name, check_number
+from ._paths import Path, Spool, Toml, text, toml_file
 
 Message = dict[str, Any]
 
 
 def record(
-    agent: str | Callable[[Message], Any] | type,
-    experiment: str = "E1..E5",
+    agent: Union[str, Callable[[Message], Any], type],
+    experiment: Toml = "E1..E5",
     *,
     seeds: int = 3,
     runs: int = 7,
     out: Path = "runs",
-    model: str | None = None,
-    images: str = "path",
+    model: Optional[str] = None,
+    images: Literal["path", "base64", "array"] = "path",
+    on_error: Literal["raise", "lose"] = "raise",
     **options: Any,
 ) -> Answer:
     """Records episodes of an agent in the mirror world: step traces to be opened, logs with the frames.
 
-    The same call again continues where it stopped. Ctrl-C ends a recording when the steps under way are done; whole
-    episodes stay.
+    The same call again continues where it stopped. Ctrl-C ends a recording: a function is not waited for, an agent of another
+    kind ends the steps under way. Whole episodes stay.
 
     Args:
         agent: what plays. A name as on the command line (`oracle`, `vlm`, `exec:CMD`), or a function that gets the messages
-            that a program of `--agent exec:CMD` gets, as dicts, and returns the reply to each `observation`: a dict with
-            the keys that the prompt asks for, or a text. What it returns for `task` and `end` is not looked at. Several
-            episodes are under way at once and share the function; of a class each episode gets an instance of its own,
-            made without arguments and called with the messages. An agent that raises loses its episode.
-        experiment: `E1`, `E1..E5`, `E1,E3`, others that are built in, or a TOML file.
+            that a program of `exec:CMD` gets, as dicts, and returns the reply to each `observation`: a dict with the keys
+            that the prompt asks for, or a text. It may be `async`. What it returns for `task` and `end` is not looked at.
+            Of a class each episode gets an instance of its own, made without arguments and called with the messages.
+        experiment: `E1`, `E1..E5`, `E1,E3`, others that are built in, a TOML file, TOML text, or a dict.
         seeds: seeds 1 to this for each experiment.
         runs: runs 1 to this for each seed.
         out: the folder for traces and logs.
-        model: the name in tables; that of the function where none is given.
-        images: how a function gets a frame, in `message["image"]`: `path`, a PNG file that is there until the episode
-            ends, or `base64`, the same PNG as text.
-        options: the other options of `mirrorstats record`, with `_` for `-`: `repeats=2`, `no_frames=True`.
+        model: the name in tables; that of the function if None.
+        images: how a function gets a frame, in `message["image"]`: `path`, a PNG file that is there until the episode ends;
+            `base64`, the same PNG as text; `array`, a NumPy array of uint8 with the shape (height, width, 3).
+        on_error: what becomes of an exception of a function: `raise` stops the recording and raises it here, `lose` loses the
+            episode and goes on; `lost` of the answer and `lost.jsonl` of the folder then have its traceback.
+        options: the other options of `mirrorstats record`, with `_` for `-`: `repeats=2`, `no_frames=True`, or
+            `in_flight=8`, the number of episodes under way at once.
 
     Returns:
         What became of the episodes: `recorded`, `found` (there before), `steps` (counts), `lost` (episodes without an answer,
         each with its `reason`; a warning names the first), `traces` and `logs` (files), and more.
 
     Raises:
-        Error: an option, an agent or a configuration that cannot be used; an agent that could not go on.
+        RecordError: an agent or a configuration that cannot be used; an agent that could not go on.
+        TypeError: an agent that is no name and cannot be called; a keyword that is no option.
+        Exception: what the agent raised, with its traceback.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> print(ms.record("frozen", "E1", seeds=1, runs=2, out="frozen", no_log=True))
+        recorded 2 of 2 episodes of frozen (200 steps), 0 there before, 0 lost
     """
-    arguments = ["--experiment", experiment, "--seeds", str(seeds), "--runs", str(runs), "--out", os.fspath(out)]
+    if not isinstance(agent, str) and not callable(agent):
+        raise TypeError(f"agent: expected a name, a function or a class, found {type(agent).__name__}")
+    check_number("seeds", seeds, 1)
+    check_number("runs", runs, 1)
+    check_name("images", images, ("path", "base64", "array"))
+    check_name("on_error", on_error, ("raise", "lose"))
+    _check_options(options)
+    spool = Spool()
+    arguments = ["--experiment", toml_file(experiment, "experiment", spool), "--seeds", str(seeds), "--runs", str(runs)]
+    arguments += ["--out", text(out, spool)]
     for name, value in options.items():
-        arguments += _option(name, value)
+        arguments += _option(name, value, spool)
     if isinstance(agent, str):
         named = [] if model is None else ["--model", model]
         return _told(Answer(_native.record([*arguments, "--agent", agent, *named])))
-    if images not in ("path", "base64"):
-        raise ValueError(f"images: expected 'path' or 'base64', found {images!r}")
     function = {
         "model": model or getattr(agent, "__name__", type(agent).__name__),
         "source": _source(agent),
-        "is_base64": images == "base64",
-        "listeners": lambda: _listener(agent),
+        "is_base64": images != "path",
+        "is_lost": on_error == "lose",
+        "listeners": lambda: _listener(agent, images == "array"),
     }
     return _told(Answer(_native.record([*arguments, "--agent", "function"], function)))
 
 
-def _option(name: str, value: Any) -> list[str]:
+def _check_options(options: dict[str, Any]) -> None:
+    """Refuses keywords that are no options of a recording."""
+    known = sorted({name.replace("-", "_") for name in _native.record_options()} - {"agent", "json", "dry_run"})
+    for name in options:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            hint = f"; did you mean `{near[0]}`?" if near else f"; options are {', '.join(known)}"
+            raise TypeError(f"record() got an unexpected keyword argument {name!r}{hint}")
+
+
+def _option(name: str, value: Any, spool: Spool) -> list[str]:
     """An option of the command line; False and None leave it out."""
     flag = "--" + name.replace("_", "-")
     if value is None or value is False:
         return []
-    return [flag] if value is True else [flag, os.fspath(value) if isinstance(value, os.PathLike) else str(value)]
+    return [flag] if value is True else [flag, text(value, spool) if hasattr(value, "__fspath__") else str(value)]
 
 
-def _source(agent: Any) -> str | None:
+def _source(agent: Any) -> Optional[str]:
     """The text of the agent, of which recordings carry the hash; None where Python does not know it."""
     plain = agent if inspect.isfunction(agent) or inspect.isclass(agent) else type(agent)
     try:
@@ -89,13 +120,22 @@ def _source(agent: Any) -> str | None:
         return None
 
 
-def _listener(agent: Any) -> Callable[[str], str]:
-    """What the native library calls in one episode, with messages as JSON."""
+def _listener(agent: Any, is_array: bool) -> Callable[[str], str]:
+    """What the native library calls in one episode, on a thread of its own, with messages as JSON."""
     function = agent() if isinstance(agent, type) else agent
+    loop: Optional[asyncio.AbstractEventLoop] = None
 
     def listen(line: str) -> str:
+        nonlocal loop
         message = json.loads(line)
+        if is_array and "image" in message:
+            message["image"] = _array(message["image"]["base64"])
         reply = function(message)
+        if inspect.isawaitable(reply):
+            loop = loop or asyncio.new_event_loop()
+            reply = loop.run_until_complete(reply)
+        if loop and message["kind"] == "end":
+            loop.close()
         if message["kind"] != "observation" or reply is None:
             return ""
         if isinstance(reply, (str, dict)):
@@ -105,9 +145,21 @@ def _listener(agent: Any) -> Callable[[str], str]:
     return listen
 
 
+def _array(png: str) -> Any:
+    """The pixels of a frame."""
+    import numpy
+
+    height, width, pixels = _native.pixels(base64.b64decode(png))
+    return numpy.frombuffer(pixels, numpy.uint8).reshape(height, width, 3)
+
+
 def _told(answer: Answer) -> Answer:
-    lost = answer["lost"]
+    lost, recorded = answer["lost"], answer["recorded"]
+    answer.text = (
+        f"recorded {recorded} of {answer['asked']} episodes of {answer['model']} ({answer['steps']} steps), "
+        f"{answer['found']} there before, {len(lost)} lost"
+    )
     if lost:
-        words = f"{len(lost)} episodes are lost; first {lost[0]['episode_id']}: {lost[0]['reason']}"
-        warnings.warn(words, RuntimeWarning, stacklevel=3)
+        reason = lost[0]["reason"].splitlines()[0]
+        warnings.warn(f"{len(lost)} episodes are lost; first {lost[0]['episode_id']}: {reason}", RuntimeWarning, stacklevel=3)
     return answer

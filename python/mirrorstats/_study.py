@@ -3,65 +3,122 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from typing import Any, Literal, Optional, Union
 
 from . import _native
-from ._answer import Answer
+from ._answer import Answer, Statistics
+from ._error import ArgumentError, InputError, check_name, check_number
+from ._import import lines, trace_of
 from ._native import ArrowSteps, ArrowTable, Figure, Table
-from ._paths import Path, Paths, texts
+from ._paths import Path, Spool, Toml, is_frame, several, text, toml_file
+
+Names = Union[str, Iterable[str]]
 
 
 def open(
-    paths: Paths,
+    inputs: Any,
     *,
-    definitions: Path | None = None,
-    where: str | None = None,
-    metrics: Iterable[str] | None = None,
-    by: Iterable[str] | None = None,
+    definitions: Optional[Toml] = None,
+    where: Optional[str] = None,
+    metrics: Optional[Names] = None,
+    by: Optional[Names] = None,
     pool: bool = False,
-    lost: str = "excluded",
-    threads: int | None = None,
+    lost: Literal["excluded", "as-failure"] = "excluded",
+    threads: Optional[int] = None,
 ) -> Study:
-    """Opens traces, or files of scores in their place.
+    """Opens traces, or scores in their place.
 
     Args:
-        paths: files, folders or globs, one or several.
-        definitions: `paper`, `extended`, or the path of a TOML file. Where none is named those that the experiments of
-            the traces name, else `paper`; for scores what they were computed with.
+        inputs: files, folders or globs, as text, `Path`, `file://` or `fsspec` file; or data frames (Polars, pandas, Arrow,
+            DuckDB) of steps, as `import_steps` takes them, or of scores, one row per episode. One or several.
+        definitions: `paper`, `extended`, the path of a TOML file, TOML text, or a dict with the keys of such a file. If None,
+            those that the experiments of the traces name, else `paper`; for scores those that they were computed with.
         where: a condition on episodes in the language of definitions, such as `seed = 1 and TSA = 1`; all if None.
-        metrics: the metrics wanted, by name; all if None.
+        metrics: the metrics wanted, by name, one or several; all if None.
         by: the columns that cells are grouped by; experiment and model if None, and the condition where there are some.
         pool: whether a cell may hold episodes that were recorded differently.
-        lost: `excluded`, or `as-failure` where lost episodes count as failures.
+        lost: `excluded`, or `as-failure` to count lost episodes as failures.
         threads: how many threads to use; all cores if None. Results do not depend on it.
 
     Raises:
-        Error: no such file, a file that is no trace, faults of the definitions or of the condition.
+        InputError: no such file, a file that is no trace, a frame that is neither steps nor scores.
+        DefinitionError: faults of the definitions or of the condition.
+        ArgumentError: no input, a metric that the definitions do not have, a number of threads below 1.
+
+    Settings of the command line (`mirrorstats.toml`, `MIRRORSTATS_...`) do not apply here.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> study = ms.open(ms.example_runs(), where="experiment = 'E1'", metrics="TSA")
+        >>> len(study.episodes)
+        168
     """
-    if lost not in ("excluded", "as-failure"):
-        raise ValueError(f"lost: expected 'excluded' or 'as-failure', found {lost!r}")
+    check_name("lost", lost, ("excluded", "as-failure"))
+    check_number("threads", threads, 1)
+    given, spool = several(inputs), Spool()
+    if not given:
+        raise ArgumentError("inputs: expected at least one file, folder or data frame, found none")
+    named = None if definitions is None else toml_file(definitions, "definitions", spool)
     asked = {
-        "paths": texts(paths),
-        "definitions": None if definitions is None else os.fspath(definitions),
+        "paths": [_input(one, named, spool) for one in given],
+        "definitions": named,
         "where": where,
-        "metrics": None if metrics is None else list(metrics),
-        "by": None if by is None else list(by),
+        "metrics": _names(metrics),
+        "by": _names(by),
         "pool": pool,
         "lost_as_failure": lost == "as-failure",
         "threads": threads,
     }
-    return Study(_native.Study(asked))
+    return Study(asked, spool)
+
+
+def compare(studies: Mapping[str, Study]) -> ArrowTable:
+    """The cells of several studies below each other, each with its change from the first study.
+
+    Args:
+        studies: studies by name, two or more, grouped by the same columns.
+
+    Returns:
+        `study` (text), the columns of `Study.cells`, and `change` (float64): the mean minus the mean of the same cell of the
+        first study; null in the first study and where either mean is undefined. `Study.diff` tells why values differ.
+
+    Raises:
+        ArgumentError: fewer than two studies, or studies with different key columns.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> runs = ms.example_runs()
+        >>> found = ms.compare({"all": ms.open(runs), "first seed": ms.open(runs, where="seed = 1")})
+        >>> found.column_names[0], found.column_names[-1], len(found)
+        ('study', 'change', 800)
+    """
+    if len(studies) < 2:
+        raise ArgumentError(f"studies: expected two or more studies by name, found {len(studies)}")
+    return _native.compare([(name, study._native) for name, study in studies.items()])
 
 
 class Study:
     """Inputs that are open, and what is asked of them. Made by `open`.
 
-    Every answer is a function of it, and the same that the command line gives. A file that changes while it is open is an
-    `Error`.
+    Every answer is the one that the command line gives. A file that changes while it is open is an `InputError`. A study can
+    be pickled: its files are opened again where it is loaded, and its data frames travel with it.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> study = ms.open(ms.example_runs())
+        >>> print(study.table().name)
+        main
     """
 
-    def __init__(self, native: _native.Study) -> None:
-        self._native = native
+    def __init__(self, asked: dict[str, Any], spool: Spool) -> None:
+        self._asked = asked
+        # What is not a file by itself is there as long as the study.
+        self._spool = spool
+        self._native = _native.Study(asked)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (self._asked, self._spool.path, self._spool.files())
 
     @property
     def episodes(self) -> ArrowTable:
@@ -71,84 +128,170 @@ class Study:
         metric (int64): a rate is 0 or 1, a duration a number of steps, null where the metric is undefined.
 
         Raises:
-            Error: what is wrong with the traces.
+            InputError: what is wrong with the traces.
+
+        Example:
+            >>> import mirrorstats as ms
+            >>> ms.open(ms.example_runs(), metrics=["TSA", "TTD"]).episodes.column_names[-2:]
+            ['TSA', 'TTD']
         """
         return self._native.episodes
 
     @property
     def cells(self) -> ArrowTable:
-        """One row per group of episodes and metric, as `cells.csv` of a report, computed once.
+        """One row per group of episodes and metric, computed once.
 
-        The key columns (text), `metric` (text), `n` (uint64, episodes where it is defined), `sum` and `sum_sq` (decimal),
-        `mean`, `se`, `ci_low`, `ci_high` (float64; null where undefined). Intervals are at 95 %.
+        The key columns, `metric`, `unit` (text), `n` (int64, episodes where the metric is defined), `sum`, `sum_sq` (int64),
+        `mean`, `se` (float64), `interval` (text: `wilson` or `student_t`), `ci_low`, `ci_high` (float64); null where undefined.
+        Intervals are at 95 %, the same as in every other output.
 
         Raises:
-            Error: what is wrong with the traces; a cell that would mix episodes which were recorded differently.
+            InputError: what is wrong with the traces; a cell that would mix episodes which were recorded differently.
+
+        Example:
+            >>> import mirrorstats as ms
+            >>> cells = ms.open(ms.example_runs(), metrics="TSA", by="model").cells
+            >>> len(cells), cells.column_names[:4]
+            (8, ['model', 'metric', 'unit', 'n'])
         """
         return self._native.cells
 
-    def steps(self, columns: Iterable[str] | None = None) -> ArrowSteps:
-        """The steps of the episodes that the filter keeps, read from the traces each time somebody asks for the rows.
+    def steps(self, columns: Optional[Names] = None) -> ArrowSteps:
+        """The steps of the episodes that the filter keeps, read from the traces each time that the rows are asked for.
 
         Args:
-            columns: the columns wanted, in this order; all if None. `mirrorstats trace schema` lists those of the schema. A file
-                that lacks a column has null there.
+            columns: the columns wanted, in this order; all if None. `mirrorstats trace schema` lists those of the schema. A
+                file that lacks a column has null there.
 
         Raises:
-            Error: scores in the place of traces; a column that no trace has, or two with different types.
-        """
-        return self._native.steps(None if columns is None else list(columns))
+            InputError: scores in the place of traces; a column that no trace has, or two with different types.
 
-    def table(self, name: str = "main", *, style: Path = "default") -> Table:
+        Example:
+            >>> import mirrorstats as ms
+            >>> ms.open(ms.example_runs()).steps(["episode_id", "t", "action"])
+            <mirrorstats.ArrowSteps: episode_id, t, action>
+        """
+        return self._native.steps(_names(columns))
+
+    def table(self, name: str = "main", *, style: Toml = "default") -> Table:
         """A table of the report: `main`, or another one that the style lays out.
 
-        Raises:
-            Error: what is wrong with the traces or the style; no such table.
-        """
-        return self._native.table(name, os.fspath(style))
-
-    def tables(self, *, style: Path = "default") -> list[Table]:
-        """All tables of the report."""
-        return self._native.tables(os.fspath(style))
-
-    def figure(self, name: str, *, style: Path = "default") -> Figure:
-        """A figure by name (`intervals`, `heatmap`, `gaze`, ...), with the models in the order of a style.
+        Args:
+            name: the table.
+            style: `default`, `paper`, the path of a TOML file, TOML text, or a dict.
 
         Raises:
-            Error: no figure of this name; traces that lack what it needs.
-        """
-        return self._native.figure(name, os.fspath(style))
+            ArgumentError: no such table.
+            DefinitionError: what is wrong with the style.
 
-    def report(self, out: Path, *, style: Path = "default", figures: bool = True) -> Answer:
+        Example:
+            >>> import mirrorstats as ms
+            >>> ms.open(ms.example_runs()).table("main", style="paper").latex.count("tabular") > 0
+            True
+        """
+        return self._native.table(name, self._style(style))
+
+    def tables(self, *, style: Toml = "default") -> list[Table]:
+        """All tables of the report.
+
+        Example:
+            >>> import mirrorstats as ms
+            >>> [table.name for table in ms.open(ms.example_runs()).tables()]
+            ['main', 'appendix']
+        """
+        return self._native.tables(self._style(style))
+
+    def figure(
+        self,
+        name: Literal[
+            "spider",
+            "heatmap",
+            "scatter",
+            "completion-gap",
+            "e5-outcomes",
+            "intervals",
+            "slopes",
+            "decision-curve",
+            "gaze",
+        ],
+        *,
+        style: Toml = "default",
+    ) -> Figure:
+        """A figure by name, with the models in the order of a style.
+
+        Raises:
+            ArgumentError: no figure of this name; traces that lack what it needs.
+
+        Example:
+            >>> import mirrorstats as ms
+            >>> ms.open(ms.example_runs()).figure("intervals")
+            <mirrorstats.Figure: intervals>
+        """
+        return self._native.figure(name, self._style(style))
+
+    def query(self, sql: str) -> ArrowTable:
+        """The rows of a SELECT over the tables `steps`, `episodes` and `cells`, as `mirrorstats query`.
+
+        Rows come in no fixed order unless the query says ORDER BY. Names with other characters than letters, digits and `_`
+        take double quotes: `"TSA-C"`. `SHOW TABLES` and `DESCRIBE episodes` say what there is.
+
+        Raises:
+            QueryError: a query that cannot be run, with the place of each fault.
+
+        Example:
+            >>> import mirrorstats as ms
+            >>> ms.open(ms.example_runs()).query("SELECT count(*), avg(TSA) FROM episodes").column_names
+            ['count_star()', 'avg(TSA)']
+        """
+        return self._native.query(sql)
+
+    def report(self, out: Path, *, style: Toml = "default", figures: bool = True) -> Answer:
         """Writes the folder of a report, in place of the report that is there, and returns its manifest.
 
         Raises:
-            Error: what is wrong with the traces, the style or the folder, which is then as it was.
-        """
-        return Answer(self._native.report(os.fspath(out), os.fspath(style), figures))
+            OutputError: a folder that holds the inputs, or cannot be written; it is then as it was.
+            DefinitionError: what is wrong with the style.
 
-    def stats(self, *, confidence: float = 0.95, horizon: int | None = None) -> Answer:
-        """Intervals, tests and comparisons of the cells, as `mirrorstats stats --json`.
+        Example:
+            >>> import mirrorstats as ms
+            >>> manifest = ms.open(ms.example_runs()).report("report-of-example", figures=False)
+            >>> manifest["where"] is None
+            True
+        """
+        return Answer(self._native.report(text(out, self._spool), self._style(style), figures))
+
+    def stats(self, *, confidence: float = 0.95, horizon: Optional[int] = None, full: bool = False) -> Statistics:
+        """Intervals, tests and comparisons of the cells, as `mirrorstats stats --json`; `Statistics` has them as frames too.
 
         Args:
             confidence: of every interval, between 0 and 1; tests are at one minus it.
             horizon: of restricted means, in steps; the last step known for every model of an experiment if None.
+            full: whether the text has every test, not the answers alone.
 
         Raises:
-            Error: what is wrong with the traces.
-            ValueError: a confidence that is not between 0 and 1.
+            ArgumentError: a confidence that is not between 0 and 1, a horizon below 1.
+
+        Example:
+            >>> import mirrorstats as ms
+            >>> stats = ms.open(ms.example_runs(), where="experiment = 'E1'").stats(confidence=0.9)
+            >>> stats["episodes"], stats["confidence"]
+            (168, 0.9)
         """
-        if not 0 < confidence < 1:
-            raise ValueError(f"confidence: expected a number between 0 and 1 such as 0.95, found {confidence}")
-        return Answer(self._native.stats(confidence, horizon))
+        if not isinstance(confidence, (int, float)) or not 0 < confidence < 1:
+            raise ArgumentError(f"confidence: expected a number between 0 and 1 such as 0.95, found {confidence!r}")
+        check_number("horizon", horizon, 1)
+        return Statistics(self._native.stats(confidence, horizon, full))
 
     def diff(self, other: Study) -> Answer:
         """What changes from this study to another one: cells, and values of episodes, as `mirrorstats diff --json`.
 
         For two studies of the same traces under one filter, each change names the timesteps that decided it.
 
-        Raises:
-            Error: what is wrong with either.
+        Example:
+            >>> import mirrorstats as ms
+            >>> study = ms.open(ms.example_runs())
+            >>> study.diff(study)["flips"]
+            []
         """
         return Answer(self._native.diff(other._native))
 
@@ -156,9 +299,53 @@ class Study:
         """The scores of one episode and the timesteps that decided them, as `mirrorstats score --explain --json`.
 
         Raises:
-            Error: no such episode; scores in the place of traces.
+            ArgumentError: no such episode.
+            InputError: scores in the place of traces.
+
+        Example:
+            >>> import mirrorstats as ms
+            >>> ms.open(ms.example_runs()).explain("E1/gpt-5-1/s1/r2")["episode_id"]
+            'E1/gpt-5-1/s1/r2'
         """
         return Answer(self._native.explain(episode_id))
 
+    def _style(self, style: Toml) -> str:
+        return toml_file(style, "style", self._spool)
+
     def __repr__(self) -> str:
-        return f"<mirrorstats.Study of {', '.join(self._native.inputs)}; definitions {self._native.definitions}>"
+        asked = self._asked
+        kept = f"; where {asked['where']}" if asked["where"] else ""
+        names = ", ".join("a data frame" if one.startswith(self._spool.path) else one for one in asked["paths"])
+        definitions = asked["definitions"]
+        is_inline = definitions is not None and definitions.startswith(self._spool.path)
+        return f"<mirrorstats.Study of {names}{kept}; definitions {'inline' if is_inline else self._native.definitions}>"
+
+
+def _again(asked: dict[str, Any], folder: str, files: dict[str, bytes]) -> Study:
+    """A study that was pickled."""
+    spool = Spool(files)
+
+    def moved(path: Optional[str]) -> Optional[str]:
+        return path.replace(folder, spool.path, 1) if path is not None and path.startswith(folder) else path
+
+    return Study({**asked, "paths": [*map(moved, asked["paths"])], "definitions": moved(asked["definitions"])}, spool)
+
+
+def _names(names: Optional[Names]) -> Optional[list[str]]:
+    return [names] if isinstance(names, str) else None if names is None else list(names)
+
+
+def _input(given: Any, definitions: Optional[str], spool: Spool) -> str:
+    """A path as it is; a data frame as a trace or as a file of scores."""
+    if isinstance(given, (str, os.PathLike)) or hasattr(given, "fs"):
+        return text(given, spool)
+    if not is_frame(given):
+        raise TypeError(f"inputs: expected a path or a data frame, found {type(given).__name__}")
+    columns, rows = lines(given)
+    if "t" in columns:
+        return str(trace_of(rows, spool.new("steps.parquet"), definitions or "paper")["out"])
+    if "episode_id" not in columns:
+        expected = "a data frame with a row per step (`episode_id`, `t`, ...) or per episode (`episode_id`, ...)"
+        raise InputError(f"inputs: expected {expected}, found the columns {', '.join(columns)}")
+    path = spool.new("scores.jsonl")
+    return spool.keep(os.path.basename(path), rows)

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-import os
+from typing import Any, Optional
 
 from . import _native
 from ._answer import Answer
-from ._paths import Path, Paths, texts
+from ._error import ArgumentError, check_number
+from ._paths import Spool, Toml, several, text, toml_file
 
 
-def validate(paths: Paths, *, definitions: Path = "paper", threads: int | None = None) -> Answer:
+def validate(inputs: Any, *, definitions: Toml = "paper", threads: Optional[int] = None) -> Answer:
     """Checks traces against every rule of the schema, as `mirrorstats trace validate --json`.
 
     Args:
-        paths: files, folders or globs, one or several.
-        definitions: the definitions whose experiments are known: `paper`, `extended`, or a TOML file.
+        inputs: files, folders or globs, one or several.
+        definitions: the definitions whose experiments are known: `paper`, `extended`, a TOML file, TOML text or a dict.
         threads: how many threads to use; all cores if None.
 
     Returns:
@@ -22,6 +23,16 @@ def validate(paths: Paths, *, definitions: Path = "paper", threads: int | None =
         rule is broken where none of them is an error.
 
     Raises:
-        Error: no such file.
+        InputError: no such file.
+
+    Example:
+        >>> import mirrorstats as ms
+        >>> [finding["code"] for finding in ms.validate(ms.example_runs())["findings"] if finding["severity"] == "error"]
+        []
     """
-    return Answer(_native.validate(texts(paths), os.fspath(definitions), threads))
+    check_number("threads", threads, 1)
+    given, spool = several(inputs), Spool()
+    if not given:
+        raise ArgumentError("inputs: expected at least one file or folder, found none")
+    paths = [text(one, spool) for one in given]
+    return Answer(_native.validate(paths, toml_file(definitions, "definitions", spool), threads))

@@ -6,13 +6,9 @@ use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::thread::available_parallelism;
 
-use arrow::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
-use arrow::json::WriterBuilder;
-use arrow::json::writer::LineDelimited;
 use mirrorstats::cli;
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyCapsule;
+use pyo3::types::PyBytes;
 use study::ImportRequest;
 use trace::import::Text;
 use trace::inputs;
@@ -56,35 +52,22 @@ pub struct ImportAsked {
 
 /// Makes a trace of lines of steps.
 #[pyfunction]
-pub fn import_text(py: Python<'_>, name: &str, lines: Vec<u8>, asked: ImportAsked) -> PyResult<Answer> {
+pub fn import_text(py: Python<'_>, name: &str, lines: &[u8], asked: ImportAsked) -> PyResult<Answer> {
     let ImportAsked { out, definitions, palette, clusters_by_seed, reconstruction } = asked;
     let request = ImportRequest { out, definitions, palette, clusters_by_seed, reconstruction };
     let imported = py.detach(|| {
-        let text = Text::spool(name, Cursor::new(lines)).map_err(error::of_input)?;
+        let text = Text::of_frame(name, lines).map_err(error::of_input)?;
         study::import(vec![text], &request).map_err(error::of_study)
     })?;
     let words = imported.to_string();
     answer::of(&imported, words)
 }
 
-/// The rows of an Arrow stream as lines of JSON; what is null says so.
+/// The pixels of a PNG file of a frame: height, width, and red, green and blue of each pixel, row by row.
 #[pyfunction]
-pub fn lines_of(py: Python<'_>, stream: &Bound<'_, PyCapsule>) -> PyResult<Vec<u8>> {
-    let pointer = stream.pointer_checked(Some(c"arrow_array_stream"))?.cast::<FFI_ArrowArrayStream>();
-    // SAFETY: a capsule of this name holds a stream of Arrow's C interface, and it lives until this function returns. The
-    // stream is moved out of it and marked as released there, as the interface has it.
-    #[expect(unsafe_code, reason = "Arrow's C interface passes a pointer")]
-    let reader = unsafe { RecordBatchStreamReader::from_raw(pointer.as_ptr()) };
-    let reader = reader.map_err(|fault| PyValueError::new_err(fault.to_string()))?;
-    let written = py.detach(|| {
-        let mut lines = Vec::new();
-        let mut writer = WriterBuilder::new().with_explicit_nulls(true).build::<_, LineDelimited>(&mut lines);
-        for batch in reader {
-            writer.write(&batch?)?;
-        }
-        writer.finish()?;
-        drop(writer);
-        Ok::<_, arrow::error::ArrowError>(lines)
-    });
-    written.map_err(|fault| PyValueError::new_err(fault.to_string()))
+pub fn pixels<'py>(py: Python<'py>, png: &[u8]) -> PyResult<(u32, u32, Bound<'py, PyBytes>)> {
+    let mut reader = png::Decoder::new(Cursor::new(png)).read_info().map_err(error::of_input)?;
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap_or_default()];
+    let frame = reader.next_frame(&mut bytes).map_err(error::of_input)?;
+    Ok((frame.height, frame.width, PyBytes::new(py, &bytes[..frame.buffer_size()])))
 }

@@ -7,29 +7,85 @@ use std::path::Path;
 use mirrorstats::StudyError;
 use mirrorstats::cli::{ErrorAnswer, Failure};
 use pyo3::prelude::*;
+use toml_spec::FaultRecord;
+use trace::import::{Fault, ImportError};
 
-/// An error of a study.
+/// An error of a study, of the kind that says what is to be changed.
 pub fn of_study(error: StudyError) -> PyErr {
-    of_failure(&error.into())
+    let kind = kind(&error);
+    if let StudyError::Import(ImportError::Faults { told, more }) = &error {
+        return raised(kind, &in_rows(told, *more), &[]);
+    }
+    of_failure(&error.into(), kind)
+}
+
+/// The class of an error; each is one of `mirrorstats`.
+fn kind(error: &StudyError) -> &'static str {
+    use StudyError as E;
+    if let Some(faults) = error.faults() {
+        let is_query = faults.records().iter().any(|fault| fault.file == "query");
+        return if is_query { "QueryError" } else { "DefinitionError" };
+    }
+    match error {
+        E::Polars(_) => "QueryError",
+        E::Definitions(_) | E::Style(_) | E::NotScored { .. } | E::DefinitionsElsewhere { .. } => "DefinitionError",
+        E::Metric(_)
+        | E::NoTable { .. }
+        | E::Figure(_)
+        | E::Group(_)
+        | E::Evidence(_)
+        | E::Palette { .. }
+        | E::EmptyFilter { .. }
+        | E::NothingMoves { .. } => "ArgumentError",
+        E::Bundle(_) | E::OntoItself { .. } | E::Target(_) | E::Encode(_) => "OutputError",
+        _ => "InputError",
+    }
+}
+
+/// Faults of rows: a data frame has no lines, and counts its rows from 0.
+fn in_rows(told: &[Fault], more: usize) -> String {
+    let one = |fault: &Fault| {
+        let row = fault.line.map_or_else(String::new, |line| format!("row {} (from 0)", line - 1));
+        let column = fault.key.as_ref().map_or_else(String::new, |key| format!("column `{key}`"));
+        let place: Vec<String> = [row, column].into_iter().filter(|part| !part.is_empty()).collect();
+        let place = if place.is_empty() { "the rows".to_owned() } else { place.join(", ") };
+        let further = match fault.further_lines {
+            0 => String::new(),
+            1 => ", and 1 more row".to_owned(),
+            more => format!(", and {more} more rows"),
+        };
+        format!("{place}{further}: expected {}, found {}\n  help: {}", fault.expected, fault.found, fault.help)
+    };
+    let told = told.iter().map(one).collect::<Vec<_>>().join("\n");
+    if more == 0 { told } else { format!("{told}\nand {more} more") }
 }
 
 /// An error of the library that the command line tells as it is.
 pub fn of_input(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {
-    of_failure(&Failure::input(error))
+    of_failure(&Failure::input(error), "InputError")
+}
+
+/// An argument that has no such value.
+pub fn of_argument(error: impl Into<Box<dyn Error + Send + Sync>>) -> PyErr {
+    of_failure(&Failure::input(error), "ArgumentError")
 }
 
 /// A file that cannot be written.
 pub fn of_writing(path: &Path, fault: &io::Error) -> PyErr {
     let help = "is the folder there and writable, and the disk not full?";
-    of_input(format!("cannot write `{}`: {fault}\n  help: {help}", path.display()))
+    raised("OutputError", &format!("cannot write `{}`: {fault}\n  help: {help}", path.display()), &[])
 }
 
-/// What the command line would say, and the code that it would end with.
-pub fn of_failure(failure: &Failure) -> PyErr {
-    let ErrorAnswer { error, code, faults } = ErrorAnswer::of(failure);
-    let faults = serde_json::to_string(&faults).unwrap_or_default();
+/// What the command line would say.
+pub fn of_failure(failure: &Failure, kind: &str) -> PyErr {
+    let ErrorAnswer { error, faults, .. } = ErrorAnswer::of(failure);
+    raised(kind, &error, &faults)
+}
+
+fn raised(kind: &str, words: &str, faults: &[FaultRecord]) -> PyErr {
+    let faults = serde_json::to_string(faults).unwrap_or_default();
     Python::attach(|py| {
-        let raised = || py.import("mirrorstats._error")?.getattr("of_words")?.call1((error, code, faults));
+        let raised = || py.import("mirrorstats._error")?.getattr("of_words")?.call1((kind, words, faults));
         match raised() {
             Ok(raised) => PyErr::from_value(raised),
             Err(fault) => fault,

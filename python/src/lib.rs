@@ -25,6 +25,10 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(commands::run, module)?)?;
     module.add_function(wrap_pyfunction!(commands::validate, module)?)?;
     module.add_function(wrap_pyfunction!(commands::import_text, module)?)?;
-    module.add_function(wrap_pyfunction!(commands::lines_of, module)?)?;
+    module.add_function(wrap_pyfunction!(commands::pixels, module)?)?;
+    module.add_function(wrap_pyfunction!(columns::lines_of, module)?)?;
+    module.add_function(wrap_pyfunction!(columns::table_of, module)?)?;
+    module.add_function(wrap_pyfunction!(study::compare, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::record_options, module)?)?;
     module.add_function(wrap_pyfunction!(recording::record, module)?)
 }

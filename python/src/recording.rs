@@ -1,14 +1,15 @@
 //! Recordings: an agent of the program's, or a Python function in its place.
 
 use std::ffi::OsString;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use mirrorstats::cli::commands::record::{RecordArgs, Recorded};
 use mirrorstats::cli::{self, Failure};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 use world::agent::Player;
 use world::agent::exec::Images;
@@ -28,60 +29,105 @@ pub struct PythonAgent {
     model: String,
     source: Option<String>,
     is_base64: bool,
+    /// Whether what the function raises loses its episode; else it ends the recording.
+    is_lost: bool,
     /// Gives the function of an episode, which takes a message as JSON and gives the text of a reply.
     listeners: Py<PyAny>,
 }
 
+/// What ends a recording before its end: Ctrl-C, or what a function raised first.
+#[derive(Clone, Debug, Default)]
+struct Ending {
+    stop: Arc<AtomicBool>,
+    raised: Arc<Mutex<Option<PyErr>>>,
+}
+
+impl Ending {
+    fn raise(&self, fault: PyErr) {
+        self.raised.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(fault);
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
 impl PythonAgent {
-    fn player(self, args: &RecordArgs) -> Arc<dyn Player> {
-        let Self { model, source, is_base64, listeners } = self;
+    fn player(self, args: &RecordArgs, ending: &Ending) -> Arc<dyn Player> {
+        let Self { model, source, is_base64, is_lost, listeners } = self;
         let images = if is_base64 { Images::Base64 } else { Images::Path };
-        let begin = move || Python::attach(|py| listeners.call0(py)).map(listener).map_err(|fault| fault.to_string());
-        let scratch = parts_of(args.out());
-        Arc::new(FunctionPlayer::new(Function { model, source, images, scratch, listeners: Box::new(begin) }))
+        let (scratch, stop, ending) = (parts_of(args.out()), Arc::clone(&ending.stop), ending.clone());
+        let failed = move |py: Python<'_>, fault: PyErr| {
+            let words = words(py, &fault);
+            if !is_lost || !fault.is_instance_of::<PyException>(py) {
+                ending.raise(fault);
+            }
+            words
+        };
+        let listeners = move || {
+            Python::attach(|py| {
+                let function = listeners.call0(py).map_err(|fault| failed(py, fault))?;
+                Ok(listener(function, failed.clone()))
+            })
+        };
+        Arc::new(FunctionPlayer::new(Function { model, source, images, scratch, listeners: Arc::new(listeners), stop }))
     }
 }
 
 /// The function of one episode.
-fn listener(function: Py<PyAny>) -> Listener {
+fn listener(function: Py<PyAny>, failed: impl Fn(Python<'_>, PyErr) -> String + Send + 'static) -> Listener {
     Box::new(move |message| {
         let message = serde_json::to_string(message).map_err(|fault| fault.to_string())?;
-        Python::attach(|py| function.call1(py, (message,))?.extract(py)).map_err(|fault: PyErr| fault.to_string())
+        Python::attach(|py| {
+            let said = function.call1(py, (message,)).and_then(|said| said.extract(py));
+            said.map_err(|fault: PyErr| failed(py, fault))
+        })
     })
+}
+
+/// What was raised and where, for the list of lost episodes.
+fn words(py: Python<'_>, fault: &PyErr) -> String {
+    let traced = fault.traceback(py).and_then(|traceback| traceback.format().ok());
+    traced.map_or_else(|| fault.to_string(), |traceback| format!("{fault}\n{}", traceback.trim_end()))
+}
+
+/// The keywords that `record` takes beside those of its own, as options of the command line.
+#[pyfunction]
+pub fn record_options() -> Vec<String> {
+    cli::option_names::<RecordArgs>()
 }
 
 /// Records as `mirrorstats record` with these options; with `agent` in the place of what `--agent` names.
 #[pyfunction]
 #[pyo3(signature = (options, agent=None))]
 pub fn record(py: Python<'_>, options: Vec<OsString>, agent: Option<PythonAgent>) -> PyResult<Answer> {
-    let failed = |failure: Failure| error::of_failure(&failure);
+    let failed = |failure: Failure| error::of_failure(&failure, "RecordError");
     let args: RecordArgs = cli::options_of("record", options).map_err(failed)?;
+    let ending = Ending::default();
     let player = match agent {
-        Some(agent) => agent.player(&args),
+        Some(agent) => agent.player(&args, &ending),
         None => py.detach(|| args.player().map_err(failed))?,
     };
-    let recorded = py.detach(|| until_interrupted(&args, player.as_ref()))?;
+    let recorded = py.detach(|| until_ended(&args, player.as_ref(), &ending))?;
+    if let Some(raised) = ending.raised.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        return Err(raised);
+    }
     let Recorded { answer, gave_up, .. } = recorded.map_err(|failure| failed(*failure))?;
     match gave_up {
-        Some(reason) => Err(error::of_input(reason)),
+        Some(reason) => Err(failed(Failure::input(reason))),
         None => answer::of(&answer, String::new()),
     }
 }
 
-/// Records on another thread, while this one looks for Ctrl-C, which only the main thread hears of. The first one lets the
-/// steps under way be done; whole episodes stay.
-fn until_interrupted(args: &RecordArgs, player: &dyn Player) -> PyResult<Result<Recorded, Box<Failure>>> {
-    let (stop, (done, ended)) = (AtomicBool::new(false), channel());
-    let stop = &stop;
+/// Records on another thread, while this one looks for Ctrl-C, which only the main thread hears of. The first one ends
+/// functions at once and lets other steps under way be done, the second one ends these too; whole episodes stay.
+fn until_ended(args: &RecordArgs, player: &dyn Player, ending: &Ending) -> PyResult<Result<Recorded, Box<Failure>>> {
+    let (done, ended) = channel();
     thread::scope(|scope| {
         scope.spawn(move || {
             // Whoever waits for it waits until this is done.
-            let _ = done.send(args.record(player, stop).map_err(Box::new));
+            let _ = done.send(args.record(player, &ending.stop).map_err(Box::new));
         });
-        let mut interrupted = None;
         loop {
             match ended.recv_timeout(GLANCE) {
-                Ok(recorded) => return interrupted.map_or(Ok(recorded), Err),
+                Ok(recorded) => return Ok(recorded),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(error::of_input(
                         "the recording ended without an answer; this is a fault of mirrorstats",
@@ -90,8 +136,10 @@ fn until_interrupted(args: &RecordArgs, player: &dyn Player) -> PyResult<Result<
                 Err(RecvTimeoutError::Timeout) => {}
             }
             if let Err(signal) = signals() {
-                stop.store(true, Ordering::Relaxed);
-                interrupted.get_or_insert(signal);
+                if ending.stop.load(Ordering::Relaxed) {
+                    player.abandon();
+                }
+                ending.raise(signal);
             }
         }
     })

@@ -2,103 +2,157 @@
 
 use std::path::PathBuf;
 
-use mirrorstats::FigureFormat;
+use mirrorstats::{FigureFormat, MetricTable};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use report::tables::Terminal;
 
 use crate::error;
 
-/// A table of a report.
+/// A table of a report, rounded as the style says. It shows itself in a notebook; `print` shows it as text. It can be pickled.
+///
+/// Example:
+///     >>> import mirrorstats as ms
+///     >>> table = ms.open(ms.example_runs()).table("main")
+///     >>> table.csv.splitlines()[0].split(",")[:3]
+///     ['experiment', 'model', 'metric']
 #[pyclass(frozen, module = "mirrorstats", name = "Table")]
 pub struct ReportTable {
-    table: mirrorstats::MetricTable,
+    /// The name that the style gives it.
+    #[pyo3(get)]
+    name: String,
+    /// The table for LaTeX, with `booktabs`.
+    #[pyo3(get)]
+    latex: String,
+    /// The table as Markdown.
+    #[pyo3(get)]
+    markdown: String,
+    /// One row per cell with every digit, as CSV.
+    #[pyo3(get)]
+    csv: String,
+    /// The table as HTML, without a style sheet.
+    #[pyo3(get)]
+    html: String,
+    text: String,
 }
 
-/// A figure of a report.
+/// A figure. It shows itself in a notebook, and can be pickled.
+///
+/// Example:
+///     >>> import mirrorstats as ms
+///     >>> figure = ms.open(ms.example_runs()).figure("heatmap")
+///     >>> figure.svg[:4]
+///     '<svg'
 #[pyclass(frozen, module = "mirrorstats")]
 pub struct Figure {
-    figure: mirrorstats::Figure,
-    name: &'static str,
+    drawn: Drawn,
+    /// The name of the figure.
+    #[pyo3(get)]
+    name: String,
+}
+
+/// A figure, or the files of one that was pickled.
+enum Drawn {
+    Figure(mirrorstats::Figure),
+    Files(Vec<Vec<u8>>),
 }
 
 impl ReportTable {
-    pub fn new(table: mirrorstats::MetricTable) -> Self {
-        Self { table }
+    pub fn new(table: &MetricTable) -> Self {
+        let printed = table.printed();
+        Self {
+            name: table.name.clone(),
+            latex: printed.latex(),
+            markdown: printed.markdown(),
+            csv: table.records().csv(),
+            html: printed.html(),
+            text: printed.terminal(Terminal::default()),
+        }
     }
 }
 
 impl Figure {
-    pub fn new(figure: mirrorstats::Figure, name: &'static str) -> Self {
-        Self { figure, name }
+    pub fn new(figure: mirrorstats::Figure, name: &str) -> Self {
+        Self { drawn: Drawn::Figure(figure), name: name.to_owned() }
+    }
+
+    fn encode(&self, format: FigureFormat) -> PyResult<Vec<u8>> {
+        match &self.drawn {
+            Drawn::Figure(figure) => format.encode(figure).map_err(error::of_input),
+            Drawn::Files(files) => {
+                let at = FigureFormat::ALL.iter().position(|other| *other == format);
+                Ok(at.and_then(|at| files.get(at)).cloned().unwrap_or_default())
+            }
+        }
     }
 }
 
+/// What a figure is made of again: its name, and its file in each format.
+type Files<'py> = (String, Vec<Bound<'py, PyBytes>>);
+
+/// What a table is made of again.
+type Parts<'t> = (&'t str, &'t str, &'t str, &'t str, &'t str, &'t str);
+
 #[pymethods]
 impl ReportTable {
-    #[getter]
-    fn name(&self) -> &str {
-        &self.table.name
+    #[new]
+    fn made(name: String, latex: String, markdown: String, csv: String, html: String, text: String) -> Self {
+        Self { name, latex, markdown, csv, html, text }
     }
 
-    #[getter]
-    fn latex(&self) -> String {
-        self.table.printed().latex()
+    fn __reduce__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyAny>, Parts<'_>) {
+        let Self { name, latex, markdown, csv, html, text } = self;
+        (py.get_type::<Self>().into_any(), (name, latex, markdown, csv, html, text))
     }
 
-    #[getter]
-    fn markdown(&self) -> String {
-        self.table.printed().markdown()
+    fn _repr_html_(&self) -> &str {
+        &self.html
     }
 
-    #[getter]
-    fn csv(&self) -> String {
-        self.table.records().csv()
+    fn _repr_markdown_(&self) -> &str {
+        &self.markdown
     }
 
-    #[getter]
-    fn html(&self) -> String {
-        self.table.printed().html()
+    fn __str__(&self) -> &str {
+        &self.text
     }
 
-    fn _repr_html_(&self) -> String {
-        self.html()
-    }
-
-    fn _repr_markdown_(&self) -> String {
-        self.markdown()
-    }
-
-    fn __str__(&self) -> String {
-        self.table.printed().terminal(Terminal::default())
-    }
-
-    fn __repr__(&self) -> String {
-        self.__str__()
+    fn __repr__(&self) -> &str {
+        &self.text
     }
 }
 
 #[pymethods]
 impl Figure {
-    #[getter]
-    fn name(&self) -> &'static str {
-        self.name
+    #[new]
+    fn made(name: String, files: Vec<Vec<u8>>) -> Self {
+        Self { drawn: Drawn::Files(files), name }
     }
 
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Files<'py>)> {
+        let files = FigureFormat::ALL.iter().map(|format| Ok(PyBytes::new(py, &self.encode(*format)?)));
+        Ok((py.get_type::<Self>().into_any(), (self.name.clone(), files.collect::<PyResult<_>>()?)))
+    }
+
+    /// The figure as an SVG document with its font inside.
     #[getter]
     fn svg(&self, py: Python<'_>) -> PyResult<String> {
-        let bytes = py.detach(|| FigureFormat::Svg.encode(&self.figure)).map_err(error::of_input)?;
-        String::from_utf8(bytes).map_err(error::of_input)
+        String::from_utf8(py.detach(|| self.encode(FigureFormat::Svg))?).map_err(error::of_input)
     }
 
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
         self.svg(py)
     }
 
-    fn save(&self, py: Python<'_>, path: &Bound<'_, PyAny>) -> PyResult<()> {
-        let path = path.extract::<PathBuf>()?;
+    /// Writes it to a file that ends in .svg, .png or .pdf.
+    ///
+    /// Raises:
+    ///     ArgumentError: another ending.
+    ///     OutputError: a file that cannot be written.
+    #[expect(clippy::needless_pass_by_value, reason = "Python's values become owned ones")]
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         py.detach(|| {
-            let bytes = FigureFormat::of(&path).map_err(error::of_input)?.encode(&self.figure);
-            let bytes = bytes.map_err(error::of_input)?;
+            let bytes = self.encode(FigureFormat::of(&path).map_err(error::of_argument)?)?;
             exact::replace::replace(&path, &bytes).map_err(|fault| error::of_writing(&path, &fault))
         })
     }

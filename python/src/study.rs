@@ -23,7 +23,6 @@ const LISTED: usize = 20;
 #[pyclass(frozen, module = "mirrorstats._native")]
 pub struct Study {
     inner: Arc<mirrorstats::Study>,
-    inputs: Vec<String>,
     episodes: OnceLock<RecordBatch>,
     cells: OnceLock<RecordBatch>,
 }
@@ -61,14 +60,8 @@ impl Asked {
 impl Study {
     #[new]
     fn new(py: Python<'_>, asked: Asked) -> PyResult<Self> {
-        let inputs = asked.paths.clone();
         let inner = Arc::new(py.detach(|| asked.open())?);
-        Ok(Self { inner, inputs, episodes: OnceLock::new(), cells: OnceLock::new() })
-    }
-
-    #[getter]
-    fn inputs(&self) -> Vec<String> {
-        self.inputs.clone()
+        Ok(Self { inner, episodes: OnceLock::new(), cells: OnceLock::new() })
     }
 
     #[getter]
@@ -105,7 +98,7 @@ impl Study {
         py.detach(|| {
             let report =
                 self.inner.report(&ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)?;
-            Ok(ReportTable::new(report.table(name).map_err(error::of_study)?.clone()))
+            Ok(ReportTable::new(report.table(name).map_err(error::of_study)?))
         })
     }
 
@@ -114,13 +107,13 @@ impl Study {
         py.detach(|| {
             let report =
                 self.inner.report(&ReportOptions { style: style.into(), figures: false }).map_err(error::of_study)?;
-            Ok(report.tables.into_iter().map(ReportTable::new).collect())
+            Ok(report.tables.iter().map(ReportTable::new).collect())
         })
     }
 
     #[pyo3(signature = (name, style))]
     fn figure(&self, py: Python<'_>, name: &str, style: &str) -> PyResult<Figure> {
-        let name = FigureName::from_str(name).map_err(error::of_input)?;
+        let name = FigureName::from_str(name).map_err(error::of_argument)?;
         let figure = py.detach(|| self.inner.figure(name, style).map_err(error::of_study))?;
         Ok(Figure::new(figure, name.name()))
     }
@@ -137,11 +130,17 @@ impl Study {
         answer::of(&written.manifest, [written.files, notes].concat().join("\n"))
     }
 
-    #[pyo3(signature = (confidence, horizon))]
-    fn stats(&self, py: Python<'_>, confidence: f64, horizon: Option<i64>) -> PyResult<Answer> {
+    #[pyo3(signature = (confidence, horizon, full))]
+    fn stats(&self, py: Python<'_>, confidence: f64, horizon: Option<i64>, full: bool) -> PyResult<Answer> {
         let options = StatisticsOptions { confidence, horizon, improvements: true, ..StatisticsOptions::default() };
         let found = py.detach(|| self.inner.statistics(&options).map_err(error::of_study))?;
-        answer::of(&found, found.render(&found.headline, Length::Short, None))
+        answer::of(&found, found.render(&found.headline, if full { Length::Full } else { Length::Short }, None))
+    }
+
+    #[pyo3(signature = (sql))]
+    fn query(&self, py: Python<'_>, sql: &str) -> PyResult<Table> {
+        let file = py.detach(|| self.inner.query_parquet(sql).map_err(error::of_study))?;
+        Table::from_parquet(file)
     }
 
     #[pyo3(signature = (other))]
@@ -168,4 +167,12 @@ fn once(kept: &OnceLock<RecordBatch>, compute: impl FnOnce() -> PyResult<RecordB
     // Two threads may compute the same at once.
     let batch = compute()?;
     Ok(Table::new(kept.get_or_init(|| batch).clone()))
+}
+
+/// The cells of studies below each other: `study`, the columns of cells, and the change of the mean from the first study.
+#[pyfunction]
+pub fn compare(py: Python<'_>, studies: Vec<(String, Py<Study>)>) -> PyResult<Table> {
+    let cells = studies.into_iter().map(|(name, study)| Ok((name, study.get().cells(py)?)));
+    let cells = cells.collect::<PyResult<Vec<_>>>()?;
+    Table::below_each_other(&cells)
 }

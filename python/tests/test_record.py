@@ -1,5 +1,6 @@
 """Recordings: a Python function beside the same agent as a program."""
 
+import asyncio
 import os
 import pathlib
 import signal
@@ -53,16 +54,81 @@ def test_an_agent_that_raises_loses_its_episode_and_the_same_call_continues(tmp_
         return 7
 
     with pytest.warns(RuntimeWarning, match="no legs"):
-        answer = ms.record(stumbles, "E1", seeds=1, runs=1, out=tmp_path, model="walker", no_log=True)
-    assert answer["recorded"] == 0 and "step 3: RuntimeError: no legs" in answer["lost"][0]["reason"]
+        answer = ms.record(stumbles, "E1", seeds=1, runs=1, out=tmp_path, model="walker", no_log=True, on_error="lose")
+    reason = answer["lost"][0]["reason"]
+    assert answer["recorded"] == 0 and reason.startswith("step 3: RuntimeError: no legs\nTraceback")
+    assert "in stumbles" in reason
     with pytest.warns(RuntimeWarning, match="expected a reply, a dict or a text, found int"):
-        ms.record(wrong, "E1", seeds=1, runs=1, out=tmp_path / "wrong", no_log=True)
+        ms.record(wrong, "E1", seeds=1, runs=1, out=tmp_path / "wrong", no_log=True, on_error="lose")
 
 
 def test_texts_that_are_no_replies_stop_a_recording_as_on_the_command_line(tmp_path):
-    with pytest.raises(ms.Error, match="gave 5 replies in a row without a decision") as raised:
+    with pytest.raises(ms.RecordError, match="gave 5 replies in a row without a decision") as raised:
         ms.record(lambda message: "well", "E1", seeds=1, runs=1, out=tmp_path, model="walker", max_unusable=5)
-    assert raised.value.hint.startswith("--max-unusable N allows more")
+    assert raised.value.hint.startswith("`max_unusable=N` allows more")
+
+
+class Stumbles:
+    def __call__(self, message):
+        if message["kind"] == "observation" and message["t"] == 2:
+            raise LookupError("no legs")
+        return agent.decide(message)
+
+
+def test_what_an_agent_raises_ends_the_recording_with_its_type_and_traceback(tmp_path):
+    with pytest.raises(LookupError, match="no legs") as raised:
+        ms.record(Stumbles, "E1", seeds=1, runs=2, out=tmp_path, no_log=True)
+    assert raised.traceback[-1].name == "__call__"
+    assert not list(tmp_path.glob("*.parquet"))
+    # The same folder can be recorded into again.
+    assert ms.record(agent.decide, "E1", seeds=1, runs=1, out=tmp_path, no_log=True)["recorded"] == 1
+
+    def stops(message):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        ms.record(stops, "E1", seeds=1, runs=1, out=tmp_path, no_log=True, on_error="lose")
+
+
+def test_what_is_wrong_with_arguments_is_said_before_anything_begins(tmp_path):
+    out = tmp_path / "runs"
+    with pytest.raises(TypeError, match="expected a name, a function or a class, found NoneType"):
+        ms.record(None, out=out)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'repeat'; did you mean `repeats`"):
+        ms.record("oracle", repeat=2, out=out)
+    for words, arguments in [("runs", {"runs": 0}), ("seeds", {"seeds": 1.5}), ("images", {"images": "png"})]:
+        with pytest.raises(ms.ArgumentError, match=f"{words}: expected"):
+            ms.record("oracle", out=out, **arguments)
+    assert not out.exists()
+
+
+def test_async_agents_of_several_episodes_wait_at_once(tmp_path):
+    under_way, most = set(), []
+
+    async def waits(message):
+        if message["kind"] != "observation":
+            return None
+        under_way.add(id(asyncio.current_task()))
+        most.append(len(under_way))
+        await asyncio.sleep(0.2)
+        under_way.discard(id(asyncio.current_task()))
+        return {**agent.decide({**message, "t": 12}), "action": "done"}
+
+    answer = ms.record(waits, "E1", seeds=1, runs=4, out=tmp_path, no_log=True, images="base64", in_flight=4)
+    assert answer["recorded"] == 4 and max(most) > 1
+    assert str(answer) == "recorded 4 of 4 episodes of waits (4 steps), 0 there before, 0 lost"
+
+
+def test_a_frame_is_an_array_of_its_pixels(tmp_path):
+    shapes = []
+
+    def looks(message):
+        if message["kind"] == "observation":
+            shapes.append((message["image"].shape, str(message["image"].dtype), message["image"].std() > 0))
+        return {"action": "done", "selected_cube": "red"}
+
+    ms.record(looks, "E1", seeds=1, runs=1, out=tmp_path, no_log=True, images="array", keep_going=True)
+    assert shapes[0] == ((480, 640, 3), "uint8", True)
 
 
 SLOW = """
@@ -70,12 +136,12 @@ import sys, time, mirrorstats as ms
 def slow(message):
     if message["kind"] == "observation":
         print(message["t"], flush=True)
-        time.sleep(0.2)
+        time.sleep(60)
     return {}
 try:
     ms.record(slow, "E1", seeds=1, runs=1, out=sys.argv[1], keep_going=True, no_log=True, model="slow")
 except KeyboardInterrupt:
-    print("interrupted")
+    print("interrupted", flush=True)
 """
 
 
@@ -83,8 +149,11 @@ def test_an_interrupt_ends_a_recording(tmp_path):
     started = subprocess.Popen([sys.executable, "-c", SLOW, tmp_path], stdout=subprocess.PIPE, text=True)
     assert started.stdout.readline() == "1\n"
     started.send_signal(signal.SIGINT)
+    since = time.monotonic()
+    assert started.stdout.readline() == "interrupted\n"
+    assert time.monotonic() - since < 5, "the agent sleeps for a minute, and is not waited for"
     said, _ = started.communicate(timeout=60)
-    assert said.splitlines()[-1] == "interrupted" and started.returncode == 0
+    assert said == "" and started.returncode == 0
 
 
 def test_an_interrupt_ends_the_command_as_it_ends_the_program(tmp_path):

@@ -20,8 +20,8 @@ use crate::cli::outcome::{ERRORS_VARIABLE, Failure};
 use exact::budget::{self, Limit};
 use exact::escape::visible;
 use exact::{input, suggest};
-use metric::fault::{Fault, Faults, Place, Source};
-use metric::keys::parse_toml;
+use toml_spec::parse_toml;
+use toml_spec::{Fault, Faults, Place, Source};
 
 const FILE: &str = "mirrorstats.toml";
 /// The variable that names another file, or none if it is empty.

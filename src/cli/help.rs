@@ -46,6 +46,13 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ),
     ("world filmstrip", &[("Every frame of an episode in a row", "world filmstrip E1/oracle/s1/r1 runs -o strip.png")]),
     (
+        "gate",
+        &[
+            ("Whether a new version is worse", "gate old new --margin 0.1"),
+            ("In a workflow of GitHub Actions", "gate old new --format github"),
+        ],
+    ),
+    (
         "import",
         &[
             ("Steps of another harness, a line of JSON each", "import steps.jsonl -o mine.parquet"),
@@ -85,6 +92,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
                 "record --agent vlm --model gpt-5.1 --experiment E1..E5 --seeds 3 --runs 7 --out runs",
             ),
             ("What it will cost, without a request", "record --agent vlm --model gpt-5.1 --dry-run"),
+            ("Models, experiments and budgets of a file", "record study.toml"),
             ("Your own program", "record --agent exec:'python3 agent.py' --model mine --experiment E1 --out runs"),
             (
                 "Two people, each in a browser",
@@ -147,7 +155,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
 /// The same command with a first page of one screen, and with examples.
 pub fn with_help(command: Command) -> Command {
     let template = format!(
-        "{{about-with-newline}}{{usage-heading}} {{usage}}\n\n{}\n{}",
+        "{{about-with-newline}}{{usage-heading}} {{usage}}\n\n{}{}",
         first_page(&command),
         "Options: --errors text|json, --help, --version; `help COMMAND` for the rest\n"
     );

@@ -116,6 +116,12 @@ pub fn options_of<A: clap::Args>(verb: &str, options: impl IntoIterator<Item = O
     parsed.map_err(|error| Failure::Usage(Box::new(error)))
 }
 
+/// The names of the options of a command, without the dashes.
+pub fn option_names<A: clap::Args>() -> Vec<String> {
+    let command = A::augment_args(clap::Command::new(NAME));
+    command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
+}
+
 /// The outcome, once all of standard output is out: what is left in its buffer at the end is written without a word
 /// about a full disk.
 fn flushed(outcome: Outcome) -> Result<Outcome, Failure> {

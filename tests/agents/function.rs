@@ -28,14 +28,16 @@ fn record(folder: &Path, images: Images, listeners: impl Fn() -> Listener + Send
     let options = words.map(OsString::from).into_iter();
     let options = options.chain(["--config".into(), at("small.toml"), "--out".into(), at("runs")]);
     let args: RecordArgs = cli::options_of("record", options).unwrap();
+    let stop = Arc::new(AtomicBool::new(false));
     let player = FunctionPlayer::new(Function {
         model: "walker".to_owned(),
         source: Some("def walk".to_owned()),
         images,
         scratch: folder.join("runs"),
-        listeners: Box::new(move || Ok(listeners())),
+        listeners: Arc::new(move || Ok(listeners())),
+        stop: Arc::clone(&stop),
     });
-    args.record(&player, &AtomicBool::new(false)).unwrap()
+    args.record(&player, &stop).unwrap()
 }
 
 /// Walks, and is done at its third step.

@@ -127,6 +127,76 @@ fn a_lone_surrogate_is_a_repair_and_a_pair_is_none() {
     assert_eq!(read(r"I see \ud83d").status, Status::ParseFailed);
 }
 
+#[test]
+fn an_action_in_other_letters_is_a_repair() {
+    use Repair::{ActionSpelling, CodeFence};
+    for (name, action) in
+        [("A", Action::TurnLeft), (" a ", Action::TurnLeft), ("DONE", Action::Done), ("Done\\n", Action::Done)]
+    {
+        let raw = GOOD.replace("\"action\": \"a\"", &format!("\"action\": \"{name}\""));
+        let reading = read(&raw);
+        assert_eq!((reading.status, reading.repairs), (Status::Repaired, vec![ActionSpelling]), "{name:?}");
+        assert_eq!(reading.action, Some(action), "{name:?}");
+    }
+    let fenced = format!("```json\n{}\n```", GOOD.replace("\"a\"", "\"A\""));
+    assert_eq!(read(&fenced).repairs, [CodeFence, ActionSpelling]);
+    for name in ["left", "wa", "don e", "1", "\u{430}"] {
+        let raw = GOOD.replace("\"action\": \"a\"", &format!("\"action\": \"{name}\""));
+        assert_eq!((read(&raw).status, read(&raw).action), (Status::SchemaInvalid, None), "{name:?}");
+    }
+}
+
+#[test]
+fn raw_control_characters_and_comments_are_repairs() {
+    use Repair::{CodeFence, Comment, ControlCharacter, SurroundingText, TrailingComma};
+    let feed = GOOD.replace("a wall", "a wall\r\n\tand more");
+    let line = GOOD.replace("\"action\":", "// I \"turn\", it's left\n \"action\":");
+    let block = GOOD.replace("\"unknown\"}", "\"unknown\", /* not \"red\" } */ }");
+    let cases: Vec<(String, Vec<Repair>, &str)> = vec![
+        (feed.clone(), vec![ControlCharacter], "a wall\r\n\tand more"),
+        (format!("```json\n{feed}\n```"), vec![CodeFence, ControlCharacter], "a wall\r\n\tand more"),
+        (line.clone(), vec![Comment], "a wall"),
+        (format!("```json\n{line}\n```"), vec![CodeFence, Comment], "a wall"),
+        (format!("So: {line}"), vec![SurroundingText, Comment], "a wall"),
+        (block, vec![Comment, TrailingComma], "a wall"),
+        // Not within strings.
+        (format!("```{}```", GOOD.replace("a wall", "see http://a /* b */")), vec![CodeFence], "see http://a /* b */"),
+    ];
+    for (raw, repairs, view) in cases {
+        let reading = read(&raw);
+        assert_eq!((reading.status, reading.repairs), (Status::Repaired, repairs), "{raw}");
+        assert_eq!(reading.words.view_description.as_deref(), Some(view), "{raw}");
+        assert_eq!(reading.action, Some(Action::TurnLeft), "{raw}");
+    }
+    assert_eq!(read(&"/*".repeat(1_000_000)).status, Status::ParseFailed);
+}
+
+#[test]
+fn a_call_of_a_function_with_the_right_arguments_is_a_repair() {
+    use Repair::{ActionSpelling, SurroundingText, ToolCall};
+    let call = format!("{{\"name\": \"reply\", \"arguments\": {GOOD}}}");
+    let cases = [
+        (call.clone(), vec![ToolCall]),
+        (call.replace("arguments", "parameters"), vec![ToolCall]),
+        (format!("<tool_call>\n{call}\n</tool_call>"), vec![SurroundingText, ToolCall]),
+        (call.replace("\"a\"", "\"A\""), vec![ToolCall, ActionSpelling]),
+    ];
+    for (raw, repairs) in cases {
+        let reading = read(&raw);
+        assert_eq!((reading.status, reading.repairs), (Status::Repaired, repairs), "{raw}");
+        assert_eq!((reading.words, reading.action), (read(GOOD).words, Some(Action::TurnLeft)), "{raw}");
+    }
+    for raw in [
+        call.replace("\"name\": \"reply\", ", ""),
+        call.replace("\"reply\"", "1"),
+        call.replace("\"action\"", "\"move\""),
+        call.replace("\"action\"", "\"action\": \"w\", \"action\""),
+        r#"{"name": "reply", "arguments": "{}"}"#.to_owned(),
+    ] {
+        assert_eq!(read(&raw).status, Status::SchemaInvalid, "{raw}");
+    }
+}
+
 /// A whole reply that decides otherwise than [`GOOD`].
 fn draft() -> String {
     GOOD.replace("\"action\": \"a\"", "\"action\": \"w\"")

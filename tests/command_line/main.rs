@@ -5,17 +5,20 @@ mod battery;
 #[cfg(target_os = "linux")]
 mod budgets;
 mod colors;
+mod comparable;
 mod config;
 mod declared;
+mod domains;
 mod extended;
 mod filters;
+mod gate;
 mod generated;
 #[path = "../../examples/generate/generation/mod.rs"]
 mod generation;
 #[path = "../harness/mod.rs"]
 mod harness;
-mod help;
 mod hostile;
+mod new_names;
 mod options;
 #[cfg(target_os = "linux")]
 mod outputs;
@@ -26,6 +29,8 @@ mod plan;
 mod quality;
 #[cfg(all(target_os = "linux", feature = "polars", feature = "raster", feature = "sim"))]
 mod readme;
+#[cfg(all(feature = "polars", feature = "raster", feature = "sim", feature = "view"))]
+mod reference;
 mod refusals;
 #[cfg(unix)]
 mod renamed;

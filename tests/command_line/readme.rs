@@ -1,11 +1,12 @@
-//! Every command line of the README, run as it stands there, and what it prints.
+//! Every command line of the README and of the pages in `docs`, and what it prints.
 //!
-//! Blocks of `sh` run in their order in one folder, which has what they name. A block of `text` that begins with `$ mirrorstats`
+//! Blocks of `sh` run in their order in one folder, which has what they name; a line that stood before is not run again. A block of `text` that begins with `$ mirrorstats`
 //! shows the output itself; `...` on a line of its own stands for any lines.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use regex::Regex;
@@ -16,7 +17,7 @@ use crate::harness::need;
 use crate::harness::program::{PROGRAM, clean};
 
 /// Command lines that are not run, by how they begin, and why.
-const NOT_RUN: [(&str, &str); 16] = [
+const NOT_RUN: [(&str, &str); 17] = [
     ("make demo", "builds the program"),
     ("make test", "runs this test"),
     ("scripts/get-mujoco.sh", "downloads a library; `make test` runs it before"),
@@ -32,6 +33,10 @@ const NOT_RUN: [(&str, &str); 16] = [
         "mirrorstats record --agent oracle --experiment reach-mirror",
         "takes minutes; the calibration of agents does as much",
     ),
+    (
+        "mirrorstats record --agent vlm --model \"GPT 5.1\" --experiment E1 --max-cost",
+        "needs a provider; `tests/agents` has servers in its place",
+    ),
     ("mirrorstats record --agent human", "waits for people; `tests/reports/view` plays"),
     ("cargo run ", "builds the program"),
     ("mirrorstats record --agent oracle --experiment two-mirrors", "takes minutes; `make calibrate` does as much"),
@@ -41,12 +46,30 @@ const NOT_RUN: [(&str, &str); 16] = [
     ("mirrorstats report mine.parquet", "its trace has one step of one episode in place of a study"),
 ];
 
-/// The blocks of the README of one language, in their order.
+/// The README, then the pages of `docs` by name.
+fn pages() -> Vec<PathBuf> {
+    let mut pages: Vec<PathBuf> = ["docs", "docs/how-to", "docs/explanation", "docs/reference"]
+        .iter()
+        .flat_map(|folder| fs::read_dir(repository().join(folder)).unwrap())
+        .map(|entry| entry.unwrap().path())
+        .filter(|path| path.extension().is_some_and(|ending| ending == "md"))
+        .collect();
+    pages.sort();
+    pages.insert(0, repository().join("README.md"));
+    pages
+}
+
+/// The blocks of one language, in their order.
 fn blocks(language: &str) -> Vec<String> {
-    let readme = fs::read_to_string(repository().join("README.md")).unwrap();
     let opening = format!("```{language}\n");
-    let parts = readme.split(&opening).skip(1);
-    parts.map(|part| part.split("\n```").next().unwrap().to_owned() + "\n").collect()
+    // docs/BENCHMARKS.md records for half an hour.
+    let short = pages().into_iter().filter(|page| !page.ends_with("docs/BENCHMARKS.md"));
+    let texts = short.map(|page| fs::read_to_string(page).unwrap());
+    let of_page = |text: String| -> Vec<String> {
+        let parts = text.split(&opening).skip(1);
+        parts.map(|part| part.split("\n```").next().unwrap().to_owned() + "\n").collect()
+    };
+    texts.flat_map(of_page).collect()
 }
 
 /// The commands of a block of `sh`: lines, those of a here-document with the line that begins it.
@@ -69,7 +92,7 @@ fn reason(command: &str) -> Option<&'static str> {
     NOT_RUN.iter().find(|(begins, _)| command.starts_with(begins)).map(|(_, why)| *why)
 }
 
-/// What the README's commands name.
+/// A folder with the files that the commands name.
 fn bench() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
@@ -84,7 +107,7 @@ fn bench() -> tempfile::TempDir {
     }
     fs::copy(repository().join("fixtures/published/main_table.csv"), at("table.csv")).unwrap();
     fs::copy(repository().join("examples/definitions/inclusive.toml"), at("mine.toml")).unwrap();
-    // The README's own files.
+    // Files that the pages show.
     let threshold = blocks("toml").into_iter().find(|text| text.contains("mirror_self_px >= 200")).unwrap();
     fs::write(at("stricter.toml"), threshold).unwrap();
     let step = blocks("json").into_iter().find(|text| text.contains("episode_id")).unwrap();
@@ -93,7 +116,7 @@ fn bench() -> tempfile::TempDir {
     folder
 }
 
-/// Runs a command of the README and gives what it prints, standard error behind standard output.
+/// Runs a documented command and returns what it prints, standard error behind standard output.
 fn output_of(command: &str, folder: &Path) -> String {
     let mut shell = clean(Command::new("sh"), folder);
     let programs = Path::new(PROGRAM).parent().unwrap();
@@ -116,12 +139,17 @@ fn lasting(output: &str) -> String {
 }
 
 #[test]
-fn every_command_line_of_the_readme_does_what_it_did() {
+fn every_documented_command_line_does_what_it_did() {
     need::drawing();
     let folder = bench();
     let mut met = Vec::new();
     let mut shown = String::new();
+    let mut run = BTreeSet::new();
     for command in blocks("sh").iter().flat_map(|block| commands(block)) {
+        let words = command.split(" #").next().unwrap().trim().to_owned();
+        if !run.insert(words) {
+            continue;
+        }
         writeln!(shown, "$ {command}").unwrap();
         match reason(&command) {
             Some(why) => {
@@ -131,14 +159,14 @@ fn every_command_line_of_the_readme_does_what_it_did() {
             None => shown += &lasting(&output_of(&command, folder.path())),
         }
     }
-    assert_shown!("the command lines of the README, and what they print", shown);
+    assert_shown!("documented command lines, and what they print", shown);
     for (begins, why) in NOT_RUN {
-        assert!(met.contains(&why), "no command line of the README begins with `{begins}` any more");
+        assert!(met.contains(&why), "no documented command line begins with `{begins}` any more");
     }
 }
 
 #[test]
-fn the_readme_prints_what_the_program_prints() {
+fn documented_outputs_are_what_the_program_prints() {
     let folder = bench();
     let shown = blocks("text").into_iter().filter(|text| text.starts_with("$ mirrorstats"));
     let mut count = 0;
@@ -152,7 +180,44 @@ fn the_readme_prints_what_the_program_prints() {
             assert!(at > 0 || from == 0, "{command}\nexpected first\n{part}\nfound\n{found}");
             rest = &rest[from + part.len()..];
         }
-        assert!(rest.is_empty() || expected.ends_with("...\n"), "{command}\nnot in the README:\n{rest}");
+        assert!(rest.is_empty() || expected.ends_with("...\n"), "{command}\nnot in the documentation:\n{rest}");
     }
-    assert!(count >= 3, "the README shows what commands print");
+    assert!(count >= 3, "the documentation shows what commands print");
+}
+
+/// The address of every link and picture of a page.
+fn links(text: &str) -> Vec<String> {
+    let link = Regex::new(r"\]\(([^)\s]+)\)").unwrap();
+    link.captures_iter(text).map(|found| found[1].to_owned()).collect()
+}
+
+/// The anchors that a forge makes of headings.
+fn anchors(text: &str) -> BTreeSet<String> {
+    let headings = text.lines().filter(|line| line.starts_with('#')).map(|line| line.trim_start_matches('#').trim());
+    let kept = |text: &str| {
+        text.to_lowercase().replace(|letter: char| !letter.is_alphanumeric() && !" -".contains(letter), "")
+    };
+    headings.map(|heading| kept(heading).replace(' ', "-")).collect()
+}
+
+#[test]
+fn documented_links_lead_somewhere() {
+    for page in pages() {
+        let text = fs::read_to_string(&page).unwrap();
+        for link in links(&text).iter().filter(|link| !link.contains("://")) {
+            let (path, anchor) = link.split_once('#').unwrap_or((link, ""));
+            let target = if path.is_empty() { page.clone() } else { page.parent().unwrap().join(path) };
+            assert!(target.exists(), "{}: {link}: no such file", page.display());
+            if !anchor.is_empty() {
+                let found = anchors(&fs::read_to_string(&target).unwrap());
+                assert!(found.contains(anchor), "{}: {link}: no such heading", page.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn the_readme_stays_short() {
+    let readme = fs::read_to_string(repository().join("README.md")).unwrap();
+    assert!(readme.lines().count() <= 200 && readme.split_whitespace().count() <= 1200);
 }

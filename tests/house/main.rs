@@ -2,5 +2,6 @@
 
 #[cfg(feature = "sim")]
 mod claim;
+mod names;
 mod schemas;
 mod surface;

@@ -13,7 +13,7 @@ use report::errata::Errata;
 use report::plan::Plan;
 use report::plan::register::RegisteredPlan;
 use report::sensitivity::Sensitivity;
-use report::statistics::{Sequential, Statistics};
+use report::statistics::{Gate, Sequential, Statistics};
 use report::style::shape::StyleFile;
 use schemars::schema_for;
 use score::evidence::Evidence;
@@ -44,6 +44,7 @@ fn current() -> Vec<(&'static str, Value)> {
         ("diff", json!(schema_for!(Changes))),
         ("episode", json!(schema_for!(EpisodeMessage))),
         ("errata", json!(schema_for!(Errata))),
+        ("gate", json!(schema_for!(Gate))),
         ("import", json!(schema_for!(ImportAnswer))),
         ("info", json!(schema_for!(Info))),
         ("manifest", json!(schema_for!(Manifest))),

@@ -1,4 +1,6 @@
-//! A cell has one interval: in tables, in `cells.csv`, on the page, in queries, in Arrow and in `stats`.
+//! A cell has one interval: in tables, in `cells.csv`, on the page, in `view`, in queries, in Arrow and in `stats`.
+//!
+//! Python's `cells` are the Arrow batch.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -27,6 +29,19 @@ value = "50 - length()"
 [metric.TURNS]
 unit = "steps"
 value = "count(action = 'turn_left')"
+[metric.SHARE]
+unit = "permille"
+measures = "fraction"
+range = { least = 0, most = 1000 }
+value = "div(1000 * count(action = 'turn_left'), length())"
+[metric.WAIT]
+unit = "half steps"
+finished = "TSA-C"
+value = "2 * length()"
+[metric.GAIN]
+unit = "lights"
+range = { least = -50 }
+value = "50 - length()"
 "#;
 
 /// Models and the steps of their episodes; 100 without a decision.
@@ -140,6 +155,18 @@ fn of_page(page: &str) -> Vec<[String; 5]> {
     found
 }
 
+/// The cells of the copy of `view` on a disk.
+#[cfg(feature = "view")]
+fn of_view(at: &Path) -> Vec<[String; 5]> {
+    run(at, &["view", "a.parquet", "--definitions", "mine.toml", "--export", "seen"]).done();
+    let script = fs::read_to_string(at.join("seen/data/overview.js")).unwrap();
+    let json = script.split_once(", ").unwrap().1.trim_end().trim_end_matches([')', ';']);
+    let overview: Value = serde_json::from_str(json).unwrap();
+    let sections: Vec<&str> =
+        overview["sections"].as_array().unwrap().iter().map(|text| text.as_str().unwrap()).collect();
+    of_page(&sections.concat())
+}
+
 #[test]
 fn every_output_has_the_interval_that_stats_has() {
     let folder = folder();
@@ -152,6 +179,8 @@ fn every_output_has_the_interval_that_stats_has() {
     #[cfg(feature = "polars")]
     assert_eq!(of_query(at), stats);
     assert_eq!(of_page(&fs::read_to_string(at.join("out/report.html")).unwrap()), texts);
+    #[cfg(feature = "view")]
+    assert_eq!(of_view(at), texts);
     // Printed tables round; they have bounds where the others have.
     let mut printed_cells = BTreeSet::new();
     for table in ["main", "appendix"] {
@@ -174,6 +203,9 @@ fn every_output_has_the_interval_that_stats_has() {
     assert_eq!(bounds("high", "TTD").1.to_bits(), 100.0f64.to_bits());
     assert_eq!(bounds("high", "TURNING").1.to_bits(), 1e6f64.to_bits());
     assert!(bounds("high", "OFFSET").0 < -50.0, "an amount of another kind has no bounds");
+    assert_eq!(bounds("high", "GAIN").0.to_bits(), (-50.0f64).to_bits(), "a declared range bounds it");
+    assert_eq!(bounds("high", "SHARE").1.to_bits(), 1000.0f64.to_bits());
+    assert_eq!(bounds("high", "WAIT").1.to_bits(), 200.0f64.to_bits(), "an own duration has the budget of its unit");
     assert!(stats[&key("one", "TSA")].is_some(), "a rate has an interval from one episode on");
     // The reader of a table is told why.
     let line = |model: &str| printed.lines().find(|line| line.trim_start().starts_with(model)).unwrap();

@@ -21,6 +21,10 @@ fn metric(kind: Kind) -> Metric {
         when: None,
         se: StandardError::Sample,
         chance: None,
+        measures: None,
+        range: None,
+        finished: None,
+        completes: None,
     }
 }
 
@@ -33,6 +37,7 @@ fn catalog() -> Catalog {
     };
     Catalog {
         name: "test".into(),
+        domain: None,
         hash: "0".repeat(64),
         open: false,
         lets: IndexMap::new(),

@@ -9,6 +9,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use super::measure::{Measures, ValueRange};
 pub use exact::moments::StandardError;
 use exact::ratio::Ratio;
 
@@ -19,6 +20,9 @@ pub struct Catalog {
     pub name: String,
     /// SHA-256 of the resolved definitions, 64 hexadecimal digits.
     pub hash: String,
+    /// What the traces are about; absent where that is the mirror.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub domain: Option<String>,
     /// Whether experiments that are not listed are accepted.
     pub open: bool,
     /// Named expressions, as written.
@@ -54,6 +58,18 @@ pub struct Metric {
     pub se: StandardError,
     /// The value of blind guessing in every experiment, unless the experiment says otherwise.
     pub chance: Option<Ratio>,
+    /// What it measures, where the definition says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measures: Option<Measures>,
+    /// The values that it can have, where the definition says it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range: Option<ValueRange>,
+    /// On a duration: the metric that is defined in finished episodes, 1 where the decision was correct.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub finished: Option<String>,
+    /// The rate that counts unfinished episodes as failures; this one is the same among finished ones.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub completes: Option<String>,
 }
 
 /// What an episode's integer means.
@@ -65,9 +81,6 @@ pub enum Kind {
     /// Any integer: a number of steps, of pixels, ...
     Quantity,
 }
-
-/// The unit of shares that are whole numbers, so that they are exact: parts per million.
-pub const PPM: &str = "ppm";
 
 impl Kind {
     /// The unit where a definition names none.

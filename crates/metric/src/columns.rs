@@ -55,8 +55,10 @@ pub struct Columns {
     fallbacks: IndexMap<String, Fallback>,
     /// Columns of the schema whose names definitions may use for something else.
     free: Vec<String>,
-    /// The only values of a column of the schema, where there is a list of them.
-    values: IndexMap<String, &'static [&'static str]>,
+    /// The only values of a column, where there is a list of them.
+    values: IndexMap<String, Vec<String>>,
+    /// Columns of the schema that mean something before a mirror alone.
+    of_mirror: Vec<String>,
     stranger: Option<&'static str>,
 }
 
@@ -79,13 +81,28 @@ impl Columns {
     /// The same columns; these of the schema take the values listed and no others, null apart.
     #[must_use]
     pub fn with_values<N: Into<String>>(self, lists: impl IntoIterator<Item = (N, &'static [&'static str])>) -> Self {
-        let values = lists.into_iter().map(|(name, values)| (name.into(), values)).collect();
+        let owned = |values: &[&str]| values.iter().map(|value| (*value).to_owned()).collect();
+        let values = lists.into_iter().map(|(name, values)| (name.into(), owned(values))).collect();
         Self { values, ..self }
     }
 
+    /// The same columns; these of the schema mean something before a mirror alone.
+    #[must_use]
+    pub fn with_mirror<N: Into<String>>(self, names: impl IntoIterator<Item = N>) -> Self {
+        Self { of_mirror: names.into_iter().map(Into::into).collect(), ..self }
+    }
+
+    /// Gives up the meaning of the columns of the mirror: their names are free, and those that are not read again as columns
+    /// of the traces' own are unknown.
+    pub fn leave_mirror(&mut self) {
+        for name in std::mem::take(&mut self.of_mirror) {
+            self.forget(&name);
+        }
+    }
+
     /// The only values of a column, null apart; `None` where any is possible.
-    pub fn values(&self, name: &str) -> Option<&'static [&'static str]> {
-        self.values.get(name).copied()
+    pub fn values(&self, name: &str) -> Option<&[String]> {
+        self.values.get(name).map(Vec::as_slice)
     }
 
     /// What to do about a name that is like none of these.
@@ -116,6 +133,7 @@ impl Columns {
     /// Takes a column out of the schema: these traces use its name for something else.
     pub fn forget(&mut self, name: &str) {
         self.schema.shift_remove(name);
+        self.values.shift_remove(name);
     }
 
     /// What the column of this name means where there is no value; `None` where that is null.
@@ -132,12 +150,16 @@ impl Columns {
         self.schema.keys().chain(self.own.keys()).map(String::as_str)
     }
 
-    /// Sets what a column beside the schema is; a column of the schema stays as it is.
-    pub fn set_own(&mut self, name: impl Into<String>, column: Column) {
+    /// Sets what a column beside the schema is, and its only texts, any if empty; a column of the schema stays as it is.
+    pub fn set_own(&mut self, name: impl Into<String>, column: Column, values: Vec<String>) {
         let name = name.into();
-        if !self.schema.contains_key(&name) {
-            self.own.insert(name, column);
+        if self.schema.contains_key(&name) {
+            return;
         }
+        if !values.is_empty() {
+            self.values.insert(name.clone(), values);
+        }
+        self.own.insert(name, column);
     }
 }
 

@@ -7,13 +7,14 @@ use indexmap::IndexMap;
 use super::bind::{self, Binding};
 use super::catalog::{Catalog, Experiment, Kind, Metric, by_order};
 use super::columns::{Columns, Level, Type};
-use super::fault::{Fault, Faults, Source};
-use super::file::{self, Document, FileError};
-use super::origin::Written;
+use super::file::{self, ColumnEntry, Document, FileError};
+use super::measure;
 use super::plan::{NodeId, Output, Plan};
 use exact::hash;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
+use toml_spec::Written;
+use toml_spec::{Fault, Faults, Place, Source};
 
 /// Checked definitions.
 #[derive(Clone, Debug)]
@@ -106,7 +107,8 @@ impl Definitions {
         let names: Vec<&str> = parts.iter().map(|(part, _)| part.document.name.as_str()).collect();
         let mut whole = Document { name: names.join("+"), open: true, ..Document::default() };
         for (part, experiments) in parts {
-            let Document { columns, lets, metrics, experiments: known, built_on, .. } = part.document.clone();
+            let Document { domain, columns, lets, metrics, experiments: known, built_on, .. } = part.document.clone();
+            whole.domain = whole.domain.or(domain);
             let same = |(name, (written, _)): (&String, &(Written, _))| {
                 whole.lets.get(name).is_none_or(|(other, _): &(Written, _)| other.text == written.text)
             };
@@ -130,17 +132,27 @@ impl Definitions {
         Some(Self::check(whole, columns, None))
     }
 
+    /// The columns that the definitions declare.
+    pub fn declared_columns(&self) -> impl Iterator<Item = (&str, &ColumnEntry)> {
+        self.document.columns.iter().map(|(name, entry)| (name.as_str(), entry))
+    }
+
     pub(super) fn document(&self) -> &Document {
         &self.document
     }
 
     fn check(document: Document, columns: &Columns, filter: Option<&Written>) -> Result<Self, Faults> {
         let mut columns = columns.clone();
+        if document.domain.is_some() {
+            columns.leave_mirror();
+        }
         let mut faults = declare(&document, &mut columns);
         faults.extend(experiment_faults(&document));
+        faults.extend(measure::relation_faults(&document));
         let binding = match bind::bind(&document, &columns, filter) {
             Ok(binding) => {
                 faults.extend(level_faults(&document, &binding));
+                faults.extend(measure::faults(&document, |metric| binding.metrics[metric].1));
                 binding
             }
             Err(more) => {
@@ -222,7 +234,7 @@ fn advice(near: Option<&str>, known: &[String]) -> String {
 /// Adds the columns that a document declares; they must not contradict the schema or the traces.
 fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
     let mut faults = Vec::new();
-    for (name, (declared, place)) in &document.columns {
+    for (name, ColumnEntry { place, column: declared, values, .. }) in &document.columns {
         if name == "t" || columns.of_schema(name).is_some_and(|known| known != *declared) {
             let message = format!("`{name}` is a column of every trace and cannot be declared as another");
             faults.push(
@@ -233,7 +245,7 @@ fn declare(document: &Document, columns: &mut Columns) -> Vec<Fault> {
             let message = format!("`{name}` is declared as {declared}, and is {found} in the traces");
             faults.push(Fault::new(place.clone(), message).help("declare it as the traces have it"));
         } else {
-            columns.set_own(name.clone(), *declared);
+            columns.set_own(name.clone(), *declared, values.clone());
         }
     }
     faults
@@ -245,13 +257,20 @@ fn experiment_faults(document: &Document) -> Vec<Fault> {
     for entry in document.experiments.values() {
         let chance = entry.chance.iter().map(|(name, (_, place))| (name, place));
         let reference = entry.reference.iter().map(|(name, (_, place))| (name, place));
-        for (name, place) in chance.chain(reference).filter(|(name, _)| !document.metrics.contains_key(*name)) {
-            let near = nearest(name, document.metrics.keys().map(String::as_str));
-            let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
-            faults.push(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))));
-        }
+        faults.extend(chance.chain(reference).filter_map(|(name, place)| unknown_metric(document, name, place)));
     }
     faults
+}
+
+/// The fault of a name that is no metric of the document.
+pub(super) fn unknown_metric(document: &Document, name: &str, place: &Place) -> Option<Fault> {
+    let metrics = &document.metrics;
+    if metrics.contains_key(name) {
+        return None;
+    }
+    let near = nearest(name, metrics.keys().map(String::as_str));
+    let fault = Fault::new(place.clone(), format!("`{name}` is no metric of these definitions"));
+    Some(fault.help_if(near.map(|near| format!("did you mean `{near}`?"))))
 }
 
 /// A level of chance of a rate is a probability.
@@ -278,6 +297,7 @@ fn catalog(document: &Document, binding: &Binding) -> Catalog {
     let mut catalog = Catalog {
         name: document.name.clone(),
         hash: String::new(),
+        domain: document.domain.clone(),
         // A file that lists no experiment at all restricts none.
         open: document.open || document.experiments.is_empty(),
         lets: document.lets.iter().map(|(name, (written, _))| (name.clone(), written.text.clone())).collect(),
@@ -310,6 +330,10 @@ fn metrics(document: &Document, binding: &Binding) -> IndexMap<String, Metric> {
             when: entry.when.as_ref().map(|when| when.text.clone()),
             se: entry.se,
             chance: entry.chance,
+            measures: entry.measures,
+            range: entry.range,
+            finished: entry.finished.as_ref().map(|(name, _)| name.clone()),
+            completes: entry.completes.as_ref().map(|(name, _)| name.clone()),
         };
         (name.clone(), metric)
     };

@@ -8,8 +8,8 @@ use serde::Serialize;
 use super::catalog::{Better, Kind, StandardError};
 use super::columns::{Level, Type};
 use super::definitions::Definitions;
-use super::origin::Written;
 use super::syntax::{self, BinaryOp, Expr, ExprKind, Literal};
+use toml_spec::Written;
 
 /// What a metric is, from its title down to the columns it reads.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]

@@ -5,8 +5,14 @@
 //! ```toml
 //! include = ["paper"]              # built-in names, or paths relative to this file
 //! open = false                     # whether unlisted experiments are accepted
-//! [column.grip_force]              # a column of your own traces, for `definitions check`
+//! domain = "robots"                # what the traces are about; `mirror` if absent
+//! [column.grip_force]              # a column of your own traces
 //! type = "float"                   # bool, int, float or text
+//! unit = "N"
+//! [column.outcome]
+//! type = "text"
+//! constant = true                  # the same in all rows of an episode
+//! values = ["success", "timeout"]  # the only texts that it holds, null apart
 //! [let]
 //! done = "first(action = 'done')"
 //! [experiment.E1]
@@ -26,14 +32,15 @@ use indexmap::IndexMap;
 
 use super::catalog::{Better, StandardError};
 use super::columns::{Column, Level, Type};
-use super::fault::{Fault, Faults, Place, Source};
-use super::include::{Includes, Kind};
-use super::keys::{Keys, key_count, parse_toml};
-use super::origin::Written;
+use super::measure::{Measures, ValueRange};
 use exact::budget::Limit;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
 use exact::{hash, input};
+use toml_spec::Written;
+use toml_spec::{Fault, Faults, Place, Source};
+use toml_spec::{IncludeKind, Includes};
+use toml_spec::{Keys, key_count, parse_toml};
 
 /// The built-in definition files, by name.
 const BUILT_IN: [(&str, &str); 5] = [
@@ -55,12 +62,26 @@ pub struct Document {
     pub built_on: Vec<&'static str>,
     /// Whether unlisted experiments are accepted.
     pub open: bool,
+    /// What the traces are about, where that is not the mirror: any name.
+    pub domain: Option<String>,
     /// Declared columns of the user's own.
-    pub columns: IndexMap<String, (Column, Place)>,
+    pub columns: IndexMap<String, ColumnEntry>,
     /// Named expressions.
     pub lets: IndexMap<String, (Written, Place)>,
     pub metrics: IndexMap<String, MetricEntry>,
     pub experiments: IndexMap<String, ExperimentEntry>,
+}
+
+/// A `[column.NAME]` table.
+#[derive(Clone, Debug)]
+pub struct ColumnEntry {
+    pub place: Place,
+    pub column: Column,
+    /// The only texts that it holds, null apart; any if empty.
+    pub values: Vec<String>,
+    pub unit: String,
+    /// For a reader of the column; may be empty.
+    pub help: String,
 }
 
 /// A `[metric.NAME]` table.
@@ -77,6 +98,10 @@ pub struct MetricEntry {
     pub when: Option<Written>,
     pub se: StandardError,
     pub chance: Option<Ratio>,
+    pub measures: Option<Measures>,
+    pub range: Option<ValueRange>,
+    pub finished: Option<(String, Place)>,
+    pub completes: Option<(String, Place)>,
 }
 
 /// An `[experiment.NAME]` table.
@@ -139,12 +164,14 @@ pub fn read_source(name: String, source: Source, folder: Option<&Path>) -> Resul
     Reading::of(name, DefinitionFile { source, folder: folder.map(Path::to_owned), place: None })
 }
 
+/// The domain of definitions that name none: the columns of the mirror are known, with their rules.
+const MIRROR: &str = "mirror";
 /// Definitions are written by hand, or by a program that spells out a family of metrics.
 const LARGEST: Limit = Limit::new("bytes of a definition file", 1 << 20);
 /// Keys of a file, tables included.
 const MOST_KEYS: Limit = Limit::new("keys in a definition file", 10_000);
 /// How definition files include others.
-const INCLUDED: Kind = Kind {
+const INCLUDED: IncludeKind = IncludeKind {
     name: "definition file",
     check: "mirrorstats definitions check FILE",
     most: Limit::new("includes, those of included files counted", 256),
@@ -215,6 +242,9 @@ impl Reading {
         if let Some(open) = root.truth("open", &mut self.faults) {
             self.document.open = open;
         }
+        if let Some((domain, _)) = root.text("domain", &mut self.faults) {
+            self.document.domain = Some(domain).filter(|name| name != MIRROR);
+        }
         self.columns(&mut root);
         self.lets(&mut root);
         self.experiments(&mut root);
@@ -246,11 +276,20 @@ impl Reading {
             let types = [("bool", Type::Bool), ("int", Type::Int), ("float", Type::Float), ("text", Type::Text)];
             let ty = keys.choice("type", &types, &mut self.faults);
             let constant = keys.truth("constant", &mut self.faults).unwrap_or(false);
+            let values = keys.texts("values", &mut self.faults).unwrap_or_default();
+            let [unit, help] =
+                ["unit", "help"].map(|key| keys.text(key, &mut self.faults).map_or_else(String::new, |(text, _)| text));
             keys.refuse_the_rest(&mut self.faults);
+            if let Some((_, place)) = values.first().filter(|_| ty.is_some_and(|ty| ty != Type::Text)) {
+                let fault = Fault::new(place.clone(), "`values` lists the texts of a column that is not text");
+                self.faults.push(fault.help("give the column `type = \"text\"`, or leave the list out"));
+            }
             match ty {
                 Some(ty) => {
                     let level = if constant { Level::Episode } else { Level::Step };
-                    self.document.columns.insert(name, (Column { ty, level }, place));
+                    let values = values.into_iter().map(|(text, _)| text).collect();
+                    let entry = ColumnEntry { place, column: Column { ty, level }, values, unit, help };
+                    self.document.columns.insert(name, entry);
                 }
                 None => self.missing(place, "type", "a column"),
             }
@@ -279,13 +318,32 @@ impl Reading {
             let help = keys.text("help", faults).map_or_else(String::new, |(text, _)| text);
             let se = keys.choice("se", &se, faults).unwrap_or_default();
             let chance = keys.ratio("chance", faults);
+            let measures = keys.choice("measures", &Measures::NAMES, faults);
+            let range = keys.table("range", faults).map(|range| value_range(range, faults));
+            let finished = keys.text("finished", faults);
+            let completes = keys.text("completes", faults);
             let when = keys.expression("when", faults);
             let present = keys.has("value");
             let value = keys.expression("value", faults);
             keys.refuse_the_rest(faults);
             match value {
                 Some(value) => {
-                    let entry = MetricEntry { place, title, unit, better, section, help, value, when, se, chance };
+                    let entry = MetricEntry {
+                        place,
+                        title,
+                        unit,
+                        better,
+                        section,
+                        help,
+                        value,
+                        when,
+                        se,
+                        chance,
+                        measures,
+                        range,
+                        finished,
+                        completes,
+                    };
                     self.document.metrics.insert(name, entry);
                 }
                 None if present => {}
@@ -315,4 +373,10 @@ impl Reading {
     fn missing(&mut self, place: Place, key: &str, what: &str) {
         self.faults.push(Fault::new(place, format!("{what} needs `{key}`")).help(format!("add `{key} = \"...\"`")));
     }
+}
+
+fn value_range(mut keys: Keys, faults: &mut Vec<Fault>) -> ValueRange {
+    let range = ValueRange { least: keys.integer("least", faults), most: keys.integer("most", faults) };
+    keys.refuse_the_rest(faults);
+    range
 }

@@ -7,7 +7,7 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::catalog::{Better, StandardError};
+use super::catalog::{Better, Measures, StandardError, ValueRange};
 use exact::ratio::Ratio;
 
 /// A definition file.
@@ -20,6 +20,8 @@ pub struct DefinitionFile {
     /// Whether experiments that are not listed are accepted. A file that lists none accepts all.
     #[serde(default)]
     pub open: bool,
+    /// What the traces are about: `mirror`, or any other name, where the columns of the mirror mean nothing.
+    pub domain: Option<String>,
     /// Columns of your own traces that expressions use.
     #[serde(default)]
     pub column: IndexMap<String, ColumnShape>,
@@ -44,6 +46,15 @@ pub struct ColumnShape {
     /// Whether it is constant in an episode.
     #[serde(default)]
     pub constant: bool,
+    /// The only texts that it holds, null apart; any if absent.
+    #[serde(default)]
+    pub values: Vec<String>,
+    /// What a number counts or measures.
+    #[serde(default)]
+    pub unit: String,
+    /// For a reader of the column.
+    #[serde(default)]
+    pub help: String,
 }
 
 /// The type of a column.
@@ -99,6 +110,14 @@ pub struct MetricShape {
     pub se: StandardError,
     /// The value of blind guessing, as a fraction such as `1/3`.
     pub chance: Option<Ratio>,
+    /// What the metric measures; as its unit says if absent.
+    pub measures: Option<Measures>,
+    /// The values that it can have, as integers; on a fraction `most` is the whole.
+    pub range: Option<ValueRange>,
+    /// On a duration: the metric that is defined in finished episodes, 1 where the decision was correct.
+    pub finished: Option<String>,
+    /// The rate that counts unfinished episodes as failures; this one is the same among finished ones.
+    pub completes: Option<String>,
 }
 
 #[cfg(test)]

@@ -11,6 +11,7 @@ pub mod audit;
 pub mod bundle;
 pub mod cells;
 pub mod changes;
+pub mod comparable;
 pub mod comparison;
 pub mod errata;
 pub mod figures;

@@ -19,7 +19,8 @@ pub use trace::schema::REPLY_STATUSES;
 use trace::schema::{self, Column, Kind};
 
 /// The columns that quality is read from, where traces have them.
-const READ: [&str; 6] = [REPLY_STATUS, "reply_repair", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
+const READ: [&str; 7] =
+    [REPLY_STATUS, "reply_repair", "reply_fault", "latency_ms", "prompt_tokens", "completion_tokens", "cost_usd"];
 /// What joins the repairs of one reply.
 const AND: char = '+';
 /// Costs are summed in billionths of a dollar.
@@ -49,6 +50,9 @@ pub struct Quality {
     pub statuses: BTreeMap<String, u64>,
     /// Repairs by name; a reply with two is counted under both.
     pub repairs: BTreeMap<String, u64>,
+    /// Why replies gave no decision, in the words of their parser.
+    #[serde(skip)]
+    pub faults: BTreeMap<String, u64>,
     /// Milliseconds from request to reply: how many replies took so long.
     #[serde(skip)]
     pub latencies: BTreeMap<i64, u64>,
@@ -100,6 +104,12 @@ impl Quality {
         self.statuses.iter().filter(|(status, _)| !ReplyCounts::is_read(status))
     }
 
+    /// The most frequent reason why a reply gave no decision, and how many have it; of equally many the first by its words.
+    pub fn commonest_fault(&self) -> Option<(&str, u64)> {
+        let faults = self.faults.iter().map(|(fault, replies)| (fault.as_str(), *replies));
+        faults.max_by(|(a, few), (b, many)| few.cmp(many).then_with(|| b.cmp(a)))
+    }
+
     pub fn of_status(&self, status: &str) -> u64 {
         self.statuses.get(status).copied().unwrap_or(0)
     }
@@ -137,6 +147,9 @@ impl Quality {
         }
         for (repair, replies) in &other.repairs {
             *self.repairs.entry(repair.clone()).or_default() += replies;
+        }
+        for (fault, replies) in &other.faults {
+            *self.faults.entry(fault.clone()).or_default() += replies;
         }
         for (latency, replies) in &other.latencies {
             *self.latencies.entry(*latency).or_default() += replies;
@@ -242,6 +255,7 @@ struct Counts {
     steps: u64,
     statuses: Vec<u64>,
     repairs: Vec<u64>,
+    faults: Vec<u64>,
     rest: Quality,
 }
 
@@ -277,6 +291,9 @@ impl Cells {
                     *quality.repairs.entry(repair.to_owned()).or_default() += replies;
                 }
             }
+            for (fault, replies) in named(columns.fault.as_ref(), &counts.faults) {
+                *quality.faults.entry(fault.to_owned()).or_default() += replies;
+            }
             found.0.entry(key).or_default().merge(&quality);
         }
         found
@@ -298,6 +315,7 @@ fn named<'a>(column: Option<&'a Coded<'a>>, counts: &[u64]) -> Vec<(&'a str, u64
 struct Columns<'a> {
     status: Option<Coded<'a>>,
     repair: Option<Coded<'a>>,
+    fault: Option<Coded<'a>>,
     latency: Option<&'a ArrayRef>,
     prompt_tokens: Option<&'a ArrayRef>,
     completion_tokens: Option<&'a ArrayRef>,
@@ -310,6 +328,7 @@ impl<'a> Columns<'a> {
         Self {
             status: Coded::of(batch, REPLY_STATUS),
             repair: Coded::of(batch, "reply_repair"),
+            fault: Coded::of(batch, "reply_fault"),
             latency: column("latency_ms"),
             prompt_tokens: column("prompt_tokens"),
             completion_tokens: column("completion_tokens"),
@@ -320,6 +339,7 @@ impl<'a> Columns<'a> {
     fn add(&self, row: usize, counts: &mut Counts) {
         count(self.status.as_ref(), row, &mut counts.statuses);
         count(self.repair.as_ref(), row, &mut counts.repairs);
+        count(self.fault.as_ref(), row, &mut counts.faults);
         if let Some(latency) = int(self.latency, row) {
             *counts.rest.latencies.entry(latency).or_default() += 1;
         }

@@ -19,13 +19,14 @@ use exact::suggest::nearest;
 use metric::catalog::Catalog;
 use metric::columns::{Column, Columns, Fallback, Level, Type};
 use metric::definitions::{Definitions, UnknownMetric};
-use metric::fault::Faults;
-use metric::file::FileError;
+use metric::file::{ColumnEntry, FileError};
 use metric::restore::RestoreError;
+use toml_spec::Faults;
 use trace::error::TraceError;
 use trace::open::TraceSet;
 use trace::scan::{EPISODE_COLUMNS, EpisodeBatch, Projection};
-use trace::schema::{self, COLUMNS, Kind};
+use trace::schema::domain::is_general;
+use trace::schema::{self, COLUMNS, DeclaredColumn, Domain, Kind};
 
 /// What to score.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -106,7 +107,8 @@ pub fn schema_columns() -> Columns {
     };
     let columns: Columns = COLUMNS.iter().filter(|column| column.name != "t").filter_map(column).collect();
     let lists = COLUMNS.iter().filter(|column| !column.values.is_empty()).map(|column| (column.name, column.values));
-    let mut columns = columns.with_values(lists);
+    let of_mirror = COLUMNS.iter().map(|column| column.name).filter(|name| !is_general(name));
+    let mut columns = columns.with_values(lists).with_mirror(of_mirror);
     // A trace without a required column is an exception that its experiment declares.
     set_fallbacks(&mut columns, |name| schema::column(name).is_some_and(|known| known.required));
     COLUMNS.iter().filter(|column| column.since > 1).for_each(|column| columns.set_free(column.name));
@@ -140,12 +142,12 @@ pub fn trace_columns(traces: &TraceSet) -> Columns {
     let mut columns =
         schema_columns().with_help("`mirrorstats trace schema` and `mirrorstats trace info` list the columns");
     set_fallbacks(&mut columns, |name| traces.declares(name));
+    for column in COLUMNS.iter().filter(|column| !traces.knows(column)) {
+        columns.forget(column.name);
+    }
     for name in traces.column_names().into_iter().filter(|name| *name != "t") {
-        if schema::column(name).is_some_and(|known| known.since > 1 && !traces.declares(name)) {
-            columns.forget(name);
-        }
         if let Some(ty) = traces.column(name).and_then(|column| type_of(column.kind)) {
-            columns.set_own(name, Column { ty, level: Level::Step });
+            columns.set_own(name, Column { ty, level: Level::Step }, Vec::new());
         }
     }
     columns
@@ -202,7 +204,7 @@ pub fn check_columns(traces: &TraceSet, definitions: &Definitions) -> Result<(),
 
 fn column_problem(traces: &TraceSet, column: &str) -> Option<(String, String)> {
     let absent = || "record it, or choose other metrics with --metrics".to_owned();
-    let has_default = schema::column(column).is_some_and(|known| known.default.is_some());
+    let has_default = traces.domain().column(column).is_some_and(|known| known.default.is_some());
     let Some(found) = traces.column(column) else { return Some(("no trace has it".to_owned(), absent())) };
     if let Some([(first, a), (second, b)]) = found.conflict {
         let problem = format!("it is {} in `{first}` and {} in `{second}`", a.name(), b.name());
@@ -402,7 +404,28 @@ pub(super) fn projection(
         seen.push(name.clone());
         new
     });
-    Ok(Projection { steps, constants, experiments: experiments(definitions), ..Projection::default() })
+    let declared = definitions.iter().flat_map(|definitions| declared_columns(definitions)).collect();
+    Ok(Projection { steps, constants, declared, experiments: experiments(definitions), ..Projection::default() })
+}
+
+/// The columns of their own that definitions declare.
+pub fn declared_columns(definitions: &Definitions) -> Vec<DeclaredColumn> {
+    let own = |(name, entry): (&str, &ColumnEntry)| DeclaredColumn {
+        name: name.to_owned(),
+        kind: kind_of(entry.column.ty),
+        values: entry.values.clone(),
+        constant: entry.column.level == Level::Episode,
+    };
+    definitions.declared_columns().map(own).collect()
+}
+
+const fn kind_of(ty: Type) -> Kind {
+    match ty {
+        Type::Bool => Kind::Bool,
+        Type::Int => Kind::Int,
+        Type::Float => Kind::Float,
+        Type::Text => Kind::String,
+    }
 }
 
 /// The experiments that all definitions know; any if `None`.
@@ -424,10 +447,17 @@ pub fn is_constant(name: &str) -> bool {
 pub fn check_label(traces: &TraceSet, label: &str) -> Result<(), ScoreError> {
     let problem = column_problem(traces, label);
     // What version 2 brought is null in older traces, or has a meaning where there is no value.
-    let is_known_anyway = schema::column(label).is_some_and(|known| {
+    let is_known_anyway = traces.domain().column(label).is_some_and(|known| {
         let found = traces.column(label);
         known.default_text().is_some() || known.since > 1 && found.is_some_and(|found| found.conflict.is_none())
     });
+    // Whether a column of one's own changes from step to step shows when it is read.
+    let is_constant = |name: &str| match traces.domain() {
+        Domain::Mirror => is_constant(name),
+        Domain::Own => {
+            name != "t" && traces.column(name).is_some_and(|column| matches!(column.kind, Kind::Int | Kind::String))
+        }
+    };
     if is_constant(label) && (problem.is_none() || is_known_anyway) {
         return Ok(());
     }

@@ -17,8 +17,8 @@ use super::table::EpisodeTable;
 use exact::suggest::nearest;
 use metric::columns::{Column, Columns, Level, Type};
 use metric::definitions::{Definitions, UnknownMetric};
-use metric::fault::Faults;
 use metric::file::FileError;
+use toml_spec::Faults;
 
 /// Why a part of a table cannot be had.
 #[derive(Debug, thiserror::Error)]

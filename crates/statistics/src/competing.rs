@@ -5,29 +5,12 @@
 
 use std::collections::BTreeMap;
 
+pub use super::endings::{Ending, Outcome};
+use super::endings::{RiskSet, risk_sets};
 use super::survival::RestrictedMean;
 
 /// How near a share must come to one half to count as having reached it: rounding only.
 const HALF: f64 = 0.5 - 1e-12;
-
-/// One episode: the steps until it ended, and how.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ending {
-    /// The steps until the decision, or until the recording stopped.
-    pub steps: i64,
-    pub outcome: Outcome,
-}
-
-/// How an episode ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Outcome {
-    /// With the decision that is waited for.
-    Correct,
-    /// With another one, after which that decision cannot come any more.
-    Wrong,
-    /// Without a decision: censored.
-    Unfinished,
-}
 
 /// The Aalen-Johansen curve (Aalen and Johansen 1978): the share of episodes decided correctly by each step.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,31 +47,15 @@ impl Incidence {
     /// The curve of these episodes; `None` without any.
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     pub fn of(endings: &[Ending]) -> Option<Self> {
-        let mut ends: BTreeMap<i64, [u64; 3]> = BTreeMap::new();
-        for ending in endings {
-            ends.entry(ending.steps).or_default()[ending.outcome as usize] += 1;
-        }
-        let mut at_risk = endings.len() as u64;
-        let (mut before, mut is_correct, mut is_wrong) = (1.0, 0.0, 0.0);
-        let mut points = Vec::with_capacity(ends.len());
-        for (steps, [correct, wrong, censored]) in ends {
-            is_correct += before * correct as f64 / at_risk as f64;
-            is_wrong += before * wrong as f64 / at_risk as f64;
-            let ended = correct + wrong + censored;
-            let [correct, wrong, censored] = [correct, wrong, censored].map(|count| count as f64);
-            points.push(Point {
-                steps,
-                at_risk: at_risk as f64,
-                correct,
-                wrong,
-                censored,
-                before,
-                is_correct,
-                is_wrong,
-            });
-            before *= (at_risk as f64 - correct - wrong) / at_risk as f64;
-            at_risk -= ended;
-        }
+        let (mut is_correct, mut is_wrong) = (0.0, 0.0);
+        let of_step = |RiskSet { steps, at_risk, ended, before, .. }: RiskSet| {
+            let at_risk = at_risk as f64;
+            let [correct, wrong, censored] = ended.map(|count| count as f64);
+            is_correct += before * correct / at_risk;
+            is_wrong += before * wrong / at_risk;
+            Point { steps, at_risk, correct, wrong, censored, before, is_correct, is_wrong }
+        };
+        let points: Vec<Point> = risk_sets(endings).into_iter().map(of_step).collect();
         (!points.is_empty()).then_some(Self { points })
     }
 
@@ -197,7 +164,7 @@ impl Influence {
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 pub(super) mod tests {
     use super::{Ending, Incidence, Outcome};
-    use crate::survival::{Duration, End, Survival};
+    use crate::survival::Survival;
 
     /// Endings: the steps, and `c` for correct, `w` for wrong, `-` for unfinished.
     pub fn endings(written: &str) -> Vec<Ending> {
@@ -266,9 +233,8 @@ pub(super) mod tests {
         let steps = [6, 6, 6, -6, 7, -9, 10, -10, -11, 13, 16, -17, -19, -20, 22, 23, -25, -32, -32, -34, -35i64];
         let ending =
             |&d: &i64| Ending { steps: d.abs(), outcome: if d > 0 { Outcome::Correct } else { Outcome::Unfinished } };
-        let duration = |&d: &i64| Duration { steps: d.abs(), end: if d > 0 { End::Finished } else { End::Unfinished } };
-        let curve = Incidence::of(&steps.iter().map(ending).collect::<Vec<_>>()).unwrap();
-        let survival = Survival::of(&steps.iter().map(duration).collect::<Vec<_>>()).unwrap();
+        let endings: Vec<Ending> = steps.iter().map(ending).collect();
+        let (curve, survival) = (Incidence::of(&endings).unwrap(), Survival::of(&endings).unwrap());
         for horizon in [5, 6, 20, 35] {
             let (a, b) =
                 (curve.restricted_mean(horizon, 0.95).unwrap(), survival.restricted_mean(horizon, 0.95).unwrap());

@@ -40,6 +40,8 @@ pub enum Withheld {
     Undefined,
     /// Scenes, seeds or participants have several episodes, which the method takes as independent.
     Dependent,
+    /// The two sides were recorded differently.
+    Incomparable,
 }
 
 /// The interval of `n` values where it may be given, and otherwise why not.

@@ -3,33 +3,15 @@
 //! Rule: an episode that ends without a decision says that the decision takes more than its length.
 //! A decision in step t comes before censoring in step t.
 
-use std::collections::BTreeMap;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::endings::{Ending, Outcome, RiskSet, risk_sets};
 use super::interval::{Interval, student_t_of};
 use super::quantile;
 
 /// How near the curve must come to one half to count as having reached it: rounding only.
 const HALF: f64 = 0.5 + 1e-12;
-
-/// How long an episode took, or at least lasted.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Duration {
-    /// The steps until the decision, or until the recording stopped.
-    pub steps: i64,
-    pub end: End,
-}
-
-/// How an episode ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum End {
-    /// With a decision, at its last step counted.
-    Finished,
-    /// Without one: the duration is censored.
-    Unfinished,
-}
 
 /// A Kaplan-Meier curve (Kaplan and Meier 1958): the share of episodes undecided after each step.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,22 +84,15 @@ pub(super) fn has_spread(se: f64, horizon: i64) -> bool {
 }
 
 impl Survival {
-    /// The curve of these durations; `None` without any.
-    #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
-    pub fn of(durations: &[Duration]) -> Option<Self> {
-        let mut ends: BTreeMap<i64, (u64, u64)> = BTreeMap::new();
-        for duration in durations {
-            let (decided, censored) = ends.entry(duration.steps).or_default();
-            *if duration.end == End::Finished { decided } else { censored } += 1;
-        }
-        let mut at_risk = durations.len() as u64;
-        let mut undecided = 1.0;
-        let mut points = Vec::with_capacity(ends.len());
-        for (steps, (decided, censored)) in ends {
-            undecided *= (at_risk - decided) as f64 / at_risk as f64;
-            points.push(Point { steps, at_risk, decided, undecided });
-            at_risk -= decided + censored;
-        }
+    /// The curve of these episodes, any decision being the one that is waited for; `None` without any.
+    ///
+    /// It is what the Aalen-Johansen curves of both decisions leave undecided.
+    pub fn of(endings: &[Ending]) -> Option<Self> {
+        let point = |RiskSet { steps, at_risk, ended, after, .. }: RiskSet| {
+            let decided = ended[Outcome::Correct as usize] + ended[Outcome::Wrong as usize];
+            Point { steps, at_risk, decided, undecided: after }
+        };
+        let points: Vec<Point> = risk_sets(endings).into_iter().map(point).collect();
         (!points.is_empty()).then_some(Self { points })
     }
 
@@ -202,13 +177,13 @@ pub fn common_horizon<'a>(curves: impl IntoIterator<Item = &'a Survival> + Clone
 #[cfg(test)]
 #[expect(clippy::unreadable_literal, reason = "reference values as their sources print them")]
 mod tests {
-    use super::{Duration, End, MedianInterval, Survival, common_horizon};
+    use super::{Ending, MedianInterval, Outcome, Survival, common_horizon};
 
     /// Durations; a negative one is censored.
     fn curve(durations: &[i64]) -> Survival {
-        let end = |steps: i64| if steps > 0 { End::Finished } else { End::Unfinished };
-        let durations: Vec<_> = durations.iter().map(|&d| Duration { steps: d.abs(), end: end(d) }).collect();
-        Survival::of(&durations).unwrap()
+        let outcome = |steps: i64| if steps > 0 { Outcome::Correct } else { Outcome::Unfinished };
+        let endings: Vec<_> = durations.iter().map(|&d| Ending { steps: d.abs(), outcome: outcome(d) }).collect();
+        Survival::of(&endings).unwrap()
     }
 
     /// Remission times of 21 patients under 6-MP (Freireich et al. 1963), the textbook example.

@@ -10,7 +10,6 @@ use exact::budget::Exceeded;
 use exact::moments::MomentOverflow;
 use exact::replace::TargetIsInput;
 use metric::definitions::{ReplaceError, UnknownMetric};
-use metric::fault::Faults;
 use metric::file::FileError;
 use report::audit::AuditError;
 use report::bundle::BundleError;
@@ -25,6 +24,7 @@ use score::evidence::EvidenceError;
 use score::format::FormatError;
 use score::score_traces::ScoreError;
 use score::select::SelectError;
+use toml_spec::Faults;
 use trace::error::TraceError;
 use trace::import::ImportError;
 use trace::lost::LostListError;
@@ -199,6 +199,17 @@ pub enum StudyError {
         /// Those that the experiment names.
         own: String,
     },
+    /// The definitions are about a mirror, and the traces about something else.
+    #[error(
+        "`{file}` has no column of the domain `mirror`: expected definitions of its own domain, found `{definitions}`\n  \
+         help: give --definitions a file that says `domain = \"NAME\"` and declares the columns that it reads, `[column.NAME]`"
+    )]
+    OtherDomain {
+        /// The first trace.
+        file: String,
+        /// The definitions that were asked for, or the default ones.
+        definitions: String,
+    },
     /// Definitions to compare, and nothing to score with them.
     #[error(
         "`{name}` are definitions: expected traces to score with them, found none\n  \
@@ -228,6 +239,14 @@ pub enum StudyError {
         known: String,
         /// The nearest of them, in words; may be empty.
         hint: String,
+    },
+    /// A metric of which neither direction is better.
+    #[error(
+        "{metric}: expected a metric with `better = \"higher\"` or \"lower\", found none\n  help: name another metric with --metric"
+    )]
+    NoDirection {
+        /// The metric.
+        metric: String,
     },
     /// A filter that keeps no episode.
     #[error("{words}\n  help: give a filter that holds for some of them, or none")]

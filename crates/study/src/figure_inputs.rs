@@ -14,7 +14,7 @@ use report::style::Style;
 #[derive(Debug)]
 pub struct FigureInputs<'a> {
     cells: Cells,
-    order: &'a [String],
+    style: &'a Style,
     results: Cow<'a, Results>,
 }
 
@@ -35,7 +35,7 @@ impl<'a> FigureInputs<'a> {
     pub fn of(results: &'a Results, style: &'a Style) -> Result<Self, StudyError> {
         let results = results.with_conditions_as_models();
         let cells = group(&results.episodes, &DEFAULT_BY.map(str::to_owned))?;
-        Ok(Self { cells, order: &style.sheet.row_order, results })
+        Ok(Self { cells, style, results })
     }
 
     /// One figure.
@@ -61,7 +61,8 @@ impl<'a> FigureInputs<'a> {
     fn input(&self) -> Input<'_> {
         Input {
             cells: &self.cells,
-            order: self.order,
+            order: &self.style.sheet.row_order,
+            sheets: &self.style.sheet.figure,
             episodes: Some(&self.results.episodes),
             outcomes: self.results.outcomes.as_ref(),
             timelines: self.results.timelines.as_deref(),

@@ -4,21 +4,22 @@ use std::fmt::{self, Write as _};
 use std::num::NonZeroUsize;
 use std::path::Path;
 
+use super::StudyError;
+use super::expected::ExpectedTraces;
 use super::experiment_findings::experiment_findings;
-use super::{StudyError, known_experiments};
 use exact::escape::visible;
 use trace::checksums::Checksums;
 use trace::diagnostic::Severity;
 use trace::inputs::Input;
-use trace::validate::{Validation, validate};
+use trace::validate::{Validation, validate_as};
 
 /// Findings that are printed for each file and rule.
 const SHOWN: usize = 10;
 
 /// All findings of traces, under the experiments of these definitions.
 pub fn findings(definitions: &Path, inputs: &[Input], threads: NonZeroUsize) -> Result<Validation, StudyError> {
-    let experiments = known_experiments(definitions)?;
-    let mut found = validate(inputs, experiments.as_deref(), threads)?;
+    let expected = ExpectedTraces::of(definitions)?;
+    let mut found = validate_as(inputs, expected.as_expected(), threads)?;
     found.findings.extend(experiment_findings(definitions, inputs)?);
     Ok(found)
 }

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::{StudyError, known_experiments};
+use super::StudyError;
+use super::expected::ExpectedTraces;
 use exact::budget::Limit;
 use exact::escape::visible;
 use exact::input;
@@ -61,10 +62,11 @@ pub struct OwnColumn {
 
 /// Makes a trace of the steps in these texts, or writes nothing.
 pub fn import(mut texts: Vec<Text>, request: &ImportRequest) -> Result<ImportAnswer, StudyError> {
-    let experiments = known_experiments(&request.definitions)?;
+    let expected = ExpectedTraces::of(&request.definitions)?;
     let palette = request.palette.as_deref().map(palette).transpose()?;
     let limits = Limits {
-        experiments: experiments.as_deref(),
+        expected: expected.as_expected(),
+        domain: expected.domain.as_deref(),
         palette: palette.as_ref(),
         cluster: request.clusters_by_seed.then_some(Cluster::Seed),
         is_reconstruction: request.reconstruction,

@@ -18,9 +18,11 @@ mod design;
 mod diff;
 mod empty_filter;
 mod error;
+mod expected;
 mod experiment_findings;
 mod figure_inputs;
 mod findings;
+mod gate;
 mod import;
 mod input_hashes;
 mod inputs;
@@ -194,15 +196,6 @@ impl Question {
     }
 }
 
-/// The experiments that some definitions know; any if `None`.
-///
-/// # Errors
-/// Every fault of the definitions.
-pub fn known_experiments(definitions: &Path) -> Result<Option<Vec<String>>, StudyError> {
-    let catalog = Definitions::load(definitions, &score_traces::schema_columns())?.catalog;
-    Ok((!catalog.open).then(|| catalog.experiment.keys().cloned().collect()))
-}
-
 impl Study {
     /// Opens traces, files of scores or folders of either: paths, folders, globs.
     ///
@@ -362,7 +355,7 @@ impl Study {
     pub fn cells_of(&self, episodes: &EpisodeTable) -> Result<Cells, StudyError> {
         let by = self.question.by_over(episodes);
         if !self.question.pool {
-            pooled::check(episodes, &by, self.source.traces().ok())?;
+            pooled::check(episodes, &by)?;
         }
         size::check_comparisons(episodes)?;
         let cells = group(episodes, &by)?;
@@ -373,23 +366,12 @@ impl Study {
     /// The tables of these episodes, each with the filter that chose them.
     fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StudyError> {
         let mut tables = layout::tables(cells, style)?;
-        let selection = self.selection(episodes).map(|selection| selection.sentence());
-        let sentences: Vec<String> = selection.into_iter().chain(self.pooled(episodes).map(|it| it + ".")).collect();
+        let chosen = self.selection(episodes).map(|selection| selection.sentence());
+        let pooled = self.pooled(episodes)?.unwrap_or_default();
         for table in &mut tables {
-            table.footnotes.extend(sentences.iter().cloned());
+            table.footnotes.extend(chosen.iter().chain(&pooled).cloned());
         }
         Ok(tables)
-    }
-
-    /// In what the recordings of a cell differ that were pooled all the same.
-    fn pooled(&self, episodes: &EpisodeTable) -> Option<String> {
-        let by = self.question.by_over(episodes);
-        match self.question.pool.then(|| pooled::check(episodes, &by, self.source.traces().ok()))? {
-            Err(StudyError::Pooled { differences, .. }) => {
-                Some(format!("Recordings are pooled although {differences}"))
-            }
-            _ => None,
-        }
     }
 
     /// The filter; it is by results where it asks for more than what is recorded of an episode before it begins.
@@ -412,6 +394,11 @@ impl Study {
         self.statistics_of(&counted, &cells, options)
     }
 
+    /// What cells mix though it was recorded differently, where that does not matter.
+    fn pooled(&self, episodes: &EpisodeTable) -> Result<Option<Vec<String>>, StudyError> {
+        self.question.pool.then(|| pooled::told(episodes, &self.question.by_over(episodes))).transpose()
+    }
+
     /// A sentence about traces whose checksums are another file's.
     pub fn stale_checksums(&self) -> Option<String> {
         self.source.traces().ok().and_then(|traces| stale_note(traces.files()))
@@ -429,11 +416,12 @@ impl Study {
         let failures = (self.question.lost == LostAs::Failure && total > 0).then_some(total);
         let as_failures = failures.map(|total| format!("{total} lost episodes counted as failures"));
         let primary = self.plan.as_ref().and_then(|plan| plan.primary.clone());
-        let mut options = Options { lost, design, selection, replies, primary, ..options.clone() };
+        let pooled = self.pooled(&results.episodes)?;
+        let mut options = Options { lost, design, selection, pooled, replies, primary, ..options.clone() };
         let departures = self.departures(&results.episodes, &options, Looks::Once);
         let departed = departures.as_ref().map_or(0, Vec::len);
         let departed = (departed > 0).then(|| format!("departures from the registered plan: {departed}"));
-        options.caveats = self.pooled(&results.episodes).into_iter().chain(as_failures).chain(departed).collect();
+        options.caveats = as_failures.into_iter().chain(departed).collect();
         let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
         statistics.departures = departures;
         if let Some(total) = failures {
@@ -454,7 +442,7 @@ impl Study {
         let episodes = self.counted(results).results.episodes;
         size::check_comparisons(&episodes)?;
         let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
-        let options = Options { design, selection, ..options.clone() };
+        let options = Options { design, selection, pooled: self.pooled(&episodes)?, ..options.clone() };
         let departures = self.departures(&episodes, &options, Looks::Any);
         Ok(Sequential { departures, ..Sequential::of(&episodes, &options)? })
     }

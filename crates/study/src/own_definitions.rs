@@ -4,7 +4,7 @@
 //! mixture; any other mixture is refused, with the questions that would do. Definitions asked for must score what they keep.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::error::StudyError;
 use super::scored_alike::ScoredAlike;
@@ -15,6 +15,7 @@ use metric::file;
 use score::table::EpisodeTable;
 use trace::declared_experiment::DeclaredExperiment;
 use trace::open::{TraceFile, TraceSet};
+use trace::schema::Domain;
 
 /// The definitions of reaching, whose traces have no colours.
 const WITHOUT_COLORS: &str = "reach";
@@ -92,6 +93,9 @@ fn chosen(traces: &TraceSet) -> Result<Option<PathBuf>, StudyError> {
 impl Question {
     /// The question with the definitions that the experiments of these traces name, where it asks for none.
     pub fn resolved(mut self, traces: &TraceSet) -> Result<Self, StudyError> {
+        if traces.domain() == Domain::Own {
+            check_domain(self.definitions_name(), traces)?;
+        }
         if self.definitions.is_some() {
             return Ok(self);
         }
@@ -115,6 +119,15 @@ impl Question {
         }
         Ok(Definitions::load(self.definitions_name(), columns)?)
     }
+}
+
+/// Refuses definitions of the mirror for traces of another domain. What cannot be read is told where it is loaded.
+fn check_domain(definitions: &Path, traces: &TraceSet) -> Result<(), StudyError> {
+    let is_mirror = file::read(definitions).is_ok_and(|document| document.domain.is_none());
+    let first = traces.files().first().filter(|_| is_mirror);
+    first.map_or(Ok(()), |first| {
+        Err(StudyError::OtherDomain { file: first.name().to_owned(), definitions: definitions.display().to_string() })
+    })
 }
 
 /// Each experiment under its own definitions, in one; `None` where two of these give one name another meaning.

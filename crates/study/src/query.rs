@@ -1,7 +1,8 @@
 //! A SELECT over the steps, episodes and cells of a study.
 
-use engines::polars::answer::{QueryError, plan};
-use engines::polars::statement::{Checked, Table};
+use engines::polars::answer::{Format, QueryError, plan};
+use engines::polars::shared_file::in_memory;
+use engines::polars::statement::{self, Checked, Table};
 use engines::polars::tables;
 use polars::prelude::LazyFrame;
 
@@ -32,5 +33,14 @@ impl Study {
             }
         }
         Ok((plan(query, loaded)?, note))
+    }
+
+    /// The rows of a query, as typed, as a Parquet file in memory.
+    ///
+    /// # Errors
+    /// A query that cannot be run; whatever is wrong with the inputs.
+    pub fn query_parquet(&self, sql: &str) -> Result<Vec<u8>, StudyError> {
+        let (frame, _) = self.query(&statement::check(sql)?)?;
+        Ok(in_memory(frame, Format::Parquet)?)
     }
 }

@@ -15,7 +15,7 @@ use statistics::losses::INFRASTRUCTURE;
 use trace::declared::Declared;
 use trace::open::TraceSet;
 use trace::replies::REPLY_STATUS;
-use trace::schema::{self, Column};
+use trace::schema::{self, Column, Domain};
 
 impl Study {
     /// Reads the inputs once. A file that changed since it was opened is an error.
@@ -148,7 +148,9 @@ const UNCHECKED: [&str; 1] = [REPLY_STATUS];
 /// it.
 pub(super) fn lost_episodes(traces: &TraceSet) -> Result<Option<Definitions>, StudyError> {
     let status = traces.column("reply_status");
-    if status.is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some()) {
+    if traces.domain() == Domain::Own
+        || status.is_none_or(|column| column.missing_from.is_some() || column.conflict.is_some())
+    {
         return Ok(None);
     }
     let columns = score_traces::trace_columns(traces);

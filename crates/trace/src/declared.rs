@@ -3,7 +3,8 @@
 //! Rule: what a footer does not say is not assumed. Several files declare together what each of them declares alike; what
 //! keeps episodes from being pairs or independent holds for all of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -57,6 +58,12 @@ pub struct Declared {
     /// The parts of each fingerprint, by its name in the column `fingerprint`.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub fingerprints: BTreeMap<String, Value>,
+    /// The fingerprints that stand for different parts in different files.
+    #[serde(default, skip_serializing_if = "BTreeSet::is_empty")]
+    pub ambiguous: BTreeSet<String>,
+    /// What a footer says of the recording behind each fingerprint. Scores do not carry it.
+    #[serde(skip)]
+    pub recordings: BTreeMap<String, Arc<Value>>,
     /// The plan that was registered before the recording, where all files name the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub registration: Option<Registration>,
@@ -87,7 +94,9 @@ impl Declared {
     fn of_recording(text: Option<&str>) -> Self {
         let recording: Value = text.and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default();
         let fingerprints = recording["fingerprints"].as_object().cloned().unwrap_or_default();
+        let shared = Arc::new(recording.clone());
         Self {
+            recordings: fingerprints.keys().map(|name| (name.clone(), Arc::clone(&shared))).collect(),
             origin: recording["kind"].as_str().and_then(Origin::named),
             cluster: recording["design"]["cluster"]
                 .as_str()
@@ -102,7 +111,12 @@ impl Declared {
     /// What these and other files declare together.
     #[must_use]
     pub fn joined(mut self, other: Self) -> Self {
+        let differs =
+            |(name, parts): &(&String, &Value)| other.fingerprints.get(*name).is_some_and(|own| own != *parts);
+        self.ambiguous.extend(self.fingerprints.iter().filter(differs).map(|(name, _)| name.clone()));
+        self.ambiguous.extend(other.ambiguous);
         self.fingerprints.extend(other.fingerprints);
+        self.recordings.extend(other.recordings);
         self.unrecorded.extend(other.unrecorded);
         self.unrecorded.sort();
         self.unrecorded.dedup();
@@ -112,6 +126,8 @@ impl Declared {
             cluster: self.cluster.or(other.cluster),
             registration: self.registration.filter(|hash| other.registration.as_ref() == Some(hash)),
             fingerprints: self.fingerprints,
+            ambiguous: self.ambiguous,
+            recordings: self.recordings,
             unrecorded: self.unrecorded,
             losses_recorded: self.losses_recorded && other.losses_recorded,
             from_text: self.from_text || other.from_text,
@@ -137,6 +153,17 @@ mod tests {
         let made_up = Declared::of_recording(Some(r#"{"kind":"reconstruction"}"#));
         assert_eq!(import.clone().joined(made_up).origin, Some(Origin::Reconstruction));
         assert_eq!(import.clone().joined(import.clone()), import);
+    }
+
+    #[test]
+    fn a_fingerprint_of_two_contents_is_ambiguous() {
+        let of = |model: &str| {
+            Declared::of_recording(Some(&format!(
+                r#"{{"kind":"recording","fingerprints":{{"a":{{"model":"{model}"}}}}}}"#
+            )))
+        };
+        assert!(of("m").joined(of("m")).ambiguous.is_empty());
+        assert!(of("m").joined(of("n")).joined(of("n")).ambiguous.contains("a"));
     }
 
     #[test]

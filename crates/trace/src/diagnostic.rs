@@ -158,6 +158,10 @@ codes! {
     /// The reply status is none of the schema's.
     UnknownReplyStatus, Error, "unknown-reply-status":
         "a reply status is one of the schema's", "use one of the names, or null";
+    /// A text is none of those that the definitions declare.
+    UnknownValue, Error, "unknown-value":
+        "a text is one of the `values` that the definitions declare of its column",
+        "use one of the values, or add it to `values` in the definition file";
     /// A colour is not spelled as colours are, or none of the palette.
     InvalidColor, Error, "invalid-color":
         "a colour is a lower-case name, of the palette in the footer where there is one, and has one spelling",

@@ -152,6 +152,7 @@ optional! {
         cube_distance: f32,
         reply_status: String,
         reply_repair: String,
+        reply_fault: String,
         view_description: String,
         reasoning: String,
         summary: String,

@@ -16,7 +16,7 @@ use super::read::in_order::in_order;
 use super::read::open::{TraceFile, TraceSet};
 use super::replies::{REPLY_STATUS, ReplyCounts};
 use super::scan::{EpisodeBatch, Projection};
-use super::schema::{self, Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
+use super::schema::{Kind, RECORDING_KEY, VERSION_KEY, WRITER_KEY};
 use exact::budget::Limit;
 use exact::hash;
 use parquet_pages::checksums::Checksums;
@@ -146,7 +146,7 @@ pub enum Listing {
 pub fn info(set: &TraceSet, listing: Listing, threads: NonZeroUsize) -> Result<Info, TraceError> {
     let mut listed = (listing == Listing::Episodes).then(Vec::new);
     let mut tally = Tally { files: vec![0; set.files().len()], ..Tally::default() };
-    let statuses: Vec<String> = set.column(REPLY_STATUS).map(|_| REPLY_STATUS.to_owned()).into_iter().collect();
+    let statuses: Vec<String> = set.declares(REPLY_STATUS).then(|| REPLY_STATUS.to_owned()).into_iter().collect();
     let mut replies = (!statuses.is_empty()).then(ReplyCounts::default);
     let summary = set.scan(
         &Projection { unchecked: statuses, ..Projection::default() },
@@ -359,7 +359,7 @@ fn coverage(cells: &Cells, pairs: &[SeedRun], experiments: &BTreeSet<String>, mo
 fn columns(set: &TraceSet) -> Vec<ColumnInfo> {
     let about = |name: &str| {
         let found = set.column(name)?;
-        let known = schema::column(name).is_some();
+        let known = set.domain().column(name).is_some();
         Some(ColumnInfo { name: name.to_owned(), kind: found.kind, known, missing_from: found.missing_from })
     };
     set.column_names().into_iter().filter_map(about).collect()

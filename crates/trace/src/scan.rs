@@ -18,6 +18,7 @@ use super::error::TraceError;
 use super::read::open::TraceSet;
 use super::read::parallel_scan::{Episodes, Event, pass};
 use super::read::projection::Layout;
+use super::schema::DeclaredColumn;
 use super::validate::color_set::{Spellings, other_names};
 use super::validate::duplicate_ids::{Prints, hashes};
 use super::validate::episode_hashes;
@@ -32,6 +33,8 @@ pub struct Projection {
     pub unchecked: Vec<String>,
     /// Columns with one value per episode, besides [`EPISODE_COLUMNS`]; checked to be constant in each.
     pub constants: Vec<String>,
+    /// What definitions declare of columns that the schema does not know.
+    pub declared: Vec<DeclaredColumn>,
     /// The experiments that are known; an episode of another one is a fault. Any if `None`.
     pub experiments: Option<Vec<String>>,
 }
@@ -120,6 +123,7 @@ impl TraceSet {
             projection.step_columns(),
             EPISODE_COLUMNS.into_iter().chain(projection.constants.iter().map(String::as_str)),
         )?;
+        layout.with_declared(&projection.declared);
         for column in &projection.unchecked {
             layout.without_rules(column);
         }

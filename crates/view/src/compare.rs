@@ -6,11 +6,11 @@ use super::episode::{LONGEST, about};
 use super::error::ViewError;
 use super::filter::{Query, number, required};
 use super::snapshot::Snapshot;
-use trace::episode::Episode;
-use trace::schema::{COLUMNS, Column};
+use trace::schema::domain::is_identity;
+use trace::schema::{COLUMNS, Column, Value as Cell};
 
 /// Columns that differ between any two recordings, and say nothing of what was done.
-const BY_CHANCE: [&str; 11] = [
+const BY_CHANCE: [&str; 12] = [
     "latency_ms",
     "prompt_tokens",
     "completion_tokens",
@@ -22,6 +22,7 @@ const BY_CHANCE: [&str; 11] = [
     "identification",
     "reply_status",
     "reply_repair",
+    "reply_fault",
 ];
 
 /// Where the frame is in a log, not what the step was.
@@ -30,12 +31,20 @@ const ADDRESS: &str = "frame_time";
 /// Both episodes, and where they differ: at steps of both in `columns` of what was seen and done, and `also` in others.
 pub(super) fn answer(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let (a, b) = (snapshot.episode(required(query, "a")?)?, snapshot.episode(required(query, "b")?)?);
-    let parted = |is_wanted: fn(&Column) -> bool| -> Vec<(&'static str, Vec<usize>)> {
-        let columns = COLUMNS.iter().filter(|column| is_wanted(column));
-        columns.map(|column| (column.name, differing(column, &a.episode, &b.episode))).collect()
+    let is_known = |column: &Column| a.own.is_none() && b.own.is_none() || is_identity(column.name);
+    let parted = |is_wanted: fn(&Column) -> bool| -> Vec<(&str, Vec<usize>)> {
+        let columns = COLUMNS.iter().filter(|column| is_wanted(column) && is_known(column));
+        columns
+            .map(|column| (column.name, differing(column.of_steps(&a.episode), column.of_steps(&b.episode))))
+            .collect()
     };
     let constants = parted(|column| column.constant && column.name != "episode_hash");
-    let of_steps = parted(|column| !column.constant && column.name != ADDRESS);
+    let mut of_steps = parted(|column| !column.constant && column.name != ADDRESS);
+    for column in a.own.iter().flatten() {
+        if let Some(other) = b.own.iter().flatten().find(|other| other.name == column.name) {
+            of_steps.push((column.name.as_str(), differing(column.values(), other.values())));
+        }
+    }
     let (of_a, of_b) = (a.episode.steps.len(), b.episode.steps.len());
     let (side, both, last) = if of_a < of_b { ("a", of_a, of_b) } else { ("b", of_b, of_a) };
     let mut acts = Vec::new();
@@ -71,7 +80,7 @@ pub(super) fn same_frame(snapshot: &Snapshot, query: &Query) -> Result<Value, Vi
 }
 
 /// The steps at which a column differs, ascending, as far as both episodes go.
-fn differing(column: &Column, a: &Episode, b: &Episode) -> Vec<usize> {
-    let pairs = column.of_steps(a).zip(column.of_steps(b)).enumerate();
+fn differing<'e>(a: impl Iterator<Item = Option<Cell<'e>>>, b: impl Iterator<Item = Option<Cell<'e>>>) -> Vec<usize> {
+    let pairs = a.zip(b).enumerate();
     pairs.filter(|(_, (a, b))| a != b).map(|(at, _)| at + 1).collect()
 }

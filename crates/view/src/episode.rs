@@ -11,6 +11,7 @@ use score::evidence::{Evidence, MetricEvidence, ranges};
 use study::Question;
 use trace::episode::Episode;
 use trace::log::frames::Moment;
+use trace::schema::domain::is_identity;
 use trace::schema::{COLUMNS, Column, Value as Cell};
 use world::replay::moments::moments;
 
@@ -62,8 +63,9 @@ pub(super) fn described(
         "frames": first.is_some_and(|moment| moment.frame.is_some()),
         "log": first.is_some(),
         "lost": is_lost(snapshot, &episode.episode_id),
-        "constants": constants(episode, longest),
-        "steps": steps(episode, longest),
+        "constants": constants(opened, longest),
+        "own": opened.own.is_some(),
+        "steps": steps(opened, longest),
         "marks": marks.collect::<Vec<_>>(),
         "metrics": metrics,
         "against": against,
@@ -75,6 +77,10 @@ pub(super) fn described(
 pub(super) fn text(snapshot: &Snapshot, query: &Query) -> Result<Value, ViewError> {
     let opened = snapshot.episode(required(query, "id")?)?;
     let (name, t) = (required(query, "column")?, number(query, "t")?.unwrap_or_default());
+    if let Some(own) = opened.own.iter().flatten().find(|own| own.name == name) {
+        let value = t.checked_sub(1).and_then(|at| own.values().nth(at)).flatten();
+        return Ok(json!({"text": if let Some(Cell::Text(text)) = value { Some(lines(text)) } else { None }}));
+    }
     let column = COLUMNS.iter().find(|column| column.name == name && !column.constant);
     let at = t.checked_sub(1).filter(|at| *at < opened.episode.steps.len());
     let (Some(column), Some(at)) = (column, at) else {
@@ -95,8 +101,10 @@ fn is_lost(snapshot: &Snapshot, id: &str) -> bool {
 }
 
 /// The columns that are the same at every step.
-fn constants(episode: &Episode, longest: usize) -> Vec<Value> {
-    let with_step = |column: &&Column| column.constant && column.name != "episode_hash";
+fn constants(opened: &Opened, longest: usize) -> Vec<Value> {
+    let episode = &opened.episode;
+    let is_known = |column: &Column| opened.own.is_none() || is_identity(column.name);
+    let with_step = |column: &&Column| column.constant && column.name != "episode_hash" && is_known(column);
     let columns = COLUMNS.iter().filter(with_step);
     columns
         .filter_map(|column| {
@@ -117,8 +125,15 @@ fn head<'e>(episode: &'e Episode, column: &Column) -> Option<Cell<'e>> {
 }
 
 /// The columns of the steps that have some value, each with a value per step.
-fn steps(episode: &Episode, longest: usize) -> Value {
-    let mut all = Map::new();
+fn steps(opened: &Opened, longest: usize) -> Value {
+    let (episode, mut all) = (&opened.episode, Map::new());
+    if let Some(own) = &opened.own {
+        for column in own {
+            let values: Vec<Option<Value>> = column.values().map(|value| Some(shown(value?, longest))).collect();
+            all.insert(column.name.clone(), json!({"doc": "", "unit": null, "values": values}));
+        }
+        return Value::Object(all);
+    }
     for column in COLUMNS.iter().filter(|column| !column.constant && column.name != "frame_time") {
         let values: Vec<Option<Cell<'_>>> = column.of_steps(episode).collect();
         if values.iter().all(Option::is_none) {

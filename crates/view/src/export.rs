@@ -47,7 +47,7 @@ impl Files {
         let bytes = bytes.into();
         self.bytes += bytes.len() as u64;
         LARGEST.check(self.bytes).map_err(|exceeded| {
-            ViewError::Request(format!("{exceeded}\n  help: --where \"experiment = 'E1'\" leaves episodes out"))
+            ViewError::Request(format!("{exceeded}\n  help: --where \"run = 1\" leaves episodes out"))
         })?;
         self.all.push((path.into(), bytes));
         Ok(())

@@ -14,8 +14,9 @@ use trace::episode::Episode;
 use trace::inputs::Input;
 use trace::log::LogError;
 use trace::log::frames::{self, LogIndex, Moment, Shape};
-use trace::merge;
+use trace::merge::{self, OwnColumn};
 use trace::scan::{EpisodePlace, episode_places};
+use trace::schema::Domain;
 
 /// How many indices of logs are kept.
 const KEPT_INDICES: usize = 64;
@@ -66,6 +67,8 @@ pub(super) struct Opened {
     /// The log of an episode under way.
     pub running: Option<PathBuf>,
     pub input: Option<Input>,
+    /// The columns of the steps where the trace is not the mirror's; then the episode holds identity and time alone.
+    pub own: Option<Vec<OwnColumn>>,
 }
 
 impl Snapshot {
@@ -159,14 +162,17 @@ impl Snapshot {
             let own = rows.iter().find(|rows| rows.episode_id == id);
             let own =
                 own.ok_or_else(|| ViewError::Absent(format!("`{}` was replaced; load the page again", input.name)))?;
-            let episode = own.episode().map_err(|fault| ViewError::Absent(format!("`{}`: {fault}", input.name)))?;
-            return Ok(Opened { episode, running: None, input: Some(input.clone()) });
+            let is_mirror = scored.study.traces()?.domain() == Domain::Mirror;
+            let episode = if is_mirror { own.episode() } else { own.identity() };
+            let episode = episode.map_err(|fault| ViewError::Absent(format!("`{}`: {fault}", input.name)))?;
+            let own = (!is_mirror).then(|| own.own_columns());
+            return Ok(Opened { episode, running: None, input: Some(input.clone()), own });
         }
         // What there is by now, not what there was: it grows.
         let own = self.running.iter().find(|running| running.episode.episode_id == id);
         let own = own.ok_or_else(|| ViewError::Absent(format!("no episode `{id}`")))?;
         let now = unfinished(&own.log)?.unwrap_or_else(|| own.episode.clone());
-        Ok(Opened { episode: now, running: Some(own.log.clone()), input: None })
+        Ok(Opened { episode: now, running: Some(own.log.clone()), input: None, own: None })
     }
 
     /// What the logs have of a step.

@@ -14,7 +14,7 @@ pub(super) mod world;
 
 #[cfg(feature = "view")]
 use study::view;
-use study::{diff, figure, plan, query, report, score, stats};
+use study::{diff, figure, gate, plan, query, report, score, stats};
 
 #[cfg(feature = "sim")]
 pub use self::world::record;
@@ -30,6 +30,7 @@ pub enum Command {
     Stats(stats::StatsArgs),
     Figure(figure::FigureArgs),
     Diff(diff::DiffArgs),
+    Gate(gate::GateArgs),
     #[cfg(feature = "sim")]
     Record(Box<world::record::RecordArgs>),
     Import(trace::import::ImportArgs),
@@ -65,6 +66,7 @@ impl Command {
             Self::Stats(args) => args.run(),
             Self::Figure(args) => args.run(),
             Self::Diff(args) => args.run(),
+            Self::Gate(args) => args.run(),
             #[cfg(feature = "sim")]
             Self::Record(args) => args.run(),
             Self::Import(args) => args.run(),

@@ -3,9 +3,11 @@
 //! | code | meaning |
 //! |---|---|
 //! | 0 | done |
-//! | 1 | a check that was asked for did not hold (`validate`, `compare`, `audit`, `verify`) |
+//! | 1 | a check that was asked for did not hold (`validate`, `compare`, `audit`, `verify`); `gate`: something regressed |
 //! | 2 | bad usage, input or definition |
 //! | 3 | something of the input is lost (`recover`); the rest was saved |
+//! | 4 | `gate`: nothing regressed, but of some cells nothing can be said |
+//! | 5 | `gate`: nothing regressed, but some cells are not comparable |
 //! | 130 | interrupted (`record`); what was done stays |
 
 use std::error::Error;
@@ -17,7 +19,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use exact::escape::visible_lines;
-use metric::fault::{FaultRecord, Faults};
+use toml_spec::{FaultRecord, Faults};
 use trace::diagnostic::{MORE_FILES, is_short_of_files};
 
 /// Which form errors have, where no option says it: decided before anything is parsed.
@@ -34,6 +36,10 @@ pub enum Outcome {
     CheckFailed,
     /// Something of the input is lost; the rest was saved.
     Lossy,
+    /// Too few episodes for a verdict that was asked for.
+    CannotSay,
+    /// Episodes that were to be compared were recorded differently.
+    NotComparable,
     /// Ctrl-C ended it; what was done until then stays, and the same command continues.
     Interrupted,
 }
@@ -111,6 +117,8 @@ pub fn exit_code(result: Result<Outcome, Failure>, format: ErrorFormat) -> u8 {
         Ok(Outcome::Done) => 0,
         Ok(Outcome::CheckFailed) => 1,
         Ok(Outcome::Lossy) => 3,
+        Ok(Outcome::CannotSay) => 4,
+        Ok(Outcome::NotComparable) => 5,
         Ok(Outcome::Interrupted) => 130,
         // The reader of a pipe has seen enough (`| head`): not an error.
         Err(Failure::Output(error)) if error.kind() == io::ErrorKind::BrokenPipe => 0,

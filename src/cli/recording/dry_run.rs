@@ -1,6 +1,6 @@
 //! What `record --dry-run` says: what would be recorded, and what that may take. Nothing is written or sent.
 
-use std::io::{self, Write as _};
+use std::io;
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -13,7 +13,10 @@ use world::agent::vlm::estimate;
 use world::record::plan::{Key, Subject};
 use world::sim::config::WorldConfig;
 
-/// The answer of `record --dry-run --json`.
+/// Tokens of a reply, hidden reasoning left out, before any is seen: the keys of the paper's object with a sentence each.
+const TYPICAL_REPLY: u64 = 250;
+
+/// The answer of `record --dry-run --json`; a list of them for a study or several models.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct ForecastAnswer {
     /// The model's name as shown in tables.
@@ -43,6 +46,8 @@ pub struct RequestForecast {
     pub completion_tokens_at_most: u64,
     /// US dollars for the requests alone; null if nobody knows the price.
     pub prompt_cost_usd: Option<f64>,
+    /// US dollars with replies of 250 tokens, a prior, or as many as they may have; null if nobody knows the price.
+    pub typical_cost_usd: Option<f64>,
     /// US dollars with the longest replies; null if nobody knows the price.
     pub cost_usd_at_most: Option<f64>,
 }
@@ -83,6 +88,7 @@ impl RequestForecast {
             prompt_tokens: 0,
             completion_tokens_at_most: 0,
             prompt_cost_usd: None,
+            typical_cost_usd: None,
             cost_usd_at_most: None,
         };
         for key in todo {
@@ -95,14 +101,32 @@ impl RequestForecast {
         forecast.completion_tokens_at_most = forecast.at_most * u64::from(vlm.max_output_tokens());
         let prices = vlm.choice().model.prices;
         forecast.prompt_cost_usd = prices.cost_of_requests(forecast.prompt_tokens);
+        let typical = TYPICAL_REPLY.min(vlm.max_output_tokens().into());
+        forecast.typical_cost_usd = prices.cost_of(forecast.prompt_tokens, forecast.at_most * typical);
         forecast.cost_usd_at_most = prices.cost_of(forecast.prompt_tokens, forecast.completion_tokens_at_most);
         Ok(forecast)
     }
 }
 
-/// Prints what would be recorded, for people.
-pub(crate) fn print(answer: &ForecastAnswer) -> io::Result<()> {
-    let mut out = io::stdout().lock();
+/// Tells what would be recorded of several models, and of all together.
+pub(crate) fn tell_all(out: &mut impl io::Write, answers: &[ForecastAnswer]) -> io::Result<()> {
+    answers.iter().try_for_each(|answer| tell(out, answer))?;
+    let requests: Vec<_> = answers.iter().filter_map(|answer| answer.requests).collect();
+    let episodes: usize = answers.iter().map(|answer| answer.episodes.len()).sum();
+    let sent: u64 = requests.iter().map(|requests| requests.at_most).sum();
+    let sum = |cost: fn(&RequestForecast) -> Option<f64>| dollars(requests.iter().filter_map(cost).sum());
+    let unknown = requests.iter().filter(|requests| requests.cost_usd_at_most.is_none()).count();
+    let (typical, most) = (sum(|requests| requests.typical_cost_usd), sum(|requests| requests.cost_usd_at_most));
+    write!(out, "together: {}, at most {}; ", counted(episodes as u64, "episode"), counted(sent, "request"))?;
+    write!(out, "about {typical} with replies of {TYPICAL_REPLY} tokens, at most {most}")?;
+    match unknown {
+        0 => writeln!(out),
+        models => writeln!(out, ", and what {} without prices cost", counted(models as u64, "model")),
+    }
+}
+
+/// Tells what would be recorded, for people.
+pub(crate) fn tell(out: &mut impl io::Write, answer: &ForecastAnswer) -> io::Result<()> {
     let (to_do, steps) = (counted(answer.episodes.len() as u64, "episode"), counted(answer.steps_at_most, "step"));
     write!(out, "{}: would record {to_do}, at most {steps}", visible(&answer.model))?;
     match answer.found {
@@ -118,11 +142,12 @@ pub(crate) fn print(answer: &ForecastAnswer) -> io::Result<()> {
     }
     let (prompt, completion) = (requests.prompt_tokens, requests.completion_tokens_at_most);
     writeln!(out, "tokens: about {prompt} in requests, at most {completion} in replies")?;
-    match (requests.prompt_cost_usd, requests.cost_usd_at_most) {
-        (Some(prompt), Some(most)) => writeln!(
+    match (requests.prompt_cost_usd, requests.typical_cost_usd.zip(requests.cost_usd_at_most)) {
+        (Some(prompt), Some((typical, most))) => writeln!(
             out,
-            "cost: about {} for the requests, at most {} with the longest replies",
+            "cost: about {} for the requests, {} with replies of {TYPICAL_REPLY} tokens, at most {} with the longest replies",
             dollars(prompt),
+            dollars(typical),
             dollars(most)
         ),
         (Some(prompt), None) => writeln!(

@@ -5,6 +5,7 @@ pub mod exec;
 #[cfg(feature = "view")]
 pub mod human;
 pub mod registration;
+pub mod several;
 pub mod vlm;
 
 use std::collections::BTreeMap;
@@ -156,7 +157,7 @@ impl Progress for Bar<'_> {
     fn step(&self, episode: Key, t: i32, row: &Step) {
         self.line.inc(1);
         if let Some(first) = self.replies.add(self.subject, episode, t, row) {
-            self.say(&format!("a reply could not be read: {}: {}", first.status, quoted(&first)));
+            self.say(&format!("a reply could not be read: {}: {}", first.status, first.words()));
         }
         if self.is_shown {
             self.line.set_message(self.message());
@@ -212,12 +213,6 @@ fn unreadable(counts: &ReplyCounts) -> Option<String> {
     (bad > 0).then(|| format!("{bad} of {all} {noun} could not be read: {counts}"))
 }
 
-/// What an unreadable reply says, and where it is.
-fn quoted(reply: &UnreadableReply) -> String {
-    let words = reply.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
-    format!("{words} ({}, step {})", visible(&reply.episode_id), reply.step)
-}
-
 fn spent(spend: &Spend) -> String {
     let (requests, answers) = (counted(spend.requests, "request"), counted(spend.uncosted, "answer"));
     let known = match (spend.uncosted, spend.cost_usd > 0.0) {
@@ -225,7 +220,14 @@ fn spent(spend: &Spend) -> String {
         (_, true) => format!("{} and what {answers} cost, which is unknown,", dollars(spend.cost_usd)),
         (_, false) => "an unknown cost".to_owned(),
     };
-    format!("{known} for {requests} and {}", counted(spend.tokens, "token"))
+    let unanswered = match spend.unanswered {
+        0 => String::new(),
+        count => {
+            let (requests, most) = (counted(count, "request"), dollars(spend.uncosted_usd_at_most));
+            format!("; {requests} without an answer may have been paid: at most {most}, as far as prices are known")
+        }
+    };
+    format!("{known} for {requests} and {}{unanswered}", counted(spend.tokens, "token"))
 }
 
 /// An amount to the cent, smaller ones to two digits that count.
@@ -261,7 +263,7 @@ pub(crate) fn say(
         writeln!(out, "another process recorded {episodes} into the same folder meanwhile")?;
     }
     if let Some(words) = unreadable(&answer.replies.counts) {
-        let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, quoted);
+        let first = answer.replies.first_unreadable.as_ref().map_or_else(String::new, UnreadableReply::words);
         writeln!(out, "{words}; first: {first}")?;
     }
     if let Some(shares) = shares(times) {
@@ -397,12 +399,16 @@ mod tests {
 
     #[test]
     fn what_is_not_known_of_a_cost_is_said() {
-        let spend = Spend { cost_usd: 1.5, uncosted: 0, tokens: 2_000, requests: 3 };
+        let spend = Spend { cost_usd: 1.5, tokens: 2_000, requests: 3, ..Spend::default() };
         assert_eq!(spent(&spend), "1.50 US dollars for 3 requests and 2000 tokens");
         let partly = Spend { uncosted: 2, ..spend };
         assert!(spent(&partly).starts_with("1.50 US dollars and what 2 answers cost, which is unknown, for"));
         let nothing = Spend { cost_usd: 0.0, ..partly };
         assert_eq!(spent(&nothing), "an unknown cost for 3 requests and 2000 tokens");
+        let killed = Spend { unanswered: 1, uncosted_usd_at_most: 0.25, ..spend };
+        let words =
+            "; 1 request without an answer may have been paid: at most 0.2500 US dollars, as far as prices are known";
+        assert_eq!(spent(&killed), spent(&spend) + words);
         assert_eq!([dollars(0.0), dollars(0.00123)], ["0.00 US dollars", "0.0012 US dollars"]);
     }
 

@@ -8,6 +8,8 @@ use std::time::Duration;
 use tokio::runtime::Runtime;
 
 use crate::cli::outcome::Failure;
+use crate::cli::output;
+use exact::escape::visible;
 use trace::model_id::OWN_SERVER;
 use world::agent::vlm::limits::{Account, Limits, Spend};
 use world::agent::vlm::models::{Choice, Contract, Models};
@@ -22,9 +24,10 @@ use world::record::plan::slug;
 #[derive(Clone, Debug, clap::Args)]
 #[command(next_help_heading = "With --agent vlm")]
 pub struct VlmArgs {
-    /// The model: a name of the paper's table, an id, or one of --models; of any other agent its name in tables
+    /// The model: a name of the paper's table, an id, or one of --models; of any other agent its name in tables. Several are
+    /// recorded one after the other
     #[arg(long, value_name = "NAME|ID")]
-    model: Option<String>,
+    model: Vec<String>,
     /// A file with more models, in the shape of assets/models.toml
     #[arg(long, value_name = "FILE")]
     models: Option<PathBuf>,
@@ -55,7 +58,7 @@ pub struct VlmArgs {
     /// 16384 for a model that is asked to reason]
     #[arg(long, value_name = "N")]
     max_output_tokens: Option<NonZeroU32>,
-    /// How much the model is asked to reason: none, minimal, low, medium, high or xhigh, as far as it takes it [default: what
+    /// How much the model is asked to reason: none, minimal, low, medium, high, xhigh or max, as far as it takes it [default: what
     /// the models' file says, else what the provider does]
     #[arg(long, value_name = "EFFORT", value_parser = effort)]
     reasoning_effort: Option<Effort>,
@@ -78,11 +81,21 @@ pub struct VlmArgs {
 
 /// The folder of journals in the folder of a recording.
 const JOURNALS: &str = "journal";
+/// The folder of what models have spent, in the same.
+const LEDGERS: &str = "ledger";
 
 impl VlmArgs {
     /// The name that was typed.
     pub fn name(&self) -> Option<&str> {
-        self.model.as_deref()
+        self.model.first().map(String::as_str)
+    }
+
+    /// The same for each of the models that were typed; once if none was.
+    pub fn each(&self) -> Vec<Self> {
+        match self.model.as_slice() {
+            [] | [_] => vec![self.clone()],
+            several => several.iter().map(|model| Self { model: vec![model.clone()], ..self.clone() }).collect(),
+        }
     }
 
     /// The player, whose journals are in the folder of the recording.
@@ -90,7 +103,7 @@ impl VlmArgs {
         let choice = self.choice()?;
         if let Some(folder) = &self.cassette {
             let vlm = Arc::new(Vlm::cassette(choice, folder.clone()));
-            return Ok(VlmPlayer { vlm, at_once: 1, network: None });
+            return Ok(VlmPlayer { vlm, at_once: 1, network: None, ledger: None, slug: String::new() });
         }
         if self.max_cost.is_some() {
             choice.check_prices().map_err(Failure::input)?;
@@ -102,25 +115,27 @@ impl VlmArgs {
             .map_err(|error| Failure::input(format!("cannot start the network's thread: {error}")))?;
         let provider = self.provider(&choice)?;
         let journals = out.join(JOURNALS);
-        let reader = Vlm::cassette(choice.clone(), journals.clone());
-        let spend: Spend = spent(&reader, &journals, &slug(&choice.name)).map_err(Failure::input)?;
+        let slug = slug(&choice.name);
+        let spent =
+            spent(&Vlm::cassette(choice.clone(), journals.clone()), &journals, &slug).map_err(Failure::input)?;
         let limits = Limits { cost_usd: self.max_cost, tokens: self.max_tokens, requests: self.max_requests };
+        let ledger = Some(out.join(LEDGERS).join(format!("{slug}.json")));
         let on_outage = if self.stand_still_on_outage { OnOutage::StandStill } else { OnOutage::Lose };
         let vlm = Vlm::online(
             choice,
             provider,
             network.handle().clone(),
             journals,
-            Arc::new(Account::new(limits, spend)),
+            Arc::new(Account::new(limits, spent)),
             on_outage,
         );
-        Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network) })
+        Ok(VlmPlayer { vlm: Arc::new(vlm), at_once: self.at_once.max(1), network: Some(network), ledger, slug })
     }
 
     /// The player of a forecast: knows the journals in the folder of the recording, has no key and sends nothing.
     pub fn forecaster(&self, out: &Path) -> Result<VlmPlayer, Failure> {
         let vlm = Arc::new(Vlm::cassette(self.choice()?, out.join(JOURNALS)));
-        Ok(VlmPlayer { vlm, at_once: 1, network: None })
+        Ok(VlmPlayer { vlm, at_once: 1, network: None, ledger: None, slug: String::new() })
     }
 
     /// Whether requests go out, and are not played from an earlier recording.
@@ -129,12 +144,19 @@ impl VlmArgs {
     }
 
     fn choice(&self) -> Result<Choice, Failure> {
-        let Some(name) = &self.model else {
+        let Some(name) = self.name() else {
             return Err(Failure::input("--agent vlm needs --model, such as --model \"Claude Sonnet 4.6\""));
         };
         let models = Models::load(self.models.as_deref()).map_err(Failure::input)?;
         let backend = self.backend.as_deref().or(self.base_url.is_some().then_some(OWN_SERVER));
         let mut choice = models.choose(name, backend).map_err(Failure::input)?;
+        if !choice.is_known && choice.model.backend != OWN_SERVER {
+            output::say(&format!(
+                "warning: no file of models has `{}`: its prices are not known, and it is asked with the temperature of the paper; \
+                 a file for --models says more",
+                visible(name)
+            ));
+        }
         if let Some(url) = &self.base_url {
             choice.backend.base_url = Some(url.clone());
         }
@@ -181,6 +203,10 @@ pub struct VlmPlayer {
     at_once: usize,
     /// Requests run on it; it ends with the player.
     network: Option<Runtime>,
+    /// The file that processes share that record into the same folder.
+    ledger: Option<PathBuf>,
+    /// The model in the names of files.
+    slug: String,
 }
 
 impl VlmPlayer {
@@ -220,7 +246,9 @@ impl Player for VlmPlayer {
     }
 
     fn check(&self) -> Result<(), String> {
-        self.vlm.connect().map_err(|fault| fault.to_string())
+        self.vlm.connect().map_err(|fault| fault.to_string())?;
+        let share = |path| self.vlm.share_account(path, &self.slug).map_err(|fault| fault.to_string());
+        self.ledger.as_deref().map_or(Ok(()), share)
     }
 
     fn stopped(&self) -> Option<String> {

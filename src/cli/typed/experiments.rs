@@ -9,7 +9,7 @@ use crate::cli::outcome::Failure;
 use world::experiment::load::{self, FileError, Loaded};
 #[cfg(feature = "sim")]
 use {
-    metric::fault::{Fault, Faults},
+    toml_spec::{Fault, Faults},
     world::experiment::Experiment,
     world::record::plan::{Experiments, Named},
     world::sim::{config::WorldConfig, placement},

@@ -9,9 +9,9 @@ use crate::cli::args::{EngineArgs, GroupingArgs, LostArg, ScoringArgs, TraceArgs
 use crate::cli::outcome::Failure;
 use crate::cli::output;
 use exact::escape::visible;
-use metric::fault::Faults;
 use report::html;
 use study::{LostAs, Question, ScoredAlike, Study, StudyError, resolve};
+use toml_spec::Faults;
 use trace::inputs::Input;
 
 impl TraceArgs {

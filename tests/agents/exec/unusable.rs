@@ -20,7 +20,7 @@ fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
     let words = ["--runs", "2", "--threads", "1"];
     let (code, answer, said) = outcome(&bench.record(&words).output().unwrap());
     assert_eq!(code, Some(2), "{said}");
-    let last = "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 20)";
+    let last = "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 20): expected value at line 1 column 1";
     assert!(said.contains(&sentence(20, last)), "{said}");
     assert_eq!((&answer["recorded"], &answer["steps"], &answer["stopped"]), (&0.into(), &0.into(), &true.into()));
     assert!(!bench.path("runs/E1-exec.parquet").exists() && bench.lost().is_empty());
@@ -31,7 +31,13 @@ fn an_agent_whose_every_reply_is_unreadable_ends_its_recording() {
     let few = [&words[..], &["--max-unusable", "3"]].concat();
     let (code, _, said) = outcome(&bench.record(&few).output().unwrap());
     assert_eq!(code, Some(2), "{said}");
-    assert!(said.contains(&sentence(3, "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 3)")), "{said}");
+    assert!(
+        said.contains(&sentence(
+            3,
+            "parse_failed: `I cannot see.` (E1/exec/s1/r1, step 3): expected value at line 1 column 1"
+        )),
+        "{said}"
+    );
 
     let all = [&words[..], &["--keep-going"]].concat();
     let (code, answer, said) = outcome(&bench.record(&all).output().unwrap());

@@ -29,13 +29,14 @@ pub fn patience() -> Patience {
         first_delay: Duration::from_millis(2),
         longest_delay: Duration::from_millis(4),
         longest_asked_delay: Duration::from_millis(30),
+        longest_wait: Duration::from_millis(200),
         largest_answer: 100_000,
         ..Patience::default()
     }
 }
 
 pub fn choice(dialect: Dialect) -> Choice {
-    let prices = Prices { input: Some(1.0), output: Some(10.0) };
+    let prices = Prices { input: Some(1.0), cached_input: Some(0.1), output: Some(10.0) };
     Choice {
         name: "Loopback".to_owned(),
         model: Model {
@@ -46,10 +47,13 @@ pub fn choice(dialect: Dialect) -> Choice {
             contract: Contract::Schema,
             max_output_tokens: NonZeroU32::new(500),
             reasoning_effort: None,
+            temperature: Some(0.2),
+            extra_body: serde_json::Map::new(),
             answers_as: Vec::new(),
             accepted: Vec::new(),
         },
-        backend: Backend { dialect, base_url: None, key: "UNUSED".to_owned() },
+        backend: Backend { dialect, base_url: None, key: "UNUSED".to_owned(), extra_body: serde_json::Map::new() },
+        is_known: true,
     }
 }
 

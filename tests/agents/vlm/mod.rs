@@ -6,6 +6,7 @@ mod fingerprints;
 mod keys;
 mod killed;
 mod languages;
+mod loopback;
 mod memory;
 #[cfg(target_os = "linux")]
 mod power;

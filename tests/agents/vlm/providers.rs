@@ -5,11 +5,13 @@ use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use world::agent::Status;
+use world::agent::reply::Repair;
 use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
+use world::record::fingerprint::Fingerprint;
 
-use super::bench::{Bench, KEY};
+use super::bench::{Bench, KEY, choice, patience};
 use super::recordings::{Folder, counting};
 use super::server::{JSON, Request, Server, decision, endings, http, ok, spoken, whole};
 use crate::harness::program::{run, stderr};
@@ -83,6 +85,65 @@ fn the_quota_of_a_day_stops_the_recording_with_what_to_do() {
     }
 }
 
+#[test]
+fn a_wait_of_hours_stops_the_recording_with_what_to_do() {
+    for (wait, seconds) in [("7200", "7200 s"), ("999999999999999999999", "s: HTTP 429")] {
+        let answer = http("429 Too Many Requests", &format!("retry-after: {wait}\r\n"), b"slow down");
+        let server = Server::start(move |_, _| answer.clone());
+        let bench = Bench::new(Limits::default());
+        let vlm = bench.vlm(&server, Dialect::OpenaiChat, OnOutage::StandStill);
+        let lost = Bench::play(&vlm, "episode", 2).remove(1).unwrap_err().cause;
+        assert!(lost.contains("asks to wait") && lost.contains(seconds) && lost.contains("\n  help: "), "{lost}");
+        assert_eq!((vlm.stopped(), server.count()), (Some(lost.as_str()), 1));
+    }
+}
+
+#[test]
+fn no_request_goes_out_before_a_used_up_limit_is_renewed() {
+    // OpenAI: <https://platform.openai.com/docs/guides/rate-limits>, "Rate limits in headers".
+    let headers = "content-type: application/json\r\nx-ratelimit-remaining-requests: 0\r\n\
+                   x-ratelimit-reset-requests: 100ms\r\n";
+    let body = spoken(Dialect::OpenaiChat, &decision("w"), "stop").to_string();
+    let server = Server::start(move |_, _| http("200 OK", headers, body.as_bytes()));
+    let bench = Bench::new(Limits::default());
+    let start = Instant::now();
+    let replies = Bench::play(&bench.vlm(&server, Dialect::OpenaiChat, OnOutage::Lose), "episode", 3);
+    assert!(replies.iter().all(|reply| reply.as_ref().is_ok_and(|reply| reply.status == Status::Ok)));
+    assert_eq!(server.count(), 3);
+    assert!(start.elapsed() >= Duration::from_millis(200), "the provider was asked too early");
+}
+
+#[test]
+fn a_call_of_a_function_in_place_of_a_text_is_a_repair_with_every_provider() {
+    let arguments: Value = serde_json::from_str(&decision("w")).unwrap();
+    for dialect in PROVIDERS {
+        let mut body = spoken(dialect, "", endings(dialect).0);
+        match dialect {
+            Dialect::OpenaiChat | Dialect::OpenaiCompatible => {
+                let call = json!({ "type": "function", "function": { "name": "reply", "arguments": decision("w") } });
+                body["choices"][0]["message"] = json!({ "content": null, "tool_calls": [call] });
+            }
+            Dialect::Gemini => {
+                let call = json!({ "functionCall": { "name": "reply", "args": arguments } });
+                body["candidates"][0]["content"]["parts"] = json!([call]);
+            }
+            Dialect::AnthropicMessages => {
+                body["content"] = json!([{ "type": "tool_use", "id": "1", "name": "reply", "input": arguments }]);
+            }
+        }
+        let server = Server::start(move |_, _| ok(&body));
+        let bench = Bench::new(Limits::default());
+        // The second time from the journal.
+        for _ in 0..2 {
+            let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+            let reply = Bench::play(&vlm, "episode", 1).remove(0).unwrap();
+            assert_eq!((reply.status, reply.repairs), (Status::Repaired, vec![Repair::ToolCall]), "{dialect:?}");
+            assert_eq!(reply.self_color.as_deref(), Some("red"), "{dialect:?}");
+        }
+        assert_eq!(server.count(), 1);
+    }
+}
+
 /// `record` of Gemini 2.5 Pro at this server.
 fn record(folder: &Folder, server: &Server, words: &str) -> (Option<i32>, String) {
     let words = format!("--backend google --seeds 1 --max-output-tokens 100 {words}");
@@ -149,4 +210,138 @@ fn a_dated_snapshot_is_the_model_that_was_asked_for() {
     assert_eq!((code, server.count()), (Some(0), 2), "{said}");
     let answer = run(folder.path(), &["report", "runs", "--no-figures"]).ends(0);
     assert!(!answer.stderr.contains("another model"), "{}", answer.stderr);
+}
+
+#[test]
+fn a_refused_parameter_is_named_with_the_line_that_mends_it() {
+    // Each as its provider sends it: OpenAI's reference of errors, Anthropic's for Claude Sonnet 5, Google's for Gemini 3,
+    // OpenRouter's guide to provider routing.
+    let openai = |param: &str, message: &str| json!({ "error": { "message": message, "type": "invalid_request_error", "param": param, "code": "unsupported_value" } });
+    let cases = [
+        (
+            "openai-chat",
+            "400 Bad Request",
+            openai("temperature", "Unsupported value: 'temperature' does not support 0.2 with this model."),
+            "temperature = \"default\"",
+        ),
+        (
+            "anthropic-messages",
+            "400 Bad Request",
+            json!({ "type": "error", "error": { "type": "invalid_request_error", "message": "`temperature` is deprecated for this model." } }),
+            "temperature = \"default\"",
+        ),
+        (
+            "openai-chat",
+            "400 Bad Request",
+            openai(
+                "reasoning_effort",
+                "Unsupported value: 'reasoning_effort' does not support 'none' with this model.",
+            ),
+            "reasoning_effort = \"low\"",
+        ),
+        (
+            "gemini",
+            "400 Bad Request",
+            json!({ "error": { "code": 400, "status": "INVALID_ARGUMENT", "message": "Thinking level MINIMAL is not supported for this model." } }),
+            "reasoning_effort = \"low\"",
+        ),
+        (
+            "openai-compatible",
+            "400 Bad Request",
+            openai("response_format", "Invalid parameter: 'response_format' of type 'json_schema' is not supported."),
+            "contract = \"prompt\"",
+        ),
+        (
+            "openai-compatible",
+            "404 Not Found",
+            json!({ "error": { "code": 404, "message": "No endpoints found that can handle the requested parameters." } }),
+            "require_parameters = false",
+        ),
+    ];
+    for (dialect, status, body, line) in cases {
+        let answer = http(status, "content-type: application/json\r\n", body.to_string().as_bytes());
+        let server = Server::start(move |_, _| answer.clone());
+        let folder = Folder::new();
+        let own = format!(
+            "[backend.own]\ndialect = \"{dialect}\"\nkey = \"MIRRORSTATS_API_KEY\"\n\
+             [model.\"Own 1\"]\nbackend = \"own\"\nid = \"own-1\"\n"
+        );
+        std::fs::write(folder.path().join("own.toml"), own).unwrap();
+        let words = "--models own.toml --backend own --seeds 1 --runs 1";
+        let output = folder.record(&server, "Own 1", words).output().unwrap();
+        let said = stderr(&output);
+        assert_eq!((output.status.code(), server.count()), (Some(2), 1), "{said}");
+        assert!(said.contains("[model.\"Own 1\"]") && said.contains(line), "{dialect}: {said}");
+    }
+}
+
+#[test]
+fn no_temperature_and_what_a_model_has_besides_are_sent_and_part_of_the_fingerprint() {
+    let asked = |dialect: Dialect, temperature: Option<f64>, extra: Value| {
+        let server = Server::start(move |_, _| ok(&spoken(dialect, &decision("w"), endings(dialect).0)));
+        let bench = Bench::new(Limits::default());
+        let mut choice = choice(dialect);
+        choice.model.temperature = temperature;
+        choice.model.extra_body = extra.as_object().unwrap().clone();
+        let vlm = bench.vlm_of(&server, choice, OnOutage::Lose, patience());
+        Bench::play(&vlm, "episode", 1).remove(0).unwrap();
+        let recording = json!({ "agent": vlm.description() });
+        (server.requests().remove(0).json(), Fingerprint::of(&recording, None).parts["sampling"].clone(), recording)
+    };
+    for dialect in PROVIDERS {
+        let place = if dialect == Dialect::Gemini { "/generationConfig/temperature" } else { "/temperature" };
+        let (plain, paper, _) = asked(dialect, Some(0.2), json!({}));
+        assert_eq!(plain.pointer(place), Some(&json!(0.2)), "{dialect:?}");
+        let extra =
+            json!({ "service_tier": "flex", "generationConfig": { "mediaResolution": "MEDIA_RESOLUTION_HIGH" } });
+        let (body, other, recording) = asked(dialect, None, extra.clone());
+        assert_eq!((body.pointer(place), &body["service_tier"]), (None, &json!("flex")), "{dialect:?}");
+        assert_eq!(body["generationConfig"]["mediaResolution"], "MEDIA_RESOLUTION_HIGH");
+        assert_eq!(body["generationConfig"].get("maxOutputTokens").is_some(), dialect == Dialect::Gemini);
+        assert_eq!(
+            (&recording["agent"]["temperature"], &recording["agent"]["extra_body"]),
+            (&json!("default"), &extra)
+        );
+        assert_ne!(paper, other, "{dialect:?}");
+    }
+}
+
+#[test]
+fn tokens_from_a_cache_have_their_price_with_every_provider() {
+    for dialect in PROVIDERS {
+        let mut body = spoken(dialect, &decision("w"), endings(dialect).0);
+        // 1000 tokens of a request, 400 of them from the cache; 100 of a reply.
+        match dialect {
+            // <https://platform.openai.com/docs/guides/prompt-caching>; OpenRouter's usage accounting has the same name.
+            Dialect::OpenaiChat | Dialect::OpenaiCompatible => {
+                body["usage"]["prompt_tokens_details"] = json!({ "cached_tokens": 400 });
+            }
+            // <https://ai.google.dev/gemini-api/docs/caching>: `promptTokenCount` has the cached ones in it.
+            Dialect::Gemini => body["usageMetadata"]["cachedContentTokenCount"] = json!(400),
+            // <https://platform.claude.com/docs/en/build-with-claude/prompt-caching>: `input_tokens` has not.
+            Dialect::AnthropicMessages => {
+                body["usage"]["input_tokens"] = json!(600);
+                body["usage"]["cache_read_input_tokens"] = json!(400);
+            }
+        }
+        let server = Server::start(move |_, _| ok(&body));
+        let bench = Bench::new(Limits::default());
+        let vlm = bench.vlm(&server, dialect, OnOutage::Lose);
+        let usage = Bench::play(&vlm, "episode", 1).remove(0).unwrap().usage;
+        assert_eq!(usage.prompt_tokens, Some(1_000), "{dialect:?}");
+        // Prices of the bench: 1, of cached 0.1, and 10 dollars for a million.
+        assert!((usage.cost_usd.unwrap() - (600.0 + 40.0 + 1_000.0) / 1e6).abs() < 1e-12, "{dialect:?}: {usage:?}");
+    }
+}
+
+#[test]
+fn an_id_that_no_file_has_is_recorded_with_a_warning() {
+    let server = Server::start(|at, request| ok(&spoken(Dialect::OpenaiChat, &counting(request, 2, at), "stop")));
+    let folder = Folder::new();
+    let words = "--backend openai --seeds 1 --runs 1 --accept-model model-1-0601";
+    let output =
+        folder.record(&server, "gpt-99", words).env("OPENAI_API_KEY", "sk-loopback-0123456789").output().unwrap();
+    let said = stderr(&output);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(said.starts_with("warning: no file of models has `gpt-99`: its prices are not known"), "{said}");
 }

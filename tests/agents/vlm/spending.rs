@@ -1,5 +1,8 @@
 //! Limits hold over all episodes of a recording and all times that it is started.
 
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
 use world::agent::vlm::OnOutage;
 use world::agent::vlm::limits::Limits;
 use world::agent::vlm::wire_format::Dialect;
@@ -8,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::bench::Bench;
 use super::recordings::{Folder, counting};
-use super::server::{Server, decision, whole};
+use super::server::{Conduct, Server, decision, whole};
 use crate::harness::program::stderr;
 
 #[test]
@@ -39,7 +42,11 @@ fn limits_count_what_earlier_starts_spent() {
     let cases = [
         ("--max-requests 2", "requests is reached: 2 of 2", 2),
         ("--max-tokens 2300", "tokens is reached: 3300 of 2300", 3),
-        ("--max-cost 0.002", "cost is reached: 0.0020 US dollars of 0.0020", 1),
+        (
+            "--max-cost 0.0075 --max-output-tokens 100",
+            "cost is reached: 0.0060 US dollars of 0.0075 US dollars; the next request may cost",
+            3,
+        ),
     ];
     for (limit, reason, requests) in cases {
         let server = Server::start(|at, request| whole(Dialect::OpenaiCompatible, &counting(request, 4, at)));
@@ -51,7 +58,9 @@ fn limits_count_what_earlier_starts_spent() {
             assert!(said.contains(reason) && said.contains("higher limit continues"), "{limit}, start {start}: {said}");
             assert_eq!(server.count(), requests, "{limit}, start {start}");
         }
-        let (code, said) = started(&folder, &server, "");
+        let (_, output_tokens) = limit.split_once("--max-output-tokens").unwrap_or_default();
+        let same = if output_tokens.is_empty() { String::new() } else { format!("--max-output-tokens{output_tokens}") };
+        let (code, said) = started(&folder, &server, &same);
         assert_eq!((code, server.count()), (Some(0), 4), "{said}");
     }
 }
@@ -107,7 +116,7 @@ fn models_that_share_a_folder_have_accounts_of_their_own() {
         serde_json::from_slice::<Value>(&output.stdout).unwrap()["spend"].clone()
     };
     // Four answers of 1100 tokens each.
-    let of = |requests: u64, cost: f64| json!({ "cost_usd": cost, "uncosted": 0, "tokens": requests * 1100, "requests": requests });
+    let of = |requests: u64, cost: f64| json!({ "cost_usd": cost, "uncosted": 0, "unanswered": 0, "uncosted_usd_at_most": 0.0, "tokens": requests * 1100, "requests": requests });
     let is = |found: &Value, requests: u64, cost: f64| {
         let expected = of(requests, cost);
         let near = (found["cost_usd"].as_f64().unwrap() - cost).abs() < 1e-9;
@@ -152,4 +161,77 @@ fn a_limit_of_cost_is_an_amount() {
         let output = folder.record(&server, "own", &format!("--max-cost={limit}")).output().unwrap();
         assert_eq!((output.status.code(), server.count()), (Some(2), 0), "{limit}: {}", stderr(&output));
     }
+}
+
+/// A model with prices: an answer takes 0.002 dollars, and a request of 100 tokens of reply at most some 0.005.
+const PRICED: &str = "[model.own]\nbackend = \"compatible\"\nid = \"own-1\"\nanswers_as = [\"model-1-*\"]\n\
+                      max_output_tokens = 100\nprices = { input = 1.0, output = 10.0 }\n";
+
+/// `record` of this model with 16 episodes of six steps, 16 in flight, at a server that takes its time.
+fn priced(folder: &Folder, server: &Server, words: &str) -> Command {
+    std::fs::write(folder.path().join("own.toml"), PRICED).unwrap();
+    let words = format!("--models own.toml --seeds 4 --runs 4 --threads 1 --in-flight 16 --json {words}");
+    folder.record(server, "own", &words)
+}
+
+fn slow_server() -> Server {
+    Server::start(|at, request| {
+        std::thread::sleep(Duration::from_millis(30));
+        whole(Dialect::OpenaiCompatible, &counting(request, 6, at))
+    })
+}
+
+#[test]
+fn money_is_never_exceeded_and_begun_episodes_are_finished() {
+    let (server, folder) = (slow_server(), Folder::new());
+    let output = priced(&folder, &server, "--max-cost 0.1").output().unwrap();
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let cost = answer["spend"]["cost_usd"].as_f64().unwrap();
+    assert!(cost <= 0.1 && (cost - 0.002 * server.count() as f64).abs() < 1e-9, "{cost} for {}", server.count());
+    // Money for eight episodes, but for what the last request may cost.
+    let recorded = answer["recorded"].as_u64().unwrap();
+    assert!(recorded >= 6, "{recorded} of 16: {}", stderr(&output));
+    assert!(server.count() as u64 - 6 * recorded < 6, "{} requests, {recorded} whole episodes", server.count());
+}
+
+#[test]
+fn processes_that_record_into_a_folder_have_one_ledger() {
+    let (server, folder) = (slow_server(), Folder::new());
+    let start =
+        || priced(&folder, &server, "--max-cost 0.1").stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    let both = [start(), start(), start()].map(|child| child.wait_with_output().unwrap());
+    for output in &both {
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(output));
+    }
+    let cost = 0.002 * server.count() as f64;
+    assert!((0.08..=0.1).contains(&cost), "{cost} dollars");
+    // The next start counts what all of them have spent.
+    let output = priced(&folder, &server, "--max-cost 0.1").output().unwrap();
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!((answer["spend"]["cost_usd"].as_f64().unwrap() - 0.002 * server.count() as f64).abs() < 1e-9);
+    assert_eq!(answer["spend"]["requests"], server.count());
+}
+
+#[test]
+fn requests_that_timed_out_or_were_killed_count_with_what_they_may_cost() {
+    let server = Server::start(|at, request| match at {
+        0 => Conduct::dripping(vec![b' '], 1, Duration::from_secs(5)),
+        _ => whole(Dialect::OpenaiCompatible, &counting(request, 4, at)).into(),
+    });
+    let folder = Folder::new();
+    let output = priced(&folder, &server, "--timeout 1 --max-requests 1 --attempts 1").output().unwrap();
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let may_cost = answer["spend"]["uncosted_usd_at_most"].as_f64().unwrap();
+    assert_eq!((&answer["spend"]["unanswered"], &answer["spend"]["cost_usd"]), (&1.into(), &0.0.into()));
+    assert!((0.003..0.01).contains(&may_cost), "{may_cost}");
+    let said = stderr(&output);
+    assert!(said.contains("1 request without an answer may have been paid: at most 0.00"), "{said}");
+    // A killed process leaves a request without any outcome: its line is the last.
+    let journal = folder.journals().into_keys().next().unwrap();
+    let text = std::fs::read_to_string(&journal).unwrap();
+    std::fs::write(&journal, text.lines().next().unwrap().to_owned() + "\n").unwrap();
+    let output = priced(&folder, &server, "--max-cost 0.001").output().unwrap();
+    let answer: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answer["spend"]["uncosted_usd_at_most"].as_f64(), Some(may_cost));
+    assert_eq!((output.status.code(), server.count()), (Some(2), 1), "{}", stderr(&output));
 }

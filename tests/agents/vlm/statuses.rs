@@ -34,8 +34,13 @@ fn check(dialect: Dialect, cases: Vec<Case>) {
         let has_decision = matches!(status, Status::Ok | Status::Repaired);
         assert_eq!(reply.action.is_some(), has_decision, "{place}");
         assert_eq!(reply.self_color.as_deref(), has_decision.then_some("red"), "{place}");
-        let is_outage = matches!(status, Status::RateLimited | Status::ServerError | Status::Timeout);
-        assert_eq!(server.count(), if is_outage { 3 } else { 1 }, "{place}");
+        let is_outage = matches!(status, Status::ServerError | Status::Timeout);
+        match status {
+            // A busy provider is waited for: more often than there are attempts.
+            Status::RateLimited => assert!(server.count() > 3, "{place}: {}", server.count()),
+            _ if name.starts_with("overloaded") => assert!(server.count() > 3, "{place}: {}", server.count()),
+            _ => assert_eq!(server.count(), if is_outage { 3 } else { 1 }, "{place}"),
+        }
     }
 }
 
@@ -97,6 +102,7 @@ fn failures_of_the_server_end_in_their_status_with_every_provider() {
         let deep = format!("{{\"x\":{}{}}}", "[".repeat(5_000), "]".repeat(5_000));
         let huge = vec![b' '; 200_000];
         let cut = |status: &str| format!("HTTP/1.1 {status}\r\ncontent-length: 100\r\n\r\nhalf").into_bytes();
+        let overloaded = br#"{"error": {"message": "The model is overloaded. Please try again later."}}"#;
         let too_many = |headers: &str| http("429 Too Many Requests", headers, b"slow down");
         check(
             dialect,
@@ -104,7 +110,6 @@ fn failures_of_the_server_end_in_their_status_with_every_provider() {
                 ("429 alone", too_many(""), Status::RateLimited),
                 ("429 with seconds", too_many("retry-after: 0\r\n"), Status::RateLimited),
                 ("429 with a date", too_many("retry-after: Sun, 06 Nov 1994 08:49:37 GMT\r\n"), Status::RateLimited),
-                ("429 for years", too_many("retry-after: 999999999999999999999\r\n"), Status::RateLimited),
                 ("429 with nonsense", too_many("retry-after: -1 soon\r\n"), Status::RateLimited),
                 ("429 cut", cut("429 Too Many Requests"), Status::RateLimited),
                 ("429 and huge", http("429 Too Many Requests", "", &huge), Status::RateLimited),
@@ -112,7 +117,8 @@ fn failures_of_the_server_end_in_their_status_with_every_provider() {
                 ("500", http("500 Internal Server Error", "", b"oops"), Status::ServerError),
                 ("503", http("503 Service Unavailable", "retry-after: 0\r\n", b""), Status::ServerError),
                 ("504", http("504 Gateway Timeout", "", page), Status::Timeout),
-                ("529", http("529 Overloaded", JSON, br#"{"type": "error"}"#), Status::ServerError),
+                ("overloaded, 503", http("503 Service Unavailable", JSON, overloaded), Status::ServerError),
+                ("overloaded, 529", http("529 Overloaded", JSON, br#"{"type": "error"}"#), Status::ServerError),
                 ("a page", http("200 OK", "content-type: text/html\r\n", page), Status::ServerError),
                 ("a page as JSON", http("200 OK", JSON, page), Status::ServerError),
                 ("no type", http("200 OK", "", b"{}"), Status::ServerError),
@@ -195,7 +201,8 @@ fn what_the_provider_will_not_change_its_mind_about_ends_the_run_at_once() {
             let replies = Bench::play(&vlm, "episode", 2);
             let reasons: Vec<_> = replies.into_iter().map(|reply| reply.unwrap_err().cause).collect();
             let sentence = format!("the provider refuses the request: HTTP {status}");
-            assert!(reasons[0].starts_with(&sentence) && !reasons[0].contains('\n'), "{}", reasons[0]);
+            let said = reasons[0].split("\n  help: the parameter is").next().unwrap();
+            assert!(said.starts_with(&sentence) && !said.contains('\n'), "{}", reasons[0]);
             assert_eq!(reasons[1], reasons[0]);
             assert_eq!(vlm.stopped(), Some(reasons[0].as_str()));
             assert_eq!(server.count(), 1, "{status} {dialect:?}");
@@ -255,7 +262,7 @@ fn the_wait_that_a_provider_asks_for_is_kept() {
         _ => whole(Dialect::AnthropicMessages, &decision("w")),
     });
     let bench = Bench::new(Limits::default());
-    let patience = Patience { longest_asked_delay: Duration::from_secs(5), ..patience() };
+    let patience = Patience { longest_wait: Duration::from_secs(5), ..patience() };
     let vlm = bench.vlm_with(&server, Dialect::AnthropicMessages, OnOutage::Lose, patience);
     let start = Instant::now();
     assert_eq!(Bench::play(&vlm, "episode", 1).remove(0).unwrap().status, Status::Ok);

@@ -8,6 +8,7 @@ use super::recordings::Folder;
 use super::server::{Request, Server, decision, ok, spoken, whole};
 use crate::harness::files::write_small_world;
 use crate::harness::program::{run, stderr};
+use crate::harness::traces;
 
 /// A folder whose episodes have 20 steps.
 fn short() -> Folder {
@@ -32,7 +33,7 @@ fn a_recording_of_which_nothing_could_be_read_says_so_everywhere() {
     let start = r"`I go on.\u{a}\u{1b}[31m[key] on and on and";
     let summary = format!("\n200 of 200 replies could not be read: parse_failed; first: {start}");
     assert!(said.contains(&summary), "{said}");
-    assert!(said.contains("...` (E1/own/s1/r1, step 1)\n"), "{said}");
+    assert!(said.contains("...` (E1/own/s1/r1, step 1): expected value at line 1 column 1\n"), "{said}");
     // It is told before the end.
     assert!(said.starts_with(&format!("a reply could not be read: parse_failed: {start}")), "{said}");
     assert!(said.lines().all(|line| line.len() < 400) && !said.contains('\u{1b}') && !said.contains(KEY), "{said}");
@@ -43,6 +44,14 @@ fn a_recording_of_which_nothing_could_be_read_says_so_everywhere() {
     let first = &replies["first_unreadable"];
     assert_eq!((&first["episode_id"], &first["step"]), (&"E1/own/s1/r1".into(), &1.into()));
     assert!(first["text"].as_str().unwrap().len() <= 203, "{first}");
+    // Why, in the parser's words: in the trace, the answer and the check.
+    let why = "expected value at line 1 column 1";
+    assert_eq!(first["fault"], why);
+    let faults = traces::texts(&folder.path().join("runs/E1-own.parquet"), "reply_fault");
+    assert_eq!(faults, vec![Some(why.to_owned()); 200]);
+    let checked = run(folder.path(), &["trace", "check", "runs", "--max-unreadable", "0.5"]);
+    let text = checked.ends(1).stdout;
+    assert!(text.contains(&format!("\n  the most frequent reason (200): {why}\n")), "{text}");
 
     let (text, json) = told(&folder, "info");
     assert!(text.contains("200 of 200 replies could not be read: parse_failed"), "{text}");
@@ -92,8 +101,7 @@ fn statuses_are_counted_apart_and_replies_that_are_read_are_no_news() {
     let folder = short();
     let output = folder.record(&server, "own", "--seeds 1 --runs 1 --json").output().unwrap();
     let said = stderr(&output);
-    let summary =
-        "3 of 20 replies could not be read: parse_failed 1, refusal 2; first: `I go on.` (E1/own/s1/r1, step 2)";
+    let summary = "3 of 20 replies could not be read: parse_failed 1, refusal 2; first: `I go on.` (E1/own/s1/r1, step 2): expected value at line 1 column 1";
     assert!(said.contains(summary), "{said}");
     let (text, json) = told(&folder, "info");
     assert!(text.contains("3 of 20 replies could not be read: parse_failed 1, refusal 2"), "{text}");

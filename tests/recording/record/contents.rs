@@ -34,6 +34,7 @@ fn rows_follow_from_one_another() {
         "start_distance",
         "shown_color",
         "reply_repair",
+        "reply_fault",
         "mark_color",
         "mark_report",
         "mirror_mark_px",

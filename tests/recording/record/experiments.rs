@@ -157,21 +157,20 @@ fn a_program_is_asked_in_its_words_and_another_prompt_is_another_recording() {
     assert_eq!(differ.iter().map(|(key, _)| key.as_str()).collect::<Vec<_>>(), ["prompts"]);
 }
 
-/// The block of commands that stands first in this section of the README.
-fn commands_of(section: &str) -> String {
-    let readme = fs::read_to_string(repository().join("README.md")).unwrap();
-    let (_, rest) = readme.split_once(&format!("### {section}\n")).unwrap();
-    let (_, block) = rest.split_once("```sh\n").unwrap();
+/// The first block of commands of a page.
+fn commands_of(page: &str) -> String {
+    let text = fs::read_to_string(repository().join(page)).unwrap();
+    let (_, block) = text.split_once("```sh\n").unwrap();
     block.split_once("```\n").unwrap().0.to_owned()
 }
 
 #[test]
-fn the_example_of_the_readme_works_as_it_is_pasted() {
+fn the_documented_example_works_as_it_is_pasted() {
     let folder = tempfile::tempdir().unwrap();
     let place = std::path::Path::new(PROGRAM).parent().unwrap().display();
     let mut shell = Command::new("sh");
     shell.current_dir(folder.path()).env("PATH", format!("{place}:{}", std::env::var("PATH").unwrap()));
-    let said = stdout(&succeeds(shell.args(["-e", "-c", &commands_of("Experiments are files")])));
+    let said = stdout(&succeeds(shell.args(["-e", "-c", &commands_of("docs/how-to/experiments.md")])));
     assert!(said.contains("late/echo.toml: no fault") && said.contains("A late echo"), "{said}");
     assert!(said.contains("a mirror that shows the room 3 steps late"), "{said}");
     assert!(folder.path().join("late/report/tables/main.md").exists());

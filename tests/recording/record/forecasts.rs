@@ -50,14 +50,17 @@ fn a_model_is_estimated_without_its_key() {
     let [prompt, most] = ["prompt_cost_usd", "cost_usd_at_most"].map(|key| requests[key].as_f64().unwrap());
     let tokens = requests["prompt_tokens"].as_f64().unwrap();
     assert!((prompt - tokens * 3.0 / 1e6).abs() < 1e-9 && (most - prompt - 60_000.0 * 15.0 / 1e6).abs() < 1e-9);
+    // No reply is longer than it may be, nor is a typical one.
+    assert_eq!(requests["typical_cost_usd"], requests["cost_usd_at_most"]);
     // Fewer pixels, fewer tokens.
     fs::write(bench.path("small.toml"), "eye.width = 640\neye.height_px = 480\n").unwrap();
     let larger = forecast(&bench, &format!("{words} anthropic/claude-sonnet-4.6"));
     assert!(larger["requests"]["prompt_tokens"].as_f64().unwrap() > tokens + 600.0 * 300.0);
 
-    let unpriced = forecast(&bench, &format!("{words} google/gemma-4-31b-it:nitro"));
+    let unpriced = forecast(&bench, &format!("{words} own-x --base-url http://127.0.0.1:9/v1"));
     assert_eq!(unpriced["requests"]["cost_usd_at_most"], Value::Null, "an unknown price is no price of zero");
-    let told = succeeds(&mut bench.record("runs", &format!("{words} google/gemma-4-31b-it:nitro --dry-run")));
+    let told =
+        succeeds(&mut bench.record("runs", &format!("{words} own-x --base-url http://127.0.0.1:9/v1 --dry-run")));
     let told = String::from_utf8(told.stdout).unwrap();
     assert!(told.contains("would record 6 episodes, at most 600 steps"), "{told}");
     assert!(told.contains("cost: unknown") && !told.contains(" 0.00"), "{told}");

@@ -1,7 +1,7 @@
 //! What is seen through panes of every kind: the census against drawn labels and MuJoCo's rays, and against what each kind
 //! must show.
 
-use metric::fault::Source;
+use toml_spec::Source;
 use trace::episode::Action;
 use trace::palette::Color;
 use world::experiment::Experiment;

@@ -145,6 +145,10 @@ fn catalog() -> Catalog {
         when: None,
         se: StandardError::Sample,
         chance: None,
+        measures: None,
+        range: None,
+        finished: None,
+        completes: None,
     };
     let experiment = |(at, (name, title)): (usize, &(&str, &str))| {
         let chance = if *name == "E5" { None } else { Ratio::new(1, 3) };
@@ -160,6 +164,7 @@ fn catalog() -> Catalog {
     };
     Catalog {
         name: "test".to_owned(),
+        domain: None,
         hash: "0".repeat(64),
         open: false,
         lets: IndexMap::new(),

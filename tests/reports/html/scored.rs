@@ -39,7 +39,8 @@ pub struct Report {
     pub statistics: Option<Statistics>,
     pub recordings: Recordings,
     /// Name, title, caption and picture.
-    pub figures: Vec<(FigureName, String)>,
+    /// Names, captions and pictures.
+    pub figures: Vec<(FigureName, String, String)>,
 }
 
 impl Report {
@@ -69,7 +70,10 @@ impl Report {
         let input = figures::Input { episodes: Some(&report.episodes), ..figures::Input::of_cells(&report.cells) };
         let drawn =
             FigureName::ALL.into_iter().filter(|name| !matches!(name, FigureName::Gaze | FigureName::E5Outcomes));
-        let picture = |name| (name, figures::draw(name, &input).unwrap().inline_svg());
+        let picture = |name| {
+            let drawn = figures::draw(name, &input).unwrap();
+            (name, drawn.caption().to_owned(), drawn.inline_svg())
+        };
         report.figures = drawn.map(picture).collect();
         report
     }
@@ -89,6 +93,6 @@ impl Report {
     }
 }
 
-fn figure((name, svg): &(FigureName, String)) -> Figure<'_> {
-    Figure { name: name.name(), title: name.title(), caption: name.caption(), svg }
+fn figure((name, caption, svg): &(FigureName, String, String)) -> Figure<'_> {
+    Figure { name: name.name(), title: name.title(), caption, svg }
 }

@@ -146,5 +146,9 @@ pub fn metric_of(kind: Kind, better: Better, when: Option<String>, se: StandardE
         when,
         se,
         chance: None,
+        measures: None,
+        range: None,
+        finished: None,
+        completes: None,
     }
 }

@@ -1,4 +1,4 @@
-//! The worked example of the README, as printed there.
+//! The worked examples of docs/how-to/definitions.md.
 
 use crate::assert_shown;
 use crate::changes::run;

@@ -8,14 +8,17 @@ use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use polars::prelude::{
-    AnyValue, CsvWriter, DataFrame, Engine, JsonFormat, JsonWriter, LazyFrame, ParquetWriter, PlanCallback,
-    PolarsError as Inner, PolarsResult, Schema, SerWriter as _,
+    AnyValue, Column, CsvWriter, DataFrame, DataType, Engine, IntoLazy as _, JsonFormat, JsonWriter, LazyFrame,
+    ParquetWriter, PlanCallback, PolarsError as Inner, PolarsResult, Schema, SerWriter as _,
 };
 use polars::sql::SQLContext;
 
+use sqlparser::ast::{Query, Value};
+
+use super::rewrite::{self, substitute};
 use super::run::{self, PolarsError};
-use super::statement::{Checked, Table};
-use metric::fault::Faults;
+use super::statement::{Asked, Checked, Table};
+use toml_spec::Faults;
 use trace::catch_panic::contained_on_all_threads;
 
 /// Rows of one batch at most.
@@ -58,13 +61,40 @@ pub struct Excerpt {
 /// The lazy answer to a checked query.
 pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFrame, QueryError> {
     let mut context = SQLContext::new();
-    let mut columns = Vec::new();
+    let (mut columns, mut schemas) = (Vec::new(), Vec::new());
     for (table, mut frame) in tables {
         let schema = frame.collect_schema().map_err(PolarsError::from)?;
         columns.extend(schema.iter_names().map(polars::prelude::PlSmallStr::to_string));
+        schemas.push((table, schema));
         context.register(table.name(), frame);
     }
-    let planned = run::plan(&mut context, &query.text).and_then(|mut frame| {
+    let statement = match &query.asked {
+        Asked::Tables => return Ok(listed("name", Table::ALL.map(Table::name), None)?),
+        Asked::Columns(table) => {
+            let found = schemas.iter().find(|(other, _)| other == table).map(|(_, schema)| schema);
+            let columns: Vec<(String, &str)> = found
+                .into_iter()
+                .flat_map(|schema| schema.iter())
+                .map(|(name, ty)| (name.to_string(), sql_type(ty)))
+                .collect();
+            let (names, types): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+            return Ok(listed("column_name", names, Some(types))?);
+        }
+        Asked::Rows(statement) => {
+            let mut statement = statement.as_ref().clone();
+            let value = |inner: &Query, asked| {
+                scalar(&mut context, inner, asked).map_err(|error| match error {
+                    PolarsError::Failed(words) => {
+                        query.whole(format!("a subquery runs by itself first: {words}")).into()
+                    }
+                    other => QueryError::Polars(other),
+                })
+            };
+            substitute(&mut statement, value)?;
+            statement
+        }
+    };
+    let planned = run::plan(&mut context, &statement.to_string()).and_then(|mut frame| {
         // Names and types are resolved here, before a row is read.
         contained_on_all_threads(|| frame.collect_schema()).map_err(PolarsError::Failed)??;
         Ok(frame)
@@ -73,6 +103,62 @@ pub fn plan(query: &Checked, tables: Vec<(Table, LazyFrame)>) -> Result<LazyFram
         PolarsError::Failed(words) => QueryError::Faults(query.fault(&words, &columns)),
         other => QueryError::Polars(other),
     })
+}
+
+/// A table of texts: names, and types where they have any.
+fn listed<T: AsRef<str>>(
+    name: &str,
+    names: impl AsRef<[T]>,
+    types: Option<Vec<&str>>,
+) -> Result<LazyFrame, PolarsError> {
+    let texts: Vec<&str> = names.as_ref().iter().map(AsRef::as_ref).collect();
+    let mut columns = vec![Column::new(name.into(), &texts)];
+    columns.extend(types.map(|types| Column::new("column_type".into(), types)));
+    Ok(DataFrame::new(texts.len(), columns)?.lazy())
+}
+
+/// The type of a column in the words of SQL.
+fn sql_type(ty: &DataType) -> &'static str {
+    match ty {
+        DataType::Boolean => "BOOLEAN",
+        DataType::Int8 => "TINYINT",
+        DataType::Int16 => "SMALLINT",
+        DataType::Int32 => "INTEGER",
+        DataType::Int64 => "BIGINT",
+        DataType::UInt32 => "UINTEGER",
+        DataType::UInt64 => "UBIGINT",
+        DataType::Float32 => "FLOAT",
+        DataType::Float64 => "DOUBLE",
+        _ => "VARCHAR",
+    }
+}
+
+/// What a subquery is by itself: the value of its only row, null if it has none, or whether it has a row.
+fn scalar(context: &mut SQLContext, query: &Query, asked: rewrite::Asked) -> Result<Value, PolarsError> {
+    let found = run::collect(run::plan(context, &query.to_string())?)?;
+    if asked == rewrite::Asked::Exists {
+        return Ok(Value::Boolean(found.height() > 0));
+    }
+    let (rows, columns) = found.shape();
+    if columns != 1 || rows > 1 {
+        let words =
+            format!("a subquery in the place of a value has {rows} rows of {columns} columns: expected one value");
+        return Err(PolarsError::Failed(words));
+    }
+    if rows == 0 {
+        return Ok(Value::Null);
+    }
+    match found.columns()[0].get(0)? {
+        AnyValue::Null => Ok(Value::Null),
+        AnyValue::Boolean(value) => Ok(Value::Boolean(value)),
+        AnyValue::String(text) => Ok(Value::SingleQuotedString(text.to_owned())),
+        AnyValue::StringOwned(text) => Ok(Value::SingleQuotedString(text.to_string())),
+        // With every digit.
+        AnyValue::Float64(value) => Ok(Value::Number(format!("{value:?}"), false)),
+        AnyValue::Float32(value) => Ok(Value::Number(format!("{value:?}"), false)),
+        value if value.is_integer() => Ok(Value::Number(value.to_string(), false)),
+        value => Err(PolarsError::Failed(format!("a subquery has a value that no statement can hold: {value}"))),
+    }
 }
 
 pub fn write(frame: LazyFrame, format: Format, out: impl Write + Send + 'static) -> Result<(), PolarsError> {

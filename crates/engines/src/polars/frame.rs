@@ -9,7 +9,7 @@ use polars::prelude::{
 use super::run::PolarsError;
 use score::score_traces::ScoreError;
 use trace::open::{TraceFile, TraceSet};
-use trace::schema::{self, Kind, Stored};
+use trace::schema::{Kind, Stored};
 use trace::verify::verify_pages;
 
 /// A column of the frame.
@@ -35,8 +35,8 @@ impl FrameColumn {
     }
 
     /// A column as the schema has it; as wide as can be where the schema does not know it.
-    pub fn natural(name: &str, kind: Kind) -> Option<Self> {
-        match schema::column(name) {
+    pub fn natural(traces: &TraceSet, name: &str, kind: Kind) -> Option<Self> {
+        match traces.schema_column(name) {
             Some(known) => Some(Self { name: name.to_owned(), stored: known.stored }),
             None => Self::wide(name, kind),
         }

@@ -5,6 +5,7 @@
 
 pub mod answer;
 pub mod frame;
+mod rewrite;
 pub mod run;
 pub mod score;
 pub mod shared_file;

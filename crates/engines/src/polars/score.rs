@@ -19,7 +19,6 @@ use score::score_traces::unscored;
 use score::table::{EpisodeKey, EpisodeTable, Header, MetricColumn};
 use trace::open::{TraceFile, TraceSet};
 use trace::scan::EPISODE_COLUMNS;
-use trace::schema;
 
 /// The table that [`score::score_traces::score`] gives, computed by Polars.
 ///
@@ -66,7 +65,7 @@ fn check_overflow(traces: &TraceSet, definitions: &Definitions, steps: &LazyFram
     let plan = &definitions.plan;
     let needed = plan.needed_by(plan.outputs.iter().map(|output| output.node).chain(plan.filter));
     let rows = traces.files().iter().map(TraceFile::rows).sum();
-    let suspects = may_overflow(plan, &needed, rows, |name| schema::column(name)?.stored.range());
+    let suspects = may_overflow(plan, &needed, rows, |name| traces.schema_column(name)?.stored.range());
     let overflow = |node| Err(PolarsError::Overflow { metric: user_of(definitions, node) });
     if let Some(certain) = suspects.iter().find(|suspect| suspect.certain) {
         return overflow(certain.node);

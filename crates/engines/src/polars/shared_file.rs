@@ -26,17 +26,31 @@ pub fn write_file(frame: LazyFrame, format: Format, file: File) -> Result<(), Wr
     written.map_err(WriteError::Polars)
 }
 
-/// A file with several writers that keeps the first error.
-#[derive(Clone)]
-struct SharedFile(Arc<Mutex<Shared>>);
+/// The rows of a query as the bytes of a file.
+pub fn in_memory(frame: LazyFrame, format: Format) -> Result<Vec<u8>, PolarsError> {
+    let out = SharedFile::new(Vec::new());
+    write(frame, format, out.clone())?;
+    let mut shared = out.0.lock().unwrap_or_else(PoisonError::into_inner);
+    shared.out.flush().map_err(|error| PolarsError::Failed(error.to_string()))?;
+    Ok(std::mem::take(shared.out.get_mut()))
+}
 
-struct Shared {
-    out: BufWriter<File>,
+/// A file with several writers that keeps the first error.
+struct SharedFile<W: Write>(Arc<Mutex<Shared<W>>>);
+
+struct Shared<W: Write> {
+    out: BufWriter<W>,
     fault: Option<io::Error>,
 }
 
-impl SharedFile {
-    fn new(file: File) -> Self {
+impl<W: Write> Clone for SharedFile<W> {
+    fn clone(&self) -> Self {
+        Self(Arc::clone(&self.0))
+    }
+}
+
+impl<W: Write> SharedFile<W> {
+    fn new(file: W) -> Self {
         Self(Arc::new(Mutex::new(Shared { out: BufWriter::new(file), fault: None })))
     }
 
@@ -45,7 +59,7 @@ impl SharedFile {
         shared.fault.take().map_or_else(|| shared.out.flush(), Err)
     }
 
-    fn with<T>(&self, work: impl FnOnce(&mut BufWriter<File>) -> io::Result<T>) -> io::Result<T> {
+    fn with<T>(&self, work: impl FnOnce(&mut BufWriter<W>) -> io::Result<T>) -> io::Result<T> {
         let mut shared = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         work(&mut shared.out).map_err(|error| {
             let kind = error.kind();
@@ -55,7 +69,7 @@ impl SharedFile {
     }
 }
 
-impl Write for SharedFile {
+impl<W: Write> Write for SharedFile<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.with(|out| out.write(bytes))
     }

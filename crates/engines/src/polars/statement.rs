@@ -4,7 +4,7 @@
 //! query is read and checked here before Polars sees it; Polars is given what was checked, written out again.
 
 use std::collections::BTreeSet;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 use sqlparser::ast::{
@@ -12,9 +12,10 @@ use sqlparser::ast::{
 };
 use sqlparser::tokenizer::Span;
 
+use super::rewrite::{bare_column, rewrite};
 use exact::suggest::nearest;
-use metric::fault::{Fault, Faults, Place, Source};
 pub use metric::syntax::grammar::{Grammar, SyntaxFault, bytes_of, shortened, with_stack};
+use toml_spec::{Fault, Faults, Place, Source};
 
 /// A table that a query may name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -48,10 +49,21 @@ impl Table {
 /// A query that may be run.
 #[derive(Clone, Debug)]
 pub struct Checked {
-    pub text: String,
+    pub(super) asked: Asked,
     /// The tables that it names.
     pub tables: BTreeSet<Table>,
     source: Arc<Source>,
+}
+
+/// What a query asks for.
+#[derive(Clone, Debug)]
+pub(super) enum Asked {
+    /// The rows of a SELECT.
+    Rows(Box<Statement>),
+    /// The names of the tables.
+    Tables,
+    /// The columns of a table.
+    Columns(Table),
 }
 
 const QUERY: Grammar = Grammar { noun: "query", one: "a query", longest: 64 * 1024, most_tokens: 8000, help: None };
@@ -63,10 +75,9 @@ pub fn check(text: &str) -> Result<Checked, Faults> {
 
 fn checked(text: &str) -> Result<Checked, Faults> {
     let source = Arc::new(Source { name: "query".to_owned(), text: text.to_owned() });
-    let statement = parse(text).map_err(|fault| {
-        let place = Place { source: Arc::clone(&source), span: fault.span };
-        Faults(vec![Fault::new(place, fault.message).help_if(fault.help)])
-    })?;
+    let at = |span, message: String| Fault::new(Place { source: Arc::clone(&source), span }, message);
+    let parsed = parse(text);
+    let mut statement = parsed.map_err(|fault| Faults(vec![at(fault.span, fault.message).help_if(fault.help)]))?;
     let mut reader = Reader { source: &source, ctes: BTreeSet::new(), tables: BTreeSet::new(), faults: Vec::new() };
     let _ = statement.visit(&mut Names(&mut reader.ctes));
     let _ = statement.visit(&mut reader);
@@ -74,10 +85,35 @@ fn checked(text: &str) -> Result<Checked, Faults> {
     if !faults.is_empty() {
         return Err(Faults(faults));
     }
-    Ok(Checked { text: statement.to_string(), tables, source })
+    let asked = match statement {
+        Statement::ShowTables { .. } => Asked::Tables,
+        Statement::ExplainTable { .. } => tables.first().map_or(Asked::Tables, |table| Asked::Columns(*table)),
+        _ => {
+            rewrite(&mut statement).map_err(|words| Faults(vec![at(0..text.len(), words)]))?;
+            Asked::Rows(Box::new(statement))
+        }
+    };
+    Ok(Checked { asked, tables, source })
 }
 
 impl Checked {
+    /// A fault of the whole query.
+    pub(super) fn whole(&self, message: String) -> Faults {
+        let place = Place { source: Arc::clone(&self.source), span: 0..self.source.text.len() };
+        Faults(vec![Fault::new(place, message).help(OTHERWISE)])
+    }
+
+    /// The column of which an unknown name is a part, because there are no quotes around it.
+    fn unquoted<'c>(&self, start: usize, columns: &'c [String]) -> Option<(Range<usize>, &'c String)> {
+        let text = &self.source.text;
+        let is_word = |name: &str| name.chars().all(|c| c.is_alphanumeric() || c == '_');
+        columns.iter().filter(|column| !is_word(column)).find_map(|column| {
+            let spans = text.match_indices(column.as_str()).map(|(at, _)| at..at + column.len());
+            let span = spans.into_iter().find(|span| span.contains(&start) && !text[..span.start].ends_with('"'))?;
+            Some((span, column))
+        })
+    }
+
     /// What Polars said of the query, at the place of the name that it does not know.
     ///
     /// `columns` are those of the tables.
@@ -89,15 +125,29 @@ impl Checked {
                 (!name.is_empty() && !columns.contains(&name)).then_some(name)
             });
         let Some(name) = unknown else {
-            let place = Place { source: Arc::clone(&self.source), span: 0..self.source.text.len() };
-            return Faults(vec![Fault::new(place, format!("Polars cannot do this: {words}"))]);
+            return self.whole(format!("Polars cannot do this: {}", plain(words)));
         };
         let start = word_at(&self.source.text, &name);
+        if let Some((span, quoted)) = self.unquoted(start, columns) {
+            let place = Place { source: Arc::clone(&self.source), span };
+            let help = format!("write \"{quoted}\" in double quotes: its name is more than letters, digits and `_`");
+            return Faults(vec![Fault::new(place, format!("unknown column `{name}`")).help(help)]);
+        }
         let place = Place { source: Arc::clone(&self.source), span: start..start + name.len() };
         let near = nearest(&name, columns.iter().map(String::as_str)).map(|near| format!("did you mean `{near}`?"));
         let known = || format!("columns are {}", columns.join(", "));
         Faults(vec![Fault::new(place, format!("unknown column `{name}`")).help(near.unwrap_or_else(known))])
     }
+}
+
+/// What to do where Polars has no SQL for a question.
+const OTHERWISE: &str = "ask with a JOIN or a table of WITH; or ask DuckDB, of the file that `mirrorstats score TRACES -o \
+                         scores.parquet` writes, or in Python of `study.episodes`";
+
+/// Words of Polars without the syntax trees that it prints.
+fn plain(words: &str) -> &str {
+    let end = words.find(['{', '[']).filter(|_| words.contains("Ident {") || words.contains("Query {"));
+    words[..end.unwrap_or(words.len())].trim_end()
 }
 
 /// Where a word stands in a text, by itself; its start otherwise.
@@ -111,7 +161,12 @@ fn parse(text: &str) -> Result<Statement, SyntaxFault> {
     let parsed = QUERY.parser(text, |tokens| tokens)?.parse_statements();
     let mut statements = parsed.map_err(|error| QUERY.fault(text, &error))?;
     let (message, help) = match (statements.pop(), statements.len()) {
-        (Some(statement @ Statement::Query(_)), 0) => return Ok(statement),
+        (
+            Some(statement @ (Statement::Query(_) | Statement::ShowTables { .. } | Statement::ExplainTable { .. })),
+            0,
+        ) => {
+            return Ok(statement);
+        }
         (Some(_), 0) => {
             let help = "write SELECT ... FROM steps, episodes or cells";
             ("a query is a SELECT: it reads, and changes nothing".to_owned(), Some(help))
@@ -205,11 +260,21 @@ impl Visitor for Reader<'_> {
         if select.into.is_some() {
             self.refuse(select.span(), "SELECT INTO makes a table; a query reads alone", None);
         }
+        if let Some(column) = bare_column(select) {
+            let help = match column.value.as_str() {
+                "*" => "name the columns in its place, here and in a GROUP BY".to_owned(),
+                _ => format!("add GROUP BY {column}, or write max({column})"),
+            };
+            let message = format!("the column `{}` stands beside an aggregate, and there is no GROUP BY", column.value);
+            self.refuse(column.span, message, Some(help));
+        }
         ControlFlow::Continue(())
     }
 
     fn pre_visit_statement(&mut self, statement: &Statement) -> ControlFlow<()> {
-        if !matches!(statement, Statement::Query(_)) {
+        if let Statement::ExplainTable { table_name, .. } = statement {
+            self.table(table_name, None);
+        } else if !matches!(statement, Statement::Query(_) | Statement::ShowTables { .. }) {
             self.refuse(statement.span(), "a query is a SELECT: it reads, and changes nothing", None);
         }
         ControlFlow::Continue(())

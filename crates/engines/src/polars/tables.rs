@@ -18,7 +18,7 @@ pub fn steps(traces: &TraceSet) -> Result<LazyFrame, PolarsError> {
             let problem = format!("`{name}` is {} in `{first}` and {} in `{second}`", a.name(), b.name());
             return Err(PolarsError::Failed(format!("{problem}; write it with one type in all traces")));
         }
-        columns.extend(FrameColumn::natural(name, found.kind));
+        columns.extend(FrameColumn::natural(traces, name, found.kind));
     }
     frame::steps(traces, &columns)
 }

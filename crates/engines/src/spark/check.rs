@@ -14,7 +14,7 @@ use trace::colors::spelling::{MIXED, STRAY, WORDS};
 use trace::diagnostic::Code;
 use trace::palette::Color;
 pub use trace::schema::rules::{Known, Requirement, rules_of};
-use trace::schema::{self, Column, Kind};
+use trace::schema::{Column, Domain, Kind};
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Rule {
@@ -35,13 +35,19 @@ pub(super) fn rules<'a>(
     let experiments: Option<Vec<String>> = (!catalog.open).then(|| catalog.experiment.keys().cloned().collect());
     let known = Known { palette, experiments: experiments.as_deref() };
     let mut rules = Vec::new();
-    for column in columns.into_iter().filter_map(schema::column) {
+    let domain = domain_of(catalog);
+    for column in columns.into_iter().filter_map(|name| domain.column(name)) {
         rules.extend(rules_of(column, known).iter().map(|rule| {
             let found = found(column, rule.asks);
             Rule { code: rule.code, column: column.name.to_owned(), expected: rule.expected(), found }
         }));
     }
     rules
+}
+
+/// The domain of the traces that definitions are for.
+pub(super) const fn domain_of(catalog: &Catalog) -> Domain {
+    if catalog.domain.is_some() { Domain::Own } else { Domain::Mirror }
 }
 
 /// What was found in an episode that does not have what is asked for; null in one that has.
@@ -53,6 +59,7 @@ fn found(column: &Column, asks: Requirement<'_>) -> String {
         Requirement::Present => format!("CASE WHEN COUNT({x}) < COUNT(*) THEN 'null' END"),
         Requirement::Name => first_bad(&format!("{x} = ''")),
         Requirement::OneOf(values) => first_bad(&format!("{x} NOT IN ({})", texts(values.iter().copied()))),
+        Requirement::Among(values) => first_bad(&format!("{x} NOT IN ({})", texts(values.iter().map(String::as_str)))),
         Requirement::Color(color, palette) => first_bad(&no_color(&x, color, palette)),
         Requirement::Within(min, max, _) => first_bad(&format!("{x} < {min} OR {x} > {max}")),
         Requirement::Count if column.stored.kind() == Kind::Float => first_bad(&format!("{x} < 0 OR ISNAN({x})")),

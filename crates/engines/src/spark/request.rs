@@ -74,7 +74,7 @@ impl Request {
             folder,
             table: place.table().display().to_string(),
             answer: place.answer().display().to_string(),
-            optional: optional(&columns, job.sources),
+            optional: optional(&columns, job),
             columns,
         })
     }
@@ -82,10 +82,11 @@ impl Request {
 
 /// Columns that some files may lack. Whether a required one may be absent says the footer, which is opened here for files
 /// alone.
-fn optional(columns: &[(String, &'static str)], sources: &Sources) -> Vec<String> {
-    let knows_footers = matches!(sources, Sources::Files { .. });
+fn optional(columns: &[(String, &'static str)], job: Job<'_>) -> Vec<String> {
+    let knows_footers = matches!(job.sources, Sources::Files { .. });
+    let domain = check::domain_of(&job.definitions.catalog);
     let is_optional = |name: &str| {
-        schema::column(name).is_some_and(|column| column.default.is_some() && (knows_footers || !column.required))
+        domain.column(name).is_some_and(|column| column.default.is_some() && (knows_footers || !column.required))
     };
     columns.iter().map(|(name, _)| name).filter(|name| is_optional(name)).cloned().collect()
 }

@@ -1,6 +1,5 @@
 //! Calls of functions: arities, arguments, aggregates.
 
-use super::super::fault::Fault;
 use super::super::functions::{self, Entry, FUNCTIONS, Function};
 use super::super::plan::{Aggregate, Arithmetic, Comparison, Op};
 use super::super::syntax::{Expr, ExprKind, Literal};
@@ -8,6 +7,7 @@ use super::Bound;
 use super::scope::Scope;
 use crate::columns::{Level, Type};
 use exact::suggest::nearest;
+use toml_spec::Fault;
 
 /// How many steps back an expression looks; each is a join of the steps in SQL.
 const DEEPEST_LAG: u8 = 8;

@@ -15,13 +15,13 @@ use indexmap::IndexMap;
 
 use self::scope::Scope;
 use super::columns::{Columns, Level, Type};
-use super::fault::Fault;
 use super::file::{Document, MetricEntry};
-use super::origin::Written;
 use super::plan::{Builder, NodeId, Op, Plan};
 use super::syntax;
 use crate::catalog::Kind;
 use exact::escape::visible;
+use toml_spec::Fault;
+use toml_spec::Written;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bound {

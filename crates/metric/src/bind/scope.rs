@@ -4,15 +4,15 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::super::columns::{Column, Fallback};
-use super::super::fault::{Fault, Place, Source};
 use super::super::functions;
-use super::super::origin::Written;
 use super::super::plan::{Arithmetic, Comparison, Constant, NodeId, Op};
 use super::super::syntax::{BinaryOp, Expr, ExprKind, Literal};
 use super::{Binder, Bound, DEEPEST, State};
 use crate::columns::{Level, Type};
-use crate::fault::MOST;
 use exact::suggest::nearest;
+use toml_spec::MOST_FAULTS;
+use toml_spec::Written;
+use toml_spec::{Fault, Place, Source};
 
 /// One expression being bound: the binder, and the text that faults point into.
 pub(super) struct Scope<'b, 'a> {
@@ -141,7 +141,7 @@ impl Scope<'_, '_> {
         let known = document.lets.keys().chain(document.metrics.keys()).map(String::as_str);
         let known = known.chain(self.binder.columns.names()).chain(["t"]);
         let is_quoted = self.written.text[expr.span.clone()].starts_with('"');
-        if self.binder.faults.len() >= MOST {
+        if self.binder.faults.len() >= MOST_FAULTS {
             // Looking for a name that is like it costs as much as there are names.
             return None;
         }

@@ -1,11 +1,11 @@
 //! Types and levels: constants, conversions that lose nothing, operands brought together.
 
-use super::super::fault::Fault;
 use super::super::plan::{Constant, NodeId, Op};
 use super::super::syntax::{Expr, Literal};
 use super::Bound;
 use super::scope::Scope;
 use crate::columns::{Level, Type};
+use toml_spec::Fault;
 
 impl Scope<'_, '_> {
     pub(super) fn literal(&mut self, literal: &Literal) -> Bound {

@@ -7,12 +7,12 @@
 
 use std::collections::HashSet;
 
-use super::super::fault::Fault;
 use super::super::plan::{Comparison, Constant, NodeId, Op};
 use super::super::syntax::Expr;
 use super::scope::Scope;
 use super::{Binder, Bound};
 use exact::suggest::nearest;
+use toml_spec::Fault;
 
 /// The texts that a node can be.
 #[derive(Debug, Default)]
@@ -83,9 +83,9 @@ impl Binder<'_> {
 }
 
 impl Possible {
-    fn add_column(&mut self, name: &str, values: &[&str]) {
+    fn add_column(&mut self, name: &str, values: &[String]) {
         self.columns.push(name.to_owned());
-        self.texts.extend(values.iter().map(|value| (*value).to_owned()));
+        self.texts.extend_from_slice(values);
     }
 
     /// That this is none of them.

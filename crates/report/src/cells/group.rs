@@ -238,6 +238,7 @@ mod tests {
     fn table(rows: &[RowOf]) -> EpisodeTable {
         let catalog = Catalog {
             name: "test".to_owned(),
+            domain: None,
             hash: String::new(),
             open: true,
             lets: IndexMap::new(),

@@ -1,11 +1,11 @@
-//! `completion-gap`: TSA among finished episodes minus TSA among all, models by experiments.
+//! `completion-gap`: a rate among finished episodes minus the rate among all, models by experiments.
 
 use super::kit::{
     Align, Frame, MARGIN, Mark, NAME_ROOM, PALETTE, Rgb, Sheet, label, leading, legend, lettering, many, tiles,
 };
 use super::matrix::{MetricId, Reading};
 use super::missing;
-use super::{Drawn, FigureError, FigureName, Scene};
+use super::{Drawn, Scene};
 use exact::moments::Moments;
 use exact::number::Decimal;
 
@@ -14,9 +14,9 @@ const CELL: f64 = 50.0;
 /// Room for the scale below, px.
 const LEAST_WIDTH: f64 = 400.0;
 
-pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
-    let Scene { matrix, roster } = scene;
-    let gaps = Gaps::new(scene)?;
+pub fn draw(scene: Scene<'_>) -> Drawn {
+    let Scene { matrix, roster, .. } = scene;
+    let gaps = Gaps::new(scene);
     let (labels, label_width) = tiles::row_labels(&roster.names(), NAME_ROOM);
     let left = MARGIN + label_width + 8.0;
     let width = (left + CELL * many(matrix.experiments.len()) + MARGIN).max(LEAST_WIDTH);
@@ -38,7 +38,7 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
     }
     let bottom = rows + ROW * many(labels.len()) + 10.0;
     let height = gaps.draw_key(&mut sheet, bottom);
-    Ok((sheet, height))
+    (sheet, height)
 }
 
 /// The gaps of all cells, the size of the largest, and whether any is below zero.
@@ -50,14 +50,13 @@ struct Gaps<'a> {
 }
 
 impl<'a> Gaps<'a> {
-    fn new(scene: Scene<'a>) -> Result<Self, FigureError> {
-        let metric = |name| scene.matrix.metric(FigureName::CompletionGap, name);
-        let mut gaps = Self { scene, ids: [metric("TSA-C")?, metric("TSA")?], largest: 0.0, has_fall: false };
+    fn new(scene: Scene<'a>) -> Self {
+        let mut gaps = Self { scene, ids: [scene.metrics[0], scene.metrics[1]], largest: 0.0, has_fall: false };
         for gap in scene.matrix.pairs().filter_map(|(e, m)| gaps.gap(e, m)).collect::<Vec<_>>() {
             gaps.largest = gaps.largest.max(gap.abs());
             gaps.has_fall |= gap < 0.0;
         }
-        Ok(gaps)
+        gaps
     }
 
     fn moments(&self, experiment: &str, model: &str) -> Option<[Moments; 2]> {
@@ -92,11 +91,12 @@ impl<'a> Gaps<'a> {
         let [finished, all] = self.ids.map(|id| self.scene.matrix.reading(experiment, model, id));
         let gap = self.gap(experiment, model);
         let words = self.text(experiment, model).unwrap_or_else(|| "undefined".to_owned());
-        let parts = format!("TSA-C: {}, TSA: {}", finished.words(), all.words());
-        let mark = Mark::new(format!("{experiment} · {model} · TSA-C − TSA: {words} · {parts}"))
+        let [among, whole] = self.ids.map(|id| id.name);
+        let parts = format!("{among}: {}, {whole}: {}", finished.words(), all.words());
+        let mark = Mark::new(format!("{experiment} · {model} · {among} − {whole}: {words} · {parts}"))
             .with("experiment", experiment)
             .with("model", model)
-            .with("metric", "TSA-C - TSA")
+            .with("metric", format!("{among} - {whole}"))
             .value(gap)
             .with("n", all.n())
             .with("n-finished", finished.n());

@@ -6,9 +6,11 @@ use super::kit::{
     Arrangement, FULL_WIDTH, Frame, MARGIN, Mark, Member, PALETTE, Panels, Plot, Point, Sheet, Stroke, Swatch, legend,
     many, marker, rate_ticks, whole_ticks,
 };
+use super::matrix::MetricId;
 use super::{Drawn, FigureError, FigureName, Scene};
 use score::table::{EpisodeTable, MetricColumn};
-use statistics::survival::{Duration, End, Survival};
+use statistics::competing::{Ending, Outcome};
+use statistics::survival::Survival;
 
 const COLUMNS: usize = 3;
 const PLOT_HEIGHT: f64 = 130.0;
@@ -18,8 +20,8 @@ const AXIS_BELOW: f64 = 28.0;
 const MARKER_EVERY: f64 = 38.0;
 
 pub fn draw(scene: Scene<'_>, episodes: &EpisodeTable) -> Result<Drawn, FigureError> {
-    let endings = endings(episodes)?;
-    let Scene { matrix, roster } = scene;
+    let endings = endings(episodes, scene.metrics)?;
+    let Scene { matrix, roster, .. } = scene;
     let gap = AXIS_ROOM + 8.0;
     let left = MARGIN + AXIS_ROOM;
     let arranged = Arrangement { left, columns: COLUMNS, height: PLOT_HEIGHT + AXIS_BELOW, gap };
@@ -51,15 +53,17 @@ fn signs() -> Vec<(Swatch, String)> {
 
 /// How the episodes of each experiment and model ended, by step.
 ///
-/// An episode is decided where TSA-C is defined: that metric is, wherever the agent said `done`.
-fn endings(episodes: &EpisodeTable) -> Result<BTreeMap<(&str, &str), Vec<Duration>>, FigureError> {
-    let [ttd, finished] = ["TTD", "TSA-C"].map(|name| column(episodes, name));
-    let (ttd, finished) = (ttd?, finished?);
-    let mut endings: BTreeMap<(&str, &str), Vec<Duration>> = BTreeMap::new();
-    for ((key, step), finished) in episodes.keys.iter().zip(ttd.iter()).zip(finished.iter()) {
+/// The first metric is the duration; the second one is defined where an episode is decided.
+fn endings<'e>(
+    episodes: &'e EpisodeTable,
+    metrics: &[MetricId<'_>],
+) -> Result<BTreeMap<(&'e str, &'e str), Vec<Ending>>, FigureError> {
+    let (duration, finished) = (column(episodes, metrics[0].name)?, column(episodes, metrics[1].name)?);
+    let mut endings: BTreeMap<(&str, &str), Vec<Ending>> = BTreeMap::new();
+    for ((key, step), finished) in episodes.keys.iter().zip(duration.iter()).zip(finished.iter()) {
         let group = endings.entry((key.experiment, key.model)).or_default();
-        let end = if finished.is_some() { End::Finished } else { End::Unfinished };
-        group.extend(step.map(|steps| Duration { steps, end }));
+        let outcome = if finished.is_some() { Outcome::Correct } else { Outcome::Unfinished };
+        group.extend(step.map(|steps| Ending { steps, outcome }));
     }
     Ok(endings)
 }

@@ -7,11 +7,7 @@ use super::kit::{
     lettering, many, text_on, tiles,
 };
 use super::{Drawn, Scene};
-use metric::catalog::Experiment;
-use score::table::EpisodeTable;
-
-/// The metric that says whether a decision was right.
-const SUCCESS: &str = "TSA";
+use score::table::{EpisodeTable, MetricColumn};
 
 const ROW: f64 = 22.0;
 const BAR: f64 = 15.0;
@@ -21,7 +17,7 @@ const PLOT_WIDTH: f64 = 260.0;
 /// How the episodes of one experiment ended, by model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outcomes {
-    /// The experiment, `E5` in the paper.
+    /// The experiment.
     pub experiment: String,
     /// One row per model; models without a row are shown as having no episodes.
     pub rows: Vec<OutcomeRow>,
@@ -40,14 +36,13 @@ pub struct OutcomeRow {
 }
 
 impl Outcomes {
-    /// The outcomes of the first experiment with episodes that has reference levels instead of a chance level for `TSA`: the
+    /// The outcomes of the first experiment with episodes that has reference levels for a rate instead of a chance level: the
     /// one whose question is open. `None` where there is none.
     ///
-    /// An episode is correct where `TSA` is 1, else wrong where its decision committed to a colour: where `answered`,
+    /// An episode is correct where the rate is 1, else wrong where its decision committed to a colour: where `answered`,
     /// which has a value per episode of the table, is true.
     pub fn of(episodes: &EpisodeTable, answered: &[bool]) -> Option<Self> {
-        let experiment = open_experiment(episodes)?;
-        let success = episodes.metric(SUCCESS)?;
+        let (experiment, success) = open_question(episodes)?;
         let mut rows: BTreeMap<&str, OutcomeRow> = BTreeMap::new();
         let all = episodes.keys.iter().zip(success.iter()).zip(answered);
         for ((key, value), answered) in all.filter(|((key, _), _)| key.experiment == experiment) {
@@ -65,16 +60,17 @@ impl Outcomes {
 
     /// Whether there is an episode that [`of`](Self::of) would count.
     pub fn are_there(episodes: &EpisodeTable) -> bool {
-        let has_success = episodes.metrics.iter().any(|metric| metric.name == SUCCESS);
-        has_success && open_experiment(episodes).is_some()
+        open_question(episodes).is_some()
     }
 }
 
-/// The first experiment with episodes that has reference levels instead of a chance level for `TSA`.
-fn open_experiment(episodes: &EpisodeTable) -> Option<&str> {
-    let open = |(_, experiment): &(&String, &Experiment)| experiment.reference.contains_key(SUCCESS);
-    let mut names = episodes.catalog.experiment.iter().filter(open).map(|(name, _)| name.as_str());
-    names.find(|name| episodes.keys.iter().any(|key| key.experiment == *name))
+/// The first experiment with episodes that has reference levels instead of a chance level, and the rate that they are of.
+fn open_question(episodes: &EpisodeTable) -> Option<(&str, &MetricColumn)> {
+    let has_episodes = |name: &str| episodes.keys.iter().any(|key| key.experiment == name);
+    episodes.catalog.experiment.iter().find_map(|(name, experiment)| {
+        let rate = episodes.metrics.iter().find(|metric| experiment.reference.contains_key(&metric.name))?;
+        has_episodes(name).then_some((name.as_str(), rate))
+    })
 }
 
 impl OutcomeRow {

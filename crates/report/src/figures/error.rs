@@ -17,6 +17,10 @@ pub enum FigureError {
          definition file"
     )]
     UnknownMetric { figure: FigureName, metric: String, known: String },
+    #[error(
+        "figure `{figure}` draws `{metric}` as a rate, found a quantity; name a rate in the style's `[figure.{figure}]`"
+    )]
+    NotARate { figure: FigureName, metric: String },
     #[error("figure `{figure}` needs {needed}; draw it from traces that have such episodes, not from scores alone")]
     MissingInput { figure: FigureName, needed: &'static str },
     #[error(

@@ -6,7 +6,6 @@ use super::kit::{
 };
 use super::matrix::{MetricId, Reading};
 use super::missing;
-use super::spider::PROFILE;
 use super::{Drawn, Scene};
 use metric::catalog::Kind;
 
@@ -19,8 +18,7 @@ const MOST_BLOCKS: usize = 8;
 const LEAST_WIDTH: f64 = 430.0;
 
 pub fn draw(scene: Scene<'_>) -> Drawn {
-    let Scene { matrix, roster } = scene;
-    let metrics = shown(&matrix.metrics());
+    let Scene { matrix, roster, metrics } = scene;
     let (labels, label_width) = tiles::row_labels(&roster.names(), NAME_ROOM);
     let left = MARGIN + label_width + 8.0;
     let room = FULL_WIDTH - MARGIN - left;
@@ -29,7 +27,7 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     let cell = (room - BLOCK_GAP * many(columns - 1)) / many((columns * metrics.len()).max(1));
     let cell = cell.clamp(LEAST_CELL, WIDEST_CELL);
     let blocks_width = cell * many(columns * metrics.len()) + BLOCK_GAP * many(columns - 1);
-    let head = Head::new(&metrics, cell);
+    let head = Head::new(metrics, cell);
     let height = head.height + ROW * many(labels.len());
     let arranged = Arrangement { left, columns, height, gap: BLOCK_GAP };
     let width = left + blocks_width + MARGIN;
@@ -42,9 +40,9 @@ pub fn draw(scene: Scene<'_>) -> Drawn {
     }
     for (experiment, body) in matrix.experiments.iter().zip(&panels.bodies) {
         head.draw(&mut sheet, *body);
-        draw_block(&mut sheet, scene, experiment, &metrics, Frame { top: body.top + head.height, ..*body });
+        draw_block(&mut sheet, scene, experiment, metrics, Frame { top: body.top + head.height, ..*body });
     }
-    let height = draw_key(&mut sheet, scene, &metrics, panels.bottom + 12.0);
+    let height = draw_key(&mut sheet, scene, metrics, panels.bottom + 12.0);
     (sheet, height)
 }
 
@@ -54,13 +52,6 @@ fn draw_key(sheet: &mut Sheet, scene: Scene<'_>, metrics: &[MetricId<'_>], top: 
     let matrix = scene.matrix;
     let readings = matrix.pairs().flat_map(|(e, m)| metrics.iter().map(move |metric| matrix.reading(e, m, *metric)));
     legend::draw_signs(sheet, (scale + 24.0, top), missing::signs(readings)).max(top + 14.0) + MARGIN
-}
-
-/// The paper's profile where the definitions have any of it, else every metric.
-fn shown<'a>(metrics: &[MetricId<'a>]) -> Vec<MetricId<'a>> {
-    let find = |name: &&str| metrics.iter().find(|metric| metric.name == *name).copied();
-    let profile: Vec<_> = PROFILE.iter().filter_map(find).collect();
-    if profile.is_empty() { metrics.to_vec() } else { profile }
 }
 
 /// The names of the metrics above their columns; upright where a column is too narrow for one of them.

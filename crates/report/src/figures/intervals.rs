@@ -1,11 +1,11 @@
-//! `intervals`: each model's success (TSA, or the first rate) with its 95 % interval, counts and the level of chance, per experiment.
+//! `intervals`: a rate of each model with its 95 % interval, counts and the level of chance, per experiment.
 
 use super::kit::{
     Align, Arrangement, FULL_WIDTH, Frame, MARGIN, Mark, Member, NAME_ROOM, PALETTE, Panels, Plot, Sheet, Stroke,
     Swatch, legend, lettering, many, marker, panels, rate_ticks, tiles,
 };
 use super::matrix::{MetricId, Reading};
-use super::{Drawn, FigureError, FigureName, Scene};
+use super::{Drawn, Scene};
 use exact::number;
 use statistics::interval::{self, Interval};
 
@@ -16,9 +16,9 @@ const LEAST_PANEL: f64 = 80.0;
 const GAP: f64 = 12.0;
 const AXIS_BELOW: f64 = 28.0;
 
-pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
-    let Scene { matrix, roster } = scene;
-    let metric = matrix.success(FigureName::Intervals)?;
+pub fn draw(scene: Scene<'_>) -> Drawn {
+    let Scene { matrix, roster, metrics } = scene;
+    let metric = metrics[0];
     let (labels, label_width) = tiles::row_labels(&roster.names(), NAME_ROOM);
     let left = MARGIN + label_width + 22.0;
     let room = FULL_WIDTH - MARGIN - left;
@@ -42,7 +42,7 @@ pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
         panel.draw(&mut sheet);
     }
     let bottom = legend::draw_signs(&mut sheet, (MARGIN, panels.bottom + 8.0), signs(scene, metric));
-    Ok((sheet, bottom + MARGIN))
+    (sheet, bottom + MARGIN)
 }
 
 fn counts_width(scene: Scene<'_>, metric: MetricId<'_>) -> f64 {

@@ -7,10 +7,7 @@ use super::{FigureError, FigureName};
 use crate::cells::{Cells, Group, KeyValue};
 use exact::moments::Moments;
 use exact::number::Decimal;
-use metric::catalog::{Better, Kind, Metric};
-
-/// The metric of success in the paper.
-pub const SUCCESS: &str = "TSA";
+use metric::catalog::{Better, Catalog, Kind, Metric};
 
 /// What a cell says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,10 +119,9 @@ impl<'a> Matrix<'a> {
         })
     }
 
-    /// Whether a task was solved: TSA, or the first rate of definitions that have no TSA.
-    pub fn success(&self, figure: FigureName) -> Result<MetricId<'a>, FigureError> {
-        let first = self.metrics().into_iter().find(|metric| metric.metric.kind == Kind::Rate);
-        self.metric(figure, SUCCESS).or_else(|error| first.ok_or(error))
+    /// The definitions of the metrics.
+    pub fn catalog(&self) -> &'a Catalog {
+        &self.cells.catalog
     }
 
     /// All metrics in the order of the cells.
@@ -199,4 +195,12 @@ pub struct MetricId<'a> {
     pub name: &'a str,
     pub metric: &'a Metric,
     at: usize,
+}
+
+impl MetricId<'_> {
+    /// The name as the end of an attribute's name.
+    pub fn attribute(self) -> String {
+        let plain = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
+        self.name.chars().map(plain).collect()
+    }
 }

@@ -22,6 +22,7 @@ mod matrix;
 mod missing;
 mod name;
 mod scatter;
+pub mod shown;
 mod slopes;
 mod spider;
 
@@ -36,9 +37,10 @@ pub use name::FigureName;
 use crate::cells::Cells;
 use e5_outcomes::Outcomes;
 use kit::{Roster, Sheet};
-use matrix::{Matrix, SUCCESS};
+use matrix::{Matrix, MetricId};
 use score::table::EpisodeTable;
 use score::timeline::Timeline;
+use shown::{FigureSheets, SHOWN};
 
 /// What figures are drawn from.
 #[derive(Clone, Copy, Debug)]
@@ -47,6 +49,8 @@ pub struct Input<'a> {
     pub cells: &'a Cells,
     /// Models in the order to show them, a style's `row_order`; those not named follow in the palette's order, then by name.
     pub order: &'a [String],
+    /// Which metrics figures show, and their captions.
+    pub sheets: &'a FigureSheets,
     /// One row per episode: for `decision-curve`.
     pub episodes: Option<&'a EpisodeTable>,
     /// How episodes of an open question ended: for `e5-outcomes`.
@@ -57,22 +61,23 @@ pub struct Input<'a> {
 
 impl<'a> Input<'a> {
     /// Cells and nothing else: enough for all figures but `decision-curve`, `e5-outcomes` and `gaze`.
-    pub const fn of_cells(cells: &'a Cells) -> Self {
-        Self { cells, order: &[], episodes: None, outcomes: None, timelines: None }
+    pub fn of_cells(cells: &'a Cells) -> Self {
+        Self { cells, order: &[], sheets: &SHOWN, episodes: None, outcomes: None, timelines: None }
     }
 }
 
 pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> {
     let matrix = Matrix::new(input.cells)?;
     let roster = Roster::new(&matrix.models, input.order);
-    let scene = Scene { matrix: &matrix, roster: &roster };
+    let metrics = shown::metrics(name, &matrix, input.sheets)?;
+    let scene = Scene { matrix: &matrix, roster: &roster, metrics: &metrics };
     let missing = |needed| FigureError::MissingInput { figure: name, needed };
     let (sheet, height) = match name {
-        FigureName::Spider => spider::draw(scene)?,
+        FigureName::Spider => spider::draw(scene),
         FigureName::Heatmap => heatmap::draw(scene),
-        FigureName::Scatter => scatter::draw(scene)?,
-        FigureName::CompletionGap => completion_gap::draw(scene)?,
-        FigureName::Intervals => intervals::draw(scene)?,
+        FigureName::Scatter => scatter::draw(scene),
+        FigureName::CompletionGap => completion_gap::draw(scene),
+        FigureName::Intervals => intervals::draw(scene),
         FigureName::Slopes => slopes::draw(scene)?,
         FigureName::E5Outcomes => {
             e5_outcomes::draw(scene, input.outcomes.ok_or_else(|| missing("the outcomes of an open question"))?)
@@ -89,11 +94,7 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
             gaze::draw(scene, input.timelines.ok_or_else(|| missing("the steps of each episode"))?)
         }
     };
-    let caption = match name {
-        FigureName::Intervals | FigureName::Slopes => name.caption().replace(SUCCESS, matrix.success(name)?.name),
-        _ => name.caption().to_owned(),
-    };
-    Ok(Figure::new(sheet, height, name.title(), caption))
+    Ok(Figure::new(sheet, height, name.title(), shown::caption(name, &metrics, input.sheets)))
 }
 
 /// What every figure is drawn from.
@@ -101,6 +102,8 @@ pub fn draw(name: FigureName, input: &Input<'_>) -> Result<Figure, FigureError> 
 struct Scene<'a> {
     matrix: &'a Matrix<'a>,
     roster: &'a Roster<'a>,
+    /// Those that the figure shows.
+    metrics: &'a [MetricId<'a>],
 }
 
 /// A drawn sheet and the height to cut it at, px.

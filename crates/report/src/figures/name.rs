@@ -1,4 +1,4 @@
-//! The names of figures, their titles and captions.
+//! The names of figures and their titles.
 
 use std::fmt;
 use std::str::FromStr;
@@ -53,68 +53,17 @@ impl FigureName {
         self.texts()[1]
     }
 
-    /// One or two sentences on how to read it.
-    pub const fn caption(self) -> &'static str {
-        self.texts()[2]
-    }
-
-    const fn texts(self) -> [&'static str; 3] {
+    const fn texts(self) -> [&'static str; 2] {
         match self {
-            Self::Spider => [
-                "spider",
-                "Behavioural profiles",
-                "One line a model, further out is better on every axis: rates where less is better are shown as one \
-                 minus the rate, durations reversed and scaled between the least and the greatest mean of their \
-                 experiment, a half where all are equal. The red mark on the TSA axis is the level of chance.",
-            ],
-            Self::Heatmap => [
-                "heatmap",
-                "Performance across experiments and metrics",
-                "Numbers are means. Colours are set so that darker is better: rates where less is better from one \
-                 minus the rate, durations reversed and scaled within their experiment.",
-            ],
-            Self::Scatter => [
-                "scatter",
-                "Task success against self-attribution",
-                "One point a model and experiment; on the dashed diagonal TSA equals CAAL. Larger markers are \
-                 slower decisions (TTD against the slowest model of the experiment). Models with the same values \
-                 are fanned out around the place they share.",
-            ],
-            Self::CompletionGap => [
-                "completion-gap",
-                "Completion gap",
-                "TSA among episodes that end with a decision, minus TSA among all: what is lost by not deciding.",
-            ],
-            Self::E5Outcomes => [
-                "e5-outcomes",
-                "Final self-identification outcomes",
-                "Episodes whose final self-attribution was correct, was another colour, or was unknown or never \
-                 given.",
-            ],
-            Self::Intervals => [
-                "intervals",
-                "Task success with 95 % intervals",
-                "TSA with its Wilson 95 % interval and counts. The red line is the level of chance, dotted lines \
-                 are reference levels where no level of chance applies.",
-            ],
-            Self::Slopes => [
-                "slopes",
-                "Task success from experiment to experiment",
-                "TSA of each model in the first experiment and in each other one. Models with the same value stand \
-                 side by side.",
-            ],
-            Self::DecisionCurve => [
-                "decision-curve",
-                "Share of episodes decided by step t",
-                "Kaplan-Meier estimate of the share of episodes decided by step t; episodes that end undecided are \
-                 censored there (upright ticks).",
-            ],
-            Self::Gaze => [
-                "gaze",
-                "Mirror in view, episode by episode",
-                "One row an episode, sorted by length within its model; the mirror in view, first sight of it, the \
-                 first claim of a colour and the decision.",
-            ],
+            Self::Spider => ["spider", "Behavioural profiles"],
+            Self::Heatmap => ["heatmap", "Performance across experiments and metrics"],
+            Self::Scatter => ["scatter", "Task success against self-attribution"],
+            Self::CompletionGap => ["completion-gap", "Completion gap"],
+            Self::E5Outcomes => ["e5-outcomes", "Final self-identification outcomes"],
+            Self::Intervals => ["intervals", "Task success with 95 % intervals"],
+            Self::Slopes => ["slopes", "Task success from experiment to experiment"],
+            Self::DecisionCurve => ["decision-curve", "Share of episodes decided by step t"],
+            Self::Gaze => ["gaze", "Mirror in view, episode by episode"],
         }
     }
 }

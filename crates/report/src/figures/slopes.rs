@@ -1,4 +1,4 @@
-//! `slopes`: each model's success (TSA, or the first rate) from the first experiment to each other one.
+//! `slopes`: a rate of each model from the first experiment to each other one.
 
 use super::kit::{
     Align, Arrangement, FULL_WIDTH, Frame, Legend, MARGIN, Mark, Member, Panels, Plot, Point, Sheet, Swatch, dodge,
@@ -6,7 +6,7 @@ use super::kit::{
 };
 use super::matrix::MetricId;
 use super::missing::Strip;
-use super::{Drawn, FigureError, FigureName, Scene};
+use super::{Drawn, FigureError, Scene};
 
 const MOST_COLUMNS: usize = 4;
 const PLOT_HEIGHT: f64 = 210.0;
@@ -14,8 +14,8 @@ const AXIS_ROOM: f64 = 30.0;
 const GAP: f64 = 22.0;
 
 pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
-    let Scene { matrix, roster } = scene;
-    let metric = matrix.success(FigureName::Slopes)?;
+    let Scene { matrix, roster, metrics } = scene;
+    let metric = metrics[0];
     let (first, others) = match matrix.experiments.as_slice() {
         [first, others @ ..] if !others.is_empty() => (*first, others),
         found => return Err(FigureError::OneExperiment { found: found.join(", ") }),

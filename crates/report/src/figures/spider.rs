@@ -1,4 +1,4 @@
-//! `spider`: the paper's behavioural profiles, a radar per experiment and a line per model.
+//! `spider`: behavioural profiles, a radar per experiment and a line per model.
 
 use std::f64::consts::TAU;
 
@@ -8,11 +8,8 @@ use super::kit::{
 };
 use super::matrix::MetricId;
 use super::missing::{self, Strip};
-use super::{Drawn, FigureError, FigureName, Scene};
+use super::{Drawn, Scene};
 use metric::catalog::{Better, Kind};
-
-/// The axes, clockwise from above (paper, caption of the behavioural profiles).
-pub const PROFILE: [&str; 6] = ["TSA", "TTD", "MCR", "MTATO", "CAAL", "CR"];
 
 const COLUMNS: usize = 3;
 const GAP: f64 = 12.0;
@@ -20,36 +17,41 @@ const RADIUS: f64 = 70.0;
 /// Room above and below the radar for the labels of its axes, px.
 const LABEL_ROOM: f64 = 18.0;
 
-pub fn draw(scene: Scene<'_>) -> Result<Drawn, FigureError> {
-    let Scene { matrix, roster } = scene;
-    let axes = PROFILE.map(|name| matrix.metric(FigureName::Spider, name));
-    let axes: Vec<MetricId<'_>> = axes.into_iter().collect::<Result<_, _>>()?;
+pub fn draw(scene: Scene<'_>) -> Drawn {
+    // Clockwise from above.
+    let Scene { matrix, roster, metrics: axes } = scene;
     let width = (FULL_WIDTH - 2.0 * MARGIN - GAP * many(COLUMNS - 1)) / many(COLUMNS);
-    let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, &axes, width)).collect();
+    let strips: Vec<_> = matrix.experiments.iter().map(|e| Strip::new(matrix, roster, e, axes, width)).collect();
     let below = strips.iter().map(Strip::height).fold(0.0, f64::max);
     let height = 2.0 * (RADIUS + LABEL_ROOM) + below;
     let arranged = Arrangement { left: MARGIN, columns: COLUMNS, height, gap: GAP };
     let panels = Panels::new(&matrix.experiments, &matrix.titles(&matrix.experiments), FULL_WIDTH, arranged);
     let mut sheet = panels.sheet(FULL_WIDTH);
     for ((experiment, body), strip) in matrix.experiments.iter().zip(&panels.bodies).zip(&strips) {
-        let radar = Radar { scene, experiment, axes: &axes, center: center(*body) };
+        let radar = Radar { scene, experiment, axes, center: center(*body) };
         radar.draw(&mut sheet);
         strip.draw(&mut sheet, (body.left, body.bottom() - below));
     }
-    let signs = signs(scene, axes[0]).into_iter().chain(missing::strip_signs(&strips)).collect();
+    let signs = signs(scene).into_iter().chain(missing::strip_signs(&strips)).collect();
     let height = legend::around(&mut sheet, roster, &panels, Swatch::Line, signs);
-    Ok((sheet, height))
+    (sheet, height)
 }
 
 fn center(body: Frame) -> Point {
     (body.center().0, body.top + RADIUS + LABEL_ROOM)
 }
 
-fn signs(scene: Scene<'_>, metric: MetricId<'_>) -> Vec<(Swatch, String)> {
+fn signs(scene: Scene<'_>) -> Vec<(Swatch, String)> {
+    let metric = scene.metrics[0];
     let has_chance = scene.matrix.experiments.iter().any(|e| scene.matrix.chance(e, metric).is_some());
     let chance = has_chance.then(|| (Swatch::Chance, format!("chance level of {}", metric.name)));
-    let scale = "centre 0, outer ring 1; TTD reversed, from the slowest (0) to the fastest model (1)";
-    chance.into_iter().chain([(Swatch::None, scale.to_owned())]).collect()
+    let is_reversed = |id: &&MetricId<'_>| (id.metric.better, id.metric.kind) == (Better::Lower, Kind::Quantity);
+    let reversed: Vec<&str> = scene.metrics.iter().filter(is_reversed).map(|id| id.name).collect();
+    let reversed = match reversed.as_slice() {
+        [] => String::new(),
+        names => format!("; {} reversed, from the slowest (0) to the fastest model (1)", names.join(", ")),
+    };
+    chance.into_iter().chain([(Swatch::None, format!("centre 0, outer ring 1{reversed}"))]).collect()
 }
 
 struct Radar<'a> {

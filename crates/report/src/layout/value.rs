@@ -5,10 +5,8 @@ use crate::cells::Cell;
 use crate::style::{CellForm, Print, Rounding, SingleSe};
 use exact::moments::Moments;
 use exact::number::Decimal;
-use metric::catalog::{Kind, Metric, PPM, StandardError};
+use metric::catalog::{Kind, Metric, StandardError};
 use statistics::interval::Interval;
-
-const MILLION: i128 = 1_000_000;
 
 /// What a cell shows in a row of `episodes` episodes.
 pub fn value(cell: &Cell, episodes: u64, print: &Print) -> Value {
@@ -34,13 +32,16 @@ pub fn zero(metric: &Metric, print: &Print) -> Value {
     Value::MeanSe { mean: zero, se: Some(zero) }
 }
 
-/// What a value of one is, and the decimals: shares in parts per million are shown as rates are.
+/// What a value of one is, and the decimals: fractions are shown as rates are.
 fn scale(metric: &Metric, print: &Print) -> (i128, u32) {
-    if metric.unit == PPM { (MILLION, print.decimals.of(Kind::Rate)) } else { (1, print.decimals.of(metric.kind)) }
+    match metric.whole() {
+        Some(whole) => (whole.into(), print.decimals.of(Kind::Rate)),
+        None => (1, print.decimals.of(metric.kind)),
+    }
 }
 
-/// One of the two scales, which are small.
-#[expect(clippy::cast_precision_loss, reason = "a million is exact")]
+/// A whole as a float.
+#[expect(clippy::cast_precision_loss, reason = "the whole of a fraction is far below 2^53")]
 const fn float_of(whole: i128) -> f64 {
     whole as f64
 }

@@ -9,7 +9,6 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::chance::COMPLETED;
 use super::compare::{Comparison, Sign};
 use super::study::named;
 use super::{ChanceRow, Contrast, Family, Options, Role, Selection, Statistics, Units, Verdict};
@@ -98,15 +97,16 @@ fn caveats(statistics: &Statistics, options: &Options) -> Vec<String> {
     };
     let replies = statistics.replies.as_ref().filter(|replies| replies.unusable > 0);
     let replies = replies.map(|it| format!("{} of {} replies gave no decision", it.unusable, it.replies));
-    selection.into_iter().chain(options.caveats.iter().cloned()).chain(lost).chain(replies).collect()
+    let pooled = (!statistics.pooled.is_empty()).then(|| "recordings that differ are pooled".to_owned());
+    let given = options.caveats.iter().cloned();
+    selection.into_iter().chain(pooled).chain(given).chain(lost).chain(replies).collect()
 }
 
 fn unranked(statistics: &Statistics) -> Vec<Answer> {
     let mut answers = Vec::new();
     let confidence = statistics.confidence;
     for metric in &statistics.headline {
-        let completed = COMPLETED.iter().filter(|(whole, _)| whole == metric).map(|(_, completed)| *completed);
-        for metric in [metric.as_str()].into_iter().chain(completed) {
+        for metric in [metric.as_str()].into_iter().chain(statistics.relations.completed(metric)) {
             answers.extend(Answer::new(ABOVE_CHANCE, metric, &above(&statistics.chance, metric, confidence)));
         }
     }
@@ -194,20 +194,31 @@ fn counted(Units { n, name, .. }: &Units) -> String {
 fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
     let mut tested = comparisons.iter().filter(|found| found.p.is_some() || found.units.is_some()).peekable();
     if tested.peek().is_none() {
-        return Some("not tested".to_owned());
+        return Some(apart(comparisons).unwrap_or_else(|| "not tested".to_owned()));
     }
     let too_few = tested.map(|found| found.unsaid(confidence)).collect::<Option<Vec<_>>>()?;
     too_few.iter().max_by_key(|units| units.n).map(cannot_say)
 }
 
+/// How many of these comparisons a setting keeps from being made, and the first such setting.
+fn apart(comparisons: &[&Comparison]) -> Option<String> {
+    let settings: Vec<&String> = comparisons.iter().filter_map(|found| found.incomparable.as_ref()).collect();
+    let setting = settings.first()?;
+    let (count, all) = (settings.len(), comparisons.len());
+    let count = if count == all { String::new() } else { format!("{count} of {all} ") };
+    Some(format!("{count}not comparable ({setting})"))
+}
+
 fn differing_in(family: &Family, confidence: f64) -> String {
-    if let Some(why) = untested(&family.tests.iter().map(|test| &test.comparison).collect::<Vec<_>>(), confidence) {
+    let comparisons: Vec<&Comparison> = family.tests.iter().map(|test| &test.comparison).collect();
+    if let Some(why) = untested(&comparisons, confidence) {
         return format!("{} {why}", family.experiment);
     }
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
     let unsettled = |test: &&super::PairTest| test.comparison.losses.is_some_and(|losses| !losses.agree);
     let unsettled = unsettled_pairs(family.tests.iter().filter(unsettled).count());
-    differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second))) + &unsettled
+    let told = differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
+    [told + &unsettled].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
 }
 
 /// The separated pairs of `all`, by the better model.
@@ -244,10 +255,12 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
         let models = those(Some(sign));
         (!models.is_empty()).then(|| format!("{what} {}", names(&models, group.len())))
     };
-    if let Some(why) = untested(&group.iter().map(|contrast| &contrast.comparison).collect::<Vec<_>>(), confidence) {
+    let comparisons: Vec<&Comparison> = group.iter().map(|contrast| &contrast.comparison).collect();
+    if let Some(why) = untested(&comparisons, confidence) {
         return format!("{baseline} - {against} {why}");
     }
-    let silent = group.iter().filter(|contrast| contrast.comparison.sign().is_none());
+    let is_silent = |it: &Comparison| it.sign().is_none() && it.incomparable.is_none();
+    let silent = group.iter().filter(|contrast| is_silent(&contrast.comparison));
     let (unsaid, shown): (Vec<&&Contrast>, Vec<_>) =
         silent.partition(|it| it.comparison.p.is_none() || it.comparison.unsaid(confidence).is_some());
     let unshown = match (shown.len(), group.len()) {
@@ -261,5 +274,6 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
         format!("cannot say for {model}: {why}")
     });
     let shown = [phrase("higher for", Sign::Higher), phrase("lower for", Sign::Lower), unshown].into_iter().flatten();
-    format!("{baseline} - {against} {}", shown.chain(unsaid).collect::<Vec<_>>().join(", "))
+    let parts: Vec<String> = shown.chain(unsaid).chain(apart(&comparisons)).collect();
+    format!("{baseline} - {against} {}", parts.join(", "))
 }

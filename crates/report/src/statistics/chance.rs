@@ -1,7 +1,7 @@
 //! Rates against the levels of blind guessing, by the exact binomial test.
 //!
 //! Rule: a rate that counts unfinished episodes as failures stands beside the same rate among finished episodes
-//! ([`COMPLETED`]): who does not finish is below chance under the first and need not guess.
+//! ([`Relations`](metric::relations::Relations)): who does not finish is below chance under the first and need not guess.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -95,10 +95,6 @@ pub enum Verdict {
     /// Not shown to differ.
     NotSeparated,
 }
-
-/// Rates that count an unfinished episode as a failure, and the same among finished episodes, which has the same levels
-/// of chance where the definitions give it none of its own.
-pub const COMPLETED: [(&str, &str); 1] = [("TSA", "TSA-C")];
 
 impl ChanceRow {
     /// Every rate against every level that its experiment has.
@@ -238,9 +234,8 @@ impl Verdict {
 /// The levels of a metric in an experiment: chance, then references; those of the rate that it completes where it has none.
 pub(super) fn levels(study: &Study, experiment: &str, metric: &str) -> Vec<(Role, Ratio)> {
     let own = own_levels(study, experiment, metric);
-    let whole = COMPLETED.iter().find(|(_, completed)| *completed == metric);
-    match whole {
-        Some((whole, _)) if own.is_empty() => own_levels(study, experiment, whole),
+    match study.relations.whole(metric) {
+        Some(whole) if own.is_empty() => own_levels(study, experiment, whole),
         _ => own,
     }
 }

@@ -85,6 +85,9 @@ pub struct Comparison {
     /// The test with the lost episodes of both sides; none where none was lost.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub losses: Option<LossCases>,
+    /// The setting in which the two sides were recorded differently, so that nothing is compared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub incomparable: Option<String>,
 }
 
 /// What two blocks are compared by.
@@ -290,7 +293,17 @@ impl Comparison {
             separated: false,
             units: None,
             losses: None,
+            incomparable: None,
         }
+    }
+
+    /// Without any result where a setting differs.
+    pub(super) fn unless(self, incomparable: Option<String>) -> Self {
+        if incomparable.is_none() {
+            return self;
+        }
+        let Self { method, n, successes, .. } = self;
+        Self { successes, withheld: Some(Withheld::Incomparable), incomparable, ..Self::of(method, n) }
     }
 
     /// Without interval and test, which take episodes as independent.

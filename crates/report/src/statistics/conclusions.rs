@@ -4,7 +4,7 @@ use indexmap::IndexMap;
 
 use super::chance::own_levels;
 use super::study::Study;
-use super::{CENSORED, ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Statistics, Verdict};
+use super::{ChanceRow, DurationRow, Family, Method, Reach, Role, Selection, Statistics, Verdict};
 use exact::format::fixed;
 use statistics::power::Detectable;
 
@@ -14,7 +14,8 @@ pub(super) fn headline(study: &Study) -> Vec<String> {
     let has_level =
         |metric: &str| study.experiments.iter().any(|known| !own_levels(study, known.name, metric).is_empty());
     let rates = study.rates().map(|column| column.name.as_str()).filter(|metric| has_level(metric));
-    let durations = CENSORED.iter().map(|(duration, _)| *duration).filter(|metric| study.column(metric).is_some());
+    let durations = study.relations.durations.iter().map(|(duration, _)| duration.as_str());
+    let durations = durations.filter(|metric| study.column(metric).is_some());
     let chosen: Vec<String> = rates.chain(durations).map(str::to_owned).collect();
     if chosen.is_empty() {
         return study.table.metrics.first().map(|column| column.name.clone()).into_iter().collect();

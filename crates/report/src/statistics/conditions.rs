@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::compare::{Compared, Comparison, adjust};
 use super::matching::{Matched, Matching, Scenes};
-use super::study::{Block, Study};
+use super::study::{Block, Experiment, Study};
+use crate::comparable::tasks_differ;
 use score::table::MetricColumn;
 
 /// How much a model's mean differs between two experiments, by pairs where their scenes agree.
@@ -30,20 +31,20 @@ pub struct Contrast {
 }
 
 impl Contrast {
-    /// Every model and metric: the first experiment of the definitions that has episodes, minus each later one.
+    /// Every model and metric: the first experiment of the definitions that has episodes, minus each later one of a like task.
     pub(super) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
-        let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
-        let scenes: Vec<Scenes> = baseline.blocks.iter().map(|block| Scenes::of(study, block)).collect();
         let mut contrasts = Vec::new();
-        for other in others {
+        for couples in Self::couples(study).chunk_by(|a, b| a.1.experiment == b.1.experiment) {
             let mut family = Vec::new();
-            for (first, scenes) in baseline.blocks.iter().zip(&scenes) {
-                for second in other.blocks.iter().filter(|block| block.is_same_subject(first)) {
-                    let matched = Matched::of(scenes, &Scenes::of(study, second));
-                    let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
-                    let under = |column| Self::of(first, second, &matched, column, compared.under(column));
-                    family.extend(study.table.metrics.iter().map(under));
-                }
+            for &(first, second) in couples {
+                let matched = Matched::of(&Scenes::of(study, first), &Scenes::of(study, second));
+                let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
+                let incomparable = study.incomparable(first, second);
+                let under = |column| {
+                    let comparison = compared.under(column).unless(incomparable.clone());
+                    Self::of(first, second, &matched, column, comparison)
+                };
+                family.extend(study.table.metrics.iter().map(under));
             }
             for column in &study.table.metrics {
                 let of_metric = family.iter_mut().filter(|it: &&mut Self| it.metric == column.name);
@@ -52,6 +53,27 @@ impl Contrast {
             contrasts.extend(family);
         }
         contrasts
+    }
+
+    /// The blocks that are contrasted.
+    pub(super) fn couples<'s, 'a>(study: &'s Study<'a>) -> Vec<(&'s Block<'a>, &'s Block<'a>)> {
+        let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
+        let is_like = |name| tasks_differ(&study.table.catalog, baseline.name, name).is_none();
+        let others = others.iter().filter(|other| is_like(other.name)).flat_map(|other| &other.blocks);
+        let same = |second: &'s Block<'a>| {
+            baseline.blocks.iter().filter(|first| second.is_same_subject(first)).map(move |first| (first, second))
+        };
+        others.flat_map(same).collect()
+    }
+
+    /// The experiments that are not contrasted with the first one, a sentence each.
+    pub(super) fn left_out(study: &Study) -> Vec<String> {
+        let Some((baseline, others)) = study.experiments.split_first() else { return Vec::new() };
+        let sentence = |other: &Experiment| {
+            let why = tasks_differ(&study.table.catalog, baseline.name, other.name)?;
+            Some(format!("{} is not contrasted with {}: {why}.", other.name, baseline.name))
+        };
+        others.iter().filter_map(sentence).collect()
     }
 
     fn of(first: &Block, second: &Block, matched: &Matched, column: &MetricColumn, comparison: Comparison) -> Self {

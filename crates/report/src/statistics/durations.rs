@@ -4,12 +4,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::study::{Block, Experiment, Study};
-use crate::cells::interval::CENSORED;
 use score::table::MetricColumn;
 use statistics::competing::{Ending, Incidence, Outcome};
 use statistics::coverage::{self, Withheld};
 use statistics::interval::Interval;
-use statistics::survival::{Duration, End, MedianInterval, RestrictedMean, Survival, common_horizon};
+use statistics::survival::{MedianInterval, RestrictedMean, Survival, common_horizon};
 
 /// One duration of one experiment and model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -58,7 +57,7 @@ pub struct CorrectRow {
 
 /// Whether a metric is a duration whose end is known.
 pub(super) fn is_duration(study: &Study, metric: &str) -> bool {
-    CENSORED.iter().any(|(duration, finished)| *duration == metric && study.column(finished).is_some())
+    study.relations.finished(metric).is_some_and(|finished| study.column(finished).is_some())
 }
 
 /// The end of an episode, any decision being the one waited for; `None` where the duration is undefined.
@@ -69,8 +68,7 @@ pub(super) fn decided(study: &Study, column: &MetricColumn, row: usize) -> Optio
 }
 
 fn ending(study: &Study, column: &MetricColumn, row: usize) -> Option<Ending> {
-    let finished = CENSORED.iter().find(|(duration, _)| *duration == column.name).map(|(_, finished)| *finished)?;
-    let outcome = match study.column(finished)?.get(row) {
+    let outcome = match study.column(study.relations.finished(&column.name)?)?.get(row) {
         Some(1) => Outcome::Correct,
         Some(_) => Outcome::Wrong,
         None => Outcome::Unfinished,
@@ -91,20 +89,14 @@ pub(super) fn restricted(study: &Study, block: &Block, column: &MetricColumn, ho
 }
 
 fn curve(study: &Study, block: &Block, column: &MetricColumn) -> Option<Survival> {
-    let end = |outcome| if outcome == Outcome::Unfinished { End::Unfinished } else { End::Finished };
-    let durations: Vec<Duration> = block
-        .rows()
-        .filter_map(|row| ending(study, column, row))
-        .map(|Ending { steps, outcome }| Duration { steps, end: end(outcome) })
-        .collect();
-    Survival::of(&durations)
+    Survival::of(&block.rows().filter_map(|row| ending(study, column, row)).collect::<Vec<_>>())
 }
 
 impl DurationRow {
-    /// Every duration of [`CENSORED`] that the table has, up to `horizon` or, without one, up to the last step
+    /// Every censored duration that the table has, up to `horizon` or, without one, up to the last step
     /// that every model's curve is known to.
     pub(super) fn all(study: &Study, horizon: Option<i64>, confidence: f64) -> Vec<Self> {
-        let durations = CENSORED.iter().filter(|(duration, _)| is_duration(study, duration));
+        let durations = study.relations.durations.iter().filter(|(duration, _)| is_duration(study, duration));
         let columns: Vec<&MetricColumn> = durations.filter_map(|(duration, _)| study.column(duration)).collect();
         let mut rows = Vec::new();
         for column in columns {
@@ -121,7 +113,7 @@ impl DurationRow {
         let endings: Vec<Ending> = block.rows().filter_map(|row| ending(study, column, row)).collect();
         let finished = endings.iter().filter(|ending| ending.outcome != Outcome::Unfinished).count() as u64;
         let n = endings.len() as u64;
-        let curve = curve(study, block, column);
+        let curve = Survival::of(&endings);
         let restricted = curve.as_ref().zip(horizon).and_then(|(curve, at)| curve.restricted_mean(at, confidence));
         let (restricted, withheld) = restricted.map_or((None, None), |found| {
             let (found, withheld) = held(found, n);

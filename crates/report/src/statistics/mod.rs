@@ -13,6 +13,7 @@ mod compare;
 mod conclusions;
 mod conditions;
 mod durations;
+mod gate;
 mod losses;
 mod matching;
 mod models;
@@ -31,11 +32,12 @@ use serde::{Deserialize, Serialize};
 
 pub use answers::{Answer, AnswerRole};
 pub use cells::{CellRow, FEW, Intervals};
-pub use chance::{COMPLETED, ChanceRow, Role, Units, Verdict};
+pub use chance::{ChanceRow, Role, Units, Verdict};
 pub use clusters::ClusterRow;
 pub use compare::{Comparison, Method, Sign};
 pub use conditions::Contrast;
 pub use durations::{CorrectRow, DurationRow};
+pub use gate::{FlippedPair, Gate, GateCell, GateFormat, GateOptions, GateVerdict, Played};
 pub use losses::{LossCase, LossCases, LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
@@ -48,9 +50,9 @@ pub use sequential::{Sequential, SequentialChance, SequentialPair, SequentialRat
 pub use warnings::TEXT_SCORES;
 
 use crate::cells::Cells;
-pub use crate::cells::interval::CENSORED;
 use crate::cells::interval::CONFIDENCE;
 use exact::moments::MomentOverflow;
+use metric::relations::Relations;
 use score::lost_counts::LostCounts;
 use score::table::EpisodeTable;
 use statistics::design::Design;
@@ -69,9 +71,11 @@ pub struct Options {
     pub design: Design,
     /// Which episodes were chosen; all by default.
     pub selection: Option<Selection>,
+    /// What cells mix though it was recorded differently, a sentence each; `None` unless such settings do not matter.
+    pub pooled: Option<Vec<String>>,
     /// How many replies gave no decision; `None` where that is not recorded.
     pub replies: Option<Replies>,
-    /// What else stands beside every answer, such as that recordings of different worlds were pooled.
+    /// What else stands beside every answer, such as lost episodes that count as failures.
     pub caveats: Vec<String>,
     /// The metric of the primary question, as a registered plan names it; the first headline metric by default.
     pub primary: Option<String>,
@@ -87,6 +91,7 @@ impl Default for Options {
             lost: None,
             design: Design::default(),
             selection: None,
+            pooled: None,
             replies: None,
             caveats: Vec::new(),
             primary: None,
@@ -114,6 +119,9 @@ pub struct Statistics {
     /// The departures from the registered plan; null without a plan.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub departures: Option<Vec<String>>,
+    /// Settings that differ within a cell or between cells that are compared, and were declared not to matter.
+    #[serde(default)]
+    pub pooled: Vec<String>,
     /// What the traces declare about their design.
     pub design: Design,
     /// What follows from the design, in a sentence.
@@ -155,6 +163,9 @@ pub struct Statistics {
     /// Replies that gave no decision; null where no status of a reply is recorded.
     #[serde(default)]
     pub replies: Option<Replies>,
+    /// Which metrics belong together, for the text.
+    #[serde(skip)]
+    relations: Relations,
 }
 
 impl Statistics {
@@ -162,7 +173,8 @@ impl Statistics {
     ///
     /// With a confidence outside (0, 1) no interval and no verdict is defined.
     pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
-        let study = Study::of(table, options.design, options.lost.as_ref())?;
+        let mut study = Study::of(table, options.design, options.lost.as_ref())?;
+        study.pool = options.pooled.is_some();
         let (confidence, horizon) = (options.confidence, options.horizon);
         let headline = conclusions::headline(&study);
         let asked: &[String] = if options.improvements { &headline } else { &[] };
@@ -175,6 +187,7 @@ impl Statistics {
             episodes: table.len(),
             selection: options.selection.clone(),
             departures: None,
+            pooled: pooled(&study, options),
             design: options.design,
             design_note: String::new(),
             families: 0,
@@ -194,12 +207,33 @@ impl Statistics {
             losses: Losses::of(&study, options.lost.is_some(), confidence),
             replies: options.replies.clone(),
             headline,
+            relations: study.relations.clone(),
         };
         let from_text = table.declared.from_text;
         statistics.design_note = warnings::design_note(&statistics, from_text);
         (statistics.answers, statistics.families) = answers::answers(&statistics, options);
         statistics.conclusions = conclusions::conclusions(&statistics);
         statistics.warnings = warnings::warnings(&statistics, from_text);
+        statistics.warnings.extend(statistics.pooled.iter().cloned());
+        statistics.warnings.extend(Contrast::left_out(&study));
         Ok(statistics)
     }
+}
+
+/// What was taken together though it was recorded differently, each setting once.
+fn pooled(study: &Study, options: &Options) -> Vec<String> {
+    let Some(mut sentences) = options.pooled.clone() else { return Vec::new() };
+    let models = study.experiments.iter().flat_map(|experiment| {
+        let blocks = &experiment.blocks;
+        (0..blocks.len()).flat_map(move |at| blocks[at + 1..].iter().map(move |other| (&blocks[at], other)))
+    });
+    let contrasts = Contrast::couples(study).into_iter();
+    for (first, second) in models.chain(contrasts) {
+        let Some(setting) = study.setting_apart(first, second) else { continue };
+        let sentence = format!("Compared though they differ (--pool): {setting}.");
+        if !sentences.contains(&sentence) {
+            sentences.push(sentence);
+        }
+    }
+    sentences
 }

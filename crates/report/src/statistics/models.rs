@@ -110,7 +110,7 @@ impl<'s, 'a> Field<'s, 'a> {
         let (first, second) = (&self.blocks[first], &self.blocks[second]);
         let (study, Asked { horizon, confidence }) = (self.study, ask);
         let compared = Compared { study, first, second, matched: &matched, horizon, confidence };
-        let comparison = compared.under(column);
+        let comparison = compared.under(column).unless(study.incomparable(first, second));
         PairTest { first: first.name(), second: second.name(), matching: matched.matching, comparison }
     }
 

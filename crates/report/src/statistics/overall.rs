@@ -1,6 +1,6 @@
 //! Models against each other over all experiments, each of which is a stratum.
 //!
-//! Rule: only experiments that both models have. Where the two are paired in all of them, all pairs are pooled; else every
+//! Rule: only experiments that both models have, recorded alike. Where the two are paired in all of them, all pairs are pooled; else every
 //! stratum is a 2x2 table of independent episodes.
 
 use std::collections::BTreeMap;
@@ -102,8 +102,8 @@ impl<'s, 'a> Couple<'s, 'a> {
         let mut couples = Vec::new();
         for (at, (first, here)) in subjects.iter().enumerate() {
             for (second, there) in subjects.iter().skip(at + 1) {
-                let strata: Vec<_> =
-                    here.iter().filter_map(|(experiment, &block)| Some((block, *there.get(experiment)?))).collect();
+                let both = here.iter().filter_map(|(experiment, &block)| Some((block, *there.get(experiment)?)));
+                let strata: Vec<_> = both.filter(|(a, b)| study.incomparable(a, b).is_none()).collect();
                 if strata.len() > 1 {
                     couples.push(Self { first: first.clone(), second: second.clone(), strata });
                 }

@@ -135,7 +135,8 @@ impl Sequential {
     ///
     /// With a confidence outside (0, 1) no sequence and no verdict is defined.
     pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
-        let study = Study::of(table, options.design, None)?;
+        let mut study = Study::of(table, options.design, None)?;
+        study.pool = options.pooled.is_some();
         Ok(Self {
             definitions: table.catalog.name.clone(),
             definitions_hash: table.catalog.hash.clone(),
@@ -245,10 +246,13 @@ impl SequentialPair {
         let mut blocks: Vec<&Block> = experiment.blocks.iter().collect();
         let mean = |block: &Block| block.moments(column).mean();
         blocks.sort_by(|a, b| by_mean(mean(a), mean(b), study.better(&column.name)));
-        let firsts: Vec<_> = blocks.iter().map(|block| (block.name(), study.firsts(block, column))).collect();
+        let firsts: Vec<_> = blocks.iter().map(|block| (*block, study.firsts(block, column))).collect();
         let mut tested = Vec::new();
         for (at, (first, here)) in firsts.iter().enumerate() {
             for (second, there) in &firsts[at + 1..] {
+                if study.incomparable(first, second).is_some() {
+                    continue;
+                }
                 let (pairs, shared) = matched(here, there);
                 tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
             }
@@ -257,8 +261,8 @@ impl SequentialPair {
         let rows = tested.into_iter().zip(adjusted).map(|((first, second, pairs, shared, found), p_adjusted)| Self {
             experiment: experiment.name.to_owned(),
             metric: column.name.clone(),
-            first: first.clone(),
-            second: second.clone(),
+            first: first.name(),
+            second: second.name(),
             pairs,
             shared,
             e: found.e,

@@ -4,8 +4,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use crate::cells::interval;
+use crate::comparable::{Recorded, Varied, difference};
 use exact::moments::{MomentOverflow, Moments};
 use metric::catalog::{Better, Kind, Metric};
+use metric::relations::Relations;
 use score::lost_counts::LostCounts;
 use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use statistics::design::{Cluster, Design};
@@ -34,6 +36,10 @@ pub(super) struct Study<'a> {
     pub table: &'a EpisodeTable,
     pub design: Design,
     pub experiments: Vec<Experiment<'a>>,
+    /// Which metrics belong together.
+    pub relations: Relations,
+    /// Whether settings that differ do not matter.
+    pub pool: bool,
     ranges: BTreeMap<&'a str, Interval>,
 }
 
@@ -50,6 +56,7 @@ pub(super) struct Block<'a> {
     pub condition: Option<&'a str>,
     /// The rows of the table, in runs.
     rows: Vec<Range<usize>>,
+    recorded: Recorded<'a>,
     moments: BTreeMap<&'a str, Moments>,
     /// Lost episodes, in no row.
     pub lost: u64,
@@ -73,7 +80,8 @@ impl<'a> Study<'a> {
         let experiments = blocks.into_iter().map(|((_, name), blocks)| Experiment { name, blocks }).collect();
         let names = table.metrics.iter().map(|column| column.name.as_str());
         let ranges = names.zip(interval::ranges(table)).collect();
-        let mut study = Self { table, design, experiments, ranges };
+        let relations = Relations::of(&table.catalog);
+        let mut study = Self { table, design, experiments, relations, pool: false, ranges };
         let of_block = |block: &Block| {
             let lost = lost.map_or(0, |lost| lost.of(block.experiment, block.model, block.condition));
             (lost, study.has_repeats(block))
@@ -82,6 +90,28 @@ impl<'a> Study<'a> {
         let blocks = study.experiments.iter_mut().flat_map(|experiment| &mut experiment.blocks);
         blocks.zip(found).for_each(|(block, (lost, repeats))| (block.lost, block.repeats) = (lost, repeats));
         Ok(study)
+    }
+
+    /// The setting in which two blocks differ though the comparison does not vary it; `None` where nothing is known to.
+    pub fn setting_between(&self, first: &Block, second: &Block, varied: Varied) -> Option<String> {
+        difference(&self.table.declared, [&first.recorded, &second.recorded], varied)
+    }
+
+    /// The same, of two blocks of one study.
+    pub fn setting_apart(&self, first: &Block, second: &Block) -> Option<String> {
+        let varied = if first.experiment != second.experiment {
+            Varied::Experiment
+        } else if first.model == second.model {
+            Varied::Condition
+        } else {
+            Varied::Model
+        };
+        self.setting_between(first, second, varied)
+    }
+
+    /// The same, unless it does not matter.
+    pub fn incomparable(&self, first: &Block, second: &Block) -> Option<String> {
+        if self.pool { None } else { self.setting_apart(first, second) }
     }
 
     pub fn blocks(&self) -> impl Iterator<Item = &Block<'a>> {
@@ -186,7 +216,8 @@ impl<'a> Block<'a> {
             Ok((column.name.as_str(), moments))
         };
         let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
-        Ok(Self { experiment, model, condition, rows, moments, lost: 0, repeats: false })
+        let recorded = Recorded::of(table, rows.iter().cloned().flatten());
+        Ok(Self { experiment, model, condition, rows, recorded, moments, lost: 0, repeats: false })
     }
 
     /// The model as it is compared: `model`, or `model [condition]` where there are several.

@@ -46,6 +46,7 @@ pub(super) fn design_note(statistics: &Statistics, from_text: bool) -> String {
         _ => "episodes of an undeclared kind",
     };
     let pairs = match (has_scenes, paired) {
+        _ if all == 0 => "there is nothing to compare".to_owned(),
         (false, _) => "no scenes are declared, so nothing is paired".to_owned(),
         (true, 0) => format!("none of {all} comparisons has pairs of equal scenes"),
         (true, _) => format!("{paired} of {all} comparisons are by pairs of equal scenes"),

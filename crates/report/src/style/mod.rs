@@ -13,9 +13,10 @@ use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::figures::shown::FigureSheets;
 use exact::suggest::nearest;
 use metric::catalog::{Better, Catalog, Kind};
-use metric::fault::{Fault, Faults, Place};
+use toml_spec::{Fault, Faults, Place};
 
 /// The table that every report has.
 pub const MAIN_TABLE: &str = "main";
@@ -56,6 +57,8 @@ pub struct Sheet {
     pub column: IndexMap<String, ColumnSheet>,
     /// The tables by name; a name becomes a file name. `main` must be one of them.
     pub table: IndexMap<String, TableSheet>,
+    /// What figures show.
+    pub figure: FigureSheets,
 }
 
 /// One table of a style file.

@@ -14,19 +14,21 @@ use super::{
     BUILT_IN, CellForm, ColumnSheet, Decimals, EmphasisRule, MAIN_TABLE, OTHER_TABLE, PrintSheet, Rounding, Sheet,
     SingleSe, StyleError, TableSheet, default_undefined,
 };
+use crate::figures::shown::{FigureSheets, SHOWN};
+use crate::figures::{FigureError, FigureName};
 use exact::budget::Limit;
 use exact::suggest::{hint, nearest};
 use exact::{hash, input};
 use metric::catalog::Better;
-use metric::fault::{Fault, Faults, Place, Source};
-use metric::include::{Includes, Kind};
-use metric::keys::{Keys, key_count, parse_toml};
+use toml_spec::{Fault, Faults, Place, Source};
+use toml_spec::{IncludeKind, Includes};
+use toml_spec::{Keys, key_count, parse_toml};
 
 /// A style is written by hand.
 const LARGEST: Limit = Limit::new("bytes of a style", 1 << 20);
 /// Keys of a file, tables included.
 const MOST_KEYS: Limit = Limit::new("keys in a style", 10_000);
-const INCLUDED: Kind = Kind {
+const INCLUDED: IncludeKind = IncludeKind {
     name: "style",
     check: "mirrorstats style check FILE",
     most: Limit::new("includes of a style, those of included files counted", 32),
@@ -103,6 +105,7 @@ struct Reading {
     print: PrintSheet,
     column: IndexMap<String, ColumnSheet>,
     table: IndexMap<String, TableDraft>,
+    figure: FigureSheets,
     named: Vec<(String, Place)>,
     faults: Vec<Fault>,
     includes: Includes,
@@ -118,6 +121,7 @@ impl Reading {
             print: PrintSheet::default(),
             column: IndexMap::new(),
             table: IndexMap::new(),
+            figure: SHOWN.clone(),
             named: Vec::new(),
             faults: Vec::new(),
             includes: Includes::new(INCLUDED),
@@ -154,6 +158,7 @@ impl Reading {
             print: self.print,
             column: self.column,
             table: tables,
+            figure: self.figure,
         };
         let hash = match self.hashes.as_slice() {
             [one] => one.clone(),
@@ -206,6 +211,9 @@ impl Reading {
         for (name, place, keys) in root.tables("table", faults) {
             let draft = self.table.entry(name.clone()).or_default();
             read_table(&name, place, keys, draft, &mut self.named, faults);
+        }
+        for (name, place, keys) in root.tables("figure", faults) {
+            read_figure(&name, &place, keys, (&mut self.figure, &mut self.named), faults);
         }
     }
 
@@ -281,6 +289,34 @@ fn read_table(
     }
     draft.print = over(printing(&mut keys, faults), draft.print);
     draft.place = Some(place);
+    keys.refuse_the_rest(faults);
+}
+
+fn read_figure(
+    name: &str,
+    place: &Place,
+    mut keys: Keys,
+    (figures, named): (&mut FigureSheets, &mut Vec<(String, Place)>),
+    faults: &mut Vec<Fault>,
+) {
+    let figure: FigureName = match name.parse() {
+        Ok(figure) => figure,
+        Err(unknown) => return faults.push(Fault::new(place.clone(), FigureError::to_string(&unknown))),
+    };
+    let sheet = figures.entry(name.to_owned()).or_default();
+    let whole = keys.value_place("metrics").unwrap_or_else(|| place.clone());
+    if let Some(metrics) = keys.texts("metrics", faults) {
+        let ([fewest, most], _) = figure.metrics();
+        if !(fewest..=most).contains(&metrics.len()) {
+            let wanted = if fewest == most { fewest.to_string() } else { format!("{fewest} to {most}") };
+            let message = format!("the figure `{name}` shows {wanted} metrics, found {}", metrics.len());
+            faults.push(Fault::new(whole, message));
+        }
+        named.extend(metrics.iter().cloned());
+        sheet.metrics = Some(without_places(metrics));
+    }
+    let caption = keys.text("caption", faults).map(|(text, _)| text);
+    sheet.caption = caption.or(sheet.caption.take());
     keys.refuse_the_rest(faults);
 }
 

@@ -5,6 +5,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::{ColumnSheet, PrintSheet};
+use crate::figures::shown::FigureSheets;
 
 /// A style file. With an include only what differs has to be said.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
@@ -24,6 +25,8 @@ pub struct StyleFile {
     pub column: IndexMap<String, ColumnSheet>,
     /// The tables by name; a name becomes a file name. `main` must be one of them, here or in an include.
     pub table: IndexMap<String, TableShape>,
+    /// The metrics and the captions of figures, by the name of the figure.
+    pub figure: FigureSheets,
 }
 
 /// One table of a style file.

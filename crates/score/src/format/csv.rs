@@ -68,6 +68,9 @@ pub(super) fn assemble(
     rows: Vec<Vec<Option<String>>>,
     first_line: usize,
 ) -> Result<EpisodeTable, FormatError> {
+    if header.iter().any(|name| name == "t") {
+        return Err(FormatError::Steps);
+    }
     MOST_COLUMNS.check(header.len() as u64).map_err(std::io::Error::from)?;
     let names: Vec<&str> = header.iter().map(String::as_str).collect();
     check_unique(&names)?;

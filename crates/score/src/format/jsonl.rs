@@ -53,10 +53,15 @@ pub(super) fn read(catalog: &Catalog, input: impl Read) -> Result<EpisodeTable, 
     csv::assemble(catalog, &header, rows, 1)
 }
 
+/// A value as text. A data frame holds integers beside nulls as floating-point numbers: `1.0` is `1`.
 fn cell(value: &Value) -> Option<String> {
     match value {
         Value::Null => None,
         Value::String(text) => Some(text.clone()),
+        Value::Number(number) if number.is_f64() => {
+            let text = number.to_string();
+            Some(text.strip_suffix(".0").map_or(text.clone(), str::to_owned))
+        }
         other => Some(other.to_string()),
     }
 }

@@ -97,6 +97,12 @@ pub enum FormatError {
         /// What it holds.
         found: String,
     },
+    /// Steps where scores are read.
+    #[error(
+        "expected scores, one row per episode, found steps: there is a column `t`\n  \
+         help: `mirrorstats trace import` makes a trace of steps that are JSON lines, `import_steps` in Python of a data frame"
+    )]
+    Steps,
     /// A line that is no CSV or JSON.
     #[error("line {line}: {reason}")]
     Line {

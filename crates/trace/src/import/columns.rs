@@ -9,7 +9,7 @@ use super::fault::{Fault, Place};
 use super::limits::Limits;
 use super::line::{Members, Value};
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
-use crate::schema::{self, COLUMNS, Column, Kind, Stored};
+use crate::schema::{COLUMNS, Column, Kind, Stored};
 use exact::suggest::nearest;
 
 /// A column that the schema does not know.
@@ -49,18 +49,19 @@ impl Columns {
     pub(super) fn check(&mut self, members: &Members, place: &Place, limits: Limits<'_>) -> Vec<Fault> {
         let mut faults = Vec::new();
         for (key, value) in members {
-            let fault = match schema::column(key) {
+            let fault = match limits.expected.domain.column(key) {
                 Some(column) => {
                     self.note_known(column);
                     misfit(column, value, limits)
                 }
-                None => self.check_own(key, value, place),
+                None => misdeclared(key, value, limits).or_else(|| self.check_own(key, value, place)),
             };
             faults.extend(fault.map(|fault| fault.of_key(key).at(place)));
         }
         let has = |name: &str| members.iter().any(|(key, _)| key == name);
-        for column in COLUMNS.iter().filter(|column| column.required && !has(column.name)) {
-            faults.push(missing(column, members).at(place));
+        let domain = limits.expected.domain;
+        for column in COLUMNS.iter().filter(|column| column.required && domain.has(column) && !has(column.name)) {
+            faults.push(missing(column, members, limits).at(place));
         }
         faults
     }
@@ -187,12 +188,39 @@ fn misfit(column: &Column, value: &Value, limits: Limits<'_>) -> Option<Fault> {
             }
         }
         (Kind::String, Value::Text(text)) => {
-            let Limits { experiments, palette, .. } = limits;
-            let rules = rules_of(column, Known { palette, experiments });
+            let Limits { expected, palette, .. } = limits;
+            let rules = rules_of(column, Known { palette, experiments: expected.experiments });
             rules.iter().find(|rule| !rule.allows(text)).map(|rule| odd_text(column, rule, text, value.shown()))
         }
         _ => refused(SEE),
     }
+}
+
+/// What is wrong with the value of a column that the definitions declare, if anything is.
+fn misdeclared(key: &str, value: &Value, limits: Limits<'_>) -> Option<Fault> {
+    let declared = limits.expected.declared.iter().find(|declared| declared.name == key)?;
+    let is_of_kind = matches!(
+        (declared.kind, value),
+        (_, Value::Null)
+            | (Kind::Bool, Value::Bool(_))
+            | (Kind::Int, Value::Int(_))
+            | (Kind::Float, Value::Int(_) | Value::Float(_))
+            | (Kind::String, Value::Text(_))
+    );
+    let help = "correct the value, or declare the column as the lines have it, under `[column.NAME]`";
+    if !is_of_kind {
+        return Some(Fault::new(
+            format!("{}, as the definitions declare it", named(declared.kind)),
+            value.shown(),
+            help,
+        ));
+    }
+    let Value::Text(text) = value else { return None };
+    let is_known = declared.values.is_empty() || declared.values.contains(text);
+    let near =
+        || nearest(text, declared.values.iter().map(String::as_str)).map(|like| format!("did you mean `{like}`?"));
+    let expected = || format!("one of {}, or null", declared.values.join(", "));
+    (!is_known).then(|| Fault::new(expected(), value.shown(), near().unwrap_or_else(|| help.to_owned())))
 }
 
 /// The smallest integer of a column.
@@ -254,8 +282,9 @@ fn odd_text(column: &Column, rule: &Rule<'_>, text: &str, found: String) -> Faul
     }
 }
 
-fn missing(column: &Column, members: &Members) -> Fault {
-    let strangers = members.iter().map(|(key, _)| key.as_str()).filter(|key| schema::column(key).is_none());
+fn missing(column: &Column, members: &Members, limits: Limits<'_>) -> Fault {
+    let is_own = |key: &&str| limits.expected.domain.column(key).is_none();
+    let strangers = members.iter().map(|(key, _)| key.as_str()).filter(is_own);
     let found =
         nearest(column.name, strangers).map_or("none".to_owned(), |key| format!("none, though there is `{key}`"));
     let help = if column.nullable { "write null where the reply gave none" } else { SEE };

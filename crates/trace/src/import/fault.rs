@@ -35,10 +35,10 @@ pub struct Fault {
 }
 
 impl Fault {
-    /// Whether another one is the same fault in another line of the file.
+    /// Whether another one is the same fault in another line of the file, whatever is found there.
     pub(super) fn is_alike(&self, other: &Self) -> bool {
-        let of_line = |fault: &Self| Self { line: None, further_lines: 0, ..fault.clone() };
-        self.line.is_some() && other.line.is_some() && of_line(self) == of_line(other)
+        let words = |fault: &Self| (fault.file.clone(), fault.key.clone(), fault.expected.clone());
+        self.line.is_some() && other.line.is_some() && words(self) == words(other)
     }
 
     /// A fault of a whole file, its words still to be said.

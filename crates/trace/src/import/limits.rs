@@ -4,12 +4,15 @@ use serde_json::{Value, json};
 
 use crate::declared::{Cluster, Origin};
 use crate::schema::colors::palette::Palette;
+use crate::validate::Expected;
 
 /// What there is of experiments and colours.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits<'a> {
-    /// The experiments that there are; any if `None`.
-    pub experiments: Option<&'a [String]>,
+    /// The experiments that there are, the domain, and the columns of its own.
+    pub expected: Expected<'a>,
+    /// The name of the domain; the mirror's if `None`.
+    pub domain: Option<&'a str>,
     /// The colours that there are, which the trace then declares; any if `None`.
     pub palette: Option<&'a Palette>,
     /// What episodes share that are more alike than chance; nothing if `None`.
@@ -23,6 +26,9 @@ impl Limits<'_> {
     pub(super) fn recording(&self, sources: &[String]) -> Value {
         let origin = if self.is_reconstruction { Origin::Reconstruction } else { Origin::Import };
         let mut recording = json!({ "kind": origin.name(), "sources": sources });
+        if let Some(domain) = self.domain {
+            recording["domain"] = json!(domain);
+        }
         if let Some(palette) = self.palette {
             recording["palette"] = json!(palette.names());
         }

@@ -29,6 +29,18 @@ pub enum Value {
 pub(super) type Members = Vec<(String, Value)>;
 
 impl Value {
+    /// Turns a floating-point number without a fraction into the same integer.
+    #[expect(clippy::cast_possible_truncation, reason = "it is whole and within 2^53")]
+    pub(super) fn make_integer(&mut self) {
+        const EXACT: f64 = 9_007_199_254_740_992.0;
+        if let Self::Float(value) = *self
+            && value.fract() == 0.0
+            && value.abs() <= EXACT
+        {
+            *self = Self::Int(value as i64);
+        }
+    }
+
     /// The value for a message, long texts cut.
     pub(super) fn shown(&self) -> String {
         const LONGEST: usize = 60;

@@ -34,7 +34,7 @@ pub use text::Text;
 use super::diagnostic::Severity;
 use super::error::TraceError;
 use super::inputs::Input;
-use super::validate::validate;
+use super::validate::{Expected, validate_as};
 use super::write::unwritable;
 use columns::Columns;
 use error::Faults;
@@ -68,7 +68,7 @@ pub fn import(texts: &mut [Text], out: &Path, limits: Limits<'_>) -> Result<Impo
     let steps = index.into_steps(&names, &mut faults);
     faults.none()?;
     let file = write(texts, &columns, &steps, out, limits)?;
-    check(&file, out, limits.experiments)?;
+    check(&file, out, limits.expected)?;
     file.commit().map_err(|error| unwritable(out, error))?;
     Ok(Imported {
         episodes: steps.chunk_by(|a, b| a.episode == b.episode).count(),
@@ -91,7 +91,7 @@ fn survey(
     text.rewind()?;
     while let Some(line) = text.next_line()? {
         is_empty = false;
-        let members = match line::members(&line.bytes, line.ended) {
+        let members = match text.members(&line.bytes, line.ended) {
             Ok(members) => members,
             Err(fault) => {
                 faults.add(fault.at(&line.place));
@@ -132,7 +132,7 @@ fn write(
         for step in episode {
             let text = &mut texts[step.text];
             let bytes = text.line_at(step.offset)?;
-            let members = line::members(&bytes, true).map_err(|_| ImportError::changed(text.name()))?;
+            let members = text.members(&bytes, true).map_err(|_| ImportError::changed(text.name()))?;
             rows.add(&members).map_err(|()| ImportError::changed(text.name()))?;
         }
         rows.end_episode().map_err(failed)?;
@@ -141,9 +141,9 @@ fn write(
 }
 
 /// Holds what was written against every rule of the schema.
-fn check(file: &NewFile, out: &Path, experiments: Option<&[String]>) -> Result<(), ImportError> {
+fn check(file: &NewFile, out: &Path, expected: Expected<'_>) -> Result<(), ImportError> {
     let input = Input { name: Input::new(out).name, path: file.temporary_path().to_owned() };
-    let report = validate(&[input], experiments, NonZeroUsize::MIN)?;
+    let report = validate_as(&[input], expected, NonZeroUsize::MIN)?;
     let errors = report.findings.into_iter().filter(|finding| finding.severity == Severity::Error).collect();
     TraceError::of(errors).map_or(Ok(()), |error| Err(error.into()))
 }

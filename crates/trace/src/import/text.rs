@@ -9,8 +9,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::error::ImportError;
-use super::fault::Place;
+use super::fault::{Fault, Place};
+use super::line::{self, Members};
 use crate::inputs::Input;
+use crate::schema::{self, Kind};
 use exact::budget::Limit;
 use exact::hash;
 use exact::input;
@@ -24,6 +26,8 @@ pub struct Text {
     offset: u64,
     /// Lines that were read since the start.
     lines: u64,
+    /// Whether the lines are rows of a data frame, which holds integers beside nulls as floating-point numbers.
+    is_frame: bool,
 }
 
 /// One line that is not blank.
@@ -67,8 +71,23 @@ impl Text {
         Ok(Self::of_file(name, file))
     }
 
+    /// The rows of a data frame as lines: a whole number is an integer where the schema asks for one.
+    pub fn of_frame(name: &str, rows: &[u8]) -> Result<Self, ImportError> {
+        Ok(Self { is_frame: true, ..Self::spool(name, rows)? })
+    }
+
     fn of_file(name: &str, file: File) -> Self {
-        Self { name: name.into(), reader: BufReader::new(file), offset: 0, lines: 0 }
+        Self { name: name.into(), reader: BufReader::new(file), offset: 0, lines: 0, is_frame: false }
+    }
+
+    /// The keys and values of one of its lines.
+    pub(super) fn members(&self, bytes: &[u8], ended: bool) -> Result<Members, Box<Fault>> {
+        let mut members = line::members(bytes, ended)?;
+        if self.is_frame {
+            let is_integer = |key: &str| schema::column(key).is_some_and(|column| column.stored.kind() == Kind::Int);
+            members.iter_mut().filter(|(key, _)| is_integer(key)).for_each(|(_, value)| value.make_integer());
+        }
+        Ok(members)
     }
 
     pub(super) fn name(&self) -> &str {

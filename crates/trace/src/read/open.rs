@@ -25,7 +25,7 @@ use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
 use crate::inputs::Input;
 use crate::schema::colors::palette::{Declared, Palette};
-use crate::schema::{self, COLUMNS, Kind};
+use crate::schema::{self, COLUMNS, Column, DeclaredColumn, Domain, Kind};
 use exact::escape::visible;
 use exact::input;
 use exact::suggest::nearest;
@@ -45,6 +45,7 @@ pub struct TraceFile {
     path: PathBuf,
     bytes: u64,
     version: u32,
+    domain: Domain,
     columns: Vec<FileColumn>,
     /// The rows of each row group.
     rows: Vec<usize>,
@@ -97,10 +98,40 @@ impl TraceSet {
                 Err(findings) => faults.extend(findings),
             }
         }
+        let set = Self { files };
+        if set.domain() == Domain::Mirror {
+            faults.extend(set.strangers());
+        }
         match TraceError::of(faults) {
             Some(error) => Err(error),
-            None => Ok(Self { files }),
+            None => Ok(set),
         }
+    }
+
+    /// The domain of all files: the mirror's, unless every file is of another one.
+    pub fn domain(&self) -> Domain {
+        let is_own = |file: &TraceFile| file.domain == Domain::Own;
+        if !self.files.is_empty() && self.files.iter().all(is_own) { Domain::Own } else { Domain::Mirror }
+    }
+
+    /// What keeps files of another domain from being traces of the mirror's.
+    pub fn strangers(&self) -> Vec<Finding> {
+        self.files.iter().flat_map(TraceFile::strangeness).collect()
+    }
+
+    /// What the schema says of the column of this name in these files; `None` for a column of their own.
+    pub fn schema_column(&self, name: &str) -> Option<&'static Column> {
+        let is_known = |known: &&'static Column| match self.domain() {
+            Domain::Mirror => known.since == 1 || self.declares(name),
+            Domain::Own => self.declares(name),
+        };
+        schema::column(name).filter(is_known)
+    }
+
+    /// Whether the schema's column keeps its meaning in these files, present or not.
+    pub fn knows(&self, known: &Column) -> bool {
+        let is_free = self.domain() == Domain::Mirror && known.since == 1;
+        self.domain().has(known) && (is_free || self.column(known.name).is_none() || self.declares(known.name))
     }
 
     /// Files that were opened one by one.
@@ -129,7 +160,7 @@ impl TraceSet {
             }
         }
         // A column that is null in every file has the schema's type, or text where the schema does not know it.
-        let unseen = || schema::column(name).map_or(Kind::String, |column| column.stored.kind());
+        let unseen = || self.domain().column(name).map_or(Kind::String, |column| column.stored.kind());
         let kind = if conflict.is_some() { Kind::Unsupported } else { seen.map_or_else(unseen, |(_, kind)| kind) };
         (present || seen.is_some()).then_some(ColumnUse { kind, missing_from, conflict })
     }
@@ -142,7 +173,7 @@ impl TraceSet {
     /// The names of all columns of all files: those of the schema in its order, then the others in the order of the
     /// files.
     pub fn column_names(&self) -> Vec<&str> {
-        let known = COLUMNS.iter().map(|column| column.name);
+        let known = COLUMNS.iter().filter(|column| self.domain().has(column)).map(|column| column.name);
         let mut names: Vec<&str> =
             known.filter(|name| self.files.iter().any(|file| file.column(name).is_some())).collect();
         for column in self.files.iter().flat_map(|file| &file.columns) {
@@ -164,7 +195,8 @@ impl TraceFile {
         let pairs = metadata.file_metadata().key_value_metadata();
         let recording = pairs.and_then(|pairs| value(pairs, schema::RECORDING_KEY));
         let absent = declared_experiment::absent(&input.name, recording);
-        let mut findings = check_columns(&input.name, &columns, version, &absent);
+        let domain = Domain::of_file(&columns, recording);
+        let mut findings = check_columns(&input.name, &columns, version, domain, &absent);
         findings.extend(bounds::fault(&input.name, bytes, &metadata));
         if !findings.is_empty() {
             return Err(findings);
@@ -185,6 +217,7 @@ impl TraceFile {
             path,
             bytes,
             version,
+            domain,
             columns,
             rows,
             pairs,
@@ -231,6 +264,29 @@ impl TraceFile {
         self.bytes
     }
 
+    /// What its episodes are about.
+    pub const fn domain(&self) -> Domain {
+        self.domain
+    }
+
+    /// What keeps it from being a trace of the mirror; nothing if it is one.
+    pub(crate) fn strangeness(&self) -> Vec<Finding> {
+        match self.domain {
+            Domain::Mirror => Vec::new(),
+            Domain::Own => check_columns(&self.name, &self.columns, self.version, Domain::Mirror, &[]),
+        }
+    }
+
+    /// Its columns of another type than definitions declare.
+    pub(crate) fn misdeclared(&self, declared: &[DeclaredColumn]) -> Vec<Finding> {
+        let fault = |declared: &DeclaredColumn| {
+            let kind = self.column(&declared.name)?.kind.filter(|kind| *kind != declared.kind)?;
+            let expected = format!("{}, as the definitions declare it", declared.kind.name());
+            Some(Finding::new(Code::WrongType, &self.name, expected, kind.name()).in_column(&declared.name))
+        };
+        declared.iter().filter_map(fault).collect()
+    }
+
     /// The columns in the file's order.
     pub fn columns(&self) -> &[FileColumn] {
         &self.columns
@@ -244,7 +300,9 @@ impl TraceFile {
     /// Whether the file has the schema's column of this name, and not one of its own that is called so: a trace of an older
     /// version may have used a name that the schema knows by now.
     pub fn declares(&self, name: &str) -> bool {
-        self.column(name).is_some() && schema::column(name).is_some_and(|known| known.since <= self.version)
+        let Some((column, known)) = self.column(name).zip(self.domain.column(name)) else { return false };
+        let has_kind = || column.kind.is_none_or(|kind| kind == known.stored.kind());
+        known.since <= self.version && (self.domain == Domain::Mirror || has_kind())
     }
 
     pub fn rows(&self) -> u64 {
@@ -382,7 +440,7 @@ fn kind_of(stored: &DataType, text: bool) -> Option<Kind> {
     }
 }
 
-fn check_columns(file: &str, columns: &[FileColumn], version: u32, absent: &[&str]) -> Vec<Finding> {
+fn check_columns(file: &str, columns: &[FileColumn], version: u32, domain: Domain, absent: &[&str]) -> Vec<Finding> {
     if let Err(exceeded) = MOST_COLUMNS.check(columns.len() as u64) {
         return vec![Finding::over_budget(file, &exceeded)];
     }
@@ -395,7 +453,9 @@ fn check_columns(file: &str, columns: &[FileColumn], version: u32, absent: &[&st
             findings.push(finding.in_column(&column.name));
         }
     }
-    for known in COLUMNS.iter().filter(|known| known.since <= version) {
+    let holds =
+        |known: &&Column| known.since <= version && (domain == Domain::Mirror || known.required && domain.has(known));
+    for known in COLUMNS.iter().filter(holds) {
         let wanted = known.stored.kind();
         match columns.iter().find(|column| column.name == known.name) {
             None if known.required && !absent.contains(&known.name) => {

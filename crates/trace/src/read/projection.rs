@@ -2,12 +2,14 @@
 
 use super::open::TraceSet;
 use crate::error::TraceError;
-use crate::schema::{self, Column, Kind};
+use crate::schema::{Column, DeclaredColumn, Domain, Kind};
 
 /// Columns that every pass reads, at these positions.
-pub(crate) const KEYS: [&str; 7] = ["episode_id", "model", "experiment", "seed", "run", "body_color", "t"];
+pub(crate) const KEYS: [&str; 6] = ["episode_id", "model", "experiment", "seed", "run", "t"];
+/// A column that is read besides in every pass over traces of the mirror's domain.
+const BODY_COLOR: &str = "body_color";
 pub(crate) const EPISODE_ID: usize = 0;
-pub(crate) const T: usize = 6;
+pub(crate) const T: usize = 5;
 
 /// The columns that a pass reads: [`KEYS`], then those asked for.
 #[derive(Clone, Debug)]
@@ -23,6 +25,8 @@ pub(crate) struct LayoutColumn {
     pub(crate) known: Option<&'static Column>,
     /// Whether it must be the same in all rows of an episode.
     pub(crate) constant: bool,
+    /// The only texts that definitions allow in it; any if empty.
+    pub(crate) values: Vec<String>,
 }
 
 impl Layout {
@@ -33,7 +37,8 @@ impl Layout {
         constants: impl IntoIterator<Item = &'a str>,
     ) -> Result<Self, TraceError> {
         let mut layout = Self { columns: Vec::new() };
-        for name in KEYS.into_iter().chain(steps) {
+        let beside = (set.domain() == Domain::Mirror).then_some(BODY_COLOR);
+        for name in KEYS.into_iter().chain(beside).chain(steps) {
             layout.add(set, name, false)?;
         }
         for name in constants {
@@ -47,12 +52,22 @@ impl Layout {
             self.columns[at].constant |= constant;
             return Ok(());
         }
-        // A name that only older traces have is a column of their own.
-        let known = schema::column(name).filter(|known| known.since == 1 || set.declares(name));
+        let known = set.schema_column(name);
         let kind = kind_in(set, name)?;
         let constant = constant || known.is_some_and(|column| column.constant);
-        self.columns.push(LayoutColumn { name: name.to_owned(), kind, known, constant });
+        self.columns.push(LayoutColumn { name: name.to_owned(), kind, known, constant, values: Vec::new() });
         Ok(())
+    }
+
+    /// Takes the rules that definitions declare for columns which the schema does not know.
+    pub(crate) fn with_declared(&mut self, declared: &[DeclaredColumn]) {
+        for declared in declared {
+            let own = self.columns.iter_mut().find(|column| column.name == declared.name && column.known.is_none());
+            if let Some(column) = own.filter(|column| column.kind == declared.kind) {
+                column.values.clone_from(&declared.values);
+                column.constant |= declared.constant;
+            }
+        }
     }
 
     /// Takes the values of a column as they are, whatever the schema says of them.

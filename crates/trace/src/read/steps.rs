@@ -20,7 +20,7 @@ use super::projection::Layout;
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
 use crate::error::TraceError;
-use crate::schema::{self, Kind, Stored};
+use crate::schema::{Kind, Stored};
 use exact::input;
 use parquet_pages::{Expansion, FaultSlot, Library, Store};
 
@@ -65,7 +65,7 @@ impl Steps {
         let layout = Layout::new(set, [], names.iter().map(String::as_str))?;
         let field = |name: &String| {
             let kind = layout.position(name).map_or(Kind::String, |at| layout.columns[at].kind);
-            Field::new(name, data_type(name, kind), true)
+            Field::new(name, data_type(set, name, kind), true)
         };
         let schema = Arc::new(Schema::new(names.iter().map(field).collect::<Vec<_>>()));
         let files = set.files().iter().map(|file| Pending::of(file).map_err(|found| TraceError::from(*found)));
@@ -136,8 +136,8 @@ fn is_readable(set: &TraceSet, name: &str) -> bool {
 }
 
 /// The type of a column: as the schema has it, as wide as can be where the schema does not know it.
-fn data_type(name: &str, kind: Kind) -> DataType {
-    let known = schema::column(name).filter(|column| column.stored.kind() == kind).map(|column| column.stored);
+fn data_type(set: &TraceSet, name: &str, kind: Kind) -> DataType {
+    let known = set.domain().column(name).filter(|column| column.stored.kind() == kind).map(|column| column.stored);
     match (known, kind) {
         (Some(Stored::Bool), _) | (None, Kind::Bool) => DataType::Boolean,
         (Some(Stored::Int8), _) => DataType::Int8,

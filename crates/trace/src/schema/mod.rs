@@ -7,6 +7,7 @@
 pub mod colors;
 mod column;
 pub mod describe;
+pub mod domain;
 mod field_access;
 pub mod rules;
 
@@ -16,6 +17,7 @@ use super::episode::Action;
 use field_access::{Access, Field as _};
 
 pub use column::{Column, Kind, Stored};
+pub use domain::{DeclaredColumn, Domain};
 pub use field_access::Value;
 
 /// The newest version of the schema. A trace is written as the oldest one that has its columns.
@@ -172,6 +174,12 @@ pub const COLUMNS: &[Column] = &[
         "The repairs that made a `repaired` reply valid, in order, joined with `+`; null where there was none."
     )
     .since(2),
+    extra!(
+        reply_fault,
+        String,
+        "Why a reply gave no decision, in the words of its parser; null where it gave one, or its status says all."
+    )
+    .since(2),
     extra!(view_description, String, "What the agent says it sees, as replied."),
     extra!(reasoning, String, "Why it acts, as replied."),
     extra!(summary, String, "Its notes for the next step, as replied."),
@@ -244,6 +252,11 @@ pub const METADATA: &[MetadataKey] = &[
     MetadataKey {
         key: "mirrorstats.recording.kind",
         doc: "`recording`, `import`, or `reconstruction`: how the rows came to be.",
+    },
+    MetadataKey {
+        key: "mirrorstats.recording.domain",
+        doc: "What the episodes are about: `mirror`, or any other name, where the columns of the mirror mean nothing. A file \
+              without it that has none of these columns is of its own domain.",
     },
     MetadataKey {
         key: "mirrorstats.recording.design",

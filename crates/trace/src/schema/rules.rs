@@ -24,6 +24,8 @@ pub enum Requirement<'a> {
     Name,
     /// One of these texts.
     OneOf(&'static [&'static str]),
+    /// One of the texts that definitions declare.
+    Among(&'a [String]),
     /// A colour that the column may hold.
     Color(ColorColumn, Option<&'a Palette>),
     /// An integer within these bounds of a type.
@@ -108,6 +110,7 @@ impl Rule<'_> {
             Requirement::Present => "a value".to_owned(),
             Requirement::Name => "a name".to_owned(),
             Requirement::OneOf(values) => values.join(", "),
+            Requirement::Among(values) => values.join(", "),
             Requirement::Color(column, palette) => column.expected(palette),
             Requirement::Within(lowest, highest, stored) => format!("{lowest} to {highest}, an {stored}"),
             Requirement::Count => "0 or more".to_owned(),
@@ -134,6 +137,7 @@ impl Rule<'_> {
         match self.asks {
             Requirement::Name => !text.is_empty(),
             Requirement::OneOf(values) => values.contains(&text),
+            Requirement::Among(values) => values.iter().any(|value| value == text),
             Requirement::Color(column, palette) => column.may_hold(text, palette),
             Requirement::Experiment(known) => text.is_empty() || known.iter().any(|name| name == text),
             _ => true,

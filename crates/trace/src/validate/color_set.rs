@@ -70,7 +70,8 @@ fn color_columns<'a>(
     layout: &'a Layout,
     episodes: &'a Episodes,
 ) -> impl Iterator<Item = (&'a Column, ColorColumn)> + 'a {
-    layout.columns.iter().zip(&episodes.columns).filter_map(|(column_of, held)| Some((held, column(&column_of.name)?)))
+    let columns = layout.columns.iter().zip(&episodes.columns);
+    columns.filter_map(|(of, held)| Some((held, column(of.known.map_or("", |known| known.name))?)))
 }
 
 /// Each text that a row of a column of texts has, its first row and the number of its rows.

@@ -22,7 +22,7 @@ use super::read::parallel_scan::{Episodes, Event, pass};
 use super::read::projection::Layout;
 use super::read::verify::verify_columns;
 use super::replies::{REPLY_STATUS, ReplyCounts};
-use super::schema::{self, COLUMNS};
+use super::schema::{self, COLUMNS, DeclaredColumn, Domain};
 use color_set::{Tally, sightings};
 use duplicate_ids::{Ids, Start, starts};
 use parquet_pages::checksums::Checksums;
@@ -86,17 +86,35 @@ impl Validation {
     }
 }
 
-/// Checks these files. Experiments are checked against `experiments` if it is given, and what the files declare.
+/// What definitions expect of traces.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Expected<'a> {
+    /// The experiments that there are, besides those that the files declare; any if `None`.
+    pub experiments: Option<&'a [String]>,
+    /// The domain: traces of any other are refused by the mirror's definitions.
+    pub domain: Domain,
+    /// The columns of their own.
+    pub declared: &'a [DeclaredColumn],
+}
+
+/// Checks these files as traces of the mirror. Experiments are checked against `experiments` if it is given, and what the
+/// files declare.
 pub fn validate(
     inputs: &[Input],
     experiments: Option<&[String]>,
     threads: NonZeroUsize,
 ) -> Result<Validation, TraceError> {
+    validate_as(inputs, Expected { experiments, ..Expected::default() }, threads)
+}
+
+/// Checks these files as definitions expect them.
+pub fn validate_as(inputs: &[Input], expected: Expected<'_>, threads: NonZeroUsize) -> Result<Validation, TraceError> {
     let mut report = Validation::default();
     let mut found: Vec<Vec<Finding>> = Vec::new();
     let (mut opened, mut places) = (Vec::new(), Vec::new());
-    for (place, input) in inputs.iter().enumerate() {
-        let file = TraceFile::open(input);
+    let mut files: Vec<_> = inputs.iter().map(TraceFile::open).collect();
+    refuse_strangers(&mut files, expected);
+    for (place, (input, file)) in inputs.iter().zip(files).enumerate() {
         let checksums = file.as_ref().map(TraceFile::checksums).unwrap_or_default();
         let (name, complete) = (input.name.clone(), file.is_ok());
         report.files.push(CheckedFile { name, complete, episodes: 0, steps: 0, checksums });
@@ -110,9 +128,9 @@ pub fn validate(
         }
     }
     let set = TraceSet::of(opened);
-    let known = experiments.map(|known| with_declared(known, &set));
+    let known = expected.experiments.map(|known| with_declared(known, &set));
     let mut replies = vec![ReplyCounts::default(); inputs.len()];
-    check_rows(&set, known.as_deref(), threads, |file, checked| {
+    check_rows(&set, Expected { experiments: known.as_deref(), ..expected }, threads, |file, checked| {
         let place = places[file];
         match checked {
             Event::Fault(finding) => {
@@ -129,7 +147,7 @@ pub fn validate(
     })?;
     for (file, place) in set.files().iter().zip(&places) {
         if report.files[*place].complete
-            && let Err(finding) = verify_columns(file, |name| schema::column(name).is_none())
+            && let Err(finding) = verify_columns(file, |name| set.domain().column(name).is_none())
         {
             report.files[*place].complete = false;
             found[*place].push(*finding);
@@ -142,6 +160,19 @@ pub fn validate(
     }
     report.findings = found.into_iter().flatten().collect();
     Ok(report)
+}
+
+/// Turns files of another domain than expected, and columns of another type than declared, into findings.
+fn refuse_strangers(files: &mut [Result<TraceFile, Vec<Finding>>], expected: Expected<'_>) {
+    let is_mirror = |file: &Result<TraceFile, _>| file.as_ref().is_ok_and(|file| file.domain() == Domain::Mirror);
+    let is_any = expected.domain == Domain::Own && !files.iter().any(is_mirror);
+    for file in files {
+        let Ok(opened) = file else { continue };
+        let found = if is_any { opened.misdeclared(expected.declared) } else { opened.strangeness() };
+        if !found.is_empty() {
+            *file = Err(found);
+        }
+    }
 }
 
 /// A note for a file whose checksums are another file's.
@@ -178,17 +209,20 @@ struct Checked {
 
 fn check_rows(
     set: &TraceSet,
-    experiments: Option<&[String]>,
+    expected: Expected<'_>,
     threads: NonZeroUsize,
     mut receive: impl FnMut(usize, Event<Checked>),
 ) -> Result<(), TraceError> {
-    let present = COLUMNS.iter().map(|column| column.name).filter(|name| set.column(name).is_some());
+    let known = COLUMNS.iter().filter(|column| set.domain().has(column)).map(|column| column.name);
+    let declared = expected.declared.iter().filter(|_| set.domain() == Domain::Own).map(|own| own.name.as_str());
+    let present = known.chain(declared).filter(|name| set.column(name).is_some());
     if set.files().is_empty() {
         return Ok(());
     }
-    let layout = Layout::new(set, present, [])?;
-    let rules = Rules { layout: &layout, experiments };
-    let statuses = layout.position(REPLY_STATUS);
+    let mut layout = Layout::new(set, present, [])?;
+    layout.with_declared(expected.declared);
+    let rules = Rules { layout: &layout, experiments: expected.experiments };
+    let statuses = layout.position(REPLY_STATUS).filter(|at| layout.columns[*at].known.is_some());
     let name = |file: usize| set.files()[file].name().to_owned();
     let work = |episodes: Episodes| {
         let mut found = rules.check(&set.files()[episodes.file], &episodes);

@@ -10,6 +10,7 @@ use crate::diagnostic::{Code, Finding};
 use crate::read::open::TraceFile;
 use crate::read::parallel_scan::Episodes;
 use crate::read::projection::{EPISODE_ID, Layout, LayoutColumn, T};
+use crate::schema::Kind;
 use crate::schema::rules::{Known, Requirement, Rule, rules_of};
 use exact::escape::exact;
 use exact::suggest::nearest;
@@ -56,9 +57,12 @@ impl Rules<'_> {
         found
     }
 
-    fn of_column<'a>(&'a self, at: usize, column: &LayoutColumn, file: &'a TraceFile) -> Vec<Rule<'a>> {
+    fn of_column<'a>(&'a self, at: usize, column: &'a LayoutColumn, file: &'a TraceFile) -> Vec<Rule<'a>> {
         let known = Known { palette: file.palette(), experiments: self.experiments };
         let mut rules = column.known.map_or_else(Vec::new, |column| rules_of(column, known));
+        if !column.values.is_empty() && column.kind == Kind::String {
+            rules.push(Rule { code: Code::UnknownValue, asks: Requirement::Among(&column.values) });
+        }
         // A definition may ask for any column to be constant.
         let constant = Rule { code: Code::InconsistentConstant, asks: Requirement::Constant };
         if column.constant && at != EPISODE_ID && !rules.contains(&constant) {
@@ -179,6 +183,9 @@ impl Look<'_> {
         let text = || text_at(self.values, row).unwrap_or_default();
         match rule.asks {
             Requirement::Color(column, palette) => Some(column.help(text(), palette)),
+            Requirement::Among(values) => {
+                nearest(text(), values.iter().map(String::as_str)).map(|like| format!("did you mean `{like}`?"))
+            }
             Requirement::Experiment(known) => {
                 let like = nearest(text(), known.iter().map(String::as_str))?;
                 Some(format!("did you mean `{like}`? Otherwise {}", rule.code.help()))

@@ -7,6 +7,7 @@ use arrow::compute::cast;
 use arrow::datatypes::{DataType, Float64Type, Int64Type};
 
 use crate::episode::{Episode, Step};
+use crate::schema::domain::is_identity;
 use crate::schema::{COLUMNS, Column, Kind, OF_SOME_TASKS, Value};
 use crate::write::row_groups::data_type;
 
@@ -32,6 +33,46 @@ pub(crate) fn episode(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
         }
     }
     Ok(episode)
+}
+
+/// A column of an episode as one of four types, whatever the file stores.
+#[derive(Clone, Debug)]
+pub struct OwnColumn {
+    pub name: String,
+    values: ArrayRef,
+}
+
+impl OwnColumn {
+    /// The values of all steps; `None` for null.
+    pub fn values(&self) -> impl Iterator<Item = Option<Value<'_>>> {
+        (0..self.values.len()).map(|row| value_at(&self.values, row))
+    }
+}
+
+/// Who played these rows and when, without a value of a step.
+pub(crate) fn identity(rows: &RecordBatch) -> Result<Episode, NotAnEpisode> {
+    let mut episode = Episode { steps: vec![Step::default(); rows.num_rows()], ..Episode::default() };
+    for column in COLUMNS.iter().filter(|column| is_identity(column.name)) {
+        let values = rows.column_by_name(column.name).ok_or_else(|| fault(column, "the column", "none"))?;
+        fill(&mut episode, column, values)?;
+    }
+    Ok(episode)
+}
+
+/// The columns besides identity and time, in the order of the file; without those of no type that is shown.
+pub(crate) fn own_columns(rows: &RecordBatch) -> Vec<OwnColumn> {
+    let schema = rows.schema();
+    let named = schema.fields().iter().zip(rows.columns()).filter(|(field, _)| !is_identity(field.name()));
+    let read = |values: &ArrayRef| {
+        let held = match values.data_type() {
+            DataType::Boolean => DataType::Boolean,
+            integer if integer.is_integer() => DataType::Int64,
+            float if float.is_floating() => DataType::Float64,
+            _ => DataType::Utf8,
+        };
+        cast(values, &held).ok()
+    };
+    named.filter_map(|(field, values)| Some(OwnColumn { name: field.name().clone(), values: read(values)? })).collect()
 }
 
 /// Puts the values of a column into their fields; those of a constant are all in the first row.

@@ -13,6 +13,7 @@ use arrow::datatypes::{DataType, Int64Type, Schema, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{RowSelection, RowSelector};
 
+pub use super::decode_episode::OwnColumn;
 use super::decode_episode::{self, NotAnEpisode};
 use crate::catch_panic::contained;
 use crate::diagnostic::{Code, Finding};
@@ -54,6 +55,16 @@ impl EpisodeRows {
 
     pub fn episode(&self) -> Result<Episode, NotAnEpisode> {
         decode_episode::episode(&self.rows)
+    }
+
+    /// Who played and when, of an episode of any domain; its steps have no value.
+    pub fn identity(&self) -> Result<Episode, NotAnEpisode> {
+        decode_episode::identity(&self.rows)
+    }
+
+    /// The columns besides identity and time, in the order of the file.
+    pub fn own_columns(&self) -> Vec<OwnColumn> {
+        decode_episode::own_columns(&self.rows)
     }
 
     /// The same rows with some columns of integers or truths replaced; a column that is not there is left out.

@@ -72,7 +72,7 @@ impl OptionalColumns {
         let experiment = &recording["experiment"];
         let has_marks = experiment["mark"].is_array() || is_there(&experiment["reply"], "mark");
         let is_given = |name: &str| match name {
-            "reply_repair" => reads_replies,
+            "reply_repair" | "reply_fault" => reads_replies,
             "participant" => agent.get("human").is_some(),
             "mark_color" | "mark_report" | "mirror_mark_px" => has_marks,
             "shown_color" => shows_another_color(&experiment["mirror"]),

@@ -1,12 +1,20 @@
 //! Agents that are functions of this process, such as those of a program that uses the library.
 //!
 //! A function gets the messages that a program gets ([`exec::message`](super::exec::message)), in the same order, and its
-//! replies are read as those of a program are. A function that fails loses its episode, as a program that ends does.
+//! replies are read as those of a program are. A function that fails loses its episode, as a program that ends does. Each
+//! episode has a thread for its function, so that several functions may take their time at once, and a recording that is
+//! stopped waits for none of them.
 
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::Instant;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Sender, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use tokio::sync::oneshot;
+use tokio::time::timeout;
 
 use super::exec::Images;
 use super::exec::conversation::Conversation;
@@ -17,7 +25,10 @@ use super::{Agent, Decision, Ended, Farewell, Lost, Observation, Player, Reply, 
 use exact::hash;
 
 /// One episode's function: gets a message and gives its reply. What it gives for a task or for the end is not looked at.
-pub type Listener = Box<dyn FnMut(&Message) -> Result<String, String>>;
+pub type Listener = Box<dyn FnMut(&Message) -> Result<String, String> + Send>;
+
+/// The time between two looks at whether the recording is stopped.
+const GLANCE: Duration = Duration::from_millis(20);
 
 /// Makes the function of each episode; an error is why there is none.
 pub type Listeners = dyn Fn() -> Result<Listener, String> + Send + Sync;
@@ -31,7 +42,9 @@ pub struct Function {
     /// The folder in which each episode gets one for its frames.
     pub scratch: PathBuf,
     /// Makes the function of each episode.
-    pub listeners: Box<Listeners>,
+    pub listeners: Arc<Listeners>,
+    /// Set when the recording is to stop: episodes under way then end without their functions.
+    pub stop: Arc<AtomicBool>,
 }
 
 /// A function as a player.
@@ -71,11 +84,10 @@ impl Player for FunctionPlayer {
     }
 
     fn agent(&self, task: Task, episode_id: &str) -> Result<Box<dyn Agent>, Lost> {
-        let Function { images, scratch, listeners, .. } = &self.function;
+        let Function { images, scratch, listeners, stop, .. } = &self.function;
         let conversation = Conversation::new(task, episode_id, *images, scratch)?;
-        let secrets = Arc::clone(&self.secrets);
-        let listener = listeners().map_err(|fault| failed(&secrets, 0, &fault))?;
-        Ok(Box::new(FunctionAgent { conversation, listener, secrets, steps: 0 }))
+        let (questions, stop) = (questions(Arc::clone(listeners))?, Arc::clone(stop));
+        Ok(Box::new(FunctionAgent { conversation, questions, secrets: Arc::clone(&self.secrets), stop, steps: 0 }))
     }
 
     fn waits(&self) -> bool {
@@ -83,42 +95,77 @@ impl Player for FunctionPlayer {
     }
 }
 
+/// A message, and where its reply goes.
+type Question = (Message, oneshot::Sender<Result<String, String>>);
+
+/// A thread that makes the function of an episode and lets it answer until nobody asks any more.
+fn questions(listeners: Arc<Listeners>) -> Result<Sender<Question>, Lost> {
+    let (questions, asked) = channel::<Question>();
+    let answer = move || {
+        let mut listener = listeners();
+        for (message, reply) in asked {
+            let said = listener.as_mut().map_err(|fault| fault.clone()).and_then(|listener| listener(&message));
+            // Nobody waits for it where the recording is stopped.
+            let _ = reply.send(said);
+        }
+    };
+    match thread::Builder::new().name("function".to_owned()).spawn(answer) {
+        Ok(_) => Ok(questions),
+        Err(error) => Err(Lost::because(format!("no thread for the function: {error}"))),
+    }
+}
+
 struct FunctionAgent {
     conversation: Conversation,
-    listener: Listener,
+    questions: Sender<Question>,
     secrets: Arc<[Secret]>,
+    stop: Arc<AtomicBool>,
     steps: i32,
 }
 
 impl Agent for FunctionAgent {
     fn decide<'a>(&'a mut self, observation: &'a Observation) -> Decision<'a> {
-        let reply = self.step(observation);
-        Box::pin(std::future::ready(reply))
+        Box::pin(self.step(observation))
     }
 
     fn end(&mut self, reason: Ended) -> Farewell<'_> {
-        // The episode is committed: what a function makes of its end changes nothing.
-        let _ = (self.listener)(&Message::End(EndMessage { reason, steps: self.steps }));
-        Box::pin(std::future::ready(()))
+        let end = Message::End(EndMessage { reason, steps: self.steps });
+        Box::pin(async move {
+            // The episode is committed: what a function makes of its end changes nothing.
+            let _ = self.tell(end).await;
+        })
     }
 }
 
 impl FunctionAgent {
-    fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
+    async fn step(&mut self, observation: &Observation) -> Result<Reply, Lost> {
         self.steps = observation.t;
         let (task, question) = self.conversation.messages(observation)?;
         let start = Instant::now();
         if let Some(task) = task {
-            self.tell(&task)?;
+            self.tell(task).await?;
         }
-        let text = self.tell(&question)?;
+        let text = self.tell(question).await?;
         let latency_ms = Some(i32::try_from(start.elapsed().as_millis()).unwrap_or(i32::MAX));
         let text = without(&self.secrets, &text);
         Ok(self.conversation.read(text, Usage { latency_ms, ..Usage::default() }))
     }
 
-    fn tell(&mut self, message: &Message) -> Result<String, Lost> {
-        (self.listener)(message).map_err(|fault| failed(&self.secrets, self.steps, &fault))
+    /// The reply to a message; the episode is not lost where the recording stops before it comes.
+    async fn tell(&mut self, message: Message) -> Result<String, Lost> {
+        let (reply, mut said) = oneshot::channel();
+        // A thread that is gone drops the question, which is an answer too.
+        let _ = self.questions.send((message, reply));
+        loop {
+            match timeout(GLANCE, &mut said).await {
+                Ok(Ok(said)) => return said.map_err(|fault| failed(&self.secrets, self.steps, &fault)),
+                Ok(Err(_)) => return Err(failed(&self.secrets, self.steps, "the function ended without a reply")),
+                Err(_) if self.stop.load(Ordering::Relaxed) => {
+                    return Err(Lost::by_limit("the recording is being stopped"));
+                }
+                Err(_) => {}
+            }
+        }
     }
 }
 

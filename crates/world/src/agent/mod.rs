@@ -85,6 +85,8 @@ pub struct Reply {
     pub status: Status,
     /// What had to be repaired to read it, in order.
     pub repairs: Vec<Repair>,
+    /// Why it gave no decision, for people; `None` where it gave one, or the status says all.
+    pub fault: Option<String>,
     /// The action; `None` where the reply gave none: the body stands still.
     pub action: Option<Action>,
     /// The self-attribution: a colour of the palette, `unknown`, or `None` where the reply gave none.

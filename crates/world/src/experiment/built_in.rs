@@ -2,7 +2,7 @@
 
 use super::Known;
 use super::file;
-use metric::fault::Source;
+use toml_spec::Source;
 
 macro_rules! files {
     ($($name:literal),+ $(,)?) => {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::spec::Spec;
 use super::table::{self, Beside, Entry};
-use metric::fault::{Fault, Faults, Place, Source};
-use metric::keys::{Keys, parse_toml};
+use toml_spec::{Fault, Faults, Place, Source};
+use toml_spec::{Keys, parse_toml};
 
 /// The most experiments of a file.
 const MOST_EXPERIMENTS: usize = 64;

@@ -8,7 +8,7 @@ use super::table::Entry;
 use super::{Experiment, TooMany, built_in_specs};
 use exact::budget::Limit;
 use exact::input;
-use metric::fault::{Faults, Place, Source};
+use toml_spec::{Faults, Place, Source};
 
 /// The most bytes of a file.
 const LARGEST: Limit = Limit::new("bytes of an experiment file", 1 << 20);

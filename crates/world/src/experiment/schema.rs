@@ -251,7 +251,7 @@ mod tests {
 
     use super::ExperimentFile;
     use crate::experiment::{Experiment, built_in, built_in_names, file};
-    use metric::fault::Source;
+    use toml_spec::Source;
 
     #[test]
     fn the_built_in_files_have_this_shape() {

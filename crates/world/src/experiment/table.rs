@@ -16,9 +16,9 @@ use super::spec::{
 use super::{Known, built_in_names};
 use exact::ratio::Ratio;
 use exact::suggest::{self, nearest};
-use metric::fault::{Fault, Place};
 use metric::file as definitions;
-use metric::keys::Keys;
+use toml_spec::Keys;
+use toml_spec::{Fault, Place};
 use trace::palette::Color;
 
 /// An experiment as read, and where its parts stand, for faults that only a drawing shows.

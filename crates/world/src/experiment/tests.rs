@@ -1,6 +1,6 @@
 use super::spec::{Cubes, Decision, PaneKind, ReplyKey, Stated};
 use super::{Experiment, built_in_names, file};
-use metric::fault::Source;
+use toml_spec::Source;
 
 fn faults(text: &str) -> Vec<String> {
     let source = Source { name: "mine.toml".to_owned(), text: text.to_owned() };

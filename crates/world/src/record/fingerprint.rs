@@ -11,7 +11,7 @@ const DIGITS: usize = 16;
 /// What an experiment is called, scored by and held against, which changes no episode.
 const WORDS: [&str; 6] = ["title", "order", "chance", "reference", "definitions", "definitions_hash"];
 /// The keys of an agent's description that are parts of their own.
-const SAMPLING: [&str; 3] = ["temperature", "max_output_tokens", "reasoning_effort"];
+const SAMPLING: [&str; 4] = ["temperature", "max_output_tokens", "reasoning_effort", "extra_body"];
 
 /// A name, and what it stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -45,6 +45,8 @@ pub struct UnreadableReply {
     pub status: String,
     /// The beginning of what was replied, characters that act on a terminal escaped; null if there is no text.
     pub text: Option<String>,
+    /// Why it gave none, in the words of its parser, shortened likewise; null where the status says all.
+    pub fault: Option<String>,
 }
 
 impl Replies {
@@ -86,7 +88,15 @@ impl UnreadableReply {
     /// The reply of a step, which has this status.
     pub(super) fn of(subject: &Subject, key: Key, step: i32, row: &Step, status: &str) -> Self {
         let text = row.extra.reply.as_deref().filter(|text| !text.trim().is_empty()).map(beginning);
-        Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text }
+        let fault = row.extra.reply_fault.as_deref().map(beginning);
+        Self { episode_id: key.episode_id(subject), step, status: status.to_owned(), text, fault }
+    }
+
+    /// What it says, where it is and why it gave no decision, in words.
+    pub fn words(&self) -> String {
+        let text = self.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
+        let fault = self.fault.as_ref().map_or_else(String::new, |fault| format!(": {fault}"));
+        format!("{text} ({}, step {}){fault}", visible(&self.episode_id), self.step)
     }
 }
 

@@ -195,6 +195,7 @@ fn row(world: &World, key: Key, t: i32, visibility: &Visibility, reply: Reply) -
         cube_distance: cube.and_then(|color| world.distance_to_cube(color)).map(narrowed),
         reply_status: Some(reply.status.name().to_owned()),
         reply_repair: Repair::joined(&reply.repairs),
+        reply_fault: reply.fault,
         view_description: reply.words.view_description,
         reasoning: reply.words.reasoning,
         summary: reply.words.summary,

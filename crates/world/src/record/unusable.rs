@@ -27,16 +27,14 @@ pub struct GivenUp {
 impl fmt::Display for GivenUp {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { model, in_a_row, last } = self;
-        let text = last.text.as_ref().map_or_else(|| "no text".to_owned(), |text| format!("`{text}`"));
         write!(
             f,
-            "the agent `{}` gave {in_a_row} replies in a row without a decision; the last: {}: {text} ({}, step {})\n  \
+            "the agent `{}` gave {in_a_row} replies in a row without a decision; the last: {}: {}\n  \
              help: --max-unusable N allows more in a row, --keep-going any number; whole episodes stay, and the same \
              command continues",
             visible(model),
             last.status,
-            visible(&last.episode_id),
-            last.step
+            last.words()
         )
     }
 }

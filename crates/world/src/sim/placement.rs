@@ -6,6 +6,9 @@
 mod panes;
 mod reach;
 
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
 use super::Experiment;
 use super::angle::{HEADINGS, Heading, sine_cosine};
 use super::body::Pose;
@@ -103,12 +106,10 @@ pub fn crowded(config: &WorldConfig, experiment: Experiment) -> Option<DoesNotFi
 
 /// A stream for all experiments with the same scenes.
 fn purpose(experiment: Experiment) -> u64 {
-    match experiment.scenes.as_str() {
-        "E1" => 1,
-        "E4" => 4,
-        "E5" => 5,
-        other => number_of(other),
-    }
+    static NUMBERED: LazyLock<BTreeMap<String, u64>> = LazyLock::new(|| {
+        toml::from_str(include_str!("../../../../assets/world/streams.toml")).expect("the file comes with the program")
+    });
+    NUMBERED.get(&experiment.scenes).copied().unwrap_or_else(|| number_of(&experiment.scenes))
 }
 
 /// The colour of the agent's own body.

@@ -15,10 +15,10 @@ use crate::cli::output;
 use exact::escape::visible;
 use exact::suggest::nearest;
 use metric::definitions::{Definitions, UnknownMetric};
-use metric::fault::FaultRecord;
 use metric::file::{FileError, built_in, built_in_names};
 use score::score_traces;
 use study::StudyError;
+use toml_spec::FaultRecord;
 use trace::inputs;
 use trace::open::TraceSet;
 

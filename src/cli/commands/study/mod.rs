@@ -2,6 +2,7 @@
 
 pub mod diff;
 pub mod figure;
+pub mod gate;
 pub mod plan;
 pub mod query;
 pub mod report;

@@ -131,7 +131,7 @@ fn json(statistics: &impl serde::Serialize) -> Result<String, Failure> {
     Ok(serde_json::to_string_pretty(statistics).map_err(Failure::input)? + "\n")
 }
 
-fn confidence(text: &str) -> Result<f64, String> {
+pub fn confidence(text: &str) -> Result<f64, String> {
     let fault = || format!("expected a number between 0 and 1 such as 0.95, found `{text}`");
     let value: f64 = text.parse().map_err(|_| fault())?;
     if value > 0.0 && value < 1.0 { Ok(value) } else { Err(fault()) }

@@ -8,7 +8,7 @@ use crate::cli::output;
 use crate::cli::quality;
 use exact::escape::visible;
 use exact::format::fixed;
-use score::quality::{CellKey, QualityByCell};
+use score::quality::{CellKey, Quality, QualityByCell};
 use study::{NotRecorded, QualityCheckAnswer, QualityLimits, Violation};
 
 /// Check the quality of the replies in traces: exits with 1 if any limit is exceeded or cannot be checked
@@ -78,6 +78,10 @@ fn print(answer: &QualityCheckAnswer, cells: &QualityByCell) -> io::Result<()> {
     for Violation { cell, limit, expected, found } in &answer.violations {
         let place = cell.as_ref().map_or_else(String::new, named);
         writeln!(out, "{place}--{limit}: expected at most {}, found {}", number(*expected), number(*found))?;
+        let quality = cell.as_ref().and_then(|cell| cells.0.get(cell)).filter(|_| *limit == "max-unreadable");
+        if let Some((fault, replies)) = quality.and_then(Quality::commonest_fault) {
+            writeln!(out, "  the most frequent reason ({replies}): {}", visible(fault))?;
+        }
     }
     for NotRecorded { cell, limit, missing, steps } in &answer.not_recorded {
         let what = format!("not recorded for {missing} of {steps} steps, so the limit cannot be checked");

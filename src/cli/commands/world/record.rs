@@ -1,10 +1,11 @@
 //! `mirrorstats record`: agents in the mirror world, one trace and one log per model and experiment.
 
 use std::collections::BTreeSet;
+use std::io;
 use std::num::{NonZeroU32, NonZeroUsize};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use crate::cli::args::ThreadArgs;
@@ -13,8 +14,10 @@ use crate::cli::exec::ExecArgs;
 use crate::cli::experiments;
 #[cfg(feature = "view")]
 use crate::cli::human::HumanArgs;
+use crate::cli::options_of;
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
+use crate::cli::recording::several;
 use crate::cli::recording::{self, Bar, RecordAnswer};
 use crate::cli::registration::registration;
 use crate::cli::vlm::VlmArgs;
@@ -40,9 +43,13 @@ use world::sim::config::WorldConfig;
 #[derive(Clone, Debug, clap::Args)]
 #[expect(clippy::struct_excessive_bools, reason = "a flag each on the command line")]
 pub struct RecordArgs {
+    /// A study file: options of this command for all models, [model."NAME"] for one and [condition.NAME] for a condition;
+    /// --dry-run and --json alone may stand beside it
+    #[arg(value_name = "STUDY")]
+    study: Option<PathBuf>,
     /// Who plays: oracle, random, guesser, gullible, confabulator, frozen, mimic; vlm, a model behind a provider; human, people
     /// in a browser; or exec:'CMD', a program of your own that takes and gives JSON lines
-    #[arg(long, value_name = "AGENT")]
+    #[arg(long, value_name = "AGENT", default_value = "vlm")]
     agent: String,
     /// The experiments: E1, E1..E5, E1,E3, others that are built in such as mark (`mirrorstats experiments show`), or a
     /// file of your own such as mine.toml
@@ -112,28 +119,78 @@ pub struct RecordArgs {
 
 impl RecordArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
-        let config = self.world()?;
-        let plan = self.planned(&config)?;
+        let each = self.each()?;
+        let forecasts = || each.iter().map(Self::forecast).collect::<Result<Vec<_>, _>>();
         if self.dry_run {
-            return self.forecast(&config, &plan);
+            return self.print_forecasts(&forecasts()?);
         }
-        let player = self.player()?;
+        if each.len() > 1 {
+            dry_run::tell_all(&mut io::stderr().lock(), &forecasts()?)?;
+        }
         let stop: &'static AtomicBool = Box::leak(Box::new(AtomicBool::new(false)));
-        stop_at_interrupt(stop, Arc::clone(&player))?;
-        let recorded = self.record(player.as_ref(), stop)?;
-        recording::say(
-            &recorded.answer,
-            (&self.out, &recorded.lost_list),
-            &self.files(),
-            recorded.elapsed,
-            recorded.times,
-        )?;
-        if self.json {
-            output::print_json(&recorded.answer)?;
+        let playing = Playing::default();
+        stop_at_interrupt(stop, Arc::clone(&playing))?;
+        let mut all = Vec::new();
+        for args in each.iter().take_while(|_| !stop.load(Ordering::Relaxed)) {
+            let recorded = args.record_one(&playing, stop);
+            // A model that cannot go on keeps none of the others from it.
+            if let (Some(reason), true) = (several::stopped(&recorded), each.len() > 1) {
+                output::say(&format!("stopped: {reason}"));
+            }
+            all.push(recorded);
         }
-        match recorded.gave_up {
-            Some(reason) => Err(Failure::input(reason)),
-            None => Ok(outcome_of(&recorded.answer)),
+        if self.json {
+            self.print_answers(&all)?;
+        }
+        several::outcome(all, each.len())
+    }
+
+    /// The answer of one recording, or a list of those of several.
+    fn print_answers(&self, all: &[Result<Recorded, Failure>]) -> Result<(), Failure> {
+        let answers: Vec<&RecordAnswer> = all.iter().flatten().map(|recorded| &recorded.answer).collect();
+        match answers.as_slice() {
+            all if self.is_list() => output::print_json(&all).map(drop),
+            [answer, ..] => output::print_json(answer).map(drop),
+            [] => Ok(()),
+        }
+    }
+
+    /// Whether an answer is a list, of however many recordings.
+    fn is_list(&self) -> bool {
+        self.study.is_some() || self.vlm.each().len() > 1
+    }
+
+    /// One recording for each condition and model of a study file, or for each `--model`.
+    fn each(&self) -> Result<Vec<Self>, Failure> {
+        let Some(file) = &self.study else {
+            let one = |vlm| Self { vlm, ..self.clone() };
+            return Ok(self.vlm.each().into_iter().map(one).collect());
+        };
+        let options = several::recordings(file)?;
+        let parsed = options.into_iter().map(|options| options_of::<Self>("record", options));
+        let in_file = |failure: Failure| match failure {
+            Failure::Usage(error) => Failure::input(format!("in the study `{}`: {error}", file.display())),
+            other => other,
+        };
+        parsed.map(|args| args.map_err(in_file)).collect()
+    }
+
+    /// Records as these options say, and tells how it went.
+    fn record_one(&self, playing: &Playing, stop: &AtomicBool) -> Result<Recorded, Failure> {
+        let player = self.player()?;
+        *playing.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&player));
+        let recorded = self.record(player.as_ref(), stop)?;
+        let places = (self.out.as_path(), recorded.lost_list.as_path());
+        recording::say(&recorded.answer, places, &self.files(), recorded.elapsed, recorded.times)?;
+        Ok(recorded)
+    }
+
+    fn print_forecasts(&self, forecasts: &[ForecastAnswer]) -> Result<Outcome, Failure> {
+        match forecasts {
+            all if self.json && self.is_list() => output::print_json(&all),
+            [one] if self.json => output::print_json(one),
+            [one] => Ok(dry_run::tell(&mut io::stdout().lock(), one).map(|()| Outcome::Done)?),
+            all => Ok(dry_run::tell_all(&mut io::stdout().lock(), all).map(|()| Outcome::Done)?),
         }
     }
 
@@ -191,8 +248,10 @@ impl RecordArgs {
         Ok(Plan { experiments, seeds: self.seeds, runs: self.runs, repeats: self.repeats, shard: self.shard })
     }
 
-    /// Says what recording would come to.
-    fn forecast(&self, config: &WorldConfig, plan: &Plan) -> Result<Outcome, Failure> {
+    /// What recording would come to.
+    fn forecast(&self) -> Result<ForecastAnswer, Failure> {
+        let config = &self.world()?;
+        let plan = &self.planned(config)?;
         let vlm = (self.agent == "vlm").then(|| self.vlm.forecaster(&self.out)).transpose()?.map(Arc::new);
         let player = match &vlm {
             Some(vlm) => Arc::clone(vlm) as Arc<dyn Player>,
@@ -206,13 +265,7 @@ impl RecordArgs {
         let vlm = vlm.filter(|_| self.vlm.sends());
         let requests =
             vlm.map(|vlm| RequestForecast::of(&vlm, &subject, &todo, config)).transpose().map_err(Failure::input)?;
-        let answer = ForecastAnswer::of(&subject, planned.len(), &todo, config, requests);
-        if self.json {
-            output::print_json(&answer)?;
-        } else {
-            dry_run::print(&answer)?;
-        }
-        Ok(Outcome::Done)
+        Ok(ForecastAnswer::of(&subject, planned.len(), &todo, config, requests))
     }
 
     /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is told.
@@ -304,14 +357,8 @@ pub struct Recorded {
     times: Spent,
 }
 
-/// How a recording that ran to its end, or was interrupted, is told from outside.
-fn outcome_of(answer: &RecordAnswer) -> Outcome {
-    match (answer.stopped, answer.lost.is_empty()) {
-        (true, _) => Outcome::Interrupted,
-        (false, true) => Outcome::Done,
-        (false, false) => Outcome::CheckFailed,
-    }
-}
+/// Who plays now.
+type Playing = Arc<Mutex<Option<Arc<dyn Player>>>>;
 
 /// The files of a plan's experiments, as far as they are there.
 fn files(plan: &Plan, path: impl Fn(Experiment) -> PathBuf) -> Vec<String> {
@@ -357,10 +404,12 @@ fn condition(text: &str) -> Result<String, String> {
 }
 
 /// The first Ctrl-C stops at the next step of each episode, the second at once.
-fn stop_at_interrupt(stop: &'static AtomicBool, player: Arc<dyn Player>) -> Result<(), Failure> {
+fn stop_at_interrupt(stop: &'static AtomicBool, playing: Playing) -> Result<(), Failure> {
     ctrlc::set_handler(move || {
         if stop.swap(true, Ordering::Relaxed) {
-            player.abandon();
+            if let Some(player) = playing.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+                player.abandon();
+            }
             leave(130);
         }
     })

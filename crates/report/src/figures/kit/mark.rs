@@ -3,6 +3,7 @@
 //! Rule: `data-value` has every digit, as in `cells.csv`, and is empty where there is no value. Names are spelled as the
 //! page spells them.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 use super::ink::escaped;
@@ -13,7 +14,7 @@ use exact::number;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
     title: String,
-    data: Vec<(&'static str, String)>,
+    data: Vec<(Cow<'static, str>, String)>,
 }
 
 impl Mark {
@@ -22,9 +23,13 @@ impl Mark {
         Self { title: title.into(), data: Vec::new() }
     }
 
-    /// The same with one more value, under `data-NAME`.
+    /// The same with one more value, under `data-NAME`; a name that is taken gets a dash.
     #[expect(clippy::needless_pass_by_value, reason = "numbers and text alike, as they come")]
-    pub fn with(mut self, name: &'static str, value: impl ToString) -> Self {
+    pub fn with(mut self, name: impl Into<Cow<'static, str>>, value: impl ToString) -> Self {
+        let mut name = name.into();
+        while self.data.iter().any(|(known, _)| *known == name) {
+            name.to_mut().push('-');
+        }
         self.data.push((name, value.to_string()));
         self
     }
@@ -35,7 +40,7 @@ impl Mark {
     }
 
     /// The same with one more number in full precision; empty where there is none.
-    pub fn number(self, name: &'static str, value: Option<f64>) -> Self {
+    pub fn number(self, name: impl Into<Cow<'static, str>>, value: Option<f64>) -> Self {
         self.with(name, value.map(number::full_precision).unwrap_or_default())
     }
 

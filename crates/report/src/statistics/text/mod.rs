@@ -38,6 +38,9 @@ impl Statistics {
         if let Some(selection) = &statistics.selection {
             push_wrapped(&mut text, &selection.sentence(), width, 0);
         }
+        for sentence in &statistics.pooled {
+            push_wrapped(&mut text, &visible(sentence), width, 0);
+        }
         push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
         departures(&mut text, statistics.departures.as_deref(), width);
         list(&mut text, &heading(statistics), &answers(&statistics.answers), width);
@@ -45,7 +48,8 @@ impl Statistics {
             list(&mut text, "What can be concluded", &statistics.conclusions, width);
         }
         let design = format!("{}.", statistics.design_note);
-        let warnings: Vec<String> = statistics.warnings.iter().filter(|warning| **warning != design).cloned().collect();
+        let is_new = |warning: &&String| **warning != design && !statistics.pooled.contains(warning);
+        let warnings: Vec<String> = statistics.warnings.iter().filter(is_new).cloned().collect();
         list(&mut text, "What can not", &warnings, width);
         for (title, table) in sections(statistics, &shown, length, &percent) {
             section(&mut text, title, table, width);

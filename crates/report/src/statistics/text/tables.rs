@@ -2,7 +2,7 @@
 
 use super::super::study::named;
 use super::super::{
-    COMPLETED, CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Role, Sign, Statistics, Units, Verdict,
+    CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Role, Sign, Statistics, Units, Verdict,
 };
 use crate::tables::Table;
 use exact::format::{UNDEFINED, bounds, fixed, p_value};
@@ -58,8 +58,7 @@ fn mark(cell: &CellRow) -> String {
 
 /// Rates against their levels; where a rate is shown, so is the same among finished episodes.
 pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
-    let is_shown =
-        |metric: &str| shown(metric) || COMPLETED.iter().any(|(whole, completed)| *completed == metric && shown(whole));
+    let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
     let columns = Columns { is_full, has_losses: statistics.chance.iter().any(|row| row.losses.is_some()) };
     let line = |row: &super::super::ChanceRow| {
         let role = match row.role {
@@ -326,6 +325,7 @@ pub(super) fn held(interval: Option<Interval>, withheld: Option<Withheld>, place
     match (interval, withheld) {
         (None, Some(Withheld::TooFew { fewest })) => format!("{UNDEFINED} (n < {fewest})"),
         (None, Some(Withheld::NoSpread)) => format!("{UNDEFINED} (no spread)"),
+        (None, Some(Withheld::Incomparable)) => format!("{UNDEFINED} (not comparable)"),
         _ => plain(interval, places),
     }
 }

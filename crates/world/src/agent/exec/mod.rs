@@ -196,9 +196,10 @@ impl ExecAgent {
                 self.conversation.read(text, usage)
             }
             // With its bytes replaced it might pass for something that the program did not say.
-            Err(_) => Reply {
+            Err(fault) => Reply {
                 status: Status::ParseFailed,
                 repairs: Vec::new(),
+                fault: Some(fault.to_string()),
                 action: None,
                 self_color: None,
                 selected_cube: None,

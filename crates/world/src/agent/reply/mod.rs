@@ -6,7 +6,8 @@
 //!
 //! Rule: nothing is made up. A reply is taken as it is, or after a repair that has a name, or it is no decision: then
 //! action, cube and attribution are absent, and the raw text is all there is. The raw text keeps how `selected_cube` and
-//! `identification` were written: letter case and white space mean nothing in either, and are no repair.
+//! `identification` were written: letter case and white space mean nothing in either, and are no repair. An action has letters
+//! of its own, so that another spelling of it is a repair.
 //!
 //! A `selected_cube` other than `none` beside another action than `done` breaks a rule of the prompt, but not the
 //! shape of the object: it is kept as replied, and the metrics look at the cube of the `done` step alone.
@@ -74,12 +75,14 @@ impl Reading {
         }
     }
 
-    /// The same where what carried the text had a lone surrogate in it, which is part of the reply's repairs.
+    /// The same after repairs of what carried the text, which come before its own.
     #[cfg(feature = "sim")]
     #[must_use]
-    pub(in crate::agent) fn with_surrogate_repaired(mut self) -> Self {
-        if matches!(self.status, Status::Ok | Status::Repaired) && !self.repairs.contains(&Repair::Surrogate) {
-            self.repairs.insert(0, Repair::Surrogate);
+    pub(in crate::agent) fn after(mut self, carried: &[Repair]) -> Self {
+        let is_new = |repair: &Repair| !self.repairs.contains(repair);
+        let new: Vec<_> = carried.iter().copied().filter(is_new).collect();
+        if matches!(self.status, Status::Ok | Status::Repaired) && !new.is_empty() {
+            self.repairs.splice(..0, new);
             self.status = Status::Repaired;
         }
         self
@@ -90,6 +93,7 @@ impl Reading {
         Reply {
             status: self.status,
             repairs: self.repairs,
+            fault: self.fault,
             action: self.action,
             self_color: self.self_color,
             selected_cube: self.selected_cube,
@@ -110,13 +114,16 @@ pub fn read(raw: &str, experiment: &Spec, ending: Ending) -> Reading {
         Ending::Whole if raw.trim().is_empty() => return Reading::without_decision(Status::Empty, None),
         Ending::Whole => {}
     }
-    let (object, repairs) = match repair::object(raw) {
+    let (object, mut repairs) = match repair::object(raw) {
         Ok(found) => found,
         Err(fault) => return without_object(fault),
     };
     match decision(&object, &experiment.reply, experiment.actions) {
-        Ok(reading) if repairs.is_empty() => reading,
-        Ok(reading) => Reading { status: Status::Repaired, repairs, ..reading },
+        Ok(reading) => {
+            repairs.extend(reading.repairs);
+            let status = if repairs.is_empty() { Status::Ok } else { Status::Repaired };
+            Reading { status, repairs, ..reading }
+        }
         Err(fault) => Reading::without_decision(Status::SchemaInvalid, Some(fault)),
     }
 }
@@ -145,19 +152,14 @@ fn decision(object: &object::Object, keys: &[ReplyKey], actions: Actions) -> Res
         Some(Value::String(text)) => Ok(Some(text.clone())),
         Some(other) => Err(format!("\"{}\" is {}, expected a string", key.name(), kind(other))),
     };
-    let action = text(ReplyKey::Action)?.unwrap_or_default();
-    let known = prompt::actions(actions);
-    let action = prompt::action(&action).filter(|action| known.contains(action)).ok_or_else(|| {
-        let letters: Vec<&str> = known.iter().map(|action| prompt::letter(*action)).collect();
-        format!("\"action\" is \"{action}\", expected one of {}", letters.join(", "))
-    })?;
+    let (action, repairs) = action(&text(ReplyKey::Action)?.unwrap_or_default(), actions)?;
     let color = |key| text(key)?.map(|name| color_or_none(key, &name)).transpose();
     let selected_cube = color(ReplyKey::SelectedCube)?;
     let mark_report = color(ReplyKey::Mark)?;
     let identification = text(ReplyKey::Identification)?;
     Ok(Reading {
         status: Status::Ok,
-        repairs: Vec::new(),
+        repairs,
         fault: None,
         action: Some(action),
         selected_cube,
@@ -169,6 +171,19 @@ fn decision(object: &object::Object, keys: &[ReplyKey], actions: Actions) -> Res
             summary: text(ReplyKey::Summary)?,
             identification,
         },
+    })
+}
+
+/// The action of this name, and the repair of its spelling.
+fn action(name: &str, actions: Actions) -> Result<(Action, Vec<Repair>), String> {
+    let known = prompt::actions(actions);
+    let named = |name: &str| prompt::action(name).filter(|action| known.contains(action));
+    if let Some(action) = named(name) {
+        return Ok((action, Vec::new()));
+    }
+    named(&spelling::normal(name)).map(|action| (action, vec![Repair::ActionSpelling])).ok_or_else(|| {
+        let letters: Vec<&str> = known.iter().map(|action| prompt::letter(*action)).collect();
+        format!("\"action\" is \"{name}\", expected one of {}", letters.join(", "))
     })
 }
 

@@ -15,6 +15,12 @@ impl Object {
         serde_json::from_str(text)
     }
 
+    /// Whether this is a call of a function and nothing else: its name and an object of arguments.
+    pub(super) fn is_call(&self) -> bool {
+        let arguments = self.get("arguments").or_else(|| self.get("parameters"));
+        self.0.len() == 2 && self.get("name").is_some_and(Value::is_string) && arguments.is_some_and(Value::is_object)
+    }
+
     pub(super) fn keys(&self) -> impl Iterator<Item = &str> {
         self.0.iter().map(|(key, _)| key.as_str())
     }

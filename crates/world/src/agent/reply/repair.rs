@@ -3,8 +3,11 @@
 //!
 //! They come in a fixed order, each on top of those before it, until the text is one JSON object:
 //! take the text out of a code fence; drop the thoughts before the answer, and take that out of a code fence; take the one
-//! object out of the text around it; drop commas before a closing bracket; turn strings in single quotes into strings in
-//! double quotes; put U+FFFD in the place of a lone surrogate.
+//! object out of the text around it; drop comments; drop commas before a closing bracket; turn strings in single quotes into
+//! strings in double quotes; escape control characters in strings; put U+FFFD in the place of a lone surrogate. Of a call of a
+//! function the arguments are taken.
+
+use std::fmt::Write as _;
 
 use super::object::Object;
 use super::surrogates::without_lone_surrogates;
@@ -24,6 +27,14 @@ pub enum Repair {
     SingleQuotes,
     /// A string had half of a pair of surrogates (`\ud83d` without `\ude00`), which is no character.
     Surrogate,
+    /// Comments, `// ...` or `/* ... */`, stood outside of strings.
+    Comment,
+    /// A string had a raw line feed, tab or another control character in it.
+    ControlCharacter,
+    /// The object came as the arguments of a call of a function.
+    ToolCall,
+    /// The action was in other letters, or had white space around it: `"DONE"`.
+    ActionSpelling,
 }
 
 impl Repair {
@@ -35,6 +46,10 @@ impl Repair {
             Self::TrailingComma => "trailing_comma",
             Self::SingleQuotes => "single_quotes",
             Self::Surrogate => "surrogate",
+            Self::Comment => "comment",
+            Self::ControlCharacter => "control_character",
+            Self::ToolCall => "tool_call",
+            Self::ActionSpelling => "action_spelling",
         }
     }
 }
@@ -72,18 +87,20 @@ pub(super) enum NoObject {
 /// The object in a reply, and what had to be repaired to read it.
 pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
     let first = match Object::parse(raw.trim()) {
-        Ok(object) => return Ok((object, Vec::new())),
+        Ok(object) => return Ok(without_call(object, raw, Vec::new())),
         Err(fault) => NoObject::Unreadable(fault.to_string()),
     };
     let mut text = raw.trim().to_owned();
     let mut repairs = Vec::new();
-    let steps: [(Repair, Change); 7] = [
+    let steps: [(Repair, Change); 9] = [
         (Repair::CodeFence, without_fence),
         (Repair::Thoughts, without_thoughts),
         (Repair::CodeFence, without_fence),
         (Repair::SurroundingText, without_surroundings),
+        (Repair::Comment, without_comments),
         (Repair::TrailingComma, without_trailing_commas),
         (Repair::SingleQuotes, with_double_quotes),
+        (Repair::ControlCharacter, with_escaped_controls),
         (Repair::Surrogate, without_lone_surrogates),
     ];
     for (repair, change) in steps {
@@ -94,10 +111,27 @@ pub(super) fn object(raw: &str) -> Result<(Object, Vec<Repair>), NoObject> {
         text = changed;
         repairs.push(repair);
         if let Ok(object) = Object::parse(&text) {
-            return Ok((object, repairs));
+            return Ok(without_call(object, &text, repairs));
         }
     }
     Err(first)
+}
+
+/// The arguments of the call of a function, read from the text again so that no repeated key is lost; any other object as it is.
+fn without_call(object: Object, text: &str, mut repairs: Vec<Repair>) -> (Object, Vec<Repair>) {
+    let arguments = || {
+        let opening = |piece| matches!(piece, Piece::Mark(_, '{')).then_some(piece);
+        let Piece::Mark(at, _) = Pieces::of(text).filter_map(opening).nth(1)? else { return None };
+        let length = end_of_object(&text[at..])?;
+        Object::parse(&text[at..at + length]).ok()
+    };
+    match object.is_call().then(arguments).flatten() {
+        Some(arguments) => {
+            repairs.push(Repair::ToolCall);
+            (arguments, repairs)
+        }
+        None => (object, repairs),
+    }
 }
 
 /// Refuses a text that is thoughts alone: whatever object they hold is no answer.
@@ -141,7 +175,8 @@ fn without_surroundings(text: &str) -> Option<String> {
 /// The bytes from an opening brace to the brace that closes it.
 fn end_of_object(text: &str) -> Option<usize> {
     let mut depth = 0_usize;
-    for piece in Pieces::of(text) {
+    let mut pieces = Pieces::of(text);
+    while let Some(piece) = pieces.next_outside_comments() {
         match piece {
             Piece::Mark(_, '{') => depth += 1,
             Piece::Mark(at, '}') => {
@@ -210,6 +245,54 @@ fn push_inside(text: &mut String, inside: &str) {
     }
 }
 
+/// The text without comments outside of strings; `None` if there are none.
+fn without_comments(text: &str) -> Option<String> {
+    let (mut kept, mut pieces) = (String::with_capacity(text.len()), Pieces::of(text));
+    while let Some(piece) = pieces.next_outside_comments() {
+        match piece {
+            Piece::Mark(_, c) => kept.push(c),
+            Piece::Quoted(string) => kept.push_str(string),
+        }
+    }
+    (kept.len() < text.len()).then_some(kept)
+}
+
+/// The bytes of the comment that a text begins with; an open one ends with the text.
+fn length_of_comment(text: &str) -> Option<usize> {
+    if let Some(rest) = text.strip_prefix("//") {
+        return Some(rest.find('\n').map_or(text.len(), |end| 2 + end));
+    }
+    let rest = text.strip_prefix("/*")?;
+    Some(rest.find("*/").map_or(text.len(), |end| end + 4))
+}
+
+/// The text with the control characters in its strings escaped; `None` if there are none.
+fn with_escaped_controls(text: &str) -> Option<String> {
+    let (mut changed, mut is_changed) = (String::with_capacity(text.len()), false);
+    for piece in Pieces::of(text) {
+        match piece {
+            Piece::Mark(_, c) => changed.push(c),
+            Piece::Quoted(string) => is_changed |= push_escaped(&mut changed, string),
+        }
+    }
+    is_changed.then_some(changed)
+}
+
+/// Adds a string with its control characters escaped, but for those behind a backslash; says whether there are any.
+fn push_escaped(text: &mut String, string: &str) -> bool {
+    let (mut is_escaped, mut is_changed) = (false, false);
+    for c in string.chars() {
+        if c.is_ascii_control() && c != '\x7f' && !is_escaped {
+            is_changed = true;
+            let _ = write!(text, "\\u{:04x}", u32::from(c));
+        } else {
+            text.push(c);
+        }
+        is_escaped = c == '\\' && !is_escaped;
+    }
+    is_changed
+}
+
 /// A piece of almost-JSON: a string with its quotes, or one character outside of strings and where it stands.
 enum Piece<'a> {
     Quoted(&'a str),
@@ -227,6 +310,13 @@ struct Pieces<'a> {
 impl<'a> Pieces<'a> {
     fn of(text: &'a str) -> Self {
         Self { text, at: 0, before: ':' }
+    }
+
+    fn next_outside_comments(&mut self) -> Option<Piece<'a>> {
+        while let Some(length) = length_of_comment(&self.text[self.at..]) {
+            self.at += length;
+        }
+        self.next()
     }
 
     /// The length of the string that begins here, its quotes included; an open one ends with the text.

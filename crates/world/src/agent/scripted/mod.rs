@@ -196,6 +196,7 @@ impl Agent for Puppet {
         let reply = Reply {
             status: Status::Ok,
             repairs: Vec::new(),
+            fault: None,
             action,
             // Not every prompt has these keys.
             self_color: self.experiment.asks_for_identification().then(|| name(claim, "unknown")),

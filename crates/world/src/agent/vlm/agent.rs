@@ -6,8 +6,10 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
 use super::journal::{Journal, JournalError, Recorded};
+use super::limits::Begun;
 use super::model::{Memory, Vlm};
-use super::step::{Step, locked};
+use super::step::{Asked, Step, locked};
+use super::wire_format::Answer;
 use crate::agent::prompt::Prompt;
 use crate::agent::{Agent, Decision, Lost, Observation, Reply, Status, Task, Usage, Words, reply};
 use exact::hash;
@@ -20,7 +22,7 @@ impl Vlm {
             Memory::Journals(_) => Journal::open(&path)?,
             Memory::Cassette(_) => Journal::cassette(&path)?,
         };
-        Ok(VlmAgent { vlm: Arc::clone(self), task, journal: Arc::new(Mutex::new(journal)) })
+        Ok(VlmAgent { vlm: Arc::clone(self), task, journal: Arc::new(Mutex::new(journal)), begun: None })
     }
 }
 
@@ -30,6 +32,8 @@ pub struct VlmAgent {
     vlm: Arc<Vlm>,
     task: Task,
     journal: Arc<Mutex<Journal>>,
+    /// Whether the episode has sent a request of this start; it ends with the agent.
+    begun: Option<Begun>,
 }
 
 impl Agent for VlmAgent {
@@ -44,9 +48,9 @@ impl VlmAgent {
             .and_then(|prompt| prompt.render(&self.task, observation))
             .map_err(|fault| self.vlm.halt(Lost::because(format!("the prompt cannot be made: {fault}"))))?;
         let schema = reply::structure(&self.task.experiment.reply);
-        let dialect = self.vlm.choice.backend.dialect;
         // Pixels differ between machines, words do not: a cassette plays on any.
-        let question = hash::of_bytes(dialect.body(&self.vlm.question(&words, &schema, "")).to_string().as_bytes());
+        let without_frame = self.vlm.body(&words, &schema, "").to_string();
+        let question = hash::of_bytes(without_frame.as_bytes());
         let recorded = locked(&self.journal).recorded(observation.t).cloned();
         if let Some(recorded) = recorded {
             return self.reply_to(observation.t, &question, &recorded);
@@ -54,6 +58,9 @@ impl VlmAgent {
         let (Some(network), Some(_)) = (&self.vlm.network, &self.vlm.provider) else {
             return Err(Lost::because(format!("the cassette has no answer for step {}", observation.t)));
         };
+        let frame = &observation.frame;
+        let view = [frame.width, frame.height].map(|pixels| u32::try_from(pixels).unwrap_or(u32::MAX));
+        let at_most = self.vlm.at_most(without_frame.len(), view);
         let png = observation
             .frame
             .to_png()
@@ -63,14 +70,33 @@ impl VlmAgent {
             journal: Arc::clone(&self.journal),
             t: observation.t,
             frame: hash::of_bytes(png),
-            body: dialect.body(&self.vlm.question(&words, &schema, &STANDARD.encode(png))),
-            question: question.clone(),
+            body: self.vlm.body(&words, &schema, &STANDARD.encode(png)),
+            question,
+            at_most,
         };
-        let recorded = network
-            .spawn(step.ask())
-            .await
-            .map_err(|fault| Lost::because(format!("a request broke off: {fault}")))??;
-        self.reply_to(observation.t, &question, &recorded)
+        let network = network.clone();
+        self.take_turn(observation, at_most).await?;
+        let asked = network.spawn(step.ask()).await;
+        match asked.map_err(|fault| Lost::because(format!("a request broke off: {fault}")))?? {
+            Asked::GivenUp(status) => Ok(without_decision(status)),
+            Asked::Answer { answer, latency_ms } => Ok(self.reply_of(answer, latency_ms)),
+        }
+    }
+
+    /// Waits until the episode may begin, or notes that it has come further.
+    async fn take_turn(&mut self, observation: &Observation, at_most: [u64; 2]) -> Result<(), Lost> {
+        let account = &self.vlm.account;
+        let left = u64::try_from(observation.remaining).unwrap_or(0);
+        match &mut self.begun {
+            Some(begun) => begun.note_left(left),
+            // What earlier steps have cost is lost if the episode is not ended.
+            None if observation.t > 1 => self.begun = Some(account.go_on(left)),
+            None => {
+                let begun = account.begin(left, self.vlm.cost_of(at_most));
+                self.begun = Some(self.vlm.unless_stopped(begun).await?);
+            }
+        }
+        Ok(())
     }
 
     /// The reply in what is recorded, which must belong to this question.
@@ -85,23 +111,26 @@ impl VlmAgent {
             Recorded::GivenUp { status, .. } => Ok(without_decision(*status)),
             Recorded::Answer { body, latency_ms, .. } => {
                 self.vlm.note_answered();
-                let (answer, cost_usd) = self
+                let answer = self
                     .vlm
                     .read(body)
                     .ok_or_else(|| Lost::because(format!("the recorded answer of step {t} cannot be read")))?;
                 self.vlm.check_model(answer.model.as_deref())?;
-                let count = |tokens: Option<u32>| tokens.and_then(|tokens| i32::try_from(tokens).ok());
-                let usage = Usage {
-                    latency_ms: Some(*latency_ms),
-                    prompt_tokens: count(answer.prompt_tokens),
-                    completion_tokens: count(answer.completion_tokens),
-                    cost_usd,
-                };
-                let reading = reply::read(&answer.text, &self.task.experiment, answer.ending);
-                let reading = if answer.has_lone_surrogate { reading.with_surrogate_repaired() } else { reading };
-                Ok(Reply { model: answer.model, ..reading.into_reply(answer.text, usage) })
+                Ok(self.reply_of(answer, *latency_ms))
             }
         }
+    }
+
+    fn reply_of(&self, answer: Answer, latency_ms: i32) -> Reply {
+        let count = |tokens: Option<u32>| tokens.and_then(|tokens| i32::try_from(tokens).ok());
+        let usage = Usage {
+            latency_ms: Some(latency_ms),
+            prompt_tokens: count(answer.prompt_tokens),
+            completion_tokens: count(answer.completion_tokens),
+            cost_usd: self.vlm.cost_usd(&answer),
+        };
+        let reading = reply::read(&answer.text, &self.task.experiment, answer.ending).after(&answer.repairs);
+        Reply { model: answer.model, ..reading.into_reply(answer.text, usage) }
     }
 }
 
@@ -109,6 +138,7 @@ fn without_decision(status: Status) -> Reply {
     Reply {
         status,
         repairs: Vec::new(),
+        fault: None,
         action: None,
         self_color: None,
         selected_cube: None,

@@ -1,9 +1,11 @@
 //! How many requests a provider gets at once: one more after a round of good answers, half as many after a reply that
-//! says that there were too many.
+//! says that there were too many; none before a rate limit is renewed.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use tokio::sync::Semaphore;
+use tokio::time::{Instant, sleep_until};
 
 /// The concurrency of one provider, shared by all episodes.
 #[derive(Debug)]
@@ -22,6 +24,8 @@ struct State {
     debt: usize,
     /// Good answers since the limit last changed.
     good: usize,
+    /// When the next request may go out; `None` if now.
+    not_before: Option<Instant>,
 }
 
 /// A request that may go out; counts as out until it is dropped.
@@ -34,7 +38,10 @@ impl Pace {
     /// At most `most` requests at once, and at least one.
     pub fn new(most: usize) -> Self {
         let most = most.clamp(1, Semaphore::MAX_PERMITS);
-        Self { permits: Semaphore::new(most), state: Mutex::new(State { limit: most, most, debt: 0, good: 0 }) }
+        Self {
+            permits: Semaphore::new(most),
+            state: Mutex::new(State { limit: most, most, debt: 0, good: 0, not_before: None }),
+        }
     }
 
     /// Waits until a request may go out.
@@ -43,7 +50,21 @@ impl Pace {
         if let Ok(permit) = self.permits.acquire().await {
             permit.forget();
         }
-        Turn { pace: self }
+        let turn = Turn { pace: self };
+        while let Some(at) = self.not_before() {
+            sleep_until(at).await;
+        }
+        turn
+    }
+
+    /// Lets no request out for this time.
+    pub fn pause(&self, wait: Duration) {
+        let mut state = self.state();
+        state.not_before = state.not_before.max(Instant::now().checked_add(wait));
+    }
+
+    fn not_before(&self) -> Option<Instant> {
+        self.state().not_before.filter(|at| *at > Instant::now())
     }
 
     /// How many requests may be out now.
@@ -93,7 +114,7 @@ impl Drop for Turn<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::Pace;
+    use super::{Duration, Instant, Pace};
 
     fn free(pace: &Pace) -> usize {
         pace.permits.available_permits()
@@ -111,6 +132,17 @@ mod tests {
             pace.good();
         }
         assert_eq!((pace.limit(), free(&pace)), (5, 5));
+    }
+
+    #[tokio::test]
+    async fn nobody_asks_before_a_pause_is_over() {
+        let (pace, start) = (Pace::new(2), Instant::now());
+        pace.pause(Duration::from_millis(50));
+        pace.pause(Duration::from_millis(1));
+        let turns = [pace.turn().await, pace.turn().await];
+        assert!(start.elapsed() >= Duration::from_millis(50));
+        drop(turns);
+        assert_eq!(free(&pace), 2);
     }
 
     #[tokio::test]

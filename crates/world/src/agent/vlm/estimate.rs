@@ -4,7 +4,6 @@
 //! providers advise for English; a frame as the provider of its language documents it. Prices that nobody knows give no
 //! cost, rather than a cost of zero.
 
-use super::model::TEMPERATURE;
 use super::models::{Choice, Contract};
 use super::wire_format::{Dialect, Question};
 use crate::agent::prompt::Prompt;
@@ -29,7 +28,7 @@ pub fn prompt_tokens(choice: &Choice, experiment: Experiment, view: [u32; 2]) ->
         user: &words.user,
         png_base64: "",
         schema: (choice.model.contract == Contract::Schema).then_some(&schema),
-        temperature: TEMPERATURE,
+        temperature: choice.model.temperature,
         max_output_tokens: 0,
         reasoning_effort: None,
     };

@@ -1,9 +1,8 @@
 //! Why there is no answer: the kinds of failure, and what each status and broken connection counts as.
 
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 use reqwest::StatusCode;
-use reqwest::header::{HeaderMap, RETRY_AFTER};
 use serde_json::Value;
 
 use crate::agent::Status;
@@ -16,6 +15,8 @@ pub struct Failure {
     pub detail: String,
     /// How long the provider asks to wait.
     pub after: Option<Duration>,
+    /// The provider may have made an answer, and may bill it.
+    pub may_be_paid: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +25,8 @@ pub enum FailureKind {
     RateLimited,
     /// Too many requests for today.
     DailyQuota,
+    /// The provider has more to do than it can: it takes the request later.
+    Overloaded,
     /// The provider failed, the connection broke, or what came is no answer.
     Server,
     /// Nothing whole came in time.
@@ -41,19 +44,25 @@ impl FailureKind {
     pub const fn status(self) -> Status {
         match self {
             Self::RateLimited | Self::DailyQuota => Status::RateLimited,
-            Self::Server | Self::Rejected | Self::Denied | Self::NoImages => Status::ServerError,
+            Self::Overloaded | Self::Server | Self::Rejected | Self::Denied | Self::NoImages => Status::ServerError,
             Self::Timeout => Status::Timeout,
         }
     }
 
     /// Whether another attempt may do better.
     pub const fn may_pass(self) -> bool {
-        matches!(self, Self::RateLimited | Self::Server | Self::Timeout)
+        self.is_busy() || matches!(self, Self::Server | Self::Timeout)
+    }
+
+    /// Whether the provider only puts the request off.
+    pub const fn is_busy(self) -> bool {
+        matches!(self, Self::RateLimited | Self::Overloaded)
     }
 }
 
+/// A whole status of success without an answer.
 pub(super) fn server(detail: String) -> Failure {
-    Failure { kind: FailureKind::Server, detail, after: None }
+    Failure { kind: FailureKind::Server, detail, after: None, may_be_paid: true }
 }
 
 pub(super) fn shortened(text: &str) -> String {
@@ -68,6 +77,7 @@ pub(super) fn shortened(text: &str) -> String {
 /// A failure below HTTP. The address is left out: it may be a private one.
 pub(super) fn broken(error: reqwest::Error) -> Failure {
     let kind = if error.is_timeout() { FailureKind::Timeout } else { FailureKind::Server };
+    let may_be_paid = !error.is_connect();
     let error = error.without_url();
     let mut detail = error.to_string();
     let mut cause = std::error::Error::source(&error);
@@ -78,7 +88,7 @@ pub(super) fn broken(error: reqwest::Error) -> Failure {
         }
         cause = inner.source();
     }
-    Failure { kind, detail, after: None }
+    Failure { kind, detail, after: None, may_be_paid }
 }
 
 /// A status that is not success.
@@ -89,6 +99,7 @@ pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
         StatusCode::TOO_MANY_REQUESTS if is_out_of_credit(body) => FailureKind::Denied,
         StatusCode::TOO_MANY_REQUESTS if is_of_a_day(body) => FailureKind::DailyQuota,
         StatusCode::TOO_MANY_REQUESTS => FailureKind::RateLimited,
+        _ if is_overloaded(status, body) => FailureKind::Overloaded,
         StatusCode::REQUEST_TIMEOUT | StatusCode::GATEWAY_TIMEOUT => FailureKind::Timeout,
         status if status.is_server_error() => FailureKind::Server,
         StatusCode::CONFLICT | StatusCode::TOO_EARLY => FailureKind::Server,
@@ -101,14 +112,15 @@ pub(super) fn failed(status: StatusCode, after: Option<Duration>, body: &str) ->
         said if said.is_empty() => format!("HTTP {status}"),
         said => format!("HTTP {status}: {said}"),
     };
-    Failure { kind, detail, after }
+    // A gateway that gave up does not know what the model behind it did.
+    Failure { kind, detail, after, may_be_paid: kind == FailureKind::Timeout }
 }
 
 /// A successful status with a body that is no answer.
 pub(super) fn no_answer(body: &str) -> Failure {
     let kind = if takes_no_images(body) { FailureKind::NoImages } else { FailureKind::Server };
     let detail = format!("the answer is not of the provider's language: {}", shortened(body));
-    Failure { kind, detail, after: None }
+    Failure { kind, detail, after: None, may_be_paid: false }
 }
 
 /// Words by which servers say that they cannot pass images to the model, lower case.
@@ -152,67 +164,24 @@ fn is_out_of_credit(body: &str) -> bool {
     error["code"] == CODE || error["type"] == CODE
 }
 
+/// Whether the server is up and has too much to do. Anthropic has the status 529 for it; Gemini says it with 503 ("The model is
+/// overloaded. Please try again later."), as does `OpenAI` ("The engine is currently overloaded").
+fn is_overloaded(status: StatusCode, body: &str) -> bool {
+    let says_so = || body.to_lowercase().contains("overloaded");
+    status.as_u16() == 529 || status == StatusCode::SERVICE_UNAVAILABLE && says_so()
+}
+
 /// Whether too many requests are those of a day. Gemini names the quota (`GenerateRequestsPerDayPerProjectPerModel`), OpenAI
 /// and OpenRouter say it in words ("requests per day (RPD)", "free-models-per-day").
 fn is_of_a_day(body: &str) -> bool {
     ["PerDay", "per day", "per-day"].iter().any(|words| body.contains(words))
 }
 
-/// The wait that the body of an error asks for: `google.rpc.RetryInfo`, as Gemini sends it, has seconds and an `s`.
-/// Source: <https://github.com/googleapis/googleapis/blob/master/google/rpc/error_details.proto>, duration in JSON.
-pub(super) fn retry_info(body: &str) -> Option<Duration> {
-    let body: Value = serde_json::from_str(body).ok()?;
-    let error = body.get("error").or_else(|| body.get(0)?.get("error"))?;
-    let info = error["details"]
-        .as_array()?
-        .iter()
-        .find(|detail| detail["@type"].as_str().is_some_and(|name| name.ends_with("google.rpc.RetryInfo")))?;
-    let seconds = info["retryDelay"].as_str()?.strip_suffix('s')?.parse().ok()?;
-    Duration::try_from_secs_f64(seconds).ok()
-}
-
-/// The wait that a provider asks for: milliseconds, as OpenAI and its own client have them; seconds, whole or not, or a date. A date that is over asks for none, what is
-/// neither asks for nothing, and what no duration can hold asks for the longest.
-pub(super) fn retry_after(headers: &HeaderMap) -> Option<Duration> {
-    let milliseconds = headers.get("retry-after-ms").and_then(|value| value.to_str().ok()?.trim().parse::<f64>().ok());
-    if let Some(wait) = milliseconds.and_then(|wait| Duration::try_from_secs_f64(wait / 1e3).ok()) {
-        return Some(wait);
-    }
-    let value = headers.get(RETRY_AFTER)?.to_str().ok()?.trim();
-    if let Ok(seconds) = value.parse::<f64>() {
-        let is_wait = seconds >= 0.0;
-        return is_wait.then(|| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
-    }
-    let date = httpdate::parse_http_date(value).ok()?;
-    Some(date.duration_since(SystemTime::now()).unwrap_or_default())
-}
-
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use reqwest::StatusCode;
-    use reqwest::header::{HeaderMap, HeaderValue, RETRY_AFTER};
 
-    use super::{FailureKind, failed, no_answer, retry_after};
-
-    #[test]
-    fn the_wait_asked_for_is_read_or_left() {
-        let asked = |value: &'static str| {
-            let mut headers = HeaderMap::new();
-            headers.insert(RETRY_AFTER, HeaderValue::from_static(value));
-            retry_after(&headers)
-        };
-        assert_eq!(asked(" 7 "), Some(Duration::from_secs(7)));
-        assert_eq!(asked("0.25"), Some(Duration::from_millis(250)));
-        assert_eq!(asked("Sun, 06 Nov 1994 08:49:37 GMT"), Some(Duration::ZERO));
-        assert!(asked("Fri, 31 Dec 9999 23:59:59 GMT").is_some_and(|wait| wait > Duration::from_hours(24)));
-        assert_eq!(asked("99999999999999999999999999"), Some(Duration::MAX));
-        for nothing in ["-1", "NaN", "soon", ""] {
-            assert_eq!(asked(nothing), None, "{nothing:?}");
-        }
-        assert_eq!(retry_after(&HeaderMap::new()), None);
-    }
+    use super::{FailureKind, failed, no_answer};
 
     #[test]
     fn no_money_left_is_not_too_many_requests() {
@@ -220,6 +189,15 @@ mod tests {
         assert_eq!(kind(r#"{"error": {"code": "insufficient_quota"}}"#), FailureKind::Denied);
         assert_eq!(kind(r#"{"error": {"code": "rate_limit_exceeded"}}"#), FailureKind::RateLimited);
         assert_eq!(kind("slow down"), FailureKind::RateLimited);
+    }
+
+    #[test]
+    fn an_overloaded_provider_is_not_a_broken_one() {
+        let kind = |status: u16, body| failed(StatusCode::from_u16(status).unwrap(), None, body).kind;
+        assert_eq!(kind(529, r#"{"type":"error","error":{"type":"overloaded_error"}}"#), FailureKind::Overloaded);
+        let google = r#"{"error":{"code":503,"message":"The model is overloaded. Please try again later.","status":"UNAVAILABLE"}}"#;
+        assert_eq!(kind(503, google), FailureKind::Overloaded);
+        assert_eq!(kind(503, "<html>Service Unavailable</html>"), FailureKind::Server);
     }
 
     #[test]

@@ -37,6 +37,9 @@ pub enum Entry {
         question: String,
         /// SHA-256 of the frame as PNG.
         frame: String,
+        /// Tokens of the request and of its reply at most.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        at_most: Option<[u64; 2]>,
     },
     /// An answer in the provider's language.
     Answer {
@@ -61,6 +64,9 @@ pub enum Entry {
         detail: String,
         /// The step was given up, and the episode went on without a decision.
         is_final: bool,
+        /// The provider may have made an answer, and may bill it.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        may_be_paid: bool,
         question: String,
     },
 }
@@ -73,6 +79,8 @@ pub enum Recorded {
         /// From sending to the whole answer, ms.
         latency_ms: i32,
         body: String,
+        /// Tokens of the request and of this reply at most, where known.
+        at_most: Option<[u64; 2]>,
     },
     /// The step was given up with this status.
     GivenUp { question: String, status: Status },
@@ -88,10 +96,31 @@ impl Recorded {
 }
 
 /// What was spent on an episode.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Requests {
     /// Requests that went out.
     pub sent: u64,
+    /// Requests without an answer that may have been paid, with their tokens at most if known.
+    pub unanswered: Vec<Option<[u64; 2]>>,
+    /// Whether the outcome of the last one is not known: it is under way, or its process was killed.
+    is_open: bool,
+    /// The tokens of the last one at most.
+    at_most: Option<[u64; 2]>,
+}
+
+impl Requests {
+    fn note_sent(&mut self, at_most: Option<[u64; 2]>) {
+        self.note_outcome(true);
+        self.sent += 1;
+        (self.is_open, self.at_most) = (true, at_most);
+    }
+
+    fn note_outcome(&mut self, may_be_paid: bool) {
+        if self.is_open && may_be_paid {
+            self.unanswered.push(self.at_most);
+        }
+        self.is_open = false;
+    }
 }
 
 /// The journal of one episode.
@@ -158,9 +187,11 @@ impl Journal {
         self.recorded.values()
     }
 
-    /// What was sent for the episode so far.
+    /// What was sent for the episode so far; a request without an outcome may have been paid.
     pub fn requests(&self) -> Requests {
-        self.requests
+        let mut requests = self.requests.clone();
+        requests.note_outcome(true);
+        requests
     }
 
     /// Adds a line and waits until it is on the disk. After a line that could not be written none is added any more: what
@@ -220,16 +251,18 @@ fn read(path: &Path) -> Result<Found, JournalError> {
 
 fn note(recorded: &mut BTreeMap<i32, Recorded>, requests: &mut Requests, entry: &Entry) {
     match entry {
-        Entry::Request { .. } => requests.sent += 1,
+        Entry::Request { at_most, .. } => requests.note_sent(*at_most),
         Entry::Answer { t, question, latency_ms, body, .. } => {
-            let answer = Recorded::Answer { question: question.clone(), latency_ms: *latency_ms, body: body.clone() };
-            recorded.insert(*t, answer);
+            let at_most = requests.at_most;
+            requests.note_outcome(false);
+            let (question, body) = (question.clone(), body.clone());
+            recorded.insert(*t, Recorded::Answer { question, latency_ms: *latency_ms, body, at_most });
         }
         Entry::Failure { t, status, is_final: true, question, .. } => {
             let status = Status::named(status).unwrap_or(Status::ServerError);
             recorded.insert(*t, Recorded::GivenUp { question: question.clone(), status });
         }
-        Entry::Failure { .. } => {}
+        Entry::Failure { may_be_paid, .. } => requests.note_outcome(*may_be_paid),
     }
 }
 
@@ -275,6 +308,33 @@ mod tests {
             journal.append(&answer(3)).unwrap();
             assert_eq!(answered(&Journal::cassette(&path).unwrap()).len(), 3);
         }
+    }
+
+    #[test]
+    fn requests_without_an_outcome_may_have_been_paid() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("E1-m-s1-r1.jsonl");
+        let mut journal = Journal::open(&path).unwrap();
+        let request = |most| {
+            let (question, frame) = (String::new(), String::new());
+            Entry::Request { t: 1, attempt: 1, question, frame, at_most: Some([most, 10]) }
+        };
+        let failure = |may_be_paid| {
+            let (status, detail, question) = ("timeout".to_owned(), String::new(), String::new());
+            Entry::Failure { t: 1, attempt: 1, status, detail, is_final: false, may_be_paid, question }
+        };
+        let entries = [
+            [request(1), failure(false)],
+            [request(2), failure(true)],
+            // Killed, and begun again.
+            [request(3), request(4)],
+        ];
+        entries.iter().flatten().for_each(|entry| journal.append(entry).unwrap());
+        let unanswered = [Some([2, 10]), Some([3, 10]), Some([4, 10])];
+        assert_eq!((journal.requests().sent, journal.requests().unanswered), (4, unanswered.to_vec()));
+        journal.append(&answer(1)).unwrap();
+        let read = Journal::cassette(&path).unwrap().requests();
+        assert_eq!((read.sent, read.unanswered), (4, unanswered[..2].to_vec()));
     }
 
     #[test]

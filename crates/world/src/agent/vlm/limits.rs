@@ -1,12 +1,19 @@
 //! What a whole run may spend, over all its episodes and all the times it was started.
 //!
-//! Rule: a limit is looked at before every request. Requests in flight may still end, so that a run can go over its
-//! limit of tokens or money by what those take, and never by a request more.
+//! Rule: before a request goes out, what it may cost at most is reserved, so that a run never ends above its limit of money.
+//! A request that may have been paid without an answer keeps its reservation. A limit of tokens is looked at before every
+//! request; those in flight may still end.
 
-use std::sync::Mutex;
+use std::io;
+use std::path::Path;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::Duration;
 
 use schemars::JsonSchema;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use tokio::sync::Notify;
+
+use super::ledger::{Entry, Ledger, Others};
 
 /// The limits of a run; `None` where there is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,74 +27,301 @@ pub struct Limits {
 }
 
 /// What was spent.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Spend {
     /// US dollars of the replies whose cost is known.
     pub cost_usd: f64,
     /// Replies whose cost is not known.
     pub uncosted: u64,
+    /// Requests without an answer that may have been paid: timed out, broken off, or killed.
+    pub unanswered: u64,
+    /// US dollars at most of these requests, and of the replies whose cost is not known, as far as prices are known.
+    pub uncosted_usd_at_most: f64,
     /// Tokens of requests and replies together.
     pub tokens: u64,
     /// Requests that went out.
     pub requests: u64,
 }
 
+impl Spend {
+    /// Counts a request that may have been paid without an answer.
+    pub(super) fn add_unanswered(&mut self, at_most_usd: f64) {
+        self.unanswered += 1;
+        self.uncosted_usd_at_most += at_most_usd;
+    }
+
+    /// Counts a reply of this many tokens.
+    pub(super) fn add_answer(&mut self, tokens: u64, cost_usd: Option<f64>, at_most_usd: f64) {
+        self.tokens = self.tokens.saturating_add(tokens);
+        if let Some(cost) = cost_usd {
+            self.cost_usd += cost;
+        } else {
+            self.uncosted += 1;
+            self.uncosted_usd_at_most += at_most_usd;
+        }
+    }
+
+    pub(super) fn add(&mut self, other: &Self) {
+        self.cost_usd += other.cost_usd;
+        self.uncosted += other.uncosted;
+        self.unanswered += other.unanswered;
+        self.uncosted_usd_at_most += other.uncosted_usd_at_most;
+        self.tokens = self.tokens.saturating_add(other.tokens);
+        self.requests += other.requests;
+    }
+
+    fn cost_at_most(&self) -> f64 {
+        self.cost_usd + self.uncosted_usd_at_most
+    }
+}
+
 /// A limit that is reached.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the limit of {what} is reached: {spent} of {limit}\n  help: the same command with a higher limit continues")]
+#[error(
+    "the limit of {what} is reached: {spent} of {limit}{next}\n  help: the same command with a higher limit continues"
+)]
 pub struct Reached {
     what: &'static str,
     spent: String,
     limit: String,
+    /// What the next request may take.
+    next: String,
 }
 
-/// The running account of a run; shared by all of its episodes.
+/// The running account of a run; shared by all of its episodes, and through a ledger by other processes.
 #[derive(Debug, Default)]
 pub struct Account {
     limits: Limits,
-    spend: Mutex<Spend>,
+    ledger: OnceLock<Ledger>,
+    state: Mutex<State>,
+    /// Tells episodes that wait for money that a request or an episode has ended.
+    changed: Notify,
 }
+
+#[derive(Debug, Default)]
+struct State {
+    /// What this process has spent, and what others had when last looked.
+    own: Entry,
+    others: Others,
+    /// Replies whose cost is known, what they cost, and the most that one of them has cost.
+    costed: u64,
+    costed_usd: f64,
+    dearest_usd: f64,
+    /// Episodes that have begun and not ended, and the steps that they may still take.
+    begun: u64,
+    steps_left: u64,
+}
+
+/// A request in flight. One that is dropped without an outcome may have been paid.
+#[derive(Debug)]
+pub struct Reserved {
+    account: Arc<Account>,
+    /// As far as prices are known.
+    at_most_usd: f64,
+    is_open: bool,
+}
+
+/// An episode that has begun; it ends when this is dropped.
+#[derive(Debug)]
+pub struct Begun {
+    account: Arc<Account>,
+    left: u64,
+}
+
+/// How often it is looked whether other processes have spent less than they had reserved.
+const AGAIN: Duration = Duration::from_millis(200);
 
 impl Account {
     /// An account that begins with what earlier starts of the run have spent.
     pub fn new(limits: Limits, spent: Spend) -> Self {
-        Self { limits, spend: Mutex::new(spent) }
+        let others = Others { spend: spent, ..Others::default() };
+        Self { limits, state: Mutex::new(State { others, ..State::default() }), ..Self::default() }
     }
 
-    /// What was spent so far.
+    /// Shares the account with other processes that record into a folder, by the ledger at this path. The first process begins
+    /// with what `journals` say; `patience` is how long a request may be in flight.
+    pub fn share<E: From<io::Error>>(
+        &self,
+        path: &Path,
+        patience: Duration,
+        journals: impl FnOnce() -> Result<Spend, E>,
+    ) -> Result<(), E> {
+        let ledger = Ledger::open(path, patience, journals)?;
+        // An account is shared once; a second time changes nothing.
+        let _ = self.ledger.set(ledger);
+        self.post(|_| ());
+        Ok(())
+    }
+
+    /// What was spent so far, by all processes as far as known.
     pub fn spend(&self) -> Spend {
-        *self.spend.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+        self.post(|state| state.spend())
     }
 
-    /// Counts a request that is about to go out.
-    pub fn request(&self) -> Result<(), Reached> {
-        let mut spend = self.spend.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+    /// Counts a request that is about to go out and costs this much at most. Waits for requests in flight if what they leave
+    /// decides.
+    pub async fn reserve(self: &Arc<Self>, at_most_usd: Option<f64>) -> Result<Reserved, Reached> {
+        loop {
+            // What ends between the attempt and the wait is heard.
+            let changed = self.changed.notified();
+            if let Some(at_most_usd) = self.post(|state| self.reserve_now(state, at_most_usd))? {
+                return Ok(Reserved { account: Arc::clone(self), at_most_usd, is_open: true });
+            }
+            let _ = tokio::time::timeout(AGAIN, changed).await;
+        }
+    }
+
+    /// Begins an episode of this many steps, the next of which costs this much at most. Waits while the episodes that have
+    /// begun may need what is left.
+    pub async fn begin(self: &Arc<Self>, steps: u64, at_most_usd: Option<f64>) -> Begun {
+        loop {
+            let changed = self.changed.notified();
+            if self.begin_now(&mut self.state(), steps, at_most_usd) {
+                return Begun { account: Arc::clone(self), left: steps };
+            }
+            changed.await;
+        }
+    }
+
+    /// Goes on with an episode of which an earlier start has taken steps; it does not wait for others.
+    pub fn go_on(self: &Arc<Self>, steps: u64) -> Begun {
+        self.state().add_episode(steps);
+        Begun { account: Arc::clone(self), left: steps }
+    }
+
+    /// What the request may cost; `None` while requests in flight decide.
+    fn reserve_now(&self, state: &mut State, at_most_usd: Option<f64>) -> Result<Option<f64>, Reached> {
+        let spend = state.spend();
         if let Some(limit) = self.limits.requests.filter(|limit| spend.requests >= *limit) {
             return Err(reached("requests", spend.requests.to_string(), limit.to_string()));
         }
         if let Some(limit) = self.limits.tokens.filter(|limit| spend.tokens >= *limit) {
             return Err(reached("tokens", spend.tokens.to_string(), limit.to_string()));
         }
-        if let Some(limit) = self.limits.cost_usd.filter(|limit| spend.cost_usd >= *limit) {
-            return Err(reached("cost", dollars(spend.cost_usd), dollars(limit)));
+        // An answer that cost more than it might is believed.
+        let next = at_most_usd.map_or(0.0, |usd| usd.max(state.dearest_usd));
+        let all = spend.cost_at_most() + state.reserved_usd() + next;
+        if let Some(limit) = self.limits.cost_usd.filter(|limit| all > *limit) {
+            if state.own.in_flight > 0 || state.others.is_waiting {
+                return Ok(None);
+            }
+            let next = format!("; the next request may cost {}", dollars(next));
+            return Err(Reached { next, ..reached("cost", dollars(spend.cost_at_most()), dollars(limit)) });
         }
-        spend.requests += 1;
-        Ok(())
+        state.own.spend.requests += 1;
+        state.own.in_flight += 1;
+        state.own.reserved_usd += next;
+        Ok(Some(next))
     }
 
-    /// Counts what an answer took.
-    pub fn answer(&self, tokens: u64, cost_usd: Option<f64>) {
-        let mut spend = self.spend.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-        spend.tokens = spend.tokens.saturating_add(tokens);
-        match cost_usd {
-            Some(cost) => spend.cost_usd += cost,
-            None => spend.uncosted += 1,
+    #[expect(clippy::cast_precision_loss, reason = "nobody counts 2^53 steps")]
+    fn begin_now(&self, state: &mut State, steps: u64, at_most_usd: Option<f64>) -> bool {
+        let a_step =
+            if state.costed == 0 { at_most_usd.unwrap_or(0.0) } else { state.costed_usd / state.costed as f64 };
+        let (spend, steps_of_all) = (state.spend(), state.steps_left + steps);
+        let cost = spend.cost_at_most() + a_step * steps_of_all as f64;
+        let fits = self.limits.cost_usd.is_none_or(|limit| cost <= limit)
+            && self.limits.requests.is_none_or(|limit| spend.requests + steps_of_all <= limit);
+        if state.begun == 0 || fits {
+            state.add_episode(steps);
+            return true;
+        }
+        false
+    }
+
+    /// Changes the state, with what other processes have spent meanwhile, and tells them.
+    fn post<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+        let mut state = self.state();
+        let Some(ledger) = self.ledger.get() else { return change(&mut state) };
+        ledger.exchange(|others| {
+            state.others = others.unwrap_or(state.others);
+            (change(&mut state), state.own)
+        })
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn spend(&self) -> Spend {
+        let mut spend = self.others.spend;
+        spend.add(&self.own.spend);
+        spend
+    }
+
+    fn reserved_usd(&self) -> f64 {
+        self.own.reserved_usd + self.others.reserved_usd
+    }
+
+    fn add_episode(&mut self, steps: u64) {
+        self.begun += 1;
+        self.steps_left += steps;
+    }
+}
+
+impl Reserved {
+    /// Counts what the answer took.
+    pub fn answered(mut self, tokens: u64, cost_usd: Option<f64>) {
+        let at_most_usd = self.at_most_usd;
+        self.close(|state| {
+            state.own.spend.add_answer(tokens, cost_usd, at_most_usd);
+            state.costed += u64::from(cost_usd.is_some());
+            state.costed_usd += cost_usd.unwrap_or(0.0);
+            state.dearest_usd = state.dearest_usd.max(cost_usd.unwrap_or(0.0));
+        });
+    }
+
+    /// The provider refused the request, or never had it: it costs nothing.
+    pub fn refused(mut self) {
+        self.close(|_| ());
+    }
+
+    fn close(&mut self, outcome: impl FnOnce(&mut State)) {
+        self.is_open = false;
+        let reserved = self.at_most_usd;
+        self.account.post(|state| {
+            state.own.in_flight -= 1;
+            state.own.reserved_usd = if state.own.in_flight == 0 { 0.0 } else { state.own.reserved_usd - reserved };
+            outcome(state);
+        });
+        self.account.changed.notify_waiters();
+    }
+}
+
+impl Drop for Reserved {
+    fn drop(&mut self) {
+        if self.is_open {
+            let at_most_usd = self.at_most_usd;
+            self.close(|state| state.own.spend.add_unanswered(at_most_usd));
         }
     }
 }
 
+impl Begun {
+    /// Notes how many steps the episode may still take.
+    pub fn note_left(&mut self, steps: u64) {
+        let mut state = self.account.state();
+        state.steps_left = state.steps_left + steps - self.left;
+        self.left = steps;
+        drop(state);
+        self.account.changed.notify_waiters();
+    }
+}
+
+impl Drop for Begun {
+    fn drop(&mut self) {
+        let mut state = self.account.state();
+        state.begun -= 1;
+        state.steps_left -= self.left;
+        drop(state);
+        self.account.changed.notify_waiters();
+    }
+}
+
 fn reached(what: &'static str, spent: String, limit: String) -> Reached {
-    Reached { what, spent, limit }
+    Reached { what, spent, limit, next: String::new() }
 }
 
 fn dollars(value: f64) -> String {
@@ -97,25 +331,75 @@ fn dollars(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+    use std::time::Duration;
+
+    use tokio::time::timeout;
+
     use super::{Account, Limits, Spend};
 
-    #[test]
-    fn a_limit_stops_before_the_request_over_it() {
-        let account = Account::new(Limits { requests: Some(2), ..Limits::default() }, Spend::default());
-        assert!(account.request().is_ok() && account.request().is_ok());
-        assert!(account.request().unwrap_err().to_string().contains("requests is reached: 2 of 2"));
+    fn account(limits: Limits, spent: Spend) -> Arc<Account> {
+        Arc::new(Account::new(limits, spent))
+    }
+
+    /// Whether something is still waited for after a while.
+    async fn waits<T>(work: impl Future<Output = T>) -> bool {
+        timeout(Duration::from_millis(20), work).await.is_err()
+    }
+
+    #[tokio::test]
+    async fn a_limit_stops_before_the_request_over_it() {
+        let account = account(Limits { requests: Some(2), ..Limits::default() }, Spend::default());
+        for _ in 0..2 {
+            account.reserve(None).await.unwrap().refused();
+        }
+        assert!(account.reserve(None).await.unwrap_err().to_string().contains("requests is reached: 2 of 2"));
         assert_eq!(account.spend().requests, 2);
     }
 
-    #[test]
-    fn money_and_tokens_count_from_earlier_starts() {
-        let spent = Spend { cost_usd: 0.9, tokens: 90, ..Spend::default() };
-        let account = Account::new(Limits { cost_usd: Some(1.0), tokens: Some(100), ..Limits::default() }, spent);
-        assert!(account.request().is_ok());
-        account.answer(5, Some(0.2));
-        assert!(account.request().unwrap_err().to_string().contains("1.1000 US dollars of 1.0000"));
-        account.answer(5, None);
-        assert!(account.request().unwrap_err().to_string().contains("tokens is reached: 100 of 100"));
-        assert_eq!(account.spend().uncosted, 1);
+    #[tokio::test]
+    async fn money_and_tokens_count_from_earlier_starts() {
+        let spent = Spend { cost_usd: 0.7, uncosted_usd_at_most: 0.1, tokens: 90, ..Spend::default() };
+        let account = account(Limits { cost_usd: Some(1.0), tokens: Some(100), ..Limits::default() }, spent);
+        let stopped = account.reserve(Some(0.21)).await.unwrap_err().to_string();
+        assert!(stopped.contains("0.8000 US dollars of 1.0000"), "{stopped}");
+        assert!(stopped.contains("the next request may cost 0.2100 US dollars"), "{stopped}");
+        account.reserve(Some(0.1)).await.unwrap().answered(5, Some(0.05));
+        account.reserve(Some(0.1)).await.unwrap().answered(5, None);
+        assert!(account.reserve(None).await.unwrap_err().to_string().contains("tokens is reached: 100 of 100"));
+        assert_eq!((account.spend().uncosted, account.spend().unanswered), (1, 0));
+    }
+
+    #[tokio::test]
+    async fn requests_in_flight_are_reserved_for_and_waited_for() {
+        let account = account(Limits { cost_usd: Some(0.2), ..Limits::default() }, Spend::default());
+        let first = account.reserve(Some(0.15)).await.unwrap();
+        assert!(waits(account.reserve(Some(0.15))).await, "both together may cost 0.30");
+        let (second, ()) = tokio::join!(account.reserve(Some(0.15)), async { first.answered(10, Some(0.01)) });
+        // Nobody knows whether it was paid.
+        drop(second.unwrap());
+        let spend = account.spend();
+        assert_eq!((spend.unanswered, spend.uncosted_usd_at_most, spend.requests), (1, 0.15, 2));
+        assert!(account.reserve(Some(0.15)).await.is_err());
+        account.reserve(Some(0.03)).await.unwrap().refused();
+    }
+
+    #[tokio::test]
+    async fn begun_episodes_come_before_new_ones() {
+        let account = account(Limits { cost_usd: Some(1.0), ..Limits::default() }, Spend::default());
+        let mut first = account.begin(100, Some(0.1)).await;
+        assert!(waits(account.begin(100, Some(0.1))).await, "the first may need all of it");
+        account.reserve(Some(0.1)).await.unwrap().answered(1, Some(0.004));
+        assert!(!waits(account.begin(100, Some(0.1))).await, "200 steps of 0.004");
+        let second = account.begin(100, Some(0.1)).await;
+        assert!(waits(account.begin(100, Some(0.1))).await);
+        first.note_left(10);
+        assert!(!waits(account.begin(100, Some(0.1))).await);
+        drop((first, second));
+        // An episode of an earlier start has begun already, and one is always under way.
+        let (_old, spent) = (account.go_on(1_000), account.spend());
+        assert!(waits(account.begin(1, Some(0.1))).await);
+        let poor = Arc::new(Account::new(Limits { cost_usd: Some(0.0), ..Limits::default() }, spent));
+        assert!(!waits(poor.begin(100, Some(0.1))).await);
     }
 }

@@ -1,22 +1,22 @@
 //! A model, and what all of its episodes share: where answers come from, what may be spent, why to stop.
 
 use std::path::{Path, PathBuf};
+use std::pin::pin;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use serde_json::Value;
 use tokio::runtime::Handle;
+use tokio::sync::Notify;
 
+use super::estimate;
 use super::journal::{Journal, JournalError, Recorded};
 use super::limits::{Account, Spend};
-use super::models::{Choice, Contract};
+use super::models::{Choice, Contract, merge};
 use super::preflight::Unreachable;
 use super::provider::Provider;
 use super::wire_format::{Answer, Question};
 use crate::agent::{Lost, prompt};
-
-/// The sampling temperature (paper, Panel A).
-pub const TEMPERATURE: f64 = 0.2;
 
 /// What is done when the attempts for a step are used up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,6 +58,8 @@ pub struct Vlm {
     max_output_tokens: u32,
     /// Why no further request makes sense, once there is such a reason.
     stop: OnceLock<Lost>,
+    /// Tells steps that wait that there is one.
+    stopped: Notify,
     /// Whether a request of this recording has had its outcome.
     is_known: AtomicBool,
     /// Held by the first request: until its outcome no other one goes out.
@@ -85,6 +87,7 @@ impl Vlm {
             account,
             on_outage,
             stop: OnceLock::new(),
+            stopped: Notify::new(),
             is_known: AtomicBool::new(false),
             first: tokio::sync::Mutex::default(),
             has_answered: AtomicBool::new(false),
@@ -102,6 +105,7 @@ impl Vlm {
             account: Arc::default(),
             on_outage: OnOutage::default(),
             stop: OnceLock::new(),
+            stopped: Notify::new(),
             is_known: AtomicBool::new(false),
             first: tokio::sync::Mutex::default(),
             has_answered: AtomicBool::new(false),
@@ -174,6 +178,14 @@ impl Vlm {
         }
     }
 
+    /// Counts what is spent with other processes that record the model into the same folder, by the ledger at this path.
+    /// `slug` is the model's name in the names of episodes.
+    pub fn share_account(&self, ledger: &Path, slug: &str) -> Result<(), Box<dyn std::error::Error>> {
+        let (Memory::Journals(folder), Some(provider)) = (&self.memory, &self.provider) else { return Ok(()) };
+        let journals = || spent(self, folder, slug).map_err(Box::<dyn std::error::Error>::from);
+        self.account.share(ledger, provider.patience().timeout, journals)
+    }
+
     /// What was spent, over all starts of the run.
     pub fn spend(&self) -> Spend {
         self.account.spend()
@@ -186,12 +198,16 @@ impl Vlm {
             "id": self.choice.model.id,
             "backend": self.choice.model.backend,
             "contract": self.choice.model.contract.name(),
-            "temperature": TEMPERATURE,
+            "temperature": self.choice.model.temperature.map_or_else(|| "default".into(), Value::from),
             "max_output_tokens": self.max_output_tokens,
             "identification_version": trace::identification::VERSION,
         });
         if let Some(effort) = self.choice.model.reasoning_effort {
             description["reasoning_effort"] = effort.name().into();
+        }
+        let extra = self.choice.extra_body();
+        if !extra.is_empty() {
+            description["extra_body"] = extra.into();
         }
         let (patterns, accepted) = (&self.choice.model.answers_as, &self.choice.model.accepted);
         if !patterns.is_empty() && patterns != &["*"] {
@@ -203,23 +219,43 @@ impl Vlm {
         description
     }
 
-    /// What a body says, and what it cost.
-    pub(super) fn read(&self, body: &str) -> Option<(Answer, Option<f64>)> {
-        let answer = self.choice.backend.dialect.read(body).ok()??;
-        let cost = answer
-            .cost_usd
-            .or_else(|| self.choice.model.prices.cost_usd(answer.prompt_tokens?, answer.completion_tokens?));
-        Some((answer, cost))
+    /// What a body says.
+    pub(super) fn read(&self, body: &str) -> Option<Answer> {
+        self.choice.backend.dialect.read(body).ok()?
     }
 
-    pub(super) fn question<'a>(&'a self, words: &'a prompt::Rendered, schema: &'a Value, png: &'a str) -> Question<'a> {
+    /// What an answer cost, US dollars: as the provider says, else by its tokens.
+    pub(super) fn cost_usd(&self, answer: &Answer) -> Option<f64> {
+        answer.cost_usd.or_else(|| self.choice.model.prices.cost_usd(answer))
+    }
+
+    /// What a request of so many bytes of words takes at most: tokens of the request and of the reply. No token of words is
+    /// less than a byte; of a frame, providers have counted up to twice what they document.
+    pub(super) fn at_most(&self, bytes: usize, view: [u32; 2]) -> [u64; 2] {
+        let frame = estimate::frame_tokens(self.choice.backend.dialect, view);
+        [bytes as u64 + 2 * frame, self.max_output_tokens.into()]
+    }
+
+    /// What these tokens of a request and a reply cost, US dollars.
+    pub(super) fn cost_of(&self, [prompt, completion]: [u64; 2]) -> Option<f64> {
+        self.choice.model.prices.cost_of(prompt, completion)
+    }
+
+    /// The body of a request with this frame, as PNG in base64.
+    pub(super) fn body(&self, words: &prompt::Rendered, schema: &Value, png: &str) -> Value {
+        let mut body = self.choice.backend.dialect.body(&self.question(words, schema, png));
+        merge(&mut body, &self.choice.extra_body().into());
+        body
+    }
+
+    fn question<'a>(&'a self, words: &'a prompt::Rendered, schema: &'a Value, png: &'a str) -> Question<'a> {
         Question {
             model: &self.choice.model.id,
             system: &words.system,
             user: &words.user,
             png_base64: png,
             schema: (self.choice.model.contract == Contract::Schema).then_some(schema),
-            temperature: TEMPERATURE,
+            temperature: self.choice.model.temperature,
             max_output_tokens: self.max_output_tokens,
             reasoning_effort: self.choice.model.reasoning_effort,
         }
@@ -227,7 +263,22 @@ impl Vlm {
 
     /// No further request is sent, for this reason.
     pub(super) fn halt(&self, lost: Lost) -> Lost {
-        self.stop.get_or_init(|| lost).clone()
+        let first = self.stop.get_or_init(|| lost).clone();
+        self.stopped.notify_waiters();
+        first
+    }
+
+    /// Waits for this, unless the recording ends first.
+    pub(super) async fn unless_stopped<T>(&self, work: impl Future<Output = T>) -> Result<T, Lost> {
+        let stopped = pin!(self.stopped.notified());
+        if let Some(lost) = self.end() {
+            return Err(lost);
+        }
+        tokio::select! {
+            biased;
+            () = stopped => Err(self.end().unwrap_or_else(|| Lost::because("the recording was stopped".to_owned()))),
+            done = work => Ok(done),
+        }
     }
 }
 
@@ -247,19 +298,24 @@ pub fn spent(vlm: &Vlm, folder: &Path, slug: &str) -> Result<Spend, JournalError
             continue;
         }
         let journal = Journal::cassette(&path)?;
-        spend.requests += journal.requests().sent;
-        for recorded in journal.answers() {
-            let Recorded::Answer { body, .. } = recorded else { continue };
-            let read = vlm.read(body);
-            let tokens = read.as_ref().map_or(0, |(answer, _)| tokens(answer));
-            spend.tokens += tokens;
-            match read.and_then(|(_, cost)| cost) {
-                Some(cost) => spend.cost_usd += cost,
-                None => spend.uncosted += 1,
-            }
-        }
+        add_journal(vlm, &journal, &mut spend);
     }
     Ok(spend)
+}
+
+fn add_journal(vlm: &Vlm, journal: &Journal, spend: &mut Spend) {
+    let usd = |at_most: Option<[u64; 2]>| at_most.and_then(|tokens| vlm.cost_of(tokens)).unwrap_or(0.0);
+    let requests = journal.requests();
+    spend.requests += requests.sent;
+    for at_most in requests.unanswered {
+        spend.add_unanswered(usd(at_most));
+    }
+    for recorded in journal.answers() {
+        let Recorded::Answer { body, at_most, .. } = recorded else { continue };
+        let answer = vlm.read(body);
+        let cost = answer.as_ref().and_then(|answer| vlm.cost_usd(answer));
+        spend.add_answer(answer.as_ref().map_or(0, tokens), cost, usd(*at_most));
+    }
 }
 
 /// The model in the name of an episode's journal: `slug` in `E1-slug-s1-r3`, and in `E1-slug@near-s1-r3-x2`.

@@ -8,9 +8,11 @@ use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+use serde_json::{Map, Value};
 
-use super::wire_format::{Dialect, Effort};
+use super::wire_format::{Answer, Dialect, Effort};
 use exact::budget::Limit;
 use exact::input;
 use exact::suggest::hint;
@@ -41,6 +43,9 @@ pub struct Backend {
     pub base_url: Option<String>,
     /// The environment variable with the key.
     pub key: String,
+    /// What every request of its models has besides.
+    #[serde(default)]
+    pub extra_body: Map<String, Value>,
 }
 
 /// A model of a backend.
@@ -63,12 +68,45 @@ pub struct Model {
     pub max_output_tokens: Option<NonZeroU32>,
     /// How much the model is asked to reason before it replies; absent to leave it to the provider.
     pub reasoning_effort: Option<Effort>,
+    /// The sampling temperature; `default` sends none. The paper's, 0.2, if absent.
+    #[serde(default = "paper_temperature", deserialize_with = "temperature")]
+    #[schemars(with = "Value")]
+    pub temperature: Option<f64>,
+    /// What every request has besides, over what its backend says: tables are merged, other values replaced.
+    #[serde(default)]
+    pub extra_body: Map<String, Value>,
     /// Ids by which the model answers, besides its own and those of its dated snapshots; `*` is any text.
     #[serde(default)]
     pub answers_as: Vec<String>,
     /// Ids of other models that the user accepts in its place.
     #[serde(skip)]
     pub accepted: Vec<String>,
+}
+
+/// The temperature of the paper (Panel A).
+#[expect(clippy::unnecessary_wraps, reason = "the default of a field that may say `default`")]
+fn paper_temperature() -> Option<f64> {
+    Some(0.2)
+}
+
+fn temperature<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    match Value::deserialize(from)? {
+        Value::Number(number) if number.as_f64().is_some_and(|value| value >= 0.0) => Ok(number.as_f64()),
+        Value::String(word) if word == "default" => Ok(None),
+        other => Err(D::Error::custom(format!("the temperature is {other}, expected a number from 0 or \"default\""))),
+    }
+}
+
+/// Puts the members of a value into another one: tables are merged, other values replaced.
+pub(super) fn merge(into: &mut Value, from: &Value) {
+    match (into, from) {
+        (Value::Object(into), Value::Object(from)) => {
+            for (key, value) in from {
+                merge(into.entry(key.as_str()).or_insert(Value::Null), value);
+            }
+        }
+        (into, from) => *into = from.clone(),
+    }
 }
 
 impl Model {
@@ -96,14 +134,19 @@ impl Model {
 pub struct Prices {
     /// Of the request.
     pub input: Option<f64>,
+    /// Of the part of the request that the provider has in its cache; as `input` if absent.
+    pub cached_input: Option<f64>,
     /// Of the reply.
     pub output: Option<f64>,
 }
 
 impl Prices {
-    /// What so many tokens cost, US dollars; `None` unless both prices are known.
-    pub fn cost_usd(self, prompt_tokens: u32, completion_tokens: u32) -> Option<f64> {
-        self.cost_of(prompt_tokens.into(), completion_tokens.into())
+    /// What an answer cost, US dollars; `None` unless its tokens are counted and both prices known.
+    pub fn cost_usd(self, answer: &Answer) -> Option<f64> {
+        let (prompt, completion) = (answer.prompt_tokens?, answer.completion_tokens?);
+        let cached = answer.cached_tokens.unwrap_or(0).min(prompt);
+        let of_cached = Self { input: self.cached_input.or(self.input), ..self }.cost_of_requests(cached.into())?;
+        Some(of_cached + self.cost_of((prompt - cached).into(), completion.into())?)
     }
 
     /// What the tokens of a whole run cost, US dollars; `None` unless both prices are known.
@@ -124,7 +167,10 @@ impl Prices {
     }
 
     fn are_amounts(self) -> bool {
-        [self.input, self.output].into_iter().flatten().all(|price| price.is_finite() && price >= 0.0)
+        [self.input, self.cached_input, self.output]
+            .into_iter()
+            .flatten()
+            .all(|price| price.is_finite() && price >= 0.0)
     }
 }
 
@@ -154,6 +200,8 @@ pub struct Choice {
     pub name: String,
     pub model: Model,
     pub backend: Backend,
+    /// Whether a file of models has it, and knows its prices and parameters.
+    pub is_known: bool,
 }
 
 /// What is wrong with a file of models, or with a choice from it.
@@ -180,6 +228,16 @@ pub enum ModelsError {
 }
 
 impl Choice {
+    /// What every request has besides.
+    pub fn extra_body(&self) -> Map<String, Value> {
+        let mut all = Value::Object(self.backend.extra_body.clone());
+        merge(&mut all, &Value::Object(self.model.extra_body.clone()));
+        match all {
+            Value::Object(all) => all,
+            _ => Map::new(),
+        }
+    }
+
     /// Both prices are known, so that a limit of cost can be held.
     pub fn check_prices(&self) -> Result<(), ModelsError> {
         let missing = self.model.prices.unknown();
@@ -191,6 +249,9 @@ impl Choice {
         Err(ModelsError::NoPrices { name, missing, backend, id })
     }
 }
+
+/// What the prompt and the choice of a model make, and nothing else.
+const PROTOCOL: [&str; 7] = ["model", "messages", "system", "contents", "systemInstruction", "stream", "n"];
 
 /// A list of models is written by hand.
 const LARGEST: Limit = Limit::new("bytes of a list of models", 1 << 20);
@@ -214,6 +275,13 @@ impl Models {
             );
             return Err(ModelsError::Invalid { file: origin(), fault });
         }
+        let extras = models.backend.iter().map(|(name, backend)| (name, &backend.extra_body));
+        for (name, extra) in extras.chain(models.model.iter().map(|(name, model)| (name, &model.extra_body))) {
+            if let Some(key) = extra.keys().find(|key| PROTOCOL.contains(&key.as_str())) {
+                let fault = format!("the `extra_body` of `{name}` has `{key}`, which is part of the protocol");
+                return Err(ModelsError::Invalid { file: origin(), fault });
+            }
+        }
         for (name, model) in &models.model {
             if !model.prices.are_amounts() {
                 let fault = format!("a price of the model `{name}` is not an amount: expected a finite number from 0");
@@ -227,9 +295,11 @@ impl Models {
         Ok(models)
     }
 
-    /// The model of this name or id; with a backend, any id is one.
+    /// The model of this name or id; with a backend, any id is one, and so is one that has the form of a provider's ids.
     pub fn choose(&self, name: &str, backend: Option<&str>) -> Result<Choice, ModelsError> {
         let known = self.model.iter().find(|(own, model)| *own == name || model.id == name);
+        let is_known = known.is_some();
+        let backend = backend.or_else(|| if is_known { None } else { backend_of(name) });
         let (title, mut model) = match (known, backend) {
             (Some((title, model)), _) => (title.clone(), model.clone()),
             (None, Some(backend)) => (
@@ -242,6 +312,8 @@ impl Models {
                     contract: Contract::default(),
                     max_output_tokens: None,
                     reasoning_effort: None,
+                    temperature: paper_temperature(),
+                    extra_body: Map::new(),
                     // A server of one's own may call the only model that it has by any name.
                     answers_as: if backend == OWN_SERVER { vec!["*".to_owned()] } else { Vec::new() },
                     accepted: Vec::new(),
@@ -256,7 +328,7 @@ impl Models {
             name: model.backend.clone(),
             known: self.backend.keys().cloned().collect::<Vec<_>>().join(", "),
         })?;
-        Ok(Choice { name: title, model, backend })
+        Ok(Choice { name: title, model, backend, is_known })
     }
 
     fn unknown(&self, name: &str) -> ModelsError {
@@ -271,6 +343,19 @@ fn parse(file: &str, text: &str) -> Result<Models, ModelsError> {
     toml::from_str(text).map_err(|fault| ModelsError::Invalid { file: file.to_owned(), fault: fault.to_string() })
 }
 
+/// The backend whose ids begin like this.
+fn backend_of(id: &str) -> Option<&'static str> {
+    let is_id = id.bytes().all(|byte| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"-./:_@".contains(&byte));
+    match id {
+        _ if !is_id => None,
+        _ if id.contains('/') => Some("openrouter"),
+        _ if id.starts_with("gpt-") => Some("openai"),
+        _ if id.starts_with("claude-") => Some("anthropic"),
+        _ if id.starts_with("gemini-") => Some("google"),
+        _ => None,
+    }
+}
+
 /// Whether this may name an environment variable: letters, digits and `_`, not a digit first.
 fn is_variable(name: &str) -> bool {
     let is_word = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
@@ -279,20 +364,73 @@ fn is_variable(name: &str) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{Models, Prices};
+    use super::{Dialect, Models, Prices};
 
     #[test]
     fn a_cost_needs_both_prices() {
-        let [none, input, output] =
-            [(None, None), (Some(2.0), None), (None, Some(3.0))].map(|(input, output)| Prices { input, output });
+        let [none, input, output] = [(None, None), (Some(2.0), None), (None, Some(3.0))]
+            .map(|(input, output)| Prices { input, output, ..Prices::default() });
         assert_eq!([none, input, output].map(|prices| prices.cost_of(1, 1)), [None; 3]);
         assert_eq!(
             [none, input, output].map(Prices::unknown),
             [vec!["input", "output"], vec!["output"], vec!["input"]]
         );
         assert_eq!([none, input].map(|prices| prices.cost_of_requests(500_000)), [None, Some(1.0)]);
-        let both = Prices { input: Some(2.0), output: Some(3.0) };
-        assert_eq!((both.cost_usd(500_000, 1_000_000), both.unknown()), (Some(4.0), vec![]));
+        let both = Prices { input: Some(2.0), output: Some(3.0), ..Prices::default() };
+        assert_eq!((both.cost_of(500_000, 1_000_000), both.unknown()), (Some(4.0), vec![]));
+    }
+
+    #[test]
+    fn cached_tokens_have_a_price_of_their_own() {
+        let body = serde_json::json!({ "choices": [], "usage": {
+            "prompt_tokens": 500_000, "completion_tokens": 1_000_000, "prompt_tokens_details": { "cached_tokens": 400_000 },
+        } });
+        let answer = Dialect::OpenaiChat.answer(&body).unwrap();
+        let prices = Prices { input: Some(2.0), cached_input: Some(0.5), output: Some(3.0) };
+        assert_eq!(prices.cost_usd(&answer), Some(0.2 + 0.2 + 3.0));
+        assert_eq!(Prices { cached_input: None, ..prices }.cost_usd(&answer), Some(4.0));
+        assert_eq!(Prices { input: None, ..prices }.cost_usd(&answer), None);
+    }
+
+    #[test]
+    fn a_temperature_and_what_a_body_has_besides_are_of_the_model() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("own.toml");
+        let own = |keys: &str| {
+            std::fs::write(&file, format!("[model.own]\nbackend = \"openrouter\"\nid = \"x\"\n{keys}\n")).unwrap();
+            Models::load(Some(&file))
+                .map(|models| models.choose("own", None).unwrap())
+                .map_err(|fault| fault.to_string())
+        };
+        let temperature = |keys: &str| own(keys).map(|choice| choice.model.temperature);
+        assert_eq!([temperature(""), temperature("temperature = 1")], [Ok(Some(0.2)), Ok(Some(1.0))]);
+        assert_eq!(temperature("temperature = \"default\""), Ok(None));
+        for wrong in ["-0.1", "\"low\"", "nan", "true"] {
+            let fault = temperature(&format!("temperature = {wrong}")).unwrap_err();
+            assert!(fault.contains("expected a number from 0 or \"default\""), "{fault}");
+        }
+        let extra = |keys: &str| own(keys).map(|choice| serde_json::Value::from(choice.extra_body()).to_string());
+        let merged = "{\"provider\":{\"only\":[\"a\"],\"require_parameters\":true},\"top_k\":1}";
+        assert_eq!(extra("extra_body = { top_k = 1, provider = { only = [\"a\"] } }").as_deref(), Ok(merged));
+        let without = "{\"provider\":{\"require_parameters\":false}}";
+        assert_eq!(extra("extra_body = { provider = { require_parameters = false } }").as_deref(), Ok(without));
+        let fault = extra("extra_body = { messages = [] }").unwrap_err();
+        assert!(fault.contains("`extra_body` of `own` has `messages`, which is part of the protocol"), "{fault}");
+    }
+
+    #[test]
+    fn an_id_that_no_file_knows_goes_where_ids_of_its_form_go() {
+        let models = Models::load(None).unwrap();
+        for (id, backend) in
+            [("gpt-9-x", "openai"), ("claude-x-1", "anthropic"), ("gemini-9", "google"), ("a/b:free", "openrouter")]
+        {
+            let choice = models.choose(id, None).unwrap();
+            assert_eq!((choice.model.backend.as_str(), choice.is_known), (backend, false), "{id}");
+        }
+        assert!(models.choose("gpt-5.1", None).unwrap().is_known);
+        for name in ["GPT 9", "gpt", "own-1", "Claude Sonnet"] {
+            assert!(models.choose(name, None).is_err(), "{name}");
+        }
     }
 
     #[test]

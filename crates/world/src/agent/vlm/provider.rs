@@ -10,9 +10,10 @@ use reqwest::header::{CONTENT_TYPE, HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Client, Response, StatusCode, Url};
 use serde_json::Value;
 
-use super::concurrency::Pace;
-use super::failure::{Failure, FailureKind, broken, failed, no_answer, retry_after, retry_info, server};
+use super::concurrency::{Pace, Turn};
+use super::failure::{Failure, broken, failed, no_answer, server};
 use super::preflight::{Unreachable, connect};
+use super::rate_limit::{retry_after, retry_info, used_up};
 use super::secrets::Secret;
 use super::wire_format::{Answer, Dialect};
 use crate::agent::reply::Ending;
@@ -30,9 +31,9 @@ pub struct Patience {
     pub first_delay: Duration,
     /// The longest delay, unless a provider asks for a longer one.
     pub longest_delay: Duration,
-    /// The longest delay that a provider gets by asking.
+    /// The longest delay that a provider gets by asking after a failure.
     pub longest_asked_delay: Duration,
-    /// The longest time that a step waits for a provider that says when to ask again, in all.
+    /// The longest time that a step waits for rate limits and an overloaded provider, in all.
     pub longest_wait: Duration,
     /// Bytes of an answer.
     pub largest_answer: usize,
@@ -153,23 +154,40 @@ impl Provider {
         self.secret.as_ref().map_or_else(|| text.to_owned(), |secret| secret.without(text))
     }
 
-    /// Sends a request once, when its turn comes.
-    pub async fn ask(&self, body: &Value) -> Result<Received, Failure> {
-        let turn = self.pace.turn().await;
+    /// Waits until a request may go out.
+    pub async fn turn(&self) -> Turn<'_> {
+        self.pace.turn().await
+    }
+
+    /// Sends a request once, in its turn.
+    pub async fn ask(&self, turn: Turn<'_>, body: &Value) -> Result<Received, Failure> {
         let result = self.exchange(body).await;
         drop(turn);
         match &result {
             Ok(_) => self.pace.good(),
-            Err(failure) if failure.kind == FailureKind::RateLimited => self.pace.too_many(),
+            Err(failure) if failure.kind.is_busy() => {
+                self.pace.too_many();
+                self.pause(failure.after);
+            }
             Err(_) => {}
         }
         result.map_err(|failure| Failure { detail: self.without_secret(&failure.detail), ..failure })
+    }
+
+    /// No request goes out before the wait that the provider states is over. One that is longer than any step has ends the
+    /// recording, and nobody waits for it.
+    fn pause(&self, wait: Option<Duration>) {
+        if let Some(wait) = wait.filter(|wait| *wait <= self.patience.longest_wait) {
+            self.pace.pause(wait);
+        }
     }
 
     async fn exchange(&self, body: &Value) -> Result<Received, Failure> {
         let start = Instant::now();
         let response = self.client.post(self.url.clone()).json(body).send().await.map_err(broken)?;
         let (status, after) = (response.status(), retry_after(response.headers()));
+        let renewed = used_up(response.headers());
+        self.pause(renewed);
         let kind =
             response.headers().get(CONTENT_TYPE).and_then(|kind| kind.to_str().ok()).unwrap_or("none").to_owned();
         if !status.is_success() {
@@ -178,7 +196,9 @@ impl Provider {
             let said = String::from_utf8_lossy(&said).into_owned();
             return match self.declined(status, &said) {
                 Some(answer) => Ok(self.received(answer, said, start.elapsed())),
-                None => Err(failed(status, after.or_else(|| retry_info(&said)), &self.without_secret(&said))),
+                None => {
+                    Err(failed(status, after.or_else(|| retry_info(&said)).or(renewed), &self.without_secret(&said)))
+                }
             };
         }
         let bytes = self.whole(response).await?;

@@ -2,17 +2,18 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
-use backon::{ExponentialBuilder, Retryable as _};
 use serde_json::Value;
 
 use super::failure::{Failure, FailureKind};
-use super::journal::{Entry, Journal, Recorded};
+use super::journal::{Entry, Journal};
 use super::limits::Reached;
 use super::model::{OnOutage, Vlm, tokens};
-use super::provider::Provider;
-use crate::agent::Lost;
+use super::parameter::mend;
+use super::provider::{Provider, Received};
+use super::waiting::Waiting;
+use super::wire_format::Answer;
+use crate::agent::{Lost, Status};
 
 /// What helps where a model takes no images.
 const SEES: &str = "\n  help: choose a model that sees; a server of one's own may have to be started with the model's part \
@@ -35,6 +36,14 @@ pub(super) struct Step {
     pub(super) frame: String,
     pub(super) body: Value,
     pub(super) question: String,
+    /// Tokens of the request and of its reply at most.
+    pub(super) at_most: [u64; 2],
+}
+
+/// What a step has from its provider.
+pub(super) enum Asked {
+    Answer { answer: Answer, latency_ms: i32 },
+    GivenUp(Status),
 }
 
 /// Why an attempt ended without an answer.
@@ -43,38 +52,41 @@ enum Ended {
     Stopped(Lost),
 }
 
+/// Whether a busy provider asks for a longer wait than any step has.
+fn is_too_long(failure: &Failure, provider: &Provider) -> bool {
+    failure.kind.is_busy() && failure.after.is_some_and(|asked| asked > provider.patience().longest_wait)
+}
+
 impl Step {
-    /// Asks until there is an answer, the attempts are used up, or there is no point in asking.
-    pub(super) async fn ask(self) -> Result<Recorded, Lost> {
+    /// Asks until there is an answer, the attempts or the time for waiting are used up, or there is no point in asking.
+    pub(super) async fn ask(self) -> Result<Asked, Lost> {
         let Some(provider) = &self.vlm.provider else {
             return Err(Lost::because("nothing is sent from a cassette".to_owned()));
         };
-        let patience = provider.patience();
-        let backoff = ExponentialBuilder::default()
-            .with_min_delay(patience.first_delay)
-            .with_max_delay(patience.longest_delay)
-            .with_max_times(patience.attempts.saturating_sub(1) as usize)
-            .with_jitter();
+        let mut waiting = Waiting::new(provider.patience());
         let mut attempt = 0;
-        let asked = (|| {
+        loop {
             attempt += 1;
-            self.attempt_in_turn(provider, attempt)
-        })
-        .retry(backoff)
-        .when(|ended| matches!(ended, Ended::Failed(failure) if failure.kind.may_pass()))
-        .adjust(|ended, delay| match ended {
-            Ended::Failed(Failure { after: Some(after), .. }) => {
-                delay.map(|_| (*after).min(patience.longest_asked_delay))
+            let failure = match self.attempt(provider, attempt).await {
+                Ok(asked) => return Ok(asked),
+                Err(Ended::Stopped(lost)) => return Err(lost),
+                Err(Ended::Failed(failure)) if !failure.kind.may_pass() => return Err(self.rejected(&failure)),
+                Err(Ended::Failed(failure)) => failure,
+            };
+            match waiting.next(&failure) {
+                Some(wait) => self.vlm.unless_stopped(tokio::time::sleep(wait)).await?,
+                None if is_too_long(&failure, provider) => return Err(self.put_off(&failure)),
+                None => return self.give_up(attempt, &failure),
             }
-            _ => delay,
-        })
-        .await;
-        match asked {
-            Ok(recorded) => Ok(recorded),
-            Err(Ended::Stopped(lost)) => Err(lost),
-            Err(Ended::Failed(failure)) if failure.kind.may_pass() => self.give_up(attempt, &failure),
-            Err(Ended::Failed(failure)) => Err(self.rejected(&failure)),
         }
+    }
+
+    /// A provider that takes nothing for hours takes no other request of this recording either.
+    fn put_off(&self, failure: &Failure) -> Lost {
+        let seconds = failure.after.unwrap_or_default().as_secs();
+        let (detail, help) = (&failure.detail, "the same command continues then; what was answered is not asked again");
+        let reason = format!("the provider asks to wait {seconds} s: {detail}\n  help: {help}");
+        self.vlm.halt(Lost::because(reason))
     }
 
     /// A request that the provider will not take costs its episode if the model has taken others; else no request of this
@@ -90,30 +102,15 @@ impl Step {
             FailureKind::DailyQuota => {
                 format!("the provider's quota of the day is used up: {}{TOMORROW}", failure.detail)
             }
-            _ => format!("the provider refuses the request: {}", failure.detail),
+            _ => {
+                let mend = mend(&failure.detail, &self.vlm.choice.name);
+                format!("the provider refuses the request: {}{mend}", failure.detail)
+            }
         };
         self.vlm.halt(Lost::because(reason))
     }
 
-    /// An attempt, made again when the provider says when: a rate limit is no fault, and uses up no attempts.
-    async fn attempt_in_turn(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
-        let patience = provider.patience();
-        let mut waited = Duration::ZERO;
-        loop {
-            let ended = self.attempt(provider, attempt).await;
-            let Err(Ended::Failed(Failure { kind: FailureKind::RateLimited, after: Some(after), .. })) = &ended else {
-                return ended;
-            };
-            let is_over = waited + *after > patience.longest_wait || *after > patience.longest_asked_delay;
-            if after.is_zero() || is_over {
-                return ended;
-            }
-            tokio::time::sleep(*after).await;
-            waited += *after;
-        }
-    }
-
-    async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
+    async fn attempt(&self, provider: &Provider, attempt: u32) -> Result<Asked, Ended> {
         let first = self.vlm.turn_of_first().await;
         let ended = self.exchange(provider, attempt).await;
         self.vlm.note_known();
@@ -121,36 +118,42 @@ impl Step {
         ended
     }
 
-    async fn exchange(&self, provider: &Provider, attempt: u32) -> Result<Recorded, Ended> {
-        if let Some(lost) = self.vlm.end() {
-            return Err(Ended::Stopped(lost));
-        }
+    async fn exchange(&self, provider: &Provider, attempt: u32) -> Result<Asked, Ended> {
+        let turn = self.vlm.unless_stopped(provider.turn()).await.map_err(Ended::Stopped)?;
+        let reserved = self.vlm.account.reserve(self.vlm.cost_of(self.at_most));
+        let reserved = self.vlm.unless_stopped(reserved).await.map_err(Ended::Stopped)?;
         let over = |reached: Reached| Ended::Stopped(self.vlm.halt(Lost::by_limit(reached.to_string())));
-        self.vlm.account.request().map_err(over)?;
+        let reserved = reserved.map_err(over)?;
         let (t, question) = (self.t, self.question.clone());
-        self.write(&Entry::Request { t, attempt, question: question.clone(), frame: self.frame.clone() })?;
-        match provider.ask(&self.body).await {
+        let (frame, at_most) = (self.frame.clone(), Some(self.at_most));
+        if let Err(ended) = self.write(&Entry::Request { t, attempt, question: question.clone(), frame, at_most }) {
+            reserved.refused();
+            return Err(ended);
+        }
+        match provider.ask(turn, &self.body).await {
             Ok(received) => {
-                let cost = self.vlm.read(&received.body).and_then(|(_, cost)| cost);
-                self.vlm.account.answer(tokens(&received.answer), cost);
-                let latency_ms = i32::try_from(received.latency.as_millis()).unwrap_or(i32::MAX);
-                let (body, model, answered) = (received.body, received.answer.model, question.clone());
-                let other = model.clone();
-                self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body: body.clone() })?;
+                let Received { answer, body, latency } = received;
+                reserved.answered(tokens(&answer), self.vlm.cost_usd(&answer));
+                let latency_ms = i32::try_from(latency.as_millis()).unwrap_or(i32::MAX);
+                let model = answer.model.clone();
+                self.write(&Entry::Answer { t, attempt, question, latency_ms, model, body })?;
                 self.vlm.note_answered();
-                self.vlm.check_model(other.as_deref()).map_err(Ended::Stopped)?;
-                Ok(Recorded::Answer { question: answered, latency_ms, body })
+                self.vlm.check_model(answer.model.as_deref()).map_err(Ended::Stopped)?;
+                Ok(Asked::Answer { answer, latency_ms })
             }
             Err(failure) => {
+                if !failure.may_be_paid {
+                    reserved.refused();
+                }
                 let status = failure.kind.status().name().to_owned();
-                let detail = failure.detail.clone();
-                self.write(&Entry::Failure { t, attempt, status, detail, is_final: false, question })?;
+                let (detail, may_be_paid) = (failure.detail.clone(), failure.may_be_paid);
+                self.write(&Entry::Failure { t, attempt, status, detail, is_final: false, may_be_paid, question })?;
                 Err(Ended::Failed(failure))
             }
         }
     }
 
-    fn give_up(&self, attempt: u32, failure: &Failure) -> Result<Recorded, Lost> {
+    fn give_up(&self, attempt: u32, failure: &Failure) -> Result<Asked, Lost> {
         let status = failure.kind.status();
         if self.vlm.on_outage == OnOutage::Lose {
             let name = status.name();
@@ -163,10 +166,11 @@ impl Step {
             status: status.name().to_owned(),
             detail: failure.detail.clone(),
             is_final: true,
+            may_be_paid: false,
             question: self.question.clone(),
         };
         match self.write(&entry) {
-            Ok(()) => Ok(Recorded::GivenUp { question: self.question.clone(), status }),
+            Ok(()) => Ok(Asked::GivenUp(status)),
             Err(Ended::Stopped(lost)) => Err(lost),
             Err(Ended::Failed(failure)) => Err(Lost::because(failure.detail)),
         }

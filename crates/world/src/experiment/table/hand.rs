@@ -2,8 +2,8 @@
 
 use super::{in_order, millimetres};
 use crate::experiment::spec::{Actions, Decision, Hand, Part, Picture, Spec, Start, Truth, Wearer};
-use metric::fault::{Fault, Place};
-use metric::keys::Keys;
+use toml_spec::Keys;
+use toml_spec::{Fault, Place};
 
 /// The furthest that a hand starts from the mark, steps.
 const FURTHEST: u32 = 40;

@@ -3,8 +3,8 @@
 use super::{millimetres, missing, no_color, pairs};
 use crate::experiment::limits::LATEST;
 use crate::experiment::spec::{BodyShown, MOST_PANES, Paint, Pane, PaneKind, Wall};
-use metric::fault::{Fault, Place};
-use metric::keys::Keys;
+use toml_spec::Keys;
+use toml_spec::{Fault, Place};
 use trace::palette::Color;
 
 /// The `[[experiment.NAME.mirror]]` tables.

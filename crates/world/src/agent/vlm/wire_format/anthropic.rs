@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Question, text, tokens};
+use super::{Answer, Question, text, text_or_call, tokens};
 use crate::agent::reply::Ending;
 
 pub(super) fn body(question: &Question<'_>) -> Value {
@@ -10,13 +10,15 @@ pub(super) fn body(question: &Question<'_>) -> Value {
     let mut body = json!({
         "model": question.model,
         "max_tokens": question.max_output_tokens,
-        "temperature": question.temperature,
         "system": question.system,
         "messages": [{ "role": "user", "content": [
             { "type": "image", "source": source },
             { "type": "text", "text": question.user },
         ] }],
     });
+    if let Some(temperature) = question.temperature {
+        body["temperature"] = json!(temperature);
+    }
     if let Some(schema) = question.schema {
         body["output_config"] = json!({ "format": { "type": "json_schema", "schema": schema } });
     }
@@ -40,11 +42,19 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
         _ => Ending::Whole,
     };
     let usage = &body["usage"];
+    let calls: Vec<_> =
+        blocks.iter().filter(|block| block["type"] == "tool_use").map(|block| block["input"].to_string()).collect();
+    let (text_of_reply, repairs) = text_or_call(words.collect(), &calls);
     Some(Answer {
-        text: words.collect(),
-        has_lone_surrogate: false,
+        text: text_of_reply,
+        repairs,
         ending,
-        prompt_tokens: tokens(&usage["input_tokens"]),
+        // Anthropic counts what is read from its cache, and written to it, apart.
+        prompt_tokens: tokens(&usage["input_tokens"]).map(|input| {
+            let cache = ["cache_read_input_tokens", "cache_creation_input_tokens"];
+            cache.iter().filter_map(|name| tokens(&usage[*name])).fold(input, u32::saturating_add)
+        }),
+        cached_tokens: tokens(&usage["cache_read_input_tokens"]),
         completion_tokens: tokens(&usage["output_tokens"]),
         cost_usd: None,
         model: text(&body["model"]),

@@ -2,8 +2,8 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Effort, Question, text, tokens};
-use crate::agent::reply::Ending;
+use super::{Answer, Effort, Question, text, text_or_call, tokens};
+use crate::agent::reply::{Ending, Repair};
 
 pub(super) fn body(question: &Question<'_>) -> Value {
     let mut body = json!({
@@ -12,11 +12,11 @@ pub(super) fn body(question: &Question<'_>) -> Value {
             { "text": question.user },
         ] }],
         "systemInstruction": { "parts": [{ "text": question.system }], "role": "user" },
-        "generationConfig": {
-            "temperature": question.temperature,
-            "maxOutputTokens": question.max_output_tokens,
-        },
+        "generationConfig": { "maxOutputTokens": question.max_output_tokens },
     });
+    if let Some(temperature) = question.temperature {
+        body["generationConfig"]["temperature"] = json!(temperature);
+    }
     if let Some(schema) = question.schema {
         body["generationConfig"]["responseMimeType"] = json!("application/json");
         body["generationConfig"]["responseJsonSchema"] = schema.clone();
@@ -37,7 +37,7 @@ fn thinking(model: &str, effort: Effort) -> Value {
         Effort::None => 0,
         Effort::Minimal | Effort::Low => 1_024,
         Effort::Medium => 8_192,
-        Effort::High | Effort::Xhigh => 24_576,
+        Effort::High | Effort::Xhigh | Effort::Max => 24_576,
     };
     json!({ "thinkingBudget": budget })
 }
@@ -72,11 +72,13 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     };
     let usage = &body["usageMetadata"];
     let completion = [&usage["candidatesTokenCount"], &usage["thoughtsTokenCount"]].map(tokens);
+    let (text_of_reply, repairs) = first.map(words).unwrap_or_default();
     Some(Answer {
-        text: first.map(words).unwrap_or_default(),
-        has_lone_surrogate: false,
+        text: text_of_reply,
+        repairs,
         ending,
         prompt_tokens: tokens(&usage["promptTokenCount"]),
+        cached_tokens: tokens(&usage["cachedContentTokenCount"]),
         completion_tokens: match completion {
             [None, None] => None,
             [candidates, thoughts] => Some(candidates.unwrap_or(0).saturating_add(thoughts.unwrap_or(0))),
@@ -86,8 +88,11 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     })
 }
 
-/// The text of a candidate, its thoughts left out.
-fn words(candidate: &Value) -> String {
+/// The text of a candidate, its thoughts left out, or the arguments of the function that it calls.
+fn words(candidate: &Value) -> (String, Vec<Repair>) {
     let parts = candidate["content"]["parts"].as_array().map(Vec::as_slice).unwrap_or_default();
-    parts.iter().filter(|part| part["thought"] != true).filter_map(|part| part["text"].as_str()).collect()
+    let words = parts.iter().filter(|part| part["thought"] != true).filter_map(|part| part["text"].as_str()).collect();
+    let calls = parts.iter().filter_map(|part| part.get("functionCall"));
+    let calls: Vec<_> = calls.map(|call| call["args"].to_string()).collect();
+    text_or_call(words, &calls)
 }

@@ -13,7 +13,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::agent::reply::{Ending, without_lone_surrogates};
+use crate::agent::reply::{Ending, Repair, without_lone_surrogates};
 use exact::names;
 
 /// A language.
@@ -41,8 +41,8 @@ pub struct Question<'a> {
     pub png_base64: &'a str,
     /// The JSON Schema that the provider is asked to enforce; `None` if the prompt alone has to do.
     pub schema: Option<&'a Value>,
-    /// The sampling temperature (0.2 in the paper).
-    pub temperature: f64,
+    /// The sampling temperature (0.2 in the paper); `None` leaves it to the provider.
+    pub temperature: Option<f64>,
     /// The most tokens that a reply may have, those of hidden reasoning included.
     pub max_output_tokens: u32,
     /// How much the model is asked to reason; `None` leaves it to the provider.
@@ -63,22 +63,35 @@ pub enum Effort {
     Medium,
     /// Much.
     High,
-    /// As much as it can.
+    /// More than that.
     Xhigh,
+    /// As much as it can.
+    Max,
 }
 
-names!(Effort { None: "none", Minimal: "minimal", Low: "low", Medium: "medium", High: "high", Xhigh: "xhigh" });
+names!(Effort {
+    None: "none",
+    Minimal: "minimal",
+    Low: "low",
+    Medium: "medium",
+    High: "high",
+    Xhigh: "xhigh",
+    Max: "max"
+});
 
 /// What an answer says.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// The text of the reply; empty where there is none.
     pub text: String,
-    /// Whether the body had a lone surrogate in it, for which the text has U+FFFD.
-    pub has_lone_surrogate: bool,
+    /// Repairs of what carried the text: a lone surrogate in the body, for which the text has U+FFFD; a call of a function,
+    /// whose arguments are the text.
+    pub repairs: Vec<Repair>,
     pub ending: Ending,
-    /// Tokens of the request, where counted.
+    /// Tokens of the request, where counted; those from the provider's cache included.
     pub prompt_tokens: Option<u32>,
+    /// Those of them that came from the provider's cache, where counted.
+    pub cached_tokens: Option<u32>,
     /// Tokens of the reply, where counted; those of hidden reasoning included.
     pub completion_tokens: Option<u32>,
     /// What it cost in US dollars, where the provider says so.
@@ -133,8 +146,12 @@ impl Dialect {
             Err(fault) => fault,
         };
         let value = without_lone_surrogates(body).and_then(|body| serde_json::from_str(&body).ok()).ok_or(fault)?;
-        let of_reply = |answer: Answer| Answer { has_lone_surrogate: answer.text.contains('\u{fffd}'), ..answer };
-        Ok(self.answer(&value).map(of_reply))
+        Ok(self.answer(&value).map(|mut answer| {
+            if answer.text.contains('\u{fffd}') {
+                answer.repairs.push(Repair::Surrogate);
+            }
+            answer
+        }))
     }
 
     /// What the body of an answer says; `None` if it is not of this language. An error that refuses what the request is
@@ -146,6 +163,14 @@ impl Dialect {
             Self::AnthropicMessages => anthropic::answer(body),
         };
         answer.or_else(|| refusal::answer(body))
+    }
+}
+
+/// The text of a reply, or else the arguments of the one function that it calls, and the repair that this is.
+fn text_or_call(text: String, calls: &[String]) -> (String, Vec<Repair>) {
+    match calls {
+        [arguments] if text.trim().is_empty() => (arguments.clone(), vec![Repair::ToolCall]),
+        _ => (text, Vec::new()),
     }
 }
 

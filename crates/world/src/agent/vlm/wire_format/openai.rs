@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::{Answer, Question, text, tokens};
+use super::{Answer, Question, text, text_or_call, tokens};
 use crate::agent::reply::Ending;
 
 pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
@@ -16,8 +16,10 @@ pub(super) fn body(question: &Question<'_>, limit: &str) -> Value {
                 { "type": "text", "text": question.user },
             ] },
         ],
-        "temperature": question.temperature,
     });
+    if let Some(temperature) = question.temperature {
+        body["temperature"] = json!(temperature);
+    }
     body[limit] = json!(question.max_output_tokens);
     if let Some(effort) = question.reasoning_effort {
         body["reasoning_effort"] = json!(effort.name());
@@ -39,11 +41,16 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     }
     let usage = &body["usage"];
     let (reply, ending) = choices.first().map_or((String::new(), Ending::Whole), reply);
+    let calls = choices.first().and_then(|choice| choice["message"]["tool_calls"].as_array());
+    let arguments = |call: &Value| call["function"]["arguments"].as_str().map(str::to_owned);
+    let calls: Vec<_> = calls.into_iter().flatten().filter_map(arguments).collect();
+    let (reply, repairs) = text_or_call(reply, &calls);
     Some(Answer {
         text: reply,
-        has_lone_surrogate: false,
+        repairs,
         ending,
         prompt_tokens: tokens(&usage["prompt_tokens"]),
+        cached_tokens: tokens(&usage["prompt_tokens_details"]["cached_tokens"]),
         completion_tokens: tokens(&usage["completion_tokens"]),
         cost_usd: usage["cost"].as_f64().filter(|cost| *cost >= 0.0),
         model: text(&body["model"]),

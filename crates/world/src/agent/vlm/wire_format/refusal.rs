@@ -53,9 +53,10 @@ pub(super) fn answer(body: &Value) -> Option<Answer> {
     let error = [&body["error"], &body["choices"][0]["error"]].into_iter().find(|error| is_refusal(error))?;
     Some(Answer {
         text: error["message"].as_str().map_or_else(|| error.to_string(), str::to_owned),
-        has_lone_surrogate: false,
+        repairs: Vec::new(),
         ending: Ending::Refused,
         prompt_tokens: None,
+        cached_tokens: None,
         completion_tokens: None,
         cost_usd: None,
         model: text(&body["model"]),

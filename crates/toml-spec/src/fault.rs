@@ -13,8 +13,8 @@ use serde::Serialize;
 
 use exact::escape::visible;
 
-/// Who corrects so many starts anew; more are neither looked for nor told.
-pub(crate) const MOST: usize = 100;
+/// The most faults that are reported.
+pub const MOST_FAULTS: usize = 100;
 
 /// Text that faults point into: a definition file, or an expression typed on the command line.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -128,7 +128,7 @@ impl Faults {
         let renderer = if colored { Renderer::styled() } else { Renderer::plain() };
         let mut texts: Vec<String> = self.0.iter().map(|fault| fault.render(&renderer)).collect();
         if texts.len() > 1 {
-            let or_more = if texts.len() == MOST { " or more" } else { "" };
+            let or_more = if texts.len() == MOST_FAULTS { " or more" } else { "" };
             texts.push(format!("error: {} faults{or_more}", texts.len()));
         }
         texts.join("\n\n")
@@ -147,7 +147,7 @@ impl Faults {
             a.place.source.name.cmp(&b.place.source.name).then(key(a).cmp(&key(b)))
         });
         self.0.dedup();
-        self.0.truncate(MOST);
+        self.0.truncate(MOST_FAULTS);
         self
     }
 }

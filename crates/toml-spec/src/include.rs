@@ -5,11 +5,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::fault::{Fault, Place};
+use crate::fault::{Fault, Place};
 use exact::budget::Limit;
 
 /// What a kind of files calls itself in faults.
-pub struct Kind {
+pub struct IncludeKind {
     /// `style`
     pub name: &'static str,
     /// The command that checks one.
@@ -21,7 +21,7 @@ pub struct Kind {
 
 /// The includes of a file, while it is read.
 pub struct Includes {
-    kind: Kind,
+    kind: IncludeKind,
     /// The files being read, for includes that lead back: their names, and their places on disk.
     open: Vec<(String, Option<PathBuf>)>,
     followed: u64,
@@ -30,7 +30,7 @@ pub struct Includes {
 }
 
 impl Includes {
-    pub fn new(kind: Kind) -> Self {
+    pub fn new(kind: IncludeKind) -> Self {
         Self { kind, open: Vec::new(), followed: 0, told: Vec::new() }
     }
 
@@ -81,7 +81,7 @@ impl Includes {
     pub fn conceal(&mut self, before: usize, place: Place, faults: &mut Vec<Fault>) {
         let Some(first) = faults.get(before).cloned() else { return };
         faults.truncate(before);
-        let Kind { name: kind, check, .. } = self.kind;
+        let IncludeKind { name: kind, check, .. } = self.kind;
         let message = if self.told.contains(&first.message) {
             first.message
         } else {

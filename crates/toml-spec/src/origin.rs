@@ -6,7 +6,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::fault::{Place, Source};
+use crate::fault::{Place, Source};
 
 /// An expression's text and where each of its bytes stands in its source.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use indexmap::IndexMap;
 use toml::de::{DeTable, DeValue};
 
-use super::fault::{Fault, Place, Source};
-use super::origin::Written;
+use crate::fault::{Fault, Place, Source};
+use crate::origin::Written;
 use exact::ratio::Ratio;
 use exact::suggest::nearest;
 
@@ -298,7 +298,7 @@ impl<'a> Keys<'a> {
 
 fn describe(what: &str) -> String {
     match what {
-        "column" | "metric" | "mirror" | "mark" | "table" => format!("a {what}"),
+        "column" | "figure" | "metric" | "mirror" | "mark" | "table" => format!("a {what}"),
         "experiment" => format!("an {what}"),
         other => other.to_owned(),
     }

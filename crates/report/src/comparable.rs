@@ -1,0 +1,185 @@
+//! Whether two sets of episodes are comparable, and if not, which setting of their recordings differs.
+//!
+//! Rule: a comparison varies one thing, and every other setting is equal on both sides. What no footer declares cannot be
+//! checked; what only some episodes declare is a difference.
+
+use std::collections::BTreeSet;
+
+use metric::catalog::Catalog;
+use serde_json::Value;
+
+use exact::escape::visible;
+use score::table::{Declared, EpisodeTable, TextColumn};
+
+/// The label of what an episode was recorded with.
+pub const FINGERPRINT: &str = "fingerprint";
+/// Digits of a hash in a message.
+const SHOWN: usize = 8;
+/// Settings of the world that an experiment sets for itself.
+const OF_EXPERIMENT: [&str; 2] = ["others", "clutter"];
+
+/// What a comparison varies on purpose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Varied {
+    /// The model, its sampling and what drives it.
+    Model,
+    /// The condition, which stands for any setting.
+    Condition,
+    /// The experiment: its panes, its prompt and its layout.
+    Experiment,
+    /// Nothing: the episodes are of one cell.
+    Nothing,
+}
+
+impl Varied {
+    /// The parts of a fingerprint that must be equal.
+    fn kept(self) -> &'static [&'static str] {
+        match self {
+            Self::Model => &["world", "prompts", "reply_schema"],
+            Self::Condition => &[],
+            Self::Experiment => &["agent", "sampling", "model"],
+            Self::Nothing => &["world", "prompts", "reply_schema", "agent", "sampling", "model"],
+        }
+    }
+}
+
+/// What some episodes were recorded with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Recorded<'a> {
+    fingerprints: BTreeSet<&'a str>,
+    undeclared: usize,
+    episodes: usize,
+}
+
+impl<'a> Recorded<'a> {
+    /// The fingerprints of these rows of a table.
+    pub fn of(table: &'a EpisodeTable, rows: impl Iterator<Item = usize>) -> Self {
+        let column = table.label(FINGERPRINT);
+        let mut found = Self::default();
+        for row in rows {
+            found.add(column, row);
+        }
+        found
+    }
+
+    /// Whether each episode has a fingerprint.
+    pub const fn is_declared(&self) -> bool {
+        self.undeclared == 0
+    }
+
+    fn add(&mut self, column: Option<&'a TextColumn>, row: usize) {
+        self.episodes += 1;
+        match column.and_then(|column| column.get(row)) {
+            Some(name) => drop(self.fingerprints.insert(name)),
+            None => self.undeclared += 1,
+        }
+    }
+}
+
+/// The setting that keeps two sets of episodes from being compared, and what each has; `None` where nothing is known to.
+pub fn difference(declared: &Declared, sides: [&Recorded<'_>; 2], varied: Varied) -> Option<String> {
+    let [first, second] = sides;
+    if varied == Varied::Condition {
+        return None;
+    }
+    let (undeclared, episodes) = (first.undeclared + second.undeclared, first.episodes + second.episodes);
+    if undeclared > 0 && undeclared < episodes {
+        return Some(format!("{undeclared} of {episodes} episodes have no fingerprint"));
+    }
+    if let Some(name) = first.fingerprints.union(&second.fingerprints).find(|name| declared.ambiguous.contains(**name))
+    {
+        return Some(format!("the fingerprint `{}` stands for different recordings", visible(name)));
+    }
+    let couples = first.fingerprints.iter().flat_map(|one| second.fingerprints.iter().map(move |other| [*one, *other]));
+    couples.filter(|[one, other]| one != other).find_map(|names| between(declared, names, varied))
+}
+
+/// The settings in which two fingerprints differ though the comparison does not vary them.
+fn between(declared: &Declared, names: [&str; 2], varied: Varied) -> Option<String> {
+    let parts = parts(declared, names, varied.kept());
+    let recordings = names.map(|name| declared.recordings.get(name));
+    let [Some(one), Some(other)] = recordings else { return parts };
+    if varied == Varied::Experiment {
+        return parts.or_else(|| between_experiments(one, other));
+    }
+    parts.map(|parts| match settings(one, other, varied) {
+        Some(settings) if varied == Varied::Nothing => format!("{parts}; {settings}"),
+        Some(settings) => settings,
+        None => parts,
+    })
+}
+
+/// The parts of two fingerprints that differ. A part that one side does not have, such as the prompt of a script, is none.
+fn parts(declared: &Declared, names: [&str; 2], kept: &[&str]) -> Option<String> {
+    let [one, other] = names.map(|name| declared.fingerprints.get(name));
+    let (one, other) = (one?, other?);
+    let is_strict = kept.contains(&"model");
+    let differs = |key: &&&str| {
+        let (one, other) = (&one[**key], &other[**key]);
+        one != other && (is_strict || !(one.is_null() || other.is_null()))
+    };
+    let found =
+        kept.iter().filter(differs).map(|key| format!("{key} ({}, {})", shown(&one[*key]), shown(&other[*key])));
+    let found: Vec<String> = found.collect();
+    (!found.is_empty()).then(|| found.join(", "))
+}
+
+/// The first setting of the world, of the experiment and of the agent in which two recordings differ, as their footers have it.
+fn settings(one: &Value, other: &Value, varied: Varied) -> Option<String> {
+    let keys = if varied == Varied::Model { &["world", "experiment"][..] } else { &["world", "experiment", "agent"] };
+    let found: Vec<String> = keys.iter().filter_map(|key| first_difference(key, &one[*key], &other[*key])).collect();
+    (!found.is_empty()).then(|| found.join("; "))
+}
+
+/// The first setting that two experiments do not vary by themselves: the world, and the text of the same prompt.
+fn between_experiments(one: &Value, other: &Value) -> Option<String> {
+    let world = |recording: &Value| {
+        let mut world = recording["world"].clone();
+        if let Some(world) = world.as_object_mut() {
+            world.retain(|key, _| !OF_EXPERIMENT.contains(&key.as_str()));
+        }
+        world
+    };
+    let prompt = |recording: &Value| recording["experiment"]["prompt"].clone();
+    let hash = |recording: &Value| recording["experiment"]["prompt_hash"].clone();
+    let of_prompt = || {
+        let is_same = !prompt(one).is_null() && prompt(one) == prompt(other);
+        is_same.then(|| first_difference("experiment.prompt_hash", &hash(one), &hash(other))).flatten()
+    };
+    first_difference("world", &world(one), &world(other)).or_else(of_prompt)
+}
+
+/// The innermost key in which two values differ, and what each has.
+fn first_difference(name: &str, one: &Value, other: &Value) -> Option<String> {
+    if one == other {
+        return None;
+    }
+    if let (Value::Object(a), Value::Object(b)) = (one, other) {
+        let keys = a.keys().chain(b.keys().filter(|key| !a.contains_key(*key)));
+        let mut inner = keys.map(|key| (key, &one[key], &other[key])).filter(|(_, one, other)| one != other);
+        if let Some((key, one, other)) = inner.next() {
+            return first_difference(&format!("{name}.{}", visible(key)), one, other);
+        }
+    }
+    Some(format!("{name} is {} and {}", shown(one), shown(other)))
+}
+
+/// The beginning of a hash, or a name.
+fn shown(value: &Value) -> String {
+    match value {
+        Value::Null => "nothing".to_owned(),
+        Value::String(text) if text.len() == 64 && text.bytes().all(|byte| byte.is_ascii_hexdigit()) => {
+            text[..SHOWN].to_owned()
+        }
+        Value::String(text) => visible(text),
+        other => visible(&other.to_string()),
+    }
+}
+
+/// Why two experiments are not contrasted, or `None`: a contrast needs like tasks, whose chance levels are equal.
+pub fn tasks_differ(catalog: &Catalog, baseline: &str, against: &str) -> Option<String> {
+    let differs = |metric: &&String| catalog.chance(baseline, metric) != catalog.chance(against, metric);
+    let metric = catalog.metric.keys().find(differs)?;
+    let level = |name: &str| catalog.chance(name, metric).map_or_else(|| "none".to_owned(), |level| level.to_string());
+    Some(format!("the chance level of {metric} is {} and {}", level(baseline), level(against)))
+}

@@ -1,0 +1,93 @@
+//! Which metrics a figure shows, and the words below it: what a style says of it, as far as the cells have it.
+
+use std::sync::LazyLock;
+
+use indexmap::IndexMap;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+use super::matrix::{Matrix, MetricId};
+use super::{FigureError, FigureName};
+use metric::catalog::Kind;
+use metric::relations::Relations;
+
+/// What a style says of one figure.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct FigureSheet {
+    /// The metrics that it shows, in the order of its roles.
+    pub metrics: Option<Vec<String>>,
+    /// The words below it; `{0}` stands for the first metric, `{1}` for the second.
+    pub caption: Option<String>,
+}
+
+/// What a style says of its figures, by name.
+pub type FigureSheets = IndexMap<String, FigureSheet>;
+
+/// What every figure shows unless a style says otherwise.
+pub static SHOWN: LazyLock<FigureSheets> = LazyLock::new(|| {
+    toml::from_str(include_str!("../../../../assets/styles/figures.toml")).expect("the file comes with the program")
+});
+
+impl FigureName {
+    /// The fewest and the most metrics that it shows; the first so many must be rates.
+    pub const fn metrics(self) -> ([usize; 2], usize) {
+        const ANY: usize = 64;
+        match self {
+            Self::Spider => ([3, ANY], 0),
+            Self::Heatmap => ([1, ANY], 0),
+            Self::Scatter => ([3, 3], 2),
+            Self::CompletionGap => ([2, 2], 2),
+            Self::Intervals | Self::Slopes => ([1, 1], 1),
+            Self::DecisionCurve => ([2, 2], 0),
+            Self::E5Outcomes | Self::Gaze => ([0, 0], 0),
+        }
+    }
+}
+
+/// The metrics of a figure, found among the cells.
+pub(super) fn metrics<'a>(
+    figure: FigureName,
+    matrix: &Matrix<'a>,
+    sheets: &'a FigureSheets,
+) -> Result<Vec<MetricId<'a>>, FigureError> {
+    let listed = sheets.get(figure.name()).and_then(|sheet| sheet.metrics.as_deref()).unwrap_or_default();
+    let found: Result<Vec<_>, _> = listed.iter().map(|name| matrix.metric(figure, name)).collect();
+    let found = found.or_else(|error| instead(figure, matrix, listed).ok_or(error))?;
+    let quantity = found.iter().take(figure.metrics().1).find(|id| id.metric.kind == Kind::Quantity);
+    match quantity {
+        Some(id) => Err(FigureError::NotARate { figure, metric: id.name.to_owned() }),
+        None => Ok(found),
+    }
+}
+
+/// What a figure shows of definitions that lack a listed metric.
+fn instead<'a>(figure: FigureName, matrix: &Matrix<'a>, listed: &[String]) -> Option<Vec<MetricId<'a>>> {
+    let all = matrix.metrics();
+    let named = |name: &str| all.iter().find(|id| id.name == name).copied();
+    let related = |pair: fn(Relations) -> Option<[String; 2]>| {
+        pair(Relations::of(matrix.catalog()))?.iter().map(|name| named(name)).collect()
+    };
+    match figure {
+        FigureName::Heatmap => {
+            let known: Vec<_> = listed.iter().filter_map(|name| named(name)).collect();
+            Some(if known.is_empty() { all } else { known })
+        }
+        FigureName::Intervals | FigureName::Slopes => {
+            all.iter().find(|id| id.metric.kind == Kind::Rate).map(|id| vec![*id])
+        }
+        FigureName::CompletionGap => {
+            related(|found| found.completed.first().map(|(whole, same)| [same, whole].map(String::clone)))
+        }
+        FigureName::DecisionCurve => {
+            related(|found| found.durations.first().map(|(one, other)| [one, other].map(String::clone)))
+        }
+        _ => None,
+    }
+}
+
+/// The words below a figure of these metrics.
+pub(super) fn caption(figure: FigureName, metrics: &[MetricId<'_>], sheets: &FigureSheets) -> String {
+    let template = sheets.get(figure.name()).and_then(|sheet| sheet.caption.clone()).unwrap_or_default();
+    metrics.iter().enumerate().fold(template, |text, (at, id)| text.replace(&format!("{{{at}}}"), id.name))
+}

@@ -1,0 +1,357 @@
+//! Later episodes against earlier ones, cell by cell: improved, held, regressed, or why neither can be said.
+//!
+//! Rule: a loss within the margin is accepted, so that `held` comes before `regressed`. Every verdict is adjusted by Holm over
+//! the cells, rests on the unit of analysis, and stands whatever lost episodes would have shown.
+
+mod flips;
+mod sides;
+mod text;
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+pub use flips::{FlippedPair, Played};
+pub use text::GateFormat;
+
+use self::sides::{Fill, Sides, joined};
+use super::chance::Units;
+use super::compare::{Compared, Comparison};
+use super::matching::{Matched, Scenes};
+use super::study::{Block, Study};
+use crate::comparable::Varied;
+use exact::format::{fixed, p_value};
+use exact::moments::{MomentOverflow, Moments};
+use metric::catalog::{Better, Kind};
+use score::table::{EpisodeTable, MetricColumn};
+use statistics::design::Design;
+use statistics::holm::{holm, level};
+use statistics::interval::Interval;
+use statistics::margin;
+
+/// What is asked of two sets of episodes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GateOptions {
+    /// The metric, which both sides have and which has a better direction.
+    pub metric: String,
+    /// The largest loss that is accepted, in the unit of the metric.
+    pub margin: f64,
+    /// One minus the level of every verdict.
+    pub confidence: f64,
+    /// Whether settings that differ do not matter.
+    pub pool: bool,
+}
+
+/// Where the later episodes of a cell stand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum GateVerdict {
+    /// Shown to be better.
+    Improved,
+    /// Shown not to be worse by the margin or more.
+    Held,
+    /// None of the others is shown.
+    CannotSay,
+    /// Recorded differently, or on one side alone.
+    NotComparable,
+    /// Shown to be worse, and not shown to be within the margin.
+    Regressed,
+}
+
+/// All cells of two sets of episodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Gate {
+    /// The metric.
+    pub metric: String,
+    /// The largest loss that is accepted, in the unit of the metric.
+    pub margin: f64,
+    /// One minus the level of every verdict.
+    pub confidence: f64,
+    /// The gravest verdict: regressed, not comparable, cannot say, held, improved.
+    pub verdict: GateVerdict,
+    /// Settings that differ and were declared not to matter, a sentence each.
+    pub pooled: Vec<String>,
+    /// The cells, in the order of the experiments, then by model and condition.
+    pub cells: Vec<GateCell>,
+}
+
+/// One experiment and model, later against earlier.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct GateCell {
+    /// The experiment.
+    pub experiment: String,
+    /// The model, by its later name.
+    pub model: String,
+    /// Its earlier name, where that is another one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_model: Option<String>,
+    /// The condition, where it is not the default one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub condition: Option<String>,
+    /// The verdict.
+    pub verdict: GateVerdict,
+    /// What it rests on, or what is in its way.
+    pub why: String,
+    /// The earlier episodes.
+    pub base: GateSide,
+    /// The later episodes.
+    pub new: GateSide,
+    /// The later mean minus the earlier one, over the episodes compared.
+    pub difference: Option<f64>,
+    /// Its interval, not adjusted.
+    pub interval: Option<Interval>,
+    /// The two-sided p value of the difference, adjusted by Holm's method over the cells; null for quantities.
+    pub p_adjusted: Option<f64>,
+    /// The one-sided p value of a loss of the margin or more, adjusted likewise; null for quantities.
+    pub p_held: Option<f64>,
+    /// The units of analysis where some have several episodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub units: Option<Units>,
+    /// The units on each side with which a verdict would be likely, if the rates stay as they are; null with a verdict.
+    pub settled_by: Option<u64>,
+    /// The scenes in which the value changed.
+    pub flips: Vec<FlippedPair>,
+}
+
+/// The episodes of one side of a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct GateSide {
+    /// The episodes in which the metric is defined.
+    pub n: u64,
+    /// The successes among them; null for quantities.
+    pub successes: Option<u64>,
+    /// The mean.
+    pub mean: Option<f64>,
+    /// The episodes that were lost, which are not counted.
+    pub lost: u64,
+}
+
+/// One cell before its verdict.
+struct Tried {
+    comparison: Comparison,
+    units: margin::Units,
+    held: Option<f64>,
+}
+
+impl Gate {
+    /// The verdict on every cell that either side has.
+    ///
+    /// # Errors
+    /// Sums of squares beyond 128 bits.
+    pub fn of([base, new]: [&EpisodeTable; 2], design: Design, options: &GateOptions) -> Result<Self, MomentOverflow> {
+        let sides = Sides::of(base, new);
+        let barrier = sides.barrier().filter(|_| !options.pool);
+        let counted = joined(&sides, options, Fill::Out);
+        let study = Study::of(&counted, design, None)?;
+        let mut cells = judged(&study, options, barrier.as_deref());
+        for cell in &mut cells {
+            cell.base_model = sides.base_model(&cell.model);
+            (cell.base.lost, cell.new.lost) = sides.lost(cell);
+        }
+        if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
+            for fill in [Fill::Against, Fill::For] {
+                let filled = joined(&sides, options, fill);
+                let bound = judged(&Study::of(&filled, design, None)?, options, barrier.as_deref());
+                for cell in &mut cells {
+                    cell.bounded_by(&bound, fill);
+                }
+            }
+        }
+        let verdict = cells.iter().map(|cell| cell.verdict).max().unwrap_or(GateVerdict::CannotSay);
+        let GateOptions { metric, margin, confidence, .. } = options.clone();
+        let mut pooled = Vec::new();
+        for setting in sides.barrier().into_iter().chain(apart(&study)).filter(|_| options.pool) {
+            let sentence = format!("Compared though they differ (--pool): {setting}.");
+            if !pooled.contains(&sentence) {
+                pooled.push(sentence);
+            }
+        }
+        Ok(Self { metric, margin, confidence, verdict, pooled, cells })
+    }
+}
+
+/// The settings in which the two sides of a cell differ.
+fn apart(study: &Study) -> Vec<String> {
+    let couples = study.experiments.iter().flat_map(|experiment| sides::couples(&experiment.blocks));
+    let both = couples.filter_map(|(base, new)| Some((base?, new?)));
+    both.filter_map(|(base, new)| study.setting_between(base, new, Varied::Model)).collect()
+}
+
+/// The verdicts on the cells of a table that holds both sides.
+fn judged(study: &Study, options: &GateOptions, barrier: Option<&str>) -> Vec<GateCell> {
+    let Some(column) = study.column(&options.metric) else { return Vec::new() };
+    let couples: Vec<_> = study.experiments.iter().flat_map(|experiment| sides::couples(&experiment.blocks)).collect();
+    let setting = |couple: &(Option<&Block>, Option<&Block>)| match couple {
+        (Some(base), Some(new)) if !options.pool => {
+            barrier.map(str::to_owned).or_else(|| study.setting_between(base, new, Varied::Model))
+        }
+        (Some(_), Some(_)) => None,
+        (None, _) => Some("BASE has no episode".to_owned()),
+        (_, None) => Some("NEW has no episode".to_owned()),
+    };
+    let settings: Vec<Option<String>> = couples.iter().map(setting).collect();
+    let tests = settings.iter().filter(|setting| setting.is_none()).count();
+    let tried = couples.iter().zip(&settings).map(|(couple, setting)| {
+        let (base, new) = (couple.0?, couple.1?);
+        setting.is_none().then(|| Tried::of(study, column, [base, new], options, tests))
+    });
+    let tried: Vec<Option<Tried>> = tried.collect();
+    let adjusted = |of: fn(&Tried) -> Option<f64>| {
+        let p_values: Vec<f64> = tried.iter().flatten().filter_map(of).collect();
+        let mut values = holm(&p_values).into_iter();
+        tried.iter().map(|tried| tried.as_ref().and_then(of).and_then(|_| values.next())).collect::<Vec<_>>()
+    };
+    let adjusted = adjusted(|tried| tried.comparison.p).into_iter().zip(adjusted(|tried| tried.held));
+    let parts = couples.iter().zip(settings).zip(tried.iter().zip(adjusted));
+    parts
+        .map(|((couple, setting), (tried, adjusted))| {
+            let cell = GateCell::blank(study, column, *couple, setting);
+            match (tried, couple) {
+                (Some(tried), (Some(base), Some(new))) => {
+                    let cell = GateCell { flips: flips::of(study, column, [base, new]), ..cell };
+                    cell.decided(tried, adjusted, tests, options, (study, new))
+                }
+                _ => cell,
+            }
+        })
+        .collect()
+}
+
+impl Tried {
+    fn of(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2], options: &GateOptions, tests: usize) -> Self {
+        let is_rate = study.kind(&column.name) == Kind::Rate;
+        let matched = Matched::of(&Scenes::of(study, new), &Scenes::of(study, base));
+        let at = |confidence| {
+            Compared { study, first: new, second: base, matched: &matched, horizon: None, confidence }.under(column)
+        };
+        if is_rate {
+            let units = units(study, column, [base, new]);
+            let held = units.non_inferior(options.margin);
+            return Self { comparison: at(options.confidence), units, held };
+        }
+        // Every verdict on a quantity is by its interval, at the level of Bonferroni.
+        #[expect(clippy::cast_precision_loss, reason = "few cells")]
+        let share = (1.0 - options.confidence) / tests.max(1) as f64;
+        let (told_apart, within) = (at(1.0 - share), at(1.0 - 2.0 * share));
+        let is_lower = study.better(&column.name) == Better::Lower;
+        let bound = |interval: Interval| if is_lower { -interval.high } else { interval.low };
+        let is_apart = told_apart.interval.is_some_and(|interval| interval.low > 0.0 || interval.high < 0.0);
+        let is_within = within.interval.is_some_and(|interval| bound(interval) > -options.margin);
+        let shown = |is_shown: bool| if is_shown { 0.0 } else { 1.0 };
+        let comparison = Comparison { p: Some(shown(is_apart)), ..at(options.confidence) };
+        Self { comparison, units: margin::Units::default(), held: Some(shown(is_within)) }
+    }
+}
+
+/// The means of both sides by unit; the better direction is up.
+fn units(study: &Study, column: &MetricColumn, [base, new]: [&Block; 2]) -> margin::Units {
+    let is_lower = study.better(&column.name) == Better::Lower;
+    let mean = |mean: f64| if is_lower { 1.0 - mean } else { mean };
+    let (mut old, mut found) = (study.by_unit(base, column), margin::Units::default());
+    for (unit, moments) in study.by_unit(new, column) {
+        let Some(first) = moments.mean().map(mean) else { continue };
+        match old.remove(&unit).and_then(Moments::mean).map(mean) {
+            Some(second) => found.shared.push((first, second)),
+            None => found.first.push(first),
+        }
+    }
+    found.second.extend(old.into_values().filter_map(Moments::mean).map(mean));
+    found
+}
+
+impl GateCell {
+    fn blank(
+        study: &Study,
+        column: &MetricColumn,
+        (base, new): (Option<&Block>, Option<&Block>),
+        setting: Option<String>,
+    ) -> Self {
+        let (model, experiment) = new.or(base).map_or(("", ""), |block| (block.model, block.experiment));
+        let side = |block: Option<&Block>| {
+            let moments = block.map(|block| block.moments(column)).unwrap_or_default();
+            let successes = moments.counts().filter(|_| study.kind(&column.name) == Kind::Rate);
+            GateSide { n: moments.n, successes: successes.map(|counts| counts.0), mean: moments.mean(), lost: 0 }
+        };
+        Self {
+            experiment: experiment.to_owned(),
+            model: model.to_owned(),
+            base_model: None,
+            condition: new.or(base).and_then(sides::condition),
+            verdict: GateVerdict::NotComparable,
+            why: setting.unwrap_or_default(),
+            base: side(base),
+            new: side(new),
+            difference: None,
+            interval: None,
+            p_adjusted: None,
+            p_held: None,
+            units: None,
+            settled_by: None,
+            flips: Vec::new(),
+        }
+    }
+
+    fn decided(
+        self,
+        tried: &Tried,
+        (p_adjusted, p_held): (Option<f64>, Option<f64>),
+        tests: usize,
+        options: &GateOptions,
+        (study, block): (&Study, &Block),
+    ) -> Self {
+        let Comparison { difference, interval, units, .. } = tried.comparison.clone();
+        let alpha = level(options.confidence).unwrap_or_default();
+        let sign = if study.better(&options.metric) == Better::Lower { -1.0 } else { 1.0 };
+        let gain = difference.map_or(0.0, |difference| sign * difference);
+        let is_counted = !units.as_ref().is_some_and(|units| units.too_few);
+        let is_apart = is_counted && p_adjusted.is_some_and(|p| p <= alpha);
+        let is_rate = study.kind(&options.metric) == Kind::Rate;
+        let numbers = |p: Option<f64>| if is_rate { format!(", p {}", p_value(p)) } else { String::new() };
+        let (verdict, why) = if is_apart && gain > 0.0 {
+            (GateVerdict::Improved, format!("better by {}{}", fixed(Some(gain), 3), numbers(p_adjusted)))
+        } else if p_held.is_some_and(|p| p <= alpha) {
+            (GateVerdict::Held, format!("not worse by {}{}", options.margin, numbers(p_held)))
+        } else if is_apart && gain < 0.0 {
+            (GateVerdict::Regressed, format!("worse by {}{}", fixed(Some(-gain), 3), numbers(p_adjusted)))
+        } else {
+            (GateVerdict::CannotSay, String::new())
+        };
+        #[expect(clippy::cast_precision_loss, reason = "few cells")]
+        let settled_by = (verdict == GateVerdict::CannotSay)
+            .then(|| tried.units.settling(options.margin, alpha / tests.max(1) as f64))
+            .flatten();
+        let name = study.unit_name(block);
+        let why = match (verdict, settled_by) {
+            (GateVerdict::CannotSay, Some(n)) => format!("about {n} {name} on each side would settle it"),
+            (GateVerdict::CannotSay, None) => format!("too few {name} for any verdict"),
+            _ => why,
+        };
+        let shown = |p: Option<f64>| p.filter(|_| is_rate);
+        Self {
+            verdict,
+            why,
+            difference,
+            interval,
+            p_adjusted: shown(p_adjusted),
+            p_held: shown(p_held),
+            units,
+            settled_by,
+            ..self
+        }
+    }
+
+    /// Without its verdict where the lost episodes could have made it another one.
+    fn bounded_by(&mut self, bound: &[Self], fill: Fill) {
+        let is_same = |cell: &&Self| {
+            (&cell.experiment, &cell.model, &cell.condition) == (&self.experiment, &self.model, &self.condition)
+        };
+        let has_verdict = !matches!(self.verdict, GateVerdict::CannotSay | GateVerdict::NotComparable);
+        let (lost, found) = (self.base.lost + self.new.lost, bound.iter().find(is_same));
+        if !has_verdict || lost == 0 || found.is_some_and(|cell| cell.verdict == self.verdict) {
+            return;
+        }
+        let (verdict, side) = (text::name(self.verdict), if fill == Fill::Against { "against" } else { "for" });
+        let other = found.map_or("nothing", |cell| text::name(cell.verdict));
+        self.why = format!("{verdict} without the {lost} lost episodes, {other} if they count {side} NEW");
+        self.verdict = GateVerdict::CannotSay;
+    }
+}

@@ -1,0 +1,169 @@
+//! Both sides of a gate as one table: the condition says which side an episode is of.
+
+use super::super::study::Block;
+use super::{GateCell, GateOptions};
+use crate::cells::group::CONDITION;
+use crate::comparable::FINGERPRINT;
+use metric::catalog::Better;
+use score::builder::TableBuilder;
+use score::table::{EpisodeTable, Header, KeyRef, LOST};
+
+/// What stands before the condition and the id of an episode of each side.
+const MARKS: [&str; 2] = ["0/", "1/"];
+/// The labels that say what episodes share, and what they were recorded with.
+const LABELS: [&str; 4] = [CONDITION, "scene", FINGERPRINT, "participant"];
+/// What stands for no condition.
+const DEFAULT: &str = "default";
+
+/// What the lost episodes count as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fill {
+    /// They do not count.
+    Out,
+    /// Failures of the later side, successes of the earlier one.
+    Against,
+    /// Successes of the later side, failures of the earlier one.
+    For,
+}
+
+/// Earlier and later episodes.
+pub(super) struct Sides<'a> {
+    tables: [&'a EpisodeTable; 2],
+    /// The only model of each side, where the two have different names.
+    renamed: Option<[&'a str; 2]>,
+}
+
+impl<'a> Sides<'a> {
+    pub fn of(base: &'a EpisodeTable, new: &'a EpisodeTable) -> Self {
+        let only = |table: &'a EpisodeTable| {
+            let mut models = table.keys.models().iter().flatten();
+            let first = models.next()?;
+            models.all(|model| model == first).then_some(first)
+        };
+        let renamed = only(base).zip(only(new)).filter(|(old, new)| old != new).map(|(old, new)| [old, new]);
+        Self { tables: [base, new], renamed }
+    }
+
+    /// What keeps all cells from being compared: other definitions, or episodes that came about in another way.
+    pub fn barrier(&self) -> Option<String> {
+        let [base, new] = self.tables;
+        let hash = |table: &EpisodeTable| table.catalog.hash.chars().take(8).collect::<String>();
+        if base.catalog.hash != new.catalog.hash {
+            return Some(format!("definitions ({}, {})", hash(base), hash(new)));
+        }
+        let kind = |table: &EpisodeTable| table.declared.origin.map_or("nothing", |origin| origin.name());
+        (kind(base) != kind(new)).then(|| format!("kind is {} and {}", kind(base), kind(new)))
+    }
+
+    /// The earlier name of a model.
+    pub fn base_model(&self, model: &str) -> Option<String> {
+        self.renamed.filter(|[_, new]| *new == model).map(|[old, _]| old.to_owned())
+    }
+
+    /// The lost episodes of a cell, earlier and later.
+    pub fn lost(&self, cell: &GateCell) -> (u64, u64) {
+        let condition = cell.condition.as_deref().unwrap_or(DEFAULT);
+        let count = |side: usize| {
+            let table = self.tables[side];
+            let is_here = |experiment: &str, model: &str, own: Option<&str>| {
+                (experiment, self.model(side, model), own.unwrap_or(DEFAULT))
+                    == (&cell.experiment, &cell.model, condition)
+            };
+            let of_row = |row: &usize| {
+                let key = table.keys.get(*row);
+                is_lost(table, *row)
+                    && is_here(key.experiment, key.model, table.label(CONDITION).and_then(|label| label.get(*row)))
+            };
+            let rows = (0..table.len()).filter(of_row).count();
+            let unrecorded = table.declared.unrecorded.iter();
+            let unrecorded =
+                unrecorded.filter(|lost| is_here(&lost.experiment, &lost.model, lost.condition.as_deref()));
+            (rows + unrecorded.count()) as u64
+        };
+        (count(0), count(1))
+    }
+
+    fn model<'m>(&'m self, side: usize, model: &'m str) -> &'m str {
+        match self.renamed {
+            Some([_, new]) if side == 0 => new,
+            _ => model,
+        }
+    }
+}
+
+fn is_lost(table: &EpisodeTable, row: usize) -> bool {
+    table.label(LOST).is_some_and(|label| label.get(row) == Some("true"))
+}
+
+/// One table of both sides, under the metrics that both have.
+pub(super) fn joined(sides: &Sides, options: &GateOptions, fill: Fill) -> EpisodeTable {
+    let [base, new] = sides.tables;
+    let names = new.metrics.iter().map(|column| column.name.clone());
+    let metrics: Vec<String> = names.filter(|name| base.metric(name).is_some()).collect();
+    let labels = LABELS.map(str::to_owned).to_vec();
+    let mut catalog = new.catalog.clone();
+    catalog.declare(base.catalog.declared());
+    let mut builder = TableBuilder::new(Header { catalog, labels, metrics: metrics.clone() });
+    let is_lower = new.catalog.metric.get(&options.metric).is_some_and(|metric| metric.better == Better::Lower);
+    for (side, table) in sides.tables.into_iter().enumerate() {
+        let is_good = (side == 1) == (fill == Fill::For);
+        let lost = i64::from(is_good != is_lower);
+        let value = |name: &String, own: Option<i64>, is_lost: bool| {
+            if is_lost && *name == options.metric { Some(lost) } else { own }
+        };
+        let mark = |text: &str| format!("{}{text}", MARKS[side]);
+        for row in (0..table.len()).filter(|row| fill != Fill::Out || !is_lost(table, *row)) {
+            let key = table.keys.get(row);
+            let text = |name: &str| table.label(name).and_then(|label| label.get(row)).map(str::to_owned);
+            let label = |name: &&str| match *name {
+                CONDITION => Some(mark(&text(CONDITION).unwrap_or_else(|| DEFAULT.to_owned()))),
+                name => text(name),
+            };
+            let labels: Vec<Option<String>> = LABELS.iter().map(label).collect();
+            let own = |name: &String| table.metric(name).and_then(|column| column.get(row));
+            let values = metrics.iter().map(|name| value(name, own(name), is_lost(table, row)));
+            let id = mark(key.episode_id);
+            let key = KeyRef { model: sides.model(side, key.model), episode_id: &id, ..key };
+            builder.push(key, labels.iter().map(Option::as_deref), values);
+        }
+        for lost in table.declared.unrecorded.iter().filter(|_| fill != Fill::Out) {
+            let id = mark(&lost.episode_id);
+            let condition = mark(lost.condition.as_deref().unwrap_or(DEFAULT));
+            let key = KeyRef {
+                experiment: &lost.experiment,
+                model: sides.model(side, &lost.model),
+                seed: lost.seed,
+                run: lost.run,
+                episode_id: &id,
+            };
+            let labels = LABELS.iter().map(|name| (*name == CONDITION).then_some(condition.as_str()));
+            builder.push(key, labels, metrics.iter().map(|name| value(name, None, true)));
+        }
+    }
+    let declared = base.declared.clone().joined(new.declared.clone());
+    EpisodeTable { declared, ..builder.finish() }
+}
+
+/// The blocks of each model and condition, earlier and later.
+pub(super) fn couples<'s, 'a>(blocks: &'s [Block<'a>]) -> Vec<(Option<&'s Block<'a>>, Option<&'s Block<'a>>)> {
+    let subject = |block: &Block<'a>| (block.model, block.condition.map(|text| &text[MARKS[0].len()..]));
+    let mut subjects: Vec<_> = blocks.iter().map(subject).collect();
+    subjects.sort_unstable();
+    subjects.dedup();
+    let of_side = |wanted, mark: &str| {
+        blocks
+            .iter()
+            .find(|block| subject(block) == wanted && block.condition.is_some_and(|text| text.starts_with(mark)))
+    };
+    subjects.into_iter().map(|wanted| (of_side(wanted, MARKS[0]), of_side(wanted, MARKS[1]))).collect()
+}
+
+/// The condition of a block without its side; `None` for the default one.
+pub(super) fn condition(block: &Block) -> Option<String> {
+    block.condition.map(|text| &text[MARKS[0].len()..]).filter(|text| *text != DEFAULT).map(str::to_owned)
+}
+
+/// The id that an episode has on its side.
+pub(super) fn id(text: &str) -> &str {
+    &text[MARKS[0].len()..]
+}

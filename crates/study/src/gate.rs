@@ -1,0 +1,146 @@
+//! Later episodes against earlier ones: one verdict per cell, with the steps that decided each flip and where its frames are.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::design::design_of;
+use super::error::StudyError;
+use super::inputs::Source;
+use super::results::Outputs;
+use super::{Study, pooled};
+use metric::catalog::Better;
+use metric::definitions::UnknownMetric;
+use report::statistics::{Gate, GateOptions, Played};
+use score::evidence;
+use score::table::EpisodeTable;
+
+/// The file that tells a page which `view --export` wrote, and the one that names its episodes.
+const PAGE: [&str; 2] = ["assets/view.js", "data/list.js"];
+
+impl Study {
+    /// The verdicts on this study, the later one, against an earlier one: improved, held, regressed, or why neither is said.
+    ///
+    /// # Errors
+    /// As [`Study::score`] for either; a metric that a side does not have, or that has no better direction; a cell that mixes
+    /// episodes which were recorded differently; sums of squares beyond 128 bits.
+    pub fn gate(&self, base: &Self, options: &GateOptions) -> Result<Gate, StudyError> {
+        let (old, new) = (base.gated(options)?, self.gated(options)?);
+        let design = design_of(&old.declared.clone().joined(new.declared.clone()));
+        let mut gate = Gate::of([&old, &new], design, options)?;
+        if options.pool {
+            for (study, table) in [(base, &old), (self, &new)] {
+                let told = pooled::told(table, &study.question.by_over(table))?;
+                gate.pooled.extend(told);
+            }
+        }
+        let flips = || gate.cells.iter().flat_map(|cell| &cell.flips);
+        let ids = |of: fn(&report::statistics::FlippedPair) -> &Played| {
+            flips().map(|flip| of(flip).episode_id.clone()).collect::<BTreeSet<String>>()
+        };
+        let (before, after) = (ids(|flip| &flip.base), ids(|flip| &flip.new));
+        let (before, after) = (base.shown(&before, &options.metric)?, self.shown(&after, &options.metric)?);
+        for flip in gate.cells.iter_mut().flat_map(|cell| &mut cell.flips) {
+            before.add_to(&mut flip.base);
+            after.add_to(&mut flip.new);
+        }
+        Ok(gate)
+    }
+
+    /// The scores of one side, lost episodes among them.
+    fn gated(&self, options: &GateOptions) -> Result<EpisodeTable, StudyError> {
+        let table = self.scan(Outputs { losses: true, ..Outputs::default() })?.episodes;
+        self.check_filter(table.len())?;
+        let known = table.catalog.metric.get(&options.metric).filter(|_| table.metric(&options.metric).is_some());
+        let Some(metric) = known else {
+            let names = || table.metrics.iter().map(|column| column.name.clone());
+            let near =
+                exact::suggest::nearest(&options.metric, table.metrics.iter().map(|column| column.name.as_str()));
+            let near = near.map(str::to_owned);
+            return Err(UnknownMetric { name: options.metric.clone(), near, known: names().collect() }.into());
+        };
+        if metric.better == Better::Neither {
+            return Err(StudyError::NoDirection { metric: options.metric.clone() });
+        }
+        if !options.pool {
+            pooled::check(&table, &self.question.by_over(&table))?;
+        }
+        Ok(table)
+    }
+
+    /// What there is to see of these episodes: nothing of scores.
+    fn shown(&self, ids: &BTreeSet<String>, metric: &str) -> Result<Shown, StudyError> {
+        let Source::Traces(traces) = &self.source else { return Ok(Shown::default()) };
+        if ids.is_empty() {
+            return Ok(Shown::default());
+        }
+        let mut definitions = self.question.bind(traces)?;
+        definitions.select(&[metric.to_owned()])?;
+        let evidence = evidence::explain_each(traces, &definitions, ids, self.threads)?;
+        let evidence =
+            evidence.into_values().filter_map(|found| Some((found.episode_id, found.metrics.into_iter().next()?)));
+        let evidence = evidence.map(|(id, found)| (id, (found.value, found.timesteps))).collect();
+        let folders: BTreeSet<PathBuf> =
+            self.inputs.iter().filter_map(|input| input.path.parent().map(Path::to_owned)).collect();
+        let pages = folders.iter().flat_map(|folder| pages_beside(folder, metric)).collect();
+        Ok(Shown { evidence, pages })
+    }
+}
+
+/// The deciding steps of some episodes with the value that they gave, and pages with frames.
+#[derive(Default)]
+struct Shown {
+    evidence: BTreeMap<String, (Option<i64>, Vec<i64>)>,
+    pages: Vec<PageBeside>,
+}
+
+/// A page that `view --export` wrote, and the value that it has of each episode.
+struct PageBeside {
+    folder: PathBuf,
+    values: BTreeMap<String, i64>,
+}
+
+impl Shown {
+    /// A page of other episodes with the same ids has other values of those that flipped.
+    fn add_to(&self, played: &mut Played) {
+        let found = self.evidence.get(&played.episode_id).filter(|(value, _)| *value == Some(played.value));
+        played.timesteps = found.map(|(_, steps)| steps.clone());
+        let is_of = |page: &&PageBeside| page.values.get(&played.episode_id) == Some(&played.value);
+        let Some(page) = self.pages.iter().find(is_of) else { return };
+        let step = played.timesteps.iter().flatten().next().map_or_else(String::new, |t| format!("&t={t}"));
+        let id = percent(&played.episode_id);
+        played.frames = Some(format!("{}?view=episode&id={id}{step}", page.folder.join("index.html").display()));
+    }
+}
+
+/// The pages in a folder of traces or beside it, by name.
+fn pages_beside(folder: &Path, metric: &str) -> Vec<PageBeside> {
+    let inside = |folder: &Path| {
+        let entries = fs::read_dir(if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+        let names = entries.into_iter().flatten().flatten().map(|entry| folder.join(entry.file_name()));
+        names.collect::<BTreeSet<PathBuf>>()
+    };
+    let beside = if folder.as_os_str().is_empty() { PathBuf::from("..") } else { folder.with_file_name("") };
+    let pages = inside(folder).into_iter().chain(inside(&beside)).filter(|path| path.join(PAGE[0]).is_file());
+    pages.filter_map(|folder| Some(PageBeside { values: listed(&folder, metric)?, folder })).collect()
+}
+
+/// The values that a page has of a metric: its list is a script that hands a JSON object over.
+fn listed(page: &Path, metric: &str) -> Option<BTreeMap<String, i64>> {
+    let text = fs::read_to_string(page.join(PAGE[1])).ok()?;
+    let list: Value = serde_json::from_str(text.get(text.find('{')?..=text.rfind('}')?)?).ok()?;
+    let at = list["metrics"].as_array()?.iter().position(|name| name == metric)?;
+    let value = |row: &Value| Some((row["id"].as_str()?.to_owned(), row["values"][at].as_str()?.parse().ok()?));
+    Some(list["rows"].as_array()?.iter().filter_map(value).collect())
+}
+
+/// A text as the value of a query.
+fn percent(text: &str) -> String {
+    let spelled = |byte: u8| match byte {
+        b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'-' | b'_' | b'.' | b'/' => char::from(byte).to_string(),
+        other => format!("%{other:02X}"),
+    };
+    text.bytes().map(spelled).collect()
+}

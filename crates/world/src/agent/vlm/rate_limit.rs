@@ -1,0 +1,135 @@
+//! The waits that providers state: in headers, in the bodies of errors, and as what is left of a rate limit.
+
+use std::time::{Duration, SystemTime};
+
+use arrow::compute::kernels::cast_utils::string_to_timestamp_nanos;
+use reqwest::header::{HeaderMap, RETRY_AFTER};
+use serde_json::Value;
+
+/// What is left of a limit and when it is renewed: `OpenAI` and servers that follow it, then Anthropic.
+const LEFT: [[&str; 2]; 4] = [
+    ["x-ratelimit-remaining-requests", "x-ratelimit-reset-requests"],
+    ["x-ratelimit-remaining-tokens", "x-ratelimit-reset-tokens"],
+    ["anthropic-ratelimit-requests-remaining", "anthropic-ratelimit-requests-reset"],
+    ["anthropic-ratelimit-tokens-remaining", "anthropic-ratelimit-tokens-reset"],
+];
+
+/// The time until every limit that is used up is renewed; `None` if something is left of all of them.
+pub(super) fn used_up(headers: &HeaderMap) -> Option<Duration> {
+    let text = |name: &str| headers.get(name)?.to_str().ok();
+    let is_used_up =
+        |name: &str| text(name).and_then(|left| left.trim().parse::<f64>().ok()).is_some_and(|left| left <= 0.0);
+    LEFT.iter().filter(|[left, _]| is_used_up(left)).filter_map(|[_, reset]| until(text(reset)?.trim())).max()
+}
+
+/// The time until a limit is renewed: `6m0s`, `20ms`, or a date as in RFC 3339.
+fn until(reset: &str) -> Option<Duration> {
+    if let Ok(at) = string_to_timestamp_nanos(reset) {
+        let at = SystemTime::UNIX_EPOCH + Duration::from_nanos(u64::try_from(at).ok()?);
+        return Some(at.duration_since(SystemTime::now()).unwrap_or_default());
+    }
+    let (mut left, mut all) = (reset, 0.0);
+    while !left.is_empty() {
+        let unit_at = left.find(|c: char| !c.is_ascii_digit() && c != '.')?;
+        let number: f64 = left[..unit_at].parse().ok()?;
+        let unit = &left[unit_at..];
+        let length = unit.find(|c: char| c.is_ascii_digit()).unwrap_or(unit.len());
+        let seconds = match &unit[..length] {
+            "ms" => 1e-3,
+            "s" => 1.0,
+            "m" => 60.0,
+            "h" => 3_600.0,
+            "d" => 86_400.0,
+            _ => return None,
+        };
+        all += number * seconds;
+        left = &unit[length..];
+    }
+    Duration::try_from_secs_f64(all).ok().filter(|_| !reset.is_empty())
+}
+
+/// The wait that the body of an error asks for: `google.rpc.RetryInfo`, as Gemini sends it, has seconds and an `s`.
+/// Source: <https://github.com/googleapis/googleapis/blob/master/google/rpc/error_details.proto>, duration in JSON.
+pub(super) fn retry_info(body: &str) -> Option<Duration> {
+    let body: Value = serde_json::from_str(body).ok()?;
+    let error = body.get("error").or_else(|| body.get(0)?.get("error"))?;
+    let info = error["details"]
+        .as_array()?
+        .iter()
+        .find(|detail| detail["@type"].as_str().is_some_and(|name| name.ends_with("google.rpc.RetryInfo")))?;
+    let seconds = info["retryDelay"].as_str()?.strip_suffix('s')?.parse().ok()?;
+    Duration::try_from_secs_f64(seconds).ok()
+}
+
+/// The wait that a provider asks for: milliseconds, as `OpenAI`'s own client reads them; seconds, whole or not; or a date. A
+/// past date asks for no wait, other text is ignored, and a number too large for a duration asks for the longest.
+pub(super) fn retry_after(headers: &HeaderMap) -> Option<Duration> {
+    let milliseconds = headers.get("retry-after-ms").and_then(|value| value.to_str().ok()?.trim().parse::<f64>().ok());
+    if let Some(wait) = milliseconds.and_then(|wait| Duration::try_from_secs_f64(wait / 1e3).ok()) {
+        return Some(wait);
+    }
+    let value = headers.get(RETRY_AFTER)?.to_str().ok()?.trim();
+    if let Ok(seconds) = value.parse::<f64>() {
+        let is_wait = seconds >= 0.0;
+        return is_wait.then(|| Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX));
+    }
+    let date = httpdate::parse_http_date(value).ok()?;
+    Some(date.duration_since(SystemTime::now()).unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use reqwest::header::{HeaderMap, HeaderName, HeaderValue, RETRY_AFTER};
+
+    use super::{retry_after, until, used_up};
+
+    #[test]
+    fn the_wait_asked_for_is_read_or_left() {
+        let asked = |value: &'static str| {
+            let mut headers = HeaderMap::new();
+            headers.insert(RETRY_AFTER, HeaderValue::from_static(value));
+            retry_after(&headers)
+        };
+        assert_eq!(asked(" 7 "), Some(Duration::from_secs(7)));
+        assert_eq!(asked("0.25"), Some(Duration::from_millis(250)));
+        assert_eq!(asked("Sun, 06 Nov 1994 08:49:37 GMT"), Some(Duration::ZERO));
+        assert!(asked("Fri, 31 Dec 9999 23:59:59 GMT").is_some_and(|wait| wait > Duration::from_hours(24)));
+        assert_eq!(asked("99999999999999999999999999"), Some(Duration::MAX));
+        for nothing in ["-1", "NaN", "soon", ""] {
+            assert_eq!(asked(nothing), None, "{nothing:?}");
+        }
+        assert_eq!(retry_after(&HeaderMap::new()), None);
+    }
+
+    #[test]
+    fn a_limit_that_is_used_up_says_until_when() {
+        let headers = |pairs: &[(&'static str, &'static str)]| -> HeaderMap {
+            pairs.iter().map(|(name, value)| (HeaderName::from_static(name), HeaderValue::from_static(value))).collect()
+        };
+        let tokens_left = [
+            ("x-ratelimit-remaining-requests", "0"),
+            ("x-ratelimit-reset-requests", "1m0.5s"),
+            ("x-ratelimit-remaining-tokens", "149984"),
+            ("x-ratelimit-reset-tokens", "6h"),
+        ];
+        assert_eq!(used_up(&headers(&tokens_left)), Some(Duration::from_millis(60_500)));
+        let anthropic = [
+            ("anthropic-ratelimit-tokens-remaining", "0"),
+            ("anthropic-ratelimit-tokens-reset", "2999-01-01T00:00:00Z"),
+        ];
+        assert!(used_up(&headers(&anthropic)).is_some_and(|wait| wait > Duration::from_hours(24)));
+        assert_eq!(used_up(&headers(&[("x-ratelimit-remaining-requests", "0")])), None);
+        assert_eq!(used_up(&HeaderMap::new()), None);
+    }
+
+    #[test]
+    fn other_texts_state_no_time() {
+        assert_eq!(until("20ms"), Some(Duration::from_millis(20)));
+        assert_eq!(until("2000-01-01T00:00:00Z"), Some(Duration::ZERO));
+        for nothing in ["", "soon", "5", "1w", "s", "1..0s", "-1s", "9999999999999999999999999999d"] {
+            assert_eq!(until(nothing), None, "{nothing:?}");
+        }
+    }
+}

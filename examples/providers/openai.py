@@ -1,0 +1,29 @@
+"""OpenAI's chat completions: limits in headers, a dated snapshot answers, newer models take no temperature.
+
+https://platform.openai.com/docs/guides/rate-limits, .../guides/prompt-caching, .../api-reference/chat
+"""
+
+from loopback import reply, serve
+
+
+def refuse(message, param):
+    error = {"message": message, "type": "invalid_request_error", "param": param, "code": "unsupported_value"}
+    return 400, {"content-type": "application/json"}, {"error": error}
+
+
+def answer(at, path, headers, body, text):
+    if "max_tokens" in body:
+        return refuse("Unsupported parameter: 'max_tokens' is not supported. Use 'max_completion_tokens'.", "max_tokens")
+    if not body["model"].startswith("gpt-5.1") and "temperature" in body:
+        return refuse("Unsupported value: 'temperature' does not support 0.2 with this model.", "temperature")
+    if at % 13 == 0:
+        error = {"message": "Rate limit reached", "type": "requests", "param": None, "code": "rate_limit_exceeded"}
+        return 429, {"content-type": "application/json", "retry-after-ms": "40"}, {"error": error}
+    left = {"x-ratelimit-remaining-requests": str(at % 17), "x-ratelimit-reset-requests": "30ms"}
+    usage = {"prompt_tokens": 1000, "completion_tokens": 100, "prompt_tokens_details": {"cached_tokens": 400}}
+    choice = {"index": 0, "finish_reason": "stop", "message": {"role": "assistant", "content": reply(text)}}
+    said = {"object": "chat.completion", "model": body["model"] + "-2026-09-29", "choices": [choice], "usage": usage}
+    return 200, {"content-type": "application/json", **left}, said
+
+
+serve(answer)

@@ -1,0 +1,150 @@
+//! Several recordings in one command: the options of `record` in a study file, once per condition and model, and how all of
+//! them ended.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::Path;
+
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use crate::cli::commands::record::Recorded;
+use crate::cli::outcome::{Failure, Outcome};
+use crate::cli::recording::RecordAnswer;
+use exact::budget::Limit;
+use exact::input;
+
+/// A study file is written by hand.
+const LARGEST: Limit = Limit::new("bytes of a study file", 1 << 20);
+/// The condition without a name.
+const DEFAULT: &str = "default";
+
+/// Options of `record` without their dashes: for all, over those for one condition, over those for one model.
+#[derive(Debug, Deserialize)]
+struct StudyFile {
+    #[serde(default)]
+    condition: BTreeMap<String, Table>,
+    #[serde(default)]
+    model: BTreeMap<String, Table>,
+    #[serde(flatten)]
+    options: Table,
+}
+
+/// The options of each recording of a study, by condition and model.
+pub fn recordings(path: &Path) -> Result<Vec<Vec<OsString>>, Failure> {
+    let place = path.display();
+    let fault =
+        |fault: &dyn std::fmt::Display| Failure::input(format!("the study in `{place}` cannot be used: {fault}"));
+    let text = input::text(path, LARGEST).map_err(|error| fault(&error))?;
+    let mut study: StudyFile = toml::from_str(&text).map_err(|error| fault(&error))?;
+    if study.model.is_empty() {
+        return Err(fault(&"expected a table for each model, such as [model.\"Claude Sonnet 4.6\"], found none"));
+    }
+    if study.condition.is_empty() {
+        study.condition.insert(DEFAULT.to_owned(), Table::new());
+    }
+    let StudyFile { condition, model, options } = study;
+    let each = condition.iter().flat_map(|of_condition| model.iter().map(move |of_model| (of_condition, of_model)));
+    Ok(each
+        .map(|((condition, of_condition), (model, of_model))| {
+            let mut all = options.clone();
+            all.entry("agent").or_insert("vlm".into());
+            all.insert("model".to_owned(), model.as_str().into());
+            if condition != DEFAULT {
+                all.insert("condition".to_owned(), condition.as_str().into());
+            }
+            all.extend(of_condition.clone());
+            all.extend(of_model.clone());
+            all.iter().flat_map(|(key, value)| typed(key, value)).collect()
+        })
+        .collect())
+}
+
+/// An option as it would be typed.
+fn typed(key: &str, value: &Value) -> Vec<OsString> {
+    match value {
+        Value::Boolean(is_given) => is_given.then(|| format!("--{key}").into()).into_iter().collect(),
+        Value::Array(values) => values.iter().flat_map(|value| typed(key, value)).collect(),
+        Value::String(text) => vec![format!("--{key}={text}").into()],
+        other => vec![format!("--{key}={other}").into()],
+    }
+}
+
+/// Why a recording could not go on.
+pub fn stopped(recorded: &Result<Recorded, Failure>) -> Option<String> {
+    match recorded {
+        Ok(recorded) => recorded.gave_up.clone(),
+        Err(failure) => Some(failure.to_string()),
+    }
+}
+
+/// How so many recordings are told from outside.
+pub fn outcome(all: Vec<Result<Recorded, Failure>>, asked: usize) -> Result<Outcome, Failure> {
+    let stopped = all.iter().filter_map(stopped).count();
+    let mut outcome = Outcome::Done;
+    for recorded in all {
+        let failure = match recorded {
+            Ok(Recorded { gave_up: Some(reason), .. }) => Failure::input(reason),
+            Ok(recorded) => {
+                outcome = worse(outcome, outcome_of(&recorded.answer));
+                continue;
+            }
+            Err(failure) => failure,
+        };
+        return Err(match asked {
+            1 => failure,
+            _ => Failure::input(format!(
+                "{stopped} of {asked} recordings were stopped; the first: {failure}\n  help: the same command goes on with all of them"
+            )),
+        });
+    }
+    Ok(outcome)
+}
+
+/// The one of two outcomes that is told.
+fn worse(one: Outcome, other: Outcome) -> Outcome {
+    match (one, other) {
+        (Outcome::Interrupted, _) | (_, Outcome::Interrupted) => Outcome::Interrupted,
+        (Outcome::Done, other) => other,
+        (one, _) => one,
+    }
+}
+
+/// How a recording that ran to its end, or was interrupted, is told from outside.
+fn outcome_of(answer: &RecordAnswer) -> Outcome {
+    match (answer.stopped, answer.lost.is_empty()) {
+        (true, _) => Outcome::Interrupted,
+        (false, true) => Outcome::Done,
+        (false, false) => Outcome::CheckFailed,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::recordings;
+
+    #[test]
+    fn a_study_is_options_by_condition_and_model() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("study.toml");
+        let of = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            recordings(&path).map(|all| {
+                let words =
+                    all.iter().map(|one| one.iter().map(|word| word.to_str().unwrap()).collect::<Vec<_>>().join(" "));
+                words.collect::<Vec<_>>()
+            })
+        };
+        let study =
+            "seeds = 1\nno-log = true\nkeep-going = false\n[model.\"B 1\"]\nmax-cost = 2.5\n[model.a]\nseeds = 3\n";
+        let expected =
+            ["--agent=vlm --max-cost=2.5 --model=B 1 --no-log --seeds=1", "--agent=vlm --model=a --no-log --seeds=3"];
+        assert_eq!(of(study).unwrap(), expected);
+        let conditions = "[model.a]\n[condition.near]\nconfig = \"near.toml\"\n[condition.default]\n";
+        let expected = ["--agent=vlm --model=a", "--agent=vlm --condition=near --config=near.toml --model=a"];
+        assert_eq!(of(conditions).unwrap(), expected);
+        assert_eq!(of("[model.a]\n[condition.near]\n").unwrap(), ["--agent=vlm --condition=near --model=a"]);
+        assert!(of("seeds = 1\n").unwrap_err().to_string().contains("expected a table for each model"));
+        assert!(of("seeds = \n").unwrap_err().to_string().contains("study.toml"));
+    }
+}

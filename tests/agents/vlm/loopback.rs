@@ -1,0 +1,179 @@
+//! A study in one command against the servers of `examples/providers`, which answer as five providers do, with a kill in the
+//! middle.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt::Write as _;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+use serde_json::Value;
+use world::agent::vlm::journal::Entry;
+
+use super::bench::KEY;
+use super::recordings::Folder;
+use crate::harness::program::{program, run, stderr};
+
+/// A server of `examples/providers`; it ends with this.
+struct Provider {
+    process: Child,
+    address: String,
+}
+
+impl Provider {
+    fn start(name: &str) -> Self {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/providers/{name}.py"));
+        let mut command = Command::new("python3");
+        command.arg(script).env("PYTHONDONTWRITEBYTECODE", "1").stdout(Stdio::piped());
+        let mut process = command.spawn().expect("python3 runs the servers");
+        let mut address = String::new();
+        BufReader::new(process.stdout.take().unwrap()).read_line(&mut address).unwrap();
+        Self { process, address: address.trim().to_owned() }
+    }
+
+    /// How many answers it was paid for.
+    fn paid(&self) -> u64 {
+        let mut stream = TcpStream::connect(self.address.trim_start_matches("http://")).unwrap();
+        stream.write_all(b"GET / HTTP/1.1\r\nhost: loopback\r\nconnection: close\r\n\r\n").unwrap();
+        let mut text = String::new();
+        stream.read_to_string(&mut text).unwrap();
+        let (_, body) = text.split_once("\r\n\r\n").unwrap();
+        serde_json::from_str::<Value>(body).unwrap()["paid"].as_u64().unwrap()
+    }
+}
+
+impl Drop for Provider {
+    fn drop(&mut self) {
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// Server, wire format, path, and its models: name, id, keys, options of the study.
+type Served = (&'static str, &'static str, &'static str, [[&'static str; 4]; 2]);
+
+const PRICES: &str = "prices = { input = 1.0, cached_input = 0.1, output = 10.0 }";
+const NO_TEMPERATURE: &str = "temperature = \"default\"\nprices = { input = 1.0, cached_input = 0.1, output = 10.0 }";
+const NONE: [&str; 4] = [""; 4];
+const SERVED: [Served; 5] = [
+    (
+        "openai",
+        "openai-chat",
+        "/v1",
+        [["GPT 5.1", "gpt-5.1", PRICES, ""], ["GPT 6.1", "gpt-6.1-sol", NO_TEMPERATURE, ""]],
+    ),
+    (
+        "anthropic",
+        "anthropic-messages",
+        "/v1",
+        [["Haiku", "claude-haiku-4-5", PRICES, ""], ["Sonnet", "claude-sonnet-5-5", NO_TEMPERATURE, ""]],
+    ),
+    (
+        "gemini",
+        "gemini",
+        "/v1beta",
+        [
+            ["Flash", "gemini-3.8-flash", PRICES, ""],
+            ["Pro", "gemini-2.5-pro", PRICES, "accept-model = \"gemini-3.8-flash\""],
+        ],
+    ),
+    ("openrouter", "openai-compatible", "/api/v1", [["Gemma", "google/gemma-4-31b-it:nitro", "", "no-max-cost"], NONE]),
+    ("local", "openai-compatible", "/v1", [["Own", "own-1", "answers_as = [\"*\"]", "no-max-cost"], NONE]),
+];
+
+/// Writes the models and the study of these options; gives the servers.
+fn prepare(folder: &Folder, options: &str) -> Vec<Provider> {
+    let mut models = String::new();
+    let mut study =
+        format!("{options}\nmodels = \"models.toml\"\nconfig = \"small.toml\"\nno-log = true\nthreads = 2\n");
+    let servers = SERVED.map(|(server, dialect, path, served)| {
+        let provider = Provider::start(server);
+        let address = &provider.address;
+        writeln!(
+            models,
+            "[backend.{server}]\ndialect = \"{dialect}\"\nkey = \"LOOPBACK_KEY\"\nbase_url = \"{address}{path}\""
+        )
+        .unwrap();
+        for [name, id, keys, own] in served.into_iter().filter(|model| *model != NONE) {
+            writeln!(models, "[model.\"{name}\"]\nbackend = \"{server}\"\nid = \"{id}\"\n{keys}").unwrap();
+            let own = if own == "no-max-cost" { String::new() } else { format!("max-cost = 50.0\n{own}\n") };
+            writeln!(study, "[model.\"{name}\"]\n{own}").unwrap();
+        }
+        provider
+    });
+    std::fs::write(folder.path().join("models.toml"), models).unwrap();
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    servers.into()
+}
+
+fn record(folder: &Folder) -> Command {
+    let mut command = program(folder.path());
+    command.env("LOOPBACK_KEY", KEY).args(["record", "study.toml", "--json"]);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+/// Records a study of so many episodes, with a kill when half of its answers were paid, and checks that none was paid twice.
+fn study(options: &str, episodes: u64) {
+    let folder = Folder::new();
+    let servers = prepare(&folder, options);
+    let paid = || servers.iter().map(Provider::paid).sum::<u64>();
+
+    let forecast = run(folder.path(), &["record", "study.toml", "--dry-run"]).done();
+    let together = format!("together: {episodes} episodes, at most ");
+    assert!(forecast.contains(&together) && forecast.contains("and what 2 models without prices cost"), "{forecast}");
+
+    let mut killed = record(&folder).spawn().unwrap();
+    // Four steps an episode.
+    while paid() < 2 * episodes {
+        assert_eq!(killed.try_wait().unwrap(), None, "it ended before half of the answers");
+        sleep(Duration::from_millis(20));
+    }
+    killed.kill().unwrap();
+    killed.wait().unwrap();
+    let output = record(&folder).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    let answers: Vec<Value> = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(answers.len(), 8);
+    let sum = |key: &str| answers.iter().map(|answer| answer[key].as_u64().unwrap()).sum::<u64>();
+    assert_eq!((sum("asked"), sum("recorded") + sum("found")), (episodes, episodes));
+
+    let mut kept = 0;
+    for (journal, entries) in folder.journals() {
+        let steps =
+            entries.iter().filter_map(|entry| if let Entry::Answer { t, .. } = entry { Some(*t) } else { None });
+        let steps: Vec<i32> = steps.collect();
+        assert_eq!(BTreeSet::from_iter(&steps).len(), steps.len(), "{}: a step was paid twice", journal.display());
+        kept += steps.len() as u64;
+    }
+    // Those that were out at the kill have no answer in a journal.
+    let lost = paid() - kept;
+    assert!(kept == 4 * episodes && lost <= 64, "{kept} answers kept, {lost} paid and lost at the kill");
+    let unanswered: u64 = answers.iter().map(|answer| answer["spend"]["unanswered"].as_u64().unwrap()).sum();
+    assert!(unanswered >= lost, "{unanswered} of {lost} are counted");
+
+    let spend: BTreeMap<&str, &Value> =
+        answers.iter().map(|answer| (answer["model"].as_str().unwrap(), &answer["spend"])).collect();
+    // What OpenRouter says that an answer cost; tokens of OpenAI's by their prices, 400 of them from the cache.
+    let cost = |model: &str| spend[model]["cost_usd"].as_f64().unwrap();
+    let each = episodes as f64 / 8.0 * 4.0;
+    assert!((cost("Gemma") - 0.000_7 * each).abs() < 1e-6, "{}", cost("Gemma"));
+    assert!((cost("GPT 5.1") - 0.001_64 * each).abs() < 1e-6, "{}", cost("GPT 5.1"));
+    assert_eq!(std::fs::read_dir(folder.path().join("runs/ledger")).unwrap().count(), 16);
+    let report = run(folder.path(), &["report", "runs", "--out", "report", "--json"]).json();
+    assert_eq!(report["episodes"], episodes);
+}
+
+#[test]
+fn a_study_file_is_recorded_in_one_command_and_goes_on_after_a_kill() {
+    study("experiment = \"E1,E2\"\nseeds = 1\nruns = 2", 32);
+}
+
+#[test]
+#[ignore = "minutes: make soak"]
+fn soak_a_study_of_eight_models_and_five_experiments_goes_on_after_a_kill() {
+    study("experiment = \"E1..E5\"\nseeds = 3\nruns = 7", 840);
+}

@@ -1,0 +1,195 @@
+//! Only like with like: no verdict across episodes that were recorded differently, but the setting that differs.
+
+use std::path::Path;
+
+use serde_json::{Value, json};
+use trace::episode::{Action, Episode, Extra, Step};
+use trace::write::write_episodes;
+
+use crate::harness;
+use crate::harness::program::run;
+
+/// The episodes of one model in one experiment, one scene each, and what they were recorded with.
+#[derive(Clone)]
+pub struct Cell<'a> {
+    pub model: &'a str,
+    pub experiment: &'a str,
+    /// The width of the mirror, in m.
+    pub mirror: f64,
+    /// The step budget.
+    pub steps: u32,
+    pub prompt: &'a str,
+    /// The name of the fingerprint; one of the settings above if absent.
+    pub named: Option<&'a str>,
+    /// How many of the episodes declare it.
+    pub declared: usize,
+    /// How many scenes there are; the episodes play them by turns.
+    pub scenes: usize,
+    /// How many of the last episodes ended for want of an answer.
+    pub lost: usize,
+    /// Whether each episode is solved.
+    pub solved: Vec<bool>,
+}
+
+pub const LIKE: Cell<'_> = Cell {
+    model: "ant",
+    experiment: "E1",
+    mirror: 3.0,
+    steps: 40,
+    prompt: "p",
+    named: None,
+    declared: usize::MAX,
+    scenes: usize::MAX,
+    lost: 0,
+    solved: Vec::new(),
+};
+
+/// `successes` solved episodes, then others.
+pub fn solved(successes: usize, n: usize) -> Vec<bool> {
+    (0..n).map(|at| at < successes).collect()
+}
+
+impl Cell<'_> {
+    fn fingerprint(&self) -> String {
+        let Self { model, experiment, mirror, steps, prompt, .. } = self;
+        self.named.map_or_else(|| format!("{model}/{experiment}/{mirror}/{steps}/{prompt}"), str::to_owned)
+    }
+
+    fn recording(&self) -> Value {
+        let Self { model, experiment, mirror, steps, prompt, .. } = self;
+        json!({
+            "kind": "recording",
+            "design": { "pairs": "scene", "cluster": null },
+            "world": { "mirror": { "width": mirror }, "episode": { "steps": steps } },
+            "fingerprints": { self.fingerprint(): {
+                "world": format!("{experiment} {mirror} {steps}"), "prompts": format!("{experiment} {prompt}"),
+                "reply_schema": null, "agent": *model, "sampling": null, "model": *model,
+            } },
+        })
+    }
+
+    fn episode(&self, at: usize) -> Episode {
+        let choice = if self.solved[at] { "red" } else { "blue" };
+        let is_lost = at + self.lost >= self.solved.len();
+        let status = |is_last| if is_lost && is_last { "timeout" } else { "ok" };
+        let step = |action, is_last: bool| Step {
+            action: Some(action),
+            self_color: Some(choice.into()),
+            selected_cube: Some(choice.into()),
+            mirror_visible: !is_last,
+            extra: Extra { reply_status: Some(status(is_last).into()), ..Extra::default() },
+        };
+        let last = if is_lost { Action::TurnLeft } else { Action::Done };
+        let (model, experiment, run) = (self.model, self.experiment, i32::try_from(at).unwrap() + 1);
+        Episode {
+            model: model.into(),
+            experiment: experiment.into(),
+            run,
+            scene: Some(format!("scene {}", at % self.scenes)),
+            fingerprint: (at < self.declared).then(|| self.fingerprint()),
+            ..harness::traces::episode(
+                &format!("{experiment}/{model}/s1/r{run}"),
+                vec![step(Action::MoveForward, false), step(last, true)],
+            )
+        }
+    }
+
+    /// Writes the trace; its name is that of the model and the experiment.
+    pub fn write(&self, folder: &Path) {
+        std::fs::create_dir_all(folder).unwrap();
+        let episodes: Vec<Episode> = (0..self.solved.len()).map(|at| self.episode(at)).collect();
+        let name = format!("{}-{}.parquet", self.experiment, self.model);
+        write_episodes(&folder.join(name), Some(self.recording()), &episodes).unwrap();
+    }
+}
+
+/// Two models that differ in every scene, the second recorded as `change` says.
+fn two(change: impl FnOnce(&mut Cell)) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    Cell { solved: solved(21, 21), ..LIKE }.write(&folder.path().join("runs"));
+    let mut other = Cell { model: "bee", solved: solved(0, 21), ..LIKE };
+    change(&mut other);
+    other.write(&folder.path().join("runs"));
+    folder
+}
+
+fn differs(folder: &Path, words: &[&str]) -> (String, Value) {
+    let found = run(folder, &[&["stats", "--json"], words].concat()).json();
+    let answers = found["answers"].as_array().unwrap().iter();
+    let differs = answers.filter(|answer| answer["question"] == "Who differs from whom?" && answer["metric"] == "TSA");
+    (differs.map(|answer| answer["answer"].as_str().unwrap()).collect(), found)
+}
+
+/// A change of what a cell was recorded with.
+type Change = fn(&mut Cell);
+
+#[test]
+fn models_of_two_worlds_prompts_or_step_budgets_are_not_compared() {
+    let like = two(|_| ());
+    assert_eq!(differs(like.path(), &["runs"]).0, "E1 ant better than bee");
+    let changes: [(Change, &str); 5] = [
+        (|cell| cell.mirror = 1.2, "world.mirror.width is 3.0 and 1.2"),
+        (|cell| cell.steps = 60, "world.episode.steps is 40 and 60"),
+        (|cell| cell.prompt = "q", "prompts (E1 p, E1 q)"),
+        (|cell| cell.declared = 0, "21 of 42 episodes have no fingerprint"),
+        (|cell| cell.named = Some("ant/E1/3/40/p"), "the fingerprint `ant/E1/3/40/p` stands for different recordings"),
+    ];
+    for (change, setting) in changes {
+        let folder = two(change);
+        let (answer, found) = differs(folder.path(), &["runs"]);
+        assert_eq!(answer, format!("E1 not comparable ({setting})"));
+        let test = &found["models"][0]["tests"][0];
+        assert_eq!((&test["p"], &test["difference"], &test["separated"]), (&Value::Null, &Value::Null, &json!(false)));
+        assert_eq!(test["incomparable"], setting);
+        // What does not matter is compared, and every output says what did not.
+        let (answer, found) = differs(folder.path(), &["runs", "--pool"]);
+        assert_eq!(answer, "E1 ant better than bee");
+        let sentence = format!("Compared though they differ (--pool): {setting}.");
+        assert_eq!(found["pooled"], json!([sentence]));
+        assert!(run(folder.path(), &["stats", "runs", "--pool"]).done().contains("(--pool)"));
+    }
+}
+
+#[test]
+fn scores_in_parquet_refuse_as_their_traces_do() {
+    let folder = two(|cell| cell.mirror = 1.2);
+    run(folder.path(), &["score", "runs", "-o", "scores.parquet"]).done();
+    let (answer, _) = differs(folder.path(), &["scores.parquet"]);
+    assert_eq!(answer, "E1 not comparable (world (E1 3 40, E1 1.2 40))");
+}
+
+#[test]
+fn a_cell_of_which_a_half_has_no_fingerprint_is_refused_unless_pooled() {
+    let folder = tempfile::tempdir().unwrap();
+    Cell { declared: 10, solved: solved(21, 21), ..LIKE }.write(&folder.path().join("runs"));
+    let message = run(folder.path(), &["stats", "runs"]).refused();
+    assert!(message.contains("11 of none declared") && message.contains("some have no fingerprint"), "{message}");
+    let words = "E1, ant: pooled with --pool: some have no fingerprint.";
+    let found = run(folder.path(), &["stats", "runs", "--pool", "--json"]).json();
+    assert!(found["pooled"][0] == words, "{found}");
+    run(folder.path(), &["report", "runs", "--pool", "--out", "out", "--no-figures"]).done();
+    let table = std::fs::read_to_string(folder.path().join("out/tables/main.md")).unwrap();
+    assert!(table.contains(words), "{table}");
+}
+
+#[test]
+fn experiments_are_contrasted_in_one_world_and_of_like_tasks_alone() {
+    let contrast = |mirror, against| {
+        let folder = tempfile::tempdir().unwrap();
+        Cell { solved: solved(21, 21), ..LIKE }.write(folder.path());
+        Cell { experiment: against, mirror, solved: solved(0, 21), ..LIKE }.write(folder.path());
+        run(folder.path(), &["stats", ".", "--json"]).json()
+    };
+    let changes = |found: &Value| {
+        let all = found["answers"].as_array().unwrap().iter();
+        let mirror =
+            all.filter(|answer| answer["question"] == "What does the mirror change?" && answer["metric"] == "TSA");
+        mirror.map(|answer| answer["answer"].as_str().unwrap().to_owned()).collect::<String>()
+    };
+    assert_eq!(changes(&contrast(3.0, "E2")), "E1 - E2 higher for ant");
+    assert_eq!(changes(&contrast(1.2, "E2")), "E1 - E2 not comparable (world.mirror.width is 3.0 and 1.2)");
+    let other = contrast(3.0, "E5");
+    assert_eq!((changes(&other), &other["conditions"]), (String::new(), &json!([])));
+    let words = json!("E5 is not contrasted with E1: the chance level of TSA is 1/3 and none.");
+    assert!(other["warnings"].as_array().unwrap().contains(&words), "{}", other["warnings"]);
+}

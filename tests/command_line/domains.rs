@@ -1,0 +1,165 @@
+//! Traces of other domains: identity, time, and the columns that a definition file declares.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use serde_json::{Value, json};
+
+#[cfg(feature = "view")]
+use crate::harness::files::contents;
+use crate::harness::files::{fixture, repository};
+use crate::harness::traces::recording;
+use crate::run;
+
+/// Steps of two policies on two tasks, without any column of the mirror but `action`, which is a number here.
+fn steps() -> String {
+    let mut lines = String::new();
+    for (model, solved) in [("act", [3, 5, 0, 2, 4, 3]), ("diffusion", [0, 6, 0, 0, 5, 0])] {
+        for (run, solved) in (1..).zip(solved) {
+            for t in 1..=6 {
+                let step = json!({
+                    "episode_id": format!("{model}-{run}"), "t": t, "model": model, "experiment": "pusht", "seed": 1,
+                    "run": run, "task": if run % 2 == 0 { "pull" } else { "push" }, "reward": f64::from(t) / 8.0,
+                    "action": t * 7, "action_change": f64::from(run * t % 4) / 4.0, "success": t == solved,
+                });
+                writeln!(lines, "{step}").unwrap();
+            }
+        }
+    }
+    lines
+}
+
+/// A folder with `steps.jsonl`, the definitions `robots.toml` and the trace `robots.parquet`.
+fn folder() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("steps.jsonl"), steps()).unwrap();
+    fs::copy(repository().join("examples/domains/robots.toml"), folder.path().join("robots.toml")).unwrap();
+    let told =
+        run(folder.path(), &["import", "steps.jsonl", "-o", "robots.parquet", "--definitions", "robots.toml"]).done();
+    assert!(told.starts_with("imported 12 episodes, 72 steps into robots.parquet\n"), "{told}");
+    folder
+}
+
+/// The words of a command over `robots.parquet`, with its definitions.
+fn asked(folder: &Path, words: &[&str]) -> String {
+    run(folder, &[words, &["robots.parquet", "--definitions", "robots.toml"]].concat()).done()
+}
+
+#[test]
+fn a_trace_of_a_robot_benchmark_is_scored_by_a_definition_file_alone() {
+    let folder = folder();
+    let at = folder.path();
+    assert_eq!(recording(&at.join("robots.parquet"))["domain"], "robots");
+    asked(at, &["trace", "validate"]);
+    asked(at, &["score", "-o", "scores.csv"]);
+    let scores = fs::read_to_string(at.join("scores.csv")).unwrap();
+    let rows: Vec<&str> = scores.lines().take(4).collect();
+    assert_eq!(rows[0], "episode_id,model,experiment,seed,run,SUCCESS,TIME,JERKS");
+    assert_eq!(rows[1..], ["act-1,act,pusht,1,1,1,3,1", "act-2,act,pusht,1,2,1,5,0", "act-3,act,pusht,1,3,0,,2"]);
+    #[cfg(feature = "polars")]
+    {
+        asked(at, &["score", "--engine", "polars", "-o", "polars.csv"]);
+        assert_eq!(fs::read_to_string(at.join("polars.csv")).unwrap(), scores);
+        let rows = run(
+            at,
+            &[
+                "query",
+                "select task, min(\"action\") as least from steps group by task order by task",
+                "robots.parquet",
+                "--definitions",
+                "robots.toml",
+            ],
+        )
+        .done();
+        assert!(rows.contains("pull") && rows.contains("i64"), "{rows}");
+    }
+}
+
+#[test]
+fn reports_statistics_figures_and_differences_know_any_domain() {
+    let folder = folder();
+    let at = folder.path();
+    let shown = asked(at, &["report", "--out", "out"]);
+    assert!(shown.contains("5/6") && shown.contains("2/6"), "{shown}");
+    let manifest: Value = serde_json::from_str(&fs::read_to_string(at.join("out/manifest.json")).unwrap()).unwrap();
+    assert_eq!(manifest["definitions"]["domain"], "robots");
+    run(at, &["table", "verify", "out"]).done();
+    let told = asked(at, &["stats", "--by", "model,task"]);
+    assert!(told.contains("pull") && told.contains("SUCCESS"), "{told}");
+    asked(at, &["figure", "intervals", "-o", "intervals.svg"]);
+    fs::write(
+        at.join("other.toml"),
+        "include = [\"robots.toml\"]\n[metric.JERKS]\nvalue = \"count(action_change > 0.2)\"\n",
+    )
+    .unwrap();
+    let told = run(at, &["diff", "robots.toml", "other.toml", "robots.parquet"]).done();
+    assert!(told.contains("count(action_change > 0.2)") && told.contains("JERKS"), "{told}");
+}
+
+#[test]
+fn rules_of_the_mirror_hold_for_the_mirror_alone() {
+    let folder = folder();
+    let at = folder.path();
+    let refused = run(at, &["score", "robots.parquet", "-o", "scores.csv"]).refused();
+    assert!(
+        refused.contains("`robots.parquet` has no column of the domain `mirror`") && refused.contains("--definitions"),
+        "{refused}"
+    );
+    let told = run(at, &["trace", "validate", "robots.parquet"]).ends(1);
+    assert!(told.stdout.contains("missing-column") && told.stdout.contains("mirror_visible"), "{}", told.stdout);
+    let mixed = fixture("paper");
+    let refused = run(
+        at,
+        &["score", "robots.parquet", mixed.to_str().unwrap(), "-o", "scores.csv", "--definitions", "robots.toml"],
+    )
+    .refused();
+    assert!(refused.contains("robots.parquet") && refused.contains("missing-column"), "{refused}");
+}
+
+#[test]
+fn values_and_types_that_definitions_declare_are_rules() {
+    let folder = folder();
+    let at = folder.path();
+    let with = |values: &str, ty: &str| {
+        let text = format!(
+            "include = [\"robots.toml\"]\n[column.task]\ntype = \"text\"\nconstant = true\nvalues = {values}\n[column.reward]\ntype = \"{ty}\"\n[metric.PULLS]\nvalue = \"task = 'pull'\"\n"
+        );
+        fs::write(at.join("strict.toml"), text).unwrap();
+    };
+    with("[\"push\", \"pulls\"]", "float");
+    let refused = run(at, &["definitions", "check", "strict.toml"]).refused();
+    assert!(refused.contains("`task` never is 'pull'") && refused.contains("did you mean 'pulls'?"), "{refused}");
+    with("[\"pull\", \"pushed\"]", "float");
+    let told = run(at, &["trace", "validate", "robots.parquet", "--definitions", "strict.toml"]).ends(1);
+    assert!(told.stdout.contains("unknown-value") && told.stdout.contains("did you mean `pushed`?"), "{}", told.stdout);
+    let refused = run(at, &["score", "robots.parquet", "-o", "scores.csv", "--definitions", "strict.toml"]).refused();
+    assert!(refused.contains("unknown-value"), "{refused}");
+    let refused = run(at, &["import", "steps.jsonl", "-o", "again.parquet", "--definitions", "strict.toml"]).refused();
+    assert!(refused.contains("expected one of pull, pushed, or null"), "{refused}");
+    with("[\"pull\", \"push\"]", "int");
+    let told = run(at, &["trace", "validate", "robots.parquet", "--definitions", "strict.toml"]).ends(1);
+    assert!(
+        told.stdout.contains("wrong-type") && told.stdout.contains("integer, as the definitions declare it"),
+        "{}",
+        told.stdout
+    );
+}
+
+#[cfg(feature = "view")]
+#[test]
+fn the_viewer_shows_the_columns_of_any_domain() {
+    let folder = folder();
+    let at = folder.path();
+    run(at, &["view", "robots.parquet", "--definitions", "robots.toml", "--export", "page"]).done();
+    let written = contents(&at.join("page"));
+    let of_episode = |bytes: &&Vec<u8>| String::from_utf8_lossy(bytes).contains("\"action_change\"");
+    let shown = written.values().filter(of_episode).map(|bytes| String::from_utf8_lossy(bytes)).collect::<Vec<_>>();
+    assert_eq!(
+        shown.iter().filter(|text| text.contains("\"values\":[7,14,21,28,35,42]")).count(),
+        12,
+        "{:?}",
+        written.keys()
+    );
+    assert!(shown.iter().all(|text| !text.contains("body_color")));
+}

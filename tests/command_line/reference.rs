@@ -1,0 +1,97 @@
+//! The pages of `docs/reference`, written from the program, and its version.
+//!
+//! `MIRRORSTATS_WRITE_REFERENCE=1 cargo test --all-features --test command_line reference` writes them.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::harness::files::repository;
+use crate::run;
+
+/// The commands that a help text lists, `help` itself apart: below headings, two spaces before the name.
+fn commands(help: &str) -> Vec<String> {
+    let listed = help.lines().skip_while(|line| !line.starts_with("Usage:")).skip(1);
+    let listed = listed.take_while(|line| !line.starts_with("Options") && !line.starts_with("Arguments"));
+    let names = listed.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    names.map(|line| line.split_whitespace().next().unwrap().to_owned()).filter(|name| name != "help").collect()
+}
+
+fn collect(command: &[&str], page: &mut String) {
+    let help = run(Path::new("."), &[command, &["--help"]].concat()).done();
+    let name = [&["mirrorstats"], command].concat().join(" ");
+    write!(page, "\n## {name}\n\n```text\n{}\n```\n", help.trim_end()).unwrap();
+    for name in commands(&help) {
+        collect(&[command, &[name.as_str()]].concat(), page);
+    }
+}
+
+/// The `--help` of every command.
+fn commands_page() -> String {
+    let mut page = "# Commands\n\nThe output of `--help` for every command.\n".to_owned();
+    collect(&[], &mut page);
+    page
+}
+
+/// A cell of a Markdown table.
+fn cell(value: &Value) -> String {
+    let text = match value {
+        Value::Null => String::new(),
+        Value::String(text) => text.clone(),
+        Value::Bool(value) => if *value { "yes" } else { "no" }.to_owned(),
+        Value::Array(values) => values.iter().map(cell).collect::<Vec<_>>().join(", "),
+        other => other.to_string(),
+    };
+    text.replace('|', "\\|").replace('\n', " ")
+}
+
+fn table(rows: &Value, columns: &[(&str, &str)], page: &mut String) {
+    let headings: Vec<&str> = columns.iter().map(|(heading, _)| *heading).collect();
+    writeln!(page, "| {} |\n|{}", headings.join(" | "), "---|".repeat(columns.len())).unwrap();
+    for row in rows.as_array().unwrap() {
+        let cells: Vec<String> = columns.iter().map(|(_, key)| cell(&row[key])).collect();
+        writeln!(page, "| {} |", cells.join(" | ")).unwrap();
+    }
+}
+
+/// The columns, footer keys and rules of traces.
+fn trace_page() -> String {
+    let schema = run(Path::new("."), &["trace", "schema", "--json"]).json();
+    let mut page = format!("# Traces\n\n{}\n\n## Columns\n\n", cell(&schema["description"]));
+    let columns = [("column", "name"), ("type", "type"), ("required", "required"), ("null", "nullable")];
+    let more = [("per episode", "constant"), ("unit", "unit"), ("meaning", "doc"), ("values", "values")];
+    table(&schema["columns"], &[columns, more].concat(), &mut page);
+    page += "\n## Footer keys\n\n";
+    table(&schema["metadata"], &[("key", "key"), ("meaning", "doc")], &mut page);
+    page += "\n## Rules\n\n`mirrorstats trace validate` checks them.\n\n";
+    table(
+        &schema["rules"],
+        &[("code", "code"), ("severity", "severity"), ("rule", "rule"), ("help", "help")],
+        &mut page,
+    );
+    page
+}
+
+#[test]
+fn reference_pages_are_current() {
+    for (name, page) in [("commands", commands_page()), ("traces", trace_page())] {
+        let path = repository().join("docs/reference").join(name).with_extension("md");
+        if std::env::var_os("MIRRORSTATS_WRITE_REFERENCE").is_some() {
+            fs::write(&path, &page).unwrap();
+        }
+        assert_eq!(fs::read_to_string(&path).unwrap(), page, "{}: not what the program says", path.display());
+    }
+}
+
+#[test]
+fn the_version_is_that_of_the_package_and_the_long_one_tells_the_features() {
+    let version = run(Path::new("."), &["-V"]).done();
+    assert_eq!(version, format!("mirrorstats {}\n", env!("CARGO_PKG_VERSION")));
+    let long = run(Path::new("."), &["--version"]).done();
+    let (first, features) = long.split_once('\n').unwrap();
+    assert_eq!(format!("{first}\n"), version);
+    assert_eq!(features.contains("sim"), cfg!(feature = "sim"));
+    assert_eq!(features.contains("polars"), cfg!(feature = "polars"));
+}

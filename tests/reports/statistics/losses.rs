@@ -8,7 +8,7 @@ use score::quality::CellKey;
 use super::{RECORDED, Row, by_place, cells, labelled, recorded, table};
 
 /// Episodes of E1, of which the first `solved` are solved in nine steps.
-fn of<'a>(model: &'a str, solved: i32, all: i32) -> impl Iterator<Item = Row<'a>> {
+fn of(model: &str, solved: i32, all: i32) -> impl Iterator<Item = Row<'_>> {
     (0..all).map(move |at| ("E1", model, 0, at, at < solved, if at < solved { 9 } else { 60 }))
 }
 

@@ -34,6 +34,7 @@ fn catalog() -> Catalog {
     Catalog {
         name: "test".into(),
         hash: "0".repeat(64),
+        domain: None,
         open: false,
         lets: IndexMap::new(),
         metric: [("TSA", Kind::Rate), ("TTD", Kind::Quantity), ("MCR", Kind::Rate)]

@@ -60,7 +60,15 @@ fn catalog() -> Catalog {
         ("E2".to_owned(), experiment(2, &[("TSA", "1/3")], &[])),
         ("E5".to_owned(), experiment(5, &[], &[("TSA", &["1/10", "1/11"])])),
     ]);
-    Catalog { name: "test".into(), hash: "0".repeat(64), open: false, lets: IndexMap::new(), metric, experiment }
+    Catalog {
+        name: "test".into(),
+        hash: "0".repeat(64),
+        domain: None,
+        open: false,
+        lets: IndexMap::new(),
+        metric,
+        experiment,
+    }
 }
 
 /// An episode: where it belongs, whether it was solved, and its steps; negative ones never finished.

@@ -161,6 +161,7 @@ fn catalog() -> Catalog {
     Catalog {
         name: "test".to_owned(),
         hash: "0".repeat(64),
+        domain: None,
         open: false,
         lets: IndexMap::new(),
         metric: METRICS.iter().map(|name| ((*name).to_owned(), metric(name))).collect(),

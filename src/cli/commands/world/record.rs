@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use super::configured;
 use crate::cli::args::ThreadArgs;
 use crate::cli::dry_run::{self, ForecastAnswer, RequestForecast};
 use crate::cli::exec::ExecArgs;
@@ -112,7 +113,7 @@ pub struct RecordArgs {
 
 impl RecordArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
-        let config = self.world()?;
+        let config = configured(self.config.as_ref())?;
         let plan = self.planned(&config)?;
         if self.dry_run {
             return self.forecast(&config, &plan);
@@ -168,13 +169,6 @@ impl RecordArgs {
         &self.out
     }
 
-    fn world(&self) -> Result<WorldConfig, Failure> {
-        match &self.config {
-            Some(path) => WorldConfig::load(path).map_err(Failure::input),
-            None => Ok(WorldConfig::default()),
-        }
-    }
-
     fn planned(&self, config: &WorldConfig) -> Result<Plan, Failure> {
         let experiments = experiments::asked(&self.experiment, config)?;
         let has_hand = Scripted::named(&self.agent).is_none_or(Scripted::has_hand);
@@ -217,7 +211,7 @@ impl RecordArgs {
 
     /// Records with this player, whatever `--agent` names, until all is done or `stop` is set. Only progress is told.
     pub fn record(&self, player: &dyn Player, stop: &AtomicBool) -> Result<Recorded, Failure> {
-        let config = &self.world()?;
+        let config = &configured(self.config.as_ref())?;
         let plan = &self.planned(config)?;
         let subject = &self.subject(player);
         let recording = self.recordings(config, plan, player)?;

@@ -31,6 +31,10 @@ fn metric(kind: Kind, better: Better, when: Option<&str>) -> Metric {
         when: when.map(str::to_owned),
         se: StandardError::Sample,
         chance: None,
+        measures: None,
+        range: None,
+        finished: None,
+        completes: None,
     }
 }
 
@@ -51,8 +55,14 @@ fn experiment(order: i64, chance: &[(&str, &str)], reference: &[(&str, &[&str])]
 fn catalog() -> Catalog {
     let metric = IndexMap::from([
         ("TSA".to_owned(), metric(Kind::Rate, Better::Higher, None)),
-        ("TTD".to_owned(), metric(Kind::Quantity, Better::Lower, None)),
-        ("TSA-C".to_owned(), metric(Kind::Rate, Better::Higher, Some("finished"))),
+        (
+            "TTD".to_owned(),
+            Metric { finished: Some("TSA-C".to_owned()), ..metric(Kind::Quantity, Better::Lower, None) },
+        ),
+        (
+            "TSA-C".to_owned(),
+            Metric { completes: Some("TSA".to_owned()), ..metric(Kind::Rate, Better::Higher, Some("finished")) },
+        ),
         ("MTATO".to_owned(), metric(Kind::Rate, Better::Higher, Some("TSA = 1"))),
     ]);
     let experiment = IndexMap::from([
@@ -62,8 +72,8 @@ fn catalog() -> Catalog {
     ]);
     Catalog {
         name: "test".into(),
-        hash: "0".repeat(64),
         domain: None,
+        hash: "0".repeat(64),
         open: false,
         lets: IndexMap::new(),
         metric,

@@ -58,7 +58,7 @@ use ::report::figures::{Figure, FigureName};
 pub use ::report::layout;
 use ::report::layout::MetricTable;
 use ::report::published;
-use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics};
+use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics, Ties};
 use ::report::style::Style;
 use exact::replace;
 use metric::file;
@@ -267,6 +267,12 @@ impl Study {
     /// The tables of these episodes, each with the filter that chose them.
     fn tables(&self, episodes: &EpisodeTable, cells: &Cells, style: &Style) -> Result<Vec<MetricTable>, StudyError> {
         let mut tables = layout::tables(cells, style)?;
+        if tables.iter().any(|table| table.is_tied) {
+            let ties = Ties::of(episodes, design_of(&episodes.declared), self.question.pool)?;
+            for table in &mut tables {
+                table.mark_ties(&ties, &style.sheet.emphasis_note);
+            }
+        }
         let chosen = self.selection(episodes).map(|selection| selection.sentence());
         let pooled = self.pooled(episodes)?.unwrap_or_default();
         for table in &mut tables {

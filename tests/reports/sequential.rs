@@ -39,7 +39,6 @@ fn catalog() -> Catalog {
         name: "test".into(),
         domain: None,
         hash: "0".repeat(64),
-        domain: None,
         open: false,
         lets: IndexMap::new(),
         metric: [("TSA", Kind::Rate), ("TTD", Kind::Quantity), ("MCR", Kind::Rate)]

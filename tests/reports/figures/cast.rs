@@ -166,7 +166,6 @@ fn catalog() -> Catalog {
         name: "test".to_owned(),
         domain: None,
         hash: "0".repeat(64),
-        domain: None,
         open: false,
         lets: IndexMap::new(),
         metric: METRICS.iter().map(|name| ((*name).to_owned(), metric(name))).collect(),

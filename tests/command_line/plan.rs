@@ -5,7 +5,7 @@ use std::path::Path;
 
 use report::plan::register::RegisteredPlan;
 
-use crate::{assert_shown, run};
+use crate::{assert_shown, run, two_files};
 
 fn plan(options: &[&str]) -> crate::Answer {
     run(Path::new("."), &[&["plan"], options].concat())
@@ -51,4 +51,41 @@ fn a_plan_is_registered_once_and_shows_changes() {
     assert_eq!((registered.definitions.name.as_str(), registered.definitions.sha256.len()), ("paper", 64));
     registered.plan.request.models = 2;
     assert!(!registered.is_unchanged());
+}
+
+#[test]
+fn stats_and_report_name_each_departure_from_the_plan() {
+    let folder = two_files();
+    let at = folder.path();
+    let primary = run(at, &["plan", "--runs", "7", "--register", "plan.json", "--primary", "TTD"]);
+    primary.done();
+    let options = ["stats", ".", "--plan", "plan.json", "--where", "seed = 1", "--confidence", "0.9", "--json"];
+    let found = run(at, &options).json();
+    let departures: Vec<&str> =
+        found["departures"].as_array().unwrap().iter().map(|departure| departure.as_str().unwrap()).collect();
+    for words in
+        ["plan: ", "models: 8 registered, ", "seeds of a model", "episodes of a model", "filter: none registered"]
+    {
+        assert!(departures.iter().any(|departure| departure.starts_with(words)), "{words}: {departures:?}");
+    }
+    assert!(departures.contains(&"confidence: 0.95 registered, 0.9 found"), "{departures:?}");
+    assert_eq!(
+        (found["answers"][0]["metric"].as_str(), found["answers"][0]["role"].as_str()),
+        (Some("TTD"), Some("primary"))
+    );
+    let text = run(at, &["stats", ".", "--plan", "plan.json"]).done();
+    assert!(
+        text.contains("Registered plan\n  - plan: ") && text.contains("departures from the registered plan: "),
+        "{text}"
+    );
+    let sequential = run(at, &["stats", ".", "--plan", "plan.json", "--sequential"]).done();
+    assert!(sequential.contains("looks: one registered, any number found"), "{sequential}");
+    let report = run(at, &["report", ".", "--plan", "plan.json", "--json", "--no-figures"]).json();
+    assert!(report["warnings"].to_string().contains("departure from the registered plan: models: 8"), "{report}");
+    let changed = fs::read_to_string(at.join("plan.json")).unwrap().replace("\"models\": 8", "\"models\": 2");
+    fs::write(at.join("changed.json"), changed).unwrap();
+    let message = run(at, &["stats", ".", "--plan", "changed.json"]).refused();
+    assert!(message.contains("the plan was changed after it was registered"), "{message}");
+    let message = run(at, &["plan", "--runs", "7", "--register", "other.json", "--primary", "TSB"]).refused();
+    assert!(message.contains("--primary TSB: expected a metric of the definitions"), "{message}");
 }

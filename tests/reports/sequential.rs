@@ -57,8 +57,14 @@ type Block<'a> = (&'a str, &'a str, i32);
 const STUDY: [Block; 4] = [("E1", "middle", 13), ("E1", "strong", 21), ("E1", "weak", 5), ("E2", "strong", 7)];
 
 fn sequential(blocks: &[Block]) -> Sequential {
-    let rows = || blocks.iter().flat_map(|block| (0..21).map(move |at| (block, at)));
-    let keys = rows().map(|((experiment, model, _), at)| EpisodeKey {
+    with_scenes(blocks, 1, |_, at| Some(format!("room {at}")))
+}
+
+/// Every scene of 21 is played `repeats` times, and solved always or never.
+fn with_scenes(blocks: &[Block], repeats: i32, scene: impl Fn(&str, i32) -> Option<String>) -> Sequential {
+    let times = || blocks.iter().flat_map(|block| (0..21 * repeats).map(move |run| (block, run)));
+    let rows = || times().map(|(block, run)| (block, run / repeats));
+    let keys = times().map(|((experiment, model, _), at)| EpisodeKey {
         experiment: (*experiment).into(),
         model: (*model).into(),
         seed: at / 7,
@@ -72,7 +78,12 @@ fn sequential(blocks: &[Block]) -> Sequential {
         keys: keys.collect(),
         labels: vec![LabelColumn {
             name: "scene".into(),
-            values: rows().map(|(_, at)| Some(format!("room {at}"))).collect(),
+            values: rows()
+                .map(|(block, at)| scene(block.1, at))
+                .collect::<Vec<_>>()
+                .iter()
+                .map(Option::as_deref)
+                .collect(),
         }],
         metrics: vec![
             MetricColumn::new("TSA", solved()),
@@ -113,6 +124,17 @@ fn models_are_told_apart_by_their_discordant_pairs() {
     }
     let alike = found.models.iter().find(|pair| pair.metric == "MCR").unwrap();
     assert_eq!((alike.e, alike.p, alike.verdict), (1.0, 1.0, Verdict::NotSeparated));
+}
+
+// The i-th episodes of two models are a pair where no scenes are shared, and a scene counts once: the same evidence.
+#[test]
+fn models_without_equal_scenes_are_told_apart_and_repeats_count_once() {
+    let by_scene = sequential(&STUDY);
+    let alone = with_scenes(&STUDY, 1, |model, at| Some(format!("{model} {at}")));
+    let repeated = with_scenes(&STUDY, 3, |_, at| Some(format!("room {at}")));
+    let evidence = |found: &Sequential| found.models.iter().map(|pair| pair.e).collect::<Vec<_>>();
+    assert_eq!((evidence(&alone), evidence(&repeated)), (evidence(&by_scene), evidence(&by_scene)));
+    assert_eq!([&by_scene, &alone, &repeated].map(|found| found.models[0].shared), [21, 0, 21]);
 }
 
 #[test]

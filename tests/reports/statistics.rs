@@ -2,6 +2,7 @@
 
 mod design;
 mod durations;
+mod losses;
 mod units;
 
 use exact::moments::Moments;

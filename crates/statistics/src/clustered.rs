@@ -81,6 +81,17 @@ pub fn clustered_rate(clusters: &[Moments], confidence: f64) -> Option<Clustered
     Some(Clustered { interval, ..found })
 }
 
+/// The variance between clusters, which is not below 0, and within them, by analysis of variance (Donner 1986).
+///
+/// `None` for fewer than two clusters and where each has one value.
+#[expect(clippy::cast_precision_loss, reason = "few clusters")]
+pub fn variance_components(clusters: &[Moments]) -> Option<(f64, f64)> {
+    let parts: Vec<Moments> = clusters.iter().copied().filter(|part| part.n > 0).collect();
+    let freedom = parts.len().checked_sub(1).filter(|&freedom| freedom > 0)? as f64;
+    let [between, within, typical_size] = Whole::of(&parts)?.mean_squares(&parts, freedom)?;
+    Some((((between - within) / typical_size).max(0.0), within))
+}
+
 /// A design effect up to this is zero but for rounding.
 const ROUNDING: f64 = 1e-12;
 
@@ -110,8 +121,9 @@ impl Whole {
         self.n.checked_mul(part.sum)?.checked_sub(self.sum.checked_mul(part.n.into())?)
     }
 
+    /// The mean squares between and within, and the typical size of a cluster.
     #[expect(clippy::cast_precision_loss, reason = "exact sums become quotients here")]
-    fn icc(&self, parts: &[Moments], between_freedom: f64) -> Option<f64> {
+    fn mean_squares(&self, parts: &[Moments], between_freedom: f64) -> Option<[f64; 3]> {
         let n = self.n as f64;
         let within_freedom = n - parts.len() as f64;
         let (mut between, mut within) = (0.0, 0.0);
@@ -122,10 +134,14 @@ impl Whole {
             within += i128::from(part.n).checked_mul(part.sum_sq)?.checked_sub(part.sum.checked_mul(part.sum)?)? as f64
                 / size;
         }
-        let (between, within) = (between / between_freedom, within / within_freedom);
         let typical_size = (n - self.squared_sizes as f64 / n) / between_freedom;
+        (within_freedom > 0.0).then(|| [between / between_freedom, within / within_freedom, typical_size])
+    }
+
+    fn icc(&self, parts: &[Moments], between_freedom: f64) -> Option<f64> {
+        let [between, within, typical_size] = self.mean_squares(parts, between_freedom)?;
         let total = between + (typical_size - 1.0) * within;
-        (within_freedom > 0.0 && total > 0.0).then(|| (between - within) / total)
+        (total > 0.0).then(|| (between - within) / total)
     }
 }
 
@@ -157,6 +173,17 @@ mod tests {
         close(found.interval.unwrap().high, 1.4168965922917767);
         close(found.icc.unwrap(), 0.3488372093023256);
         close(found.design_effect.unwrap(), 3.0930232558139537);
+    }
+
+    // scipy 1.17.1: f_oneway of the three seeds above is 4.75; the mean squares are 4.75 and 1 times 4/21.
+    #[test]
+    fn the_variance_of_a_rate_is_split_into_clusters_and_repeats() {
+        let seeds = [of(&[1, 1, 1, 0, 1, 1, 1]), of(&[0, 0, 1, 0, 0, 0, 0]), of(&[1, 1, 0, 1, 0, 1, 0])];
+        let (between, within) = super::variance_components(&seeds).unwrap();
+        close(within, 4.0 / 21.0);
+        close(between, (4.75 - 1.0) * 4.0 / 21.0 / 7.0);
+        assert_eq!(super::variance_components(&[of(&[1]), of(&[0])]), None);
+        close(super::variance_components(&[of(&[1, 0]), of(&[1, 0])]).unwrap().0, 0.0);
     }
 
     #[test]

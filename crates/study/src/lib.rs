@@ -57,6 +57,8 @@ use ::report::errata::Errata;
 use ::report::figures::{Figure, FigureName};
 pub use ::report::layout;
 use ::report::layout::MetricTable;
+use ::report::plan::departures::{Looks, departures};
+use ::report::plan::register::RegisteredPlan;
 use ::report::published;
 use ::report::statistics::{Options, Replies, Selection, Sequential, Statistics, Ties};
 use ::report::style::Style;
@@ -107,6 +109,8 @@ pub struct Study {
     question: Question,
     backend: Backend,
     threads: NonZeroUsize,
+    /// The plan that the analysis is compared with.
+    plan: Option<RegisteredPlan>,
 }
 
 impl Study {
@@ -132,7 +136,7 @@ impl Study {
             // What keeps an answer from having definitions is told with the answer: others may be asked for first.
             question = question.clone().resolved(traces).unwrap_or(question);
         }
-        Ok(Self { inputs, stamps, source, question, backend: Backend::Native, threads })
+        Ok(Self { inputs, stamps, source, question, backend: Backend::Native, threads, plan: None })
     }
 
     /// Asks for these definitions: `paper`, `extended`, or the path of a TOML file.
@@ -175,6 +179,18 @@ impl Study {
     pub const fn pool(mut self) -> Self {
         self.question.pool = true;
         self
+    }
+
+    /// Compares the analysis with this plan: each answer names the departures.
+    #[must_use]
+    pub fn registered(mut self, plan: RegisteredPlan) -> Self {
+        self.plan = Some(plan);
+        self
+    }
+
+    /// The departures from the registered plan; `None` without a plan.
+    fn departures(&self, episodes: &EpisodeTable, options: &Options, looks: Looks) -> Option<Vec<String>> {
+        Some(departures(self.plan.as_ref()?, episodes, options, looks))
     }
 
     /// Uses so many threads; all cores where this is not called. Results do not depend on it.
@@ -320,10 +336,18 @@ impl Study {
         let (design, selection) = (design_of(declared), self.selection(&results.episodes));
         let replies = results.quality.as_ref().and_then(Replies::of);
         let lost = is_known.then_some(beside);
+        let failures = (self.question.lost == LostAs::Failure && total > 0).then_some(total);
+        let as_failures = failures.map(|total| format!("{total} lost episodes counted as failures"));
+        let primary = self.plan.as_ref().and_then(|plan| plan.primary.clone());
         let pooled = self.pooled(&results.episodes)?;
-        let options = Options { lost, design, selection, pooled, replies, ..options.clone() };
+        let mut options = Options { lost, design, selection, pooled, replies, primary, ..options.clone() };
+        let departures = self.departures(&results.episodes, &options, Looks::Once);
+        let departed = departures.as_ref().map_or(0, Vec::len);
+        let departed = (departed > 0).then(|| format!("departures from the registered plan: {departed}"));
+        options.caveats = as_failures.into_iter().chain(departed).collect();
         let mut statistics = Statistics::of(&results.episodes, cells, &options)?;
-        if self.question.lost == LostAs::Failure && total > 0 {
+        statistics.departures = departures;
+        if let Some(total) = failures {
             let words = format!("{total} lost episodes are counted as failures in every rate that each episode has.");
             statistics.warnings.push(words);
         }
@@ -342,7 +366,8 @@ impl Study {
         size::check_comparisons(&episodes)?;
         let (design, selection) = (design_of(&episodes.declared), self.selection(&episodes));
         let options = Options { design, selection, pooled: self.pooled(&episodes)?, ..options.clone() };
-        Ok(Sequential::of(&episodes, &options)?)
+        let departures = self.departures(&episodes, &options, Looks::Any);
+        Ok(Sequential { departures, ..Sequential::of(&episodes, &options)? })
     }
 
     /// One figure, with the models in the order of a style.

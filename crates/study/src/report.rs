@@ -16,6 +16,7 @@ use report::figures::{Figure as Drawn, FigureName};
 use report::html::{self, Figure, Page, Recordings};
 use report::layout::MetricTable;
 use report::layout::quality::{self, QualityTable};
+use report::plan::departures::Looks;
 use report::statistics::{Options, Replies, Statistics, TEXT_SCORES};
 use report::style::{MAIN_TABLE, OTHER_TABLE, Style};
 use score::format::Format;
@@ -114,7 +115,10 @@ impl Study {
         let tables = self.tables(&results.episodes, &cells, &style)?;
         let filter = self.question.filter.clone();
         let manifest = Manifest::new(&cells, &style, SCHEMA_VERSION, filter, results.inputs.clone());
-        let notes = self.notes(&results, &lost);
+        let mut notes = self.notes(&results, &lost);
+        let own = Options { selection: self.selection(&results.episodes), ..Options::default() };
+        let departures = self.departures(&results.episodes, &own, Looks::Once).into_iter().flatten();
+        notes.extend(departures.map(|departure| format!("departure from the registered plan: {departure}")));
         let (illustrations, read) = (Vec::new(), self.files_read(Some(&options.style)));
         let (threads, recordings) = (self.threads, self.recordings(&manifest));
         let mut report = Report {

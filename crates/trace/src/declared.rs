@@ -1,6 +1,7 @@
 //! What footers declare of how their rows came to be, apart from the rows.
 //!
-//! Rule: what a footer does not say is not assumed. Several files declare together what each of them declares alike.
+//! Rule: what a footer does not say is not assumed. Several files declare together what each of them declares alike; what
+//! keeps episodes from being pairs or independent holds for all of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -48,10 +49,10 @@ pub struct Registration {
 /// What some files declare together.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Declared {
-    /// How the rows came to be, where all files say the same.
+    /// How the rows came to be, where all files say the same; a reconstruction where any file is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub origin: Option<Origin>,
-    /// What a cluster is, where all files say the same.
+    /// What a cluster is, where any file says so: no test then takes episodes as independent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cluster: Option<Cluster>,
     /// The parts of each fingerprint, by its name in the column `fingerprint`.
@@ -119,9 +120,10 @@ impl Declared {
         self.unrecorded.extend(other.unrecorded);
         self.unrecorded.sort();
         self.unrecorded.dedup();
+        let made_up = [self.origin, other.origin].into_iter().flatten().find(|it| *it == Origin::Reconstruction);
         Self {
-            origin: self.origin.filter(|origin| other.origin == Some(*origin)),
-            cluster: self.cluster.filter(|cluster| other.cluster == Some(*cluster)),
+            origin: self.origin.filter(|origin| other.origin == Some(*origin)).or(made_up),
+            cluster: self.cluster.or(other.cluster),
             registration: self.registration.filter(|hash| other.registration.as_ref() == Some(hash)),
             fingerprints: self.fingerprints,
             ambiguous: self.ambiguous,
@@ -146,8 +148,10 @@ mod tests {
         ));
         assert_eq!(recording.registration.as_ref().map(|plan| plan.sha256.as_str()), Some("r"));
         let both = import.clone().joined(recording);
-        assert_eq!((both.origin, both.cluster, both.registration), (None, None, None));
+        assert_eq!((both.origin, both.cluster, both.registration), (None, Some(Cluster::Seed), None));
         assert_eq!(both.fingerprints["a"]["model"], "m");
+        let made_up = Declared::of_recording(Some(r#"{"kind":"reconstruction"}"#));
+        assert_eq!(import.clone().joined(made_up).origin, Some(Origin::Reconstruction));
         assert_eq!(import.clone().joined(import.clone()), import);
     }
 

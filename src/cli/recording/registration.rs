@@ -3,15 +3,12 @@
 use std::path::Path;
 
 use crate::cli::outcome::Failure;
-use exact::budget::Limit;
-use exact::input;
+use crate::cli::typed::plan::read_plan;
 use report::plan::register::{NamedHash, RegisteredPlan};
 use trace::declared::Registration;
 use world::agent::prompt;
 use world::sim::config::WorldConfig;
 
-/// The largest plan that is read, bytes.
-const LARGEST: Limit = Limit::new("bytes of a plan", 1 << 20);
 /// The name of the world among the experiments of a plan.
 pub(crate) const WORLD: &str = "world";
 
@@ -25,18 +22,7 @@ pub(crate) fn prompts() -> Vec<NamedHash> {
 /// The plan in a file, for the footers of a recording with this world.
 pub(crate) fn registration(file: &Path, config: &WorldConfig) -> Result<Registration, Failure> {
     let shown = file.display();
-    let text = input::text(file, LARGEST)
-        .map_err(|error| Failure::input(format!("{shown}: cannot read the plan: {error}")))?;
-    let plan: RegisteredPlan = serde_json::from_str(&text).map_err(|error| {
-        let help = "`mirrorstats plan ... --register FILE` writes one";
-        Failure::input(format!("{shown}: expected a registered plan: {error}\n  help: {help}"))
-    })?;
-    if !plan.is_unchanged() {
-        let words = "the plan was changed after it was registered: its hash is not that of its content";
-        return Err(Failure::input(format!(
-            "{shown}: {words}\n  help: take the file as it was registered, or register anew"
-        )));
-    }
+    let plan = read_plan(file)?;
     check(&shown.to_string(), &plan, config)?;
     Ok(Registration { sha256: plan.sha256, definitions: Some(plan.definitions.sha256) })
 }

@@ -2,5 +2,6 @@
 
 pub mod args;
 pub mod experiments;
+pub mod plan;
 pub mod scoring;
 pub mod spark;

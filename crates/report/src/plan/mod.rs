@@ -3,6 +3,7 @@
 //! Rule: every test is planned twice, by itself and at the level that Holm's procedure holds its smallest p value to.
 //! What had to be assumed stands beside the answer, in sentences.
 
+pub mod departures;
 pub mod register;
 pub mod text;
 

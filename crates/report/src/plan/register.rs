@@ -32,6 +32,9 @@ pub struct RegisteredPlan {
     pub experiments: Vec<NamedHash>,
     /// The prompts, each with the hash of its text.
     pub prompts: Vec<NamedHash>,
+    /// The metric of the primary question; absent where none is declared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub primary: Option<String>,
     /// SHA-256 over all of the above, 64 hexadecimal digits.
     pub sha256: String,
 }
@@ -50,8 +53,30 @@ impl RegisteredPlan {
     /// Registers a plan; experiments and prompts may be empty.
     pub fn new(plan: Plan, definitions: NamedHash, experiments: Vec<NamedHash>, prompts: Vec<NamedHash>) -> Self {
         let (format, version, sha256) = (FORMAT.to_owned(), VERSION, String::new());
-        let open = Self { format, version, plan, definitions, experiments, prompts, sha256 };
+        let open = Self { format, version, plan, definitions, experiments, prompts, primary: None, sha256 };
         Self { sha256: open.content_hash(), ..open }
+    }
+
+    /// The same plan with a primary metric.
+    #[must_use]
+    pub fn with_primary(self, metric: Option<String>) -> Self {
+        let open = Self { primary: metric, ..self };
+        Self { sha256: open.content_hash(), ..open }
+    }
+
+    /// Reads a plan as it was registered.
+    ///
+    /// # Errors
+    /// What is wrong with it and what to do: no registered plan, or one that was changed.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let plan: Self = serde_json::from_str(text).map_err(|error| {
+            format!("expected a registered plan: {error}\n  help: `mirrorstats plan ... --register FILE` writes one")
+        })?;
+        if plan.is_unchanged() {
+            return Ok(plan);
+        }
+        let words = "the plan was changed after it was registered: its hash is not that of its content";
+        Err(format!("{words}\n  help: take the file as it was registered, or register anew"))
     }
 
     /// Whether it is as it was registered.

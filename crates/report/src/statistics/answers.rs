@@ -3,16 +3,20 @@
 //! Rule: an answer names what a test shows after Holm's adjustment, and nothing else; the numbers stand in the tables. What
 //! would not fit into a line is counted.
 
+use std::collections::BTreeSet;
+
 use indexmap::IndexMap;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::compare::{Comparison, Sign};
 use super::study::named;
-use super::{ChanceRow, Contrast, Family, Role, Statistics, Units, Verdict};
+use super::{ChanceRow, Contrast, Family, Options, Role, Selection, Statistics, Units, Verdict};
 
 /// The most pairs that an experiment's answer names; more are counted.
 const MOST_NAMED: usize = 6;
+
+const ABOVE_CHANCE: &str = "Who is above chance?";
 
 /// One question about one metric, and its answer over all experiments.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -23,29 +27,100 @@ pub struct Answer {
     pub metric: String,
     /// The answer, in a line.
     pub answer: String,
+    /// Whether it is the declared primary one.
+    #[serde(default)]
+    pub role: AnswerRole,
+    /// What the episodes were chosen by, pooled over or short of, a phrase each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub caveats: Vec<String>,
+}
+
+/// How much weight an answer has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum AnswerRole {
+    /// The question that the study was made for; the first answer.
+    Primary,
+    /// Any other question.
+    #[default]
+    Secondary,
 }
 
 impl Answer {
     fn new(question: &str, metric: &str, parts: &[String]) -> Option<Self> {
-        let answer = || Self { question: question.to_owned(), metric: metric.to_owned(), answer: parts.join("; ") };
+        let (question, metric) = (question.to_owned(), metric.to_owned());
+        let answer =
+            || Self { question, metric, answer: parts.join("; "), role: AnswerRole::Secondary, caveats: Vec::new() };
         (!parts.is_empty()).then(answer)
     }
 }
 
-/// The answers about the headline metrics.
-pub(super) fn answers(statistics: &Statistics) -> Vec<Answer> {
+/// The answers about the headline metrics, the primary one first, and the number of families of tests behind them.
+pub(super) fn answers(statistics: &Statistics, options: &Options) -> (Vec<Answer>, usize) {
+    let mut answers = unranked(statistics);
+    let primary = options.primary.as_ref().or(statistics.headline.first());
+    let first = answers.iter().position(|answer| Some(&answer.metric) == primary).unwrap_or(0);
+    if first < answers.len() {
+        answers[..=first].rotate_right(1);
+        answers[0].role = AnswerRole::Primary;
+    }
+    let caveats = caveats(statistics, options);
+    for answer in &mut answers {
+        answer.caveats.clone_from(&caveats);
+    }
+    let families = families(statistics, &answers);
+    (answers, families)
+}
+
+/// The number of families of tests behind these answers.
+fn families(statistics: &Statistics, answers: &[Answer]) -> usize {
+    let of_chance = |metric: &str| answers.iter().any(|it| it.metric == metric && it.question == ABOVE_CHANCE);
+    let is_answered = |metric: &String| statistics.headline.contains(metric);
+    let chance = statistics.chance.iter().filter(|row| of_chance(&row.metric));
+    let levels: BTreeSet<_> = chance.map(|row| (&row.experiment, &row.metric, row.level.to_string())).collect();
+    let models = statistics.models.iter().filter(|family| is_answered(&family.metric));
+    let models = models.filter(|family| family.tests.iter().any(|test| test.comparison.p.is_some())).count();
+    let overall = statistics.overall.iter().filter(|row| is_answered(&row.metric) && row.p.is_some());
+    let overall: BTreeSet<_> = overall.map(|row| &row.metric).collect();
+    let tested = statistics.conditions.iter().filter(|it| is_answered(&it.metric) && it.comparison.p.is_some());
+    let conditions: BTreeSet<_> = tested.map(|it| (&it.metric, &it.baseline, &it.against)).collect();
+    levels.len() + models + overall.len() + conditions.len()
+}
+
+/// What stands beside every answer: the filter, lost episodes, replies without a decision, and what the caller adds.
+fn caveats(statistics: &Statistics, options: &Options) -> Vec<String> {
+    let selection = statistics.selection.as_ref().map(Selection::phrase);
+    let lost = match super::warnings::lost(statistics) {
+        0 => None,
+        1 => Some("1 episode lost".to_owned()),
+        lost => Some(format!("{lost} episodes lost")),
+    };
+    let replies = statistics.replies.as_ref().filter(|replies| replies.unusable > 0);
+    let replies = replies.map(|it| format!("{} of {} replies gave no decision", it.unusable, it.replies));
+    let pooled = (!statistics.pooled.is_empty()).then(|| "recordings that differ are pooled".to_owned());
+    let given = options.caveats.iter().cloned();
+    selection.into_iter().chain(pooled).chain(given).chain(lost).chain(replies).collect()
+}
+
+fn unranked(statistics: &Statistics) -> Vec<Answer> {
     let mut answers = Vec::new();
     let confidence = statistics.confidence;
     for metric in &statistics.headline {
         for metric in [metric.as_str()].into_iter().chain(statistics.relations.completed(metric)) {
-            answers.extend(Answer::new("Who is above chance?", metric, &above(&statistics.chance, metric, confidence)));
+            answers.extend(Answer::new(ABOVE_CHANCE, metric, &above(&statistics.chance, metric, confidence)));
         }
     }
     for metric in &statistics.headline {
         let families = statistics.models.iter().filter(|family| family.metric == *metric);
         let overall: Vec<_> = statistics.overall.iter().filter(|row| row.metric == *metric).collect();
         let separated = overall.iter().filter(|row| row.separated).map(|row| (&*row.first, &*row.second));
-        let overall = (!overall.is_empty()).then(|| differing("over all experiments", overall.len(), separated));
+        let is_tested = overall.iter().any(|row| row.p.is_some());
+        let unsettled = overall.iter().filter(|row| row.losses.is_some_and(|losses| !losses.agree)).count();
+        let overall = match (overall.len(), is_tested) {
+            (0, _) => None,
+            (_, false) => Some("over all experiments not tested".to_owned()),
+            (all, true) => Some(differing("over all experiments", all, separated) + &unsettled_pairs(unsettled)),
+        };
         let parts: Vec<String> = families.map(|family| differing_in(family, confidence)).chain(overall).collect();
         answers.extend(Answer::new("Who differs from whom?", metric, &parts));
     }
@@ -54,6 +129,15 @@ pub(super) fn answers(statistics: &Statistics) -> Vec<Answer> {
         answers.extend(Answer::new("What does the mirror change?", metric, &parts));
     }
     answers
+}
+
+/// The pairs of models whose verdict lost episodes decide.
+fn unsettled_pairs(count: usize) -> String {
+    match count {
+        0 => String::new(),
+        1 => ", cannot say for 1 pair: lost episodes".to_owned(),
+        _ => format!(", cannot say for {count} pairs: lost episodes"),
+    }
 }
 
 /// Per experiment, the models above its chance level; above its highest reference where it has none.
@@ -74,7 +158,7 @@ fn above_in(experiment: &str, rows: &[&ChanceRow], confidence: f64) -> String {
     let those = |verdict| rows.iter().filter(|row| row.verdict == verdict).map(|row| row.name()).collect::<Vec<_>>();
     let (above, below) = (those(Verdict::Above), those(Verdict::Below));
     let unsaid: Vec<(String, Units)> =
-        rows.iter().filter_map(|row| Some((row.name(), row.too_few(confidence)?))).collect();
+        rows.iter().filter_map(|row| Some((row.name(), row.unsaid(confidence)?))).collect();
     let reference = level.filter(|(role, _)| *role == Role::Reference);
     let about =
         reference.map_or_else(|| experiment.to_owned(), |(_, level)| format!("{experiment} (reference {level})"));
@@ -112,7 +196,7 @@ fn untested(comparisons: &[&Comparison], confidence: f64) -> Option<String> {
     if tested.peek().is_none() {
         return Some(apart(comparisons).unwrap_or_else(|| "not tested".to_owned()));
     }
-    let too_few = tested.map(|found| found.too_few(confidence)).collect::<Option<Vec<_>>>()?;
+    let too_few = tested.map(|found| found.unsaid(confidence)).collect::<Option<Vec<_>>>()?;
     too_few.iter().max_by_key(|units| units.n).map(cannot_say)
 }
 
@@ -131,8 +215,10 @@ fn differing_in(family: &Family, confidence: f64) -> String {
         return format!("{} {why}", family.experiment);
     }
     let separated = family.tests.iter().filter(|test| test.comparison.separated);
+    let unsettled = |test: &&super::PairTest| test.comparison.losses.is_some_and(|losses| !losses.agree);
+    let unsettled = unsettled_pairs(family.tests.iter().filter(unsettled).count());
     let told = differing(&family.experiment, family.tests.len(), separated.map(|test| (&*test.first, &*test.second)));
-    [told].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
+    [told + &unsettled].into_iter().chain(apart(&comparisons)).collect::<Vec<_>>().join(", ")
 }
 
 /// The separated pairs of `all`, by the better model.
@@ -173,13 +259,21 @@ fn changed(baseline: &str, against: &str, group: &[&Contrast], confidence: f64) 
     if let Some(why) = untested(&comparisons, confidence) {
         return format!("{baseline} - {against} {why}");
     }
-    let rest = those(None).len();
-    let unshown = match (rest, group.len()) {
+    let is_silent = |it: &Comparison| it.sign().is_none() && it.incomparable.is_none();
+    let silent = group.iter().filter(|contrast| is_silent(&contrast.comparison));
+    let (unsaid, shown): (Vec<&&Contrast>, Vec<_>) =
+        silent.partition(|it| it.comparison.p.is_none() || it.comparison.unsaid(confidence).is_some());
+    let unshown = match (shown.len(), group.len()) {
         (0, _) => None,
         (rest, all) if rest == all => Some("no change shown".to_owned()),
         (rest, _) => Some(format!("no change shown for {rest} more")),
     };
-    let parts = [phrase("higher for", Sign::Higher), phrase("lower for", Sign::Lower), unshown];
-    let parts: Vec<String> = parts.into_iter().flatten().chain(apart(&comparisons)).collect();
+    let unsaid = unsaid.into_iter().map(|contrast| {
+        let model = named(&contrast.model, contrast.condition.as_deref());
+        let why = contrast.comparison.unsaid(confidence).map_or_else(|| "not tested".to_owned(), |it| counted(&it));
+        format!("cannot say for {model}: {why}")
+    });
+    let shown = [phrase("higher for", Sign::Higher), phrase("lower for", Sign::Lower), unshown].into_iter().flatten();
+    let parts: Vec<String> = shown.chain(unsaid).chain(apart(&comparisons)).collect();
     format!("{baseline} - {against} {}", parts.join(", "))
 }

@@ -6,6 +6,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::losses::{LossCase, LossCases, Toward, settle};
 use super::study::{Block, Experiment, Study, named};
 use exact::moments::Moments;
 use exact::ratio::Ratio;
@@ -50,6 +51,9 @@ pub struct ChanceRow {
     /// The units of analysis where some have several episodes: the test counts each once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Units>,
+    /// The test with the lost episodes of the model; none where it lost none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<LossCases>,
 }
 
 /// Scenes, seeds or participants with several episodes.
@@ -114,48 +118,54 @@ impl ChanceRow {
         confidence: f64,
     ) -> Vec<Self> {
         let Some(column) = study.column(metric) else { return Vec::new() };
-        let tested: Vec<_> = experiment
+        let mut tested: Vec<_> = experiment
             .blocks
             .iter()
             .filter_map(|block| Tested::of(study, block, column, (chance, confidence)))
             .collect();
+        settle(&mut tested.iter_mut().map(|tested| (tested.seen, &mut tested.losses)).collect::<Vec<_>>(), confidence);
         let adjusted = holm(&tested.iter().map(|tested| tested.test.p).collect::<Vec<_>>());
         let attained = |tested: &Tested| Attained { p: tested.test.p, least: tested.least };
         let by_tarone = tarone_holm(&tested.iter().map(attained).collect::<Vec<_>>());
-        let row =
-            |(Tested { block, successes, n, test, units, .. }, (p_adjusted, p_tarone)): (Tested, (f64, f64))| Self {
-                experiment: experiment.name.to_owned(),
-                model: block.model.to_owned(),
-                condition: block.condition(),
-                metric: metric.to_owned(),
-                role,
-                level: chance,
+        let row = |(Tested { block, successes, n, test, units, losses, .. }, (p_adjusted, p_tarone)): (
+            Tested,
+            (f64, f64),
+        )| Self {
+            experiment: experiment.name.to_owned(),
+            model: block.model.to_owned(),
+            condition: block.condition(),
+            metric: metric.to_owned(),
+            role,
+            level: chance,
+            successes,
+            n,
+            p: test.p,
+            mid_p: test.mid_p,
+            p_adjusted,
+            p_tarone,
+            verdict: Verdict::of(
                 successes,
                 n,
-                p: test.p,
-                mid_p: test.mid_p,
-                p_adjusted,
-                p_tarone,
-                verdict: Verdict::of(
-                    successes,
-                    n,
-                    chance,
-                    level(confidence).is_some_and(|level| p_adjusted <= level)
-                        && !units.as_ref().is_some_and(|units: &Units| units.too_few),
-                ),
-                units,
-            };
+                chance,
+                level(confidence).is_some_and(|level| p_adjusted <= level)
+                    && !units.as_ref().is_some_and(|units: &Units| units.too_few)
+                    && losses.is_none_or(|losses: LossCases| losses.agree),
+            ),
+            units,
+            losses,
+        };
         tested.into_iter().zip(adjusted.into_iter().zip(by_tarone)).map(row).collect()
     }
 
-    /// The units or episodes where they are too few for any verdict; none where they are enough.
-    pub(super) fn too_few(&self, confidence: f64) -> Option<Units> {
+    /// The units or episodes that are too few for any verdict, or the lost ones that decide it; none elsewhere.
+    pub(super) fn unsaid(&self, confidence: f64) -> Option<Units> {
         let hopeless =
             || least_p(self.n, self.level).zip(level(confidence)).is_some_and(|(least, level)| least > level);
         match &self.units {
             Some(units) => units.too_few.then(|| units.clone()),
             None => hopeless().then(|| Units { n: self.n, name: "episodes".to_owned(), too_few: true }),
         }
+        .or_else(|| LossCases::unsettled(self.losses.as_ref()))
     }
 
     /// The model as it is compared.
@@ -172,6 +182,8 @@ struct Tested<'s, 'a> {
     test: ExactTest,
     least: f64,
     units: Option<Units>,
+    seen: LossCase,
+    losses: Option<LossCases>,
 }
 
 impl<'s, 'a> Tested<'s, 'a> {
@@ -181,21 +193,29 @@ impl<'s, 'a> Tested<'s, 'a> {
         column: &MetricColumn,
         (chance, confidence): (Ratio, f64),
     ) -> Option<Self> {
-        let (successes, n) = block.moments(column).counts()?;
-        if study.repeats(block) {
-            let of_units: Vec<Moments> = study.by_unit(block, column).into_values().collect();
-            let (test, least) = rate_test(&of_units, chance)?;
-            let units = Units::new(study, block, of_units.len(), least, confidence);
-            return Some(Self { block, successes, n, test, least, units: Some(units) });
-        }
-        Some(Self {
-            block,
-            successes,
-            n,
-            test: exact_test(successes, n, chance)?,
-            least: least_p(n, chance)?,
-            units: None,
-        })
+        let known = block.moments(column);
+        let (successes, n) = known.counts()?;
+        let of_units: Option<Vec<Moments>> =
+            block.repeats.then(|| study.by_unit(block, column).into_values().collect());
+        let tested = |toward: Option<Toward>| {
+            let with_lost = |known| toward.map_or(known, |toward| toward.moments(known, block.lost, true));
+            let Some(units) = &of_units else {
+                let (successes, n) = with_lost(known).counts()?;
+                return Some((exact_test(successes, n, chance)?, least_p(n, chance)?));
+            };
+            let one = |toward: Toward| toward.moments(Moments::default(), 1, true);
+            let lost = (0..block.lost).filter_map(|_| toward.map(one));
+            rate_test(&units.iter().copied().chain(lost).collect::<Vec<_>>(), chance)
+        };
+        let difference = |toward: Option<Toward>| {
+            let mean = toward.map_or(known, |toward| toward.moments(known, block.lost, true)).mean();
+            mean.map(|mean| mean - chance.value())
+        };
+        let case = |toward| LossCase { difference: difference(toward), p: tested(toward).map(|(test, _)| test.p) };
+        let (test, least) = tested(None)?;
+        let units = of_units.as_ref().map(|units| Units::new(study, block, units.len(), least, confidence));
+        let losses = LossCases::of(block.lost, |toward| case(Some(toward)));
+        Some(Self { block, successes, n, test, least, units, seen: case(None), losses })
     }
 }
 

@@ -7,12 +7,14 @@ use serde::{Deserialize, Serialize};
 
 use super::chance::Units;
 use super::durations::{decided, is_duration};
+use super::losses::{LossCase, LossCases, Toward, settle};
 use super::matching::Matched;
 use super::study::{Block, Study, Unit};
 use super::units::Sides;
 use exact::moments::Moments;
 use metric::catalog::{Kind, StandardError};
 use score::table::MetricColumn;
+use statistics::competing::{Ending, Outcome};
 use statistics::contrast::{newcombe, welch};
 use statistics::coverage::{self, Withheld};
 use statistics::holm::{holm, level};
@@ -80,6 +82,9 @@ pub struct Comparison {
     /// The units of analysis of both sides where the test counts each once, however many episodes it has.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub units: Option<Units>,
+    /// The test with the lost episodes of both sides; none where none was lost.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<LossCases>,
     /// The setting in which the two sides were recorded differently, so that nothing is compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub incomparable: Option<String>,
@@ -100,17 +105,60 @@ impl Compared<'_, '_> {
     pub fn under(&self, column: &MetricColumn) -> Comparison {
         let rates = self.study.kind(&column.name) == Kind::Rate;
         let sides = Sides::of(self.study, column, &[(self.first, self.second)]);
-        match sides {
-            Some(sides) if rates => self.rates_by_unit(column, &sides),
+        let found = match &sides {
+            Some(sides) if rates => self.rates_by_unit(column, sides),
             _ if !rates && self.is_dependent() => self.of_episodes(column).withheld_as_dependent(),
             _ => self.of_episodes(column),
+        };
+        let lost = if found.p.is_some() { self.first.lost + self.second.lost } else { 0 };
+        let losses = LossCases::of(lost, |toward| self.with_lost(column, &found, sides.as_ref(), toward));
+        Comparison { losses, ..found }
+    }
+
+    /// The test with the lost episodes of both sides: in a comparison by pairs or units, each is a pair against a known
+    /// outcome, which is the most that it can do.
+    fn with_lost(&self, column: &MetricColumn, seen: &Comparison, sides: Option<&Sides>, toward: Toward) -> LossCase {
+        let is_highest = toward == Toward::Highest;
+        let lost = self.first.lost + self.second.lost;
+        let rate = |block: &Block, is_first| toward.moments(block.moments(column), block.lost, is_first);
+        let (a, b) = (rate(self.first, true), rate(self.second, false));
+        let difference = a.mean().zip(b.mean()).map(|(a, b)| a - b);
+        match seen.method {
+            Method::Mcnemar => {
+                let mut pairs = seen.pairs.unwrap_or_default();
+                *(if is_highest { &mut pairs.first_only } else { &mut pairs.second_only }) += lost;
+                LossCase { difference: pairs.difference(), p: pairs.mcnemar() }
+            }
+            Method::Fisher => {
+                let test = a.counts().zip(b.counts()).and_then(|(a, b)| fisher(a, b));
+                LossCase { difference, p: test.map(|test| test.p) }
+            }
+            Method::Units => {
+                let one = |is_first| toward.moments(Moments::default(), 1, is_first);
+                let lost: Vec<_> = (0..lost).map(|_| (one(true), one(false))).collect();
+                LossCase { difference, p: sides.and_then(|sides| sides.test(&lost)).map(|test| test.p) }
+            }
+            Method::RestrictedMeanPaired | Method::RestrictedMean => {
+                let Some(horizon) = seen.horizon else { return LossCase::default() };
+                let fast = Ending { steps: 1, outcome: Outcome::Correct };
+                let slow = Ending { steps: horizon, outcome: Outcome::Unfinished };
+                let ends = if is_highest { [slow, fast] } else { [fast, slow] };
+                let mut sides = self.endings(column);
+                let counts = if self.matched.pairs.is_some() { [lost; 2] } else { [self.first.lost, self.second.lost] };
+                for ((side, end), count) in sides.iter_mut().zip(ends).zip(counts) {
+                    side.extend((0..count).map(|_| end));
+                }
+                let found = self.restricted(&sides, horizon);
+                LossCase { difference: found.map(|it| it.difference), p: found.and_then(|it| it.p) }
+            }
+            Method::StudentPaired | Method::Welch => LossCase::default(),
         }
     }
 
     /// Whether a unit enters the comparison of episodes more than once.
     fn is_dependent(&self) -> bool {
         let Some(pairs) = &self.matched.pairs else {
-            return self.study.repeats(self.first) || self.study.repeats(self.second);
+            return self.first.repeats || self.second.repeats;
         };
         let units: BTreeSet<Unit> = pairs.iter().map(|&(row, _)| self.study.unit(row)).collect();
         units.len() < pairs.len()
@@ -118,7 +166,7 @@ impl Compared<'_, '_> {
 
     fn rates_by_unit(&self, column: &MetricColumn, sides: &Sides) -> Comparison {
         let (a, b) = (self.first.moments(column), self.second.moments(column));
-        let test = sides.test();
+        let test = sides.test(&[]);
         let least = test.map_or(1.0, |test| test.least);
         let table = |rows: &Vec<(usize, usize)>| {
             Pairs::of(rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?))))
@@ -196,24 +244,32 @@ impl Compared<'_, '_> {
     }
 
     fn durations(&self, column: &MetricColumn) -> Comparison {
-        let ending = |row: usize| decided(self.study, column, row);
-        let (first, second, found);
-        let method = if let Some(pairs) = &self.matched.pairs {
-            let pairs: Vec<_> = pairs.iter().filter_map(|&(a, b)| ending(a).zip(ending(b))).collect();
-            (first, second) = pairs.iter().copied().unzip::<_, _, Vec<_>, Vec<_>>();
-            let horizon = self.horizon.or_else(|| shared_horizon(&first, &second));
-            found = horizon.and_then(|horizon| paired(&pairs, horizon, self.confidence));
-            Method::RestrictedMeanPaired
-        } else {
-            first = self.first.rows().filter_map(ending).collect();
-            second = self.second.rows().filter_map(ending).collect();
-            let horizon = self.horizon.or_else(|| shared_horizon(&first, &second));
-            found = horizon.and_then(|horizon| independent(&first, &second, horizon, self.confidence));
-            Method::RestrictedMean
+        let sides = self.endings(column);
+        let horizon = self.horizon.or_else(|| shared_horizon(&sides[0], &sides[1]));
+        let found = horizon.and_then(|horizon| self.restricted(&sides, horizon));
+        let n = sides.map(|side| side.len() as u64);
+        let (method, undefined) = match &self.matched.pairs {
+            Some(pairs) => (Method::RestrictedMeanPaired, pairs.len() as u64 - n[0]),
+            None => (Method::RestrictedMean, 0),
         };
-        let n = [first.len() as u64, second.len() as u64];
-        let undefined = self.matched.pairs.as_ref().map_or(0, |pairs| pairs.len() as u64 - n[0]);
         Comparison { undefined, ..Comparison::of_durations(method, n, found) }
+    }
+
+    /// The ends of both sides' episodes; of pairs, those of which both have one, in the same order.
+    fn endings(&self, column: &MetricColumn) -> [Vec<Ending>; 2] {
+        let ending = |row: usize| decided(self.study, column, row);
+        match &self.matched.pairs {
+            Some(pairs) => pairs.iter().filter_map(|&(a, b)| ending(a).zip(ending(b))).unzip().into(),
+            None => [self.first, self.second].map(|block| block.rows().filter_map(ending).collect()),
+        }
+    }
+
+    fn restricted(&self, [first, second]: &[Vec<Ending>; 2], horizon: i64) -> Option<Difference> {
+        if self.matched.pairs.is_none() {
+            return independent(first, second, horizon, self.confidence);
+        }
+        let pairs: Vec<_> = first.iter().copied().zip(second.iter().copied()).collect();
+        paired(&pairs, horizon, self.confidence)
     }
 }
 
@@ -236,6 +292,7 @@ impl Comparison {
             p_tarone: None,
             separated: false,
             units: None,
+            losses: None,
             incomparable: None,
         }
     }
@@ -276,11 +333,11 @@ impl Comparison {
         Self { p: test.map(|test| test.p), mid_p: test.map(|test| test.mid_p), p_least: least, ..self }
     }
 
-    /// The units, pairs or episodes where they are too few for any verdict; none where they are enough, and without a test.
+    /// The units, pairs or episodes that are too few for any verdict, or the lost episodes that decide it; none elsewhere.
     #[expect(clippy::cast_precision_loss, reason = "few episodes: more of them are never too few")]
-    pub(super) fn too_few(&self, confidence: f64) -> Option<Units> {
+    pub(super) fn unsaid(&self, confidence: f64) -> Option<Units> {
         if let Some(units) = &self.units {
-            return units.too_few.then(|| units.clone());
+            return units.too_few.then(|| units.clone()).or_else(|| LossCases::unsettled(self.losses.as_ref()));
         }
         let [m, n] = self.n;
         let (least, name) = match self.method {
@@ -289,10 +346,11 @@ impl Comparison {
                 let divisions: f64 = (1..=m.min(n)).map(|k| (m.max(n) + k) as f64 / k as f64).product();
                 (if m == n { 2.0 / divisions } else { 1.0 / divisions }, "episodes")
             }
-            _ => return None,
+            _ => return LossCases::unsettled(self.losses.as_ref()),
         };
         let is_hopeless = self.p.is_some() && level(confidence).is_some_and(|level| least > level);
-        is_hopeless.then(|| Units { n: m.min(n), name: name.to_owned(), too_few: true })
+        let hopeless = is_hopeless.then(|| Units { n: m.min(n), name: name.to_owned(), too_few: true });
+        hopeless.or_else(|| LossCases::unsettled(self.losses.as_ref()))
     }
 
     /// Whether the first is shown to be above or below the second; none where neither is.
@@ -314,6 +372,8 @@ pub enum Sign {
 /// Fills in the adjusted values of a family and what follows from them; a comparison without a test is not in it.
 pub(super) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confidence: f64) {
     let mut tested: Vec<&mut Comparison> = family.filter(|comparison| comparison.p.is_some()).collect();
+    let seen = |it: &Comparison| LossCase { difference: it.difference, p: it.p };
+    settle(&mut tested.iter_mut().map(|it| (seen(it), &mut it.losses)).collect::<Vec<_>>(), confidence);
     let p_values: Vec<f64> = tested.iter().filter_map(|comparison| comparison.p).collect();
     let attained: Option<Vec<Attained>> =
         tested.iter().map(|it| Some(Attained { p: it.p?, least: it.p_least? })).collect();
@@ -322,6 +382,8 @@ pub(super) fn adjust<'c>(family: impl Iterator<Item = &'c mut Comparison>, confi
         let too_few = comparison.units.as_ref().is_some_and(|units| units.too_few);
         comparison.p_adjusted = Some(adjusted);
         comparison.p_tarone = by_tarone.as_ref().map(|adjusted| adjusted[at]);
-        comparison.separated = level(confidence).is_some_and(|level| adjusted <= level) && !too_few;
+        comparison.separated = level(confidence).is_some_and(|level| adjusted <= level)
+            && !too_few
+            && comparison.losses.is_none_or(|losses| losses.agree);
     }
 }

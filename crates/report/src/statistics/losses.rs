@@ -3,8 +3,10 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::chance::Units;
 use super::study::{Block, Study};
-use score::lost_counts::LostCounts;
+use exact::moments::Moments;
+use statistics::holm::{holm, level};
 use statistics::losses::{Fate, Lossy, bounds};
 
 /// Losses, or that nothing is known of them.
@@ -35,15 +37,91 @@ pub struct LossRow {
 
 impl Losses {
     /// The losses beside the episodes, where they are known; the episodes given are those that were not lost.
-    pub(super) fn of(study: &Study, lost: Option<&LostCounts>, confidence: f64) -> Self {
-        let Some(lost) = lost else { return Self::default() };
-        let rows = study.blocks().flat_map(|block| of_block(study, block, lost, confidence)).collect();
-        Self { recorded: true, rows }
+    pub(super) fn of(study: &Study, recorded: bool, confidence: f64) -> Self {
+        let rows = study.blocks().flat_map(|block| of_block(study, block, confidence)).collect();
+        Self { recorded, rows }
     }
 }
 
-fn of_block(study: &Study, block: &Block, lost: &LostCounts, confidence: f64) -> Vec<LossRow> {
-    let lost = usize::try_from(lost.of(block.experiment, block.model, block.condition)).unwrap_or(usize::MAX);
+/// A test with its lost episodes taken both ways; the verdict stands if it is the same in both, after Holm's adjustment.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LossCases {
+    /// The episodes lost, of both sides.
+    pub lost: u64,
+    /// Every lost episode lowers the difference as far as it can: all of the first fail, all of the second succeed.
+    pub lowest: LossCase,
+    /// Every lost episode raises it as far as it can.
+    pub highest: LossCase,
+    /// Whether the verdict is the same in both cases as without the lost episodes; otherwise there is none.
+    pub agree: bool,
+}
+
+/// A difference and its p value, not adjusted.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct LossCase {
+    /// The first minus the second; of a rate against a level, the rate minus the level.
+    pub difference: Option<f64>,
+    /// The p value.
+    pub p: Option<f64>,
+}
+
+/// Which way lost episodes are taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Toward {
+    Lowest,
+    Highest,
+}
+
+impl Toward {
+    /// The moments of a rate with the lost episodes of its side, which is the first or the second of a difference.
+    pub fn moments(self, known: Moments, lost: u64, is_first: bool) -> Moments {
+        let lost = usize::try_from(lost).unwrap_or(usize::MAX);
+        let (zeros, ones) = if (self == Self::Highest) == is_first { (0, lost) } else { (lost, 0) };
+        known.with_truths(zeros, ones).unwrap_or(known)
+    }
+}
+
+impl LossCases {
+    /// Both cases; `None` without a lost episode.
+    pub(super) fn of(lost: u64, case: impl Fn(Toward) -> LossCase) -> Option<Self> {
+        let both = || Self { lost, lowest: case(Toward::Lowest), highest: case(Toward::Highest), agree: true };
+        (lost > 0).then(both)
+    }
+
+    /// The same of the second minus the first.
+    pub(super) fn turned(self) -> Self {
+        let turned = |case: LossCase| LossCase { difference: case.difference.map(|it| -it), ..case };
+        Self { lowest: turned(self.highest), highest: turned(self.lowest), ..self }
+    }
+
+    /// The lost episodes where they decide the verdict.
+    pub(super) fn unsettled(cases: Option<&Self>) -> Option<Units> {
+        let units = |cases: &Self| Units { n: cases.lost, name: "lost episodes".to_owned(), too_few: true };
+        cases.filter(|cases| !cases.agree).map(units)
+    }
+}
+
+/// Compares the verdicts of a family in both cases with those of the study as it is.
+pub(super) fn settle(tests: &mut [(LossCase, &mut Option<LossCases>)], confidence: f64) {
+    let verdicts = |case: fn(LossCase, LossCases) -> LossCase| -> Vec<Option<bool>> {
+        let of = |(seen, cases): &(LossCase, &mut Option<LossCases>)| cases.map_or(*seen, |cases| case(*seen, cases));
+        let cases: Vec<LossCase> = tests.iter().map(of).collect();
+        let adjusted = holm(&cases.iter().map(|case| case.p.unwrap_or(1.0)).collect::<Vec<_>>());
+        let is_shown = |p: f64| level(confidence).is_some_and(|level| p <= level);
+        let sign = |(case, p): (&LossCase, f64)| is_shown(p).then(|| case.difference.is_some_and(|it| it > 0.0));
+        cases.iter().zip(adjusted).map(sign).collect()
+    };
+    let (without, lowest) = (verdicts(|seen, _| seen), verdicts(|_, cases| cases.lowest));
+    let highest = verdicts(|_, cases| cases.highest);
+    for (at, (_, cases)) in tests.iter_mut().enumerate() {
+        if let Some(cases) = cases {
+            cases.agree = lowest[at] == without[at] && highest[at] == without[at];
+        }
+    }
+}
+
+fn of_block(study: &Study, block: &Block, confidence: f64) -> Vec<LossRow> {
+    let lost = usize::try_from(block.lost).unwrap_or(usize::MAX);
     let row = |metric: &str, lossy| LossRow {
         experiment: block.experiment.to_owned(),
         model: block.model.to_owned(),

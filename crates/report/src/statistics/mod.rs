@@ -31,7 +31,7 @@ mod warnings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-pub use answers::Answer;
+pub use answers::{Answer, AnswerRole};
 pub use cells::{CellRow, FEW, Intervals};
 pub use chance::{ChanceRow, Role, Units, Verdict};
 pub use clusters::ClusterRow;
@@ -39,7 +39,7 @@ pub use compare::{Comparison, Method, Sign};
 pub use conditions::Contrast;
 pub use durations::{CorrectRow, DurationRow};
 pub use gate::{FlippedPair, Gate, GateCell, GateFormat, GateOptions, GateVerdict, Played};
-pub use losses::{LossRow, Losses};
+pub use losses::{LossCase, LossCases, LossRow, Losses};
 pub use matching::Matching;
 pub use models::{Family, Gap, PairTest, Reach};
 pub use overall::{ImprovementRow, OverallMethod, OverallRow};
@@ -77,6 +77,10 @@ pub struct Options {
     pub pooled: Option<Vec<String>>,
     /// How many replies gave no decision; `None` where that is not recorded.
     pub replies: Option<Replies>,
+    /// What else stands beside every answer, such as lost episodes that count as failures.
+    pub caveats: Vec<String>,
+    /// The metric of the primary question, as a registered plan names it; the first headline metric by default.
+    pub primary: Option<String>,
     /// Whether probabilities of improvement are computed, each of which resamples all episodes of two models.
     pub improvements: bool,
 }
@@ -91,6 +95,8 @@ impl Default for Options {
             selection: None,
             pooled: None,
             replies: None,
+            caveats: Vec::new(),
+            primary: None,
             improvements: false,
         }
     }
@@ -112,6 +118,9 @@ pub struct Statistics {
     /// The filter that chose the episodes; null without one.
     #[serde(default, rename = "where")]
     pub selection: Option<Selection>,
+    /// The departures from the registered plan; null without a plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub departures: Option<Vec<String>>,
     /// Settings that differ within a cell or between cells that are compared, and were declared not to matter.
     #[serde(default)]
     pub pooled: Vec<String>,
@@ -119,7 +128,10 @@ pub struct Statistics {
     pub design: Design,
     /// What follows from the design, in a sentence.
     pub design_note: String,
-    /// The answers to the questions of the study, a line each.
+    /// The number of families of tests behind the answers; Holm's adjustment holds within each.
+    #[serde(default)]
+    pub families: usize,
+    /// The answers to the questions of the study, a line each; the primary one first.
     pub answers: Vec<Answer>,
     /// What a reader may conclude, a sentence each.
     pub conclusions: Vec<String>,
@@ -166,7 +178,7 @@ impl Statistics {
     ///
     /// With a confidence outside (0, 1) no interval and no verdict is defined.
     pub fn of(table: &EpisodeTable, cells: &Cells, options: &Options) -> Result<Self, MomentOverflow> {
-        let mut study = Study::of(table, options.design)?;
+        let mut study = Study::of(table, options.design, options.lost.as_ref())?;
         study.pool = options.pooled.is_some();
         let (confidence, horizon) = (options.confidence, options.horizon);
         let headline = conclusions::headline(&study);
@@ -180,9 +192,11 @@ impl Statistics {
             by: cells.by.clone(),
             episodes: table.len(),
             selection: options.selection.clone(),
+            departures: None,
             pooled: pooled(&study, options),
             design: options.design,
             design_note: String::new(),
+            families: 0,
             answers: Vec::new(),
             conclusions: Vec::new(),
             warnings: Vec::new(),
@@ -197,14 +211,14 @@ impl Statistics {
             clusters: ClusterRow::all(&study, confidence),
             durations: DurationRow::all(&study, horizon, confidence),
             retests: RetestRow::all(&study),
-            losses: Losses::of(&study, options.lost.as_ref(), confidence),
+            losses: Losses::of(&study, options.lost.is_some(), confidence),
             replies: options.replies.clone(),
             headline,
             relations: study.relations.clone(),
         };
         let from_text = table.declared.from_text;
         statistics.design_note = warnings::design_note(&statistics, from_text);
-        statistics.answers = answers::answers(&statistics);
+        (statistics.answers, statistics.families) = answers::answers(&statistics, options);
         statistics.conclusions = conclusions::conclusions(&statistics);
         statistics.warnings = warnings::warnings(&statistics, from_text);
         statistics.warnings.extend(statistics.pooled.iter().cloned());

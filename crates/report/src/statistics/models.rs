@@ -229,7 +229,7 @@ fn best_first(field: &Field, column: &MetricColumn, horizon: Option<i64>) -> Vec
 }
 
 /// The better mean first, undefined ones last.
-fn by_mean(a: Option<f64>, b: Option<f64>, better: Better) -> Ordering {
+pub(super) fn by_mean(a: Option<f64>, b: Option<f64>, better: Better) -> Ordering {
     match (a, b) {
         (Some(a), Some(b)) if better == Better::Lower => a.total_cmp(&b),
         (Some(a), Some(b)) => b.total_cmp(&a),

@@ -9,9 +9,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::durations::{decided, is_duration};
+use super::losses::{LossCase, LossCases, Toward, settle};
 use super::matching::{Matched, Scenes};
 use super::study::{Block, Study};
 use super::units::Sides;
+use exact::moments::Moments;
 use metric::catalog::Kind;
 use score::table::MetricColumn;
 use statistics::clustered::fewest_clusters;
@@ -60,6 +62,9 @@ pub struct OverallRow {
     pub p_adjusted: Option<f64>,
     /// Whether the adjusted value reaches the level of significance.
     pub separated: bool,
+    /// The test with the lost episodes of both sides; none where none was lost.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub losses: Option<LossCases>,
 }
 
 /// How often an episode of one model decides earlier than one of another, averaged over the experiments that both have.
@@ -126,14 +131,40 @@ impl<'s, 'a> Couple<'s, 'a> {
         pairs: Option<&[Vec<(usize, usize)>]>,
         confidence: f64,
     ) -> OverallRow {
-        let row = self.by_episodes(column, pairs, confidence);
-        let Some(sides) = Sides::of(study, column, &self.strata) else { return row };
+        let sides = Sides::of(study, column, &self.strata);
+        let of = |toward| self.taken(column, pairs, sides.as_ref(), (toward, confidence));
+        let case = |row: &OverallRow| LossCase { difference: row.difference, p: row.p };
+        let row = of(None);
+        let lost = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum();
+        let losses = LossCases::of(lost, |toward| case(&of(Some(toward)))).filter(|_| row.p.is_some());
+        OverallRow { losses, ..row }
+    }
+
+    /// The test with the lost episodes taken one way, or without them.
+    fn taken(
+        &self,
+        column: &MetricColumn,
+        pairs: Option<&[Vec<(usize, usize)>]>,
+        sides: Option<&Sides>,
+        (toward, confidence): (Option<Toward>, f64),
+    ) -> OverallRow {
+        let row = self.by_episodes(column, pairs, toward, confidence);
+        let Some(sides) = sides else { return row };
         let few = level(confidence).is_none_or(|level| sides.len() < fewest_clusters(level));
-        let p = sides.test().filter(|_| !few).map(|test| test.p);
+        let pair = |toward: Toward| [true, false].map(|is_first| toward.moments(Moments::default(), 1, is_first));
+        let lost = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum::<u64>();
+        let lost: Vec<_> = (0..lost).filter_map(|_| toward.map(|toward| pair(toward).into())).collect();
+        let p = sides.test(&lost).filter(|_| !few).map(|test| test.p);
         OverallRow { method: OverallMethod::Units, interval: None, p, mid_p: None, ..row }
     }
 
-    fn by_episodes(&self, column: &MetricColumn, pairs: Option<&[Vec<(usize, usize)>]>, confidence: f64) -> OverallRow {
+    fn by_episodes(
+        &self,
+        column: &MetricColumn,
+        pairs: Option<&[Vec<(usize, usize)>]>,
+        toward: Option<Toward>,
+        confidence: f64,
+    ) -> OverallRow {
         let row = |method, difference, interval, test: Option<ExactTest>| OverallRow {
             metric: column.name.clone(),
             first: self.first.clone(),
@@ -146,13 +177,20 @@ impl<'s, 'a> Couple<'s, 'a> {
             mid_p: test.map(|test| test.mid_p),
             p_adjusted: None,
             separated: false,
+            losses: None,
         };
         if let Some(strata) = pairs {
             let of_stratum = |rows: &Vec<(usize, usize)>| {
                 let values = rows.iter().filter_map(|&(a, b)| Some((column.get(a)?, column.get(b)?)));
                 Pairs::of(values)
             };
-            let all = pooled(&strata.iter().map(of_stratum).collect::<Vec<_>>());
+            let mut all = pooled(&strata.iter().map(of_stratum).collect::<Vec<_>>());
+            let lost: u64 = self.strata.iter().map(|(a, b)| a.lost + b.lost).sum();
+            match toward {
+                Some(Toward::Lowest) => all.second_only += lost,
+                Some(Toward::Highest) => all.first_only += lost,
+                None => {}
+            }
             let test = all.mcnemar().zip(all.mcnemar_mid_p()).map(|(p, mid_p)| ExactTest { p, mid_p });
             return row(OverallMethod::PooledMcnemar, all.difference(), all.interval(confidence), test);
         }
@@ -160,7 +198,11 @@ impl<'s, 'a> Couple<'s, 'a> {
             .strata
             .iter()
             .filter_map(|(a, b)| {
-                Some(Stratum { first: a.moments(column).counts()?, second: b.moments(column).counts()? })
+                let [first, second] = [(a, true), (b, false)].map(|(block, is_first)| {
+                    let known = block.moments(column);
+                    toward.map_or(known, |toward| toward.moments(known, block.lost, is_first)).counts()
+                });
+                Some(Stratum { first: first?, second: second? })
             })
             .filter(|stratum| stratum.first.1 > 0 && stratum.second.1 > 0)
             .collect();
@@ -216,10 +258,14 @@ pub(super) fn improvements(study: &Study, metrics: &[String], confidence: f64) -
 }
 
 fn adjust(rows: &mut [OverallRow], confidence: f64) {
+    let seen = |row: &OverallRow| LossCase { difference: row.difference, p: row.p };
+    let tested = rows.iter_mut().filter(|row| row.p.is_some());
+    settle(&mut tested.map(|row| (seen(row), &mut row.losses)).collect::<Vec<_>>(), confidence);
     let p_values: Vec<f64> = rows.iter().filter_map(|row| row.p).collect();
     for (row, adjusted) in rows.iter_mut().filter(|row| row.p.is_some()).zip(holm(&p_values)) {
         row.p_adjusted = Some(adjusted);
-        row.separated = level(confidence).is_some_and(|level| adjusted <= level);
+        row.separated =
+            level(confidence).is_some_and(|level| adjusted <= level) && row.losses.is_none_or(|losses| losses.agree);
     }
 }
 
@@ -235,6 +281,7 @@ impl OverallRow {
             second: self.first,
             difference: self.difference.map(|difference| -difference),
             interval: self.interval.map(|Interval { low, high }| Interval { low: -high, high: -low }),
+            losses: self.losses.map(LossCases::turned),
             ..self
         }
     }

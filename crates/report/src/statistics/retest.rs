@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::matching::Scenes;
 use super::study::{Block, Study};
+use exact::moments::Moments;
 use score::table::MetricColumn;
+use statistics::clustered::variance_components;
 
 /// The verdicts of one model on scenes that it played more than once.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -31,6 +33,12 @@ pub struct RetestRow {
     /// The chance that two times of a scene, both taken at random, give different verdicts: the mean over scenes of
     /// 2 k (m - k) / (m (m - 1)) for k successes in m times (Fleiss 1971, one minus the agreement of a subject).
     pub flipped: f64,
+    /// How much the rate varies from scene to scene, by analysis of variance; none where that is not estimable.
+    #[serde(default)]
+    pub between_scenes: Option<f64>,
+    /// How much it varies from one time of a scene to the next.
+    #[serde(default)]
+    pub within_scenes: Option<f64>,
 }
 
 impl RetestRow {
@@ -49,6 +57,7 @@ impl RetestRow {
     #[expect(clippy::cast_precision_loss, reason = "counts of episodes are far below 2^53")]
     fn of(block: &Block, scenes: &Scenes, column: &MetricColumn) -> Option<Self> {
         let (mut count, mut episodes, mut unstable, mut flipped) = (0, 0, 0, 0.0);
+        let mut parts = Vec::new();
         for rows in scenes.rows.values() {
             let values: Vec<i64> = rows.iter().filter_map(|row| column.get(*row)).collect();
             let (times, successes) = (values.len() as u64, values.iter().filter(|value| **value == 1).count() as u64);
@@ -56,10 +65,13 @@ impl RetestRow {
                 continue;
             }
             count += 1;
+            let (ones, all) = (usize::try_from(successes).ok()?, values.len());
+            parts.push(Moments::default().with_truths(all - ones, ones).ok()?);
             episodes += times;
             unstable += u64::from(successes > 0 && successes < times);
             flipped += (2 * successes * (times - successes)) as f64 / (times * (times - 1)) as f64;
         }
+        let components = variance_components(&parts);
         (count > 0).then(|| Self {
             experiment: block.experiment.to_owned(),
             model: block.model.to_owned(),
@@ -69,6 +81,8 @@ impl RetestRow {
             episodes,
             unstable,
             flipped: flipped / count as f64,
+            between_scenes: components.map(|(between, _)| between),
+            within_scenes: components.map(|(_, within)| within),
         })
     }
 }

@@ -15,6 +15,16 @@ pub struct Selection {
 }
 
 impl Selection {
+    /// The phrase that stands beside each answer.
+    pub(super) fn phrase(&self) -> String {
+        let condition = visible(&self.condition);
+        if self.by_results {
+            format!("episodes chosen by their results: `{condition}`")
+        } else {
+            format!("only episodes where `{condition}`")
+        }
+    }
+
     /// The sentence that stands beside tables and conclusions.
     pub fn sentence(&self) -> String {
         let chosen = if self.by_results {

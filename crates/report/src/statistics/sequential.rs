@@ -3,18 +3,20 @@
 //! Rule: nothing here is a fixed-n statistic, so that a reader may look after every episode and stop at any look.
 //! Families are those of the fixed-n page: models of an experiment against a level, pairs of models of an experiment.
 
+use std::collections::BTreeMap;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::chance::levels;
 use super::conclusions::headline;
-use super::models::compared;
-use super::study::{Experiment, Study, named};
-use super::{Family, Options, PairTest, Role, Selection, Verdict};
-use exact::moments::MomentOverflow;
+use super::models::by_mean;
+use super::study::{Block, Experiment, Study, Unit, named};
+use super::{Options, Role, Selection, Verdict};
+use exact::moments::{MomentOverflow, Moments};
 use exact::ratio::Ratio;
 use metric::catalog::Kind;
-use score::table::EpisodeTable;
+use score::table::{EpisodeTable, MetricColumn};
 use statistics::holm::{holm, level};
 use statistics::interval::Interval;
 use statistics::paired::Pairs;
@@ -34,6 +36,9 @@ pub struct Sequential {
     /// The filter that chose the episodes; null without one.
     #[serde(default, rename = "where")]
     pub selection: Option<Selection>,
+    /// The departures from the registered plan; null without a plan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub departures: Option<Vec<String>>,
     /// The rates that have a level to be compared with.
     pub headline: Vec<String>,
     /// Every rate of every model.
@@ -96,7 +101,10 @@ pub struct SequentialChance {
     pub verdict: Verdict,
 }
 
-/// One model against another, over their pairs.
+/// One model against another, over pairs: of equal scenes, and of the others in the order of seed and run.
+///
+/// Each scene, seed or participant enters once, by its first episode. Which episodes are a pair does not depend on any
+/// outcome, so that of a discordant pair either side succeeds with the same chance if the models do not differ.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SequentialPair {
     /// The experiment.
@@ -109,6 +117,9 @@ pub struct SequentialPair {
     pub second: String,
     /// The 2x2 table of the pairs.
     pub pairs: Pairs,
+    /// The pairs of equal scenes, seeds or participants among them.
+    #[serde(default)]
+    pub shared: u64,
     /// The e-value of the discordant pairs.
     pub e: f64,
     /// The anytime-valid p value, 1 / e.
@@ -124,7 +135,7 @@ impl Sequential {
     ///
     /// With a confidence outside (0, 1) no sequence and no verdict is defined.
     pub fn of(table: &EpisodeTable, options: &Options) -> Result<Self, MomentOverflow> {
-        let mut study = Study::of(table, options.design)?;
+        let mut study = Study::of(table, options.design, None)?;
         study.pool = options.pooled.is_some();
         Ok(Self {
             definitions: table.catalog.name.clone(),
@@ -132,10 +143,11 @@ impl Sequential {
             confidence: options.confidence,
             episodes: table.len(),
             selection: options.selection.clone(),
+            departures: None,
             headline: headline_rates(&study),
             rates: SequentialRate::all(&study, options.confidence),
             chance: SequentialChance::all(&study, options.confidence),
-            models: SequentialPair::all(&study, options),
+            models: SequentialPair::all(&study, options.confidence),
         })
     }
 }
@@ -162,7 +174,8 @@ impl SequentialRate {
 fn of_experiment(study: &Study, experiment: &Experiment, confidence: f64) -> Vec<SequentialRate> {
     let each = study.rates().flat_map(|column| experiment.blocks.iter().map(move |block| (column, block)));
     each.filter_map(|(column, block)| {
-        let (successes, n) = study.first_of_units(block, column).counts()?;
+        let mut firsts = study.firsts(block, column).into_iter();
+        let (successes, n) = firsts.try_fold(Moments::default(), |sum, (_, value)| sum.with(value)).ok()?.counts()?;
         Some(SequentialRate {
             experiment: experiment.name.to_owned(),
             model: block.model.to_owned(),
@@ -224,24 +237,34 @@ impl SequentialChance {
 }
 
 impl SequentialPair {
-    fn all(study: &Study, options: &Options) -> Vec<Self> {
-        let families = paired(study, options);
-        families.iter().flat_map(|family| Self::family(family, options.confidence)).collect()
+    fn all(study: &Study, confidence: f64) -> Vec<Self> {
+        let families = study.experiments.iter().flat_map(|experiment| study.rates().map(move |it| (experiment, it)));
+        families.flat_map(|(experiment, column)| Self::family(study, experiment, column, confidence)).collect()
     }
 
-    fn family(family: &Family, confidence: f64) -> Vec<Self> {
-        let evidence = |test: &PairTest| {
-            let pairs = test.comparison.pairs?;
-            Some((test.clone(), pairs, discordant(pairs)?))
-        };
-        let tested: Vec<_> = family.tests.iter().filter_map(evidence).collect();
+    fn family(study: &Study, experiment: &Experiment, column: &MetricColumn, confidence: f64) -> Vec<Self> {
+        let mut blocks: Vec<&Block> = experiment.blocks.iter().collect();
+        let mean = |block: &Block| block.moments(column).mean();
+        blocks.sort_by(|a, b| by_mean(mean(a), mean(b), study.better(&column.name)));
+        let firsts: Vec<_> = blocks.iter().map(|block| (*block, study.firsts(block, column))).collect();
+        let mut tested = Vec::new();
+        for (at, (first, here)) in firsts.iter().enumerate() {
+            for (second, there) in &firsts[at + 1..] {
+                if study.incomparable(first, second).is_some() {
+                    continue;
+                }
+                let (pairs, shared) = matched(here, there);
+                tested.extend(discordant(pairs).map(|found| (first, second, pairs, shared, found)));
+            }
+        }
         let adjusted = holm(&tested.iter().map(|(.., found)| found.p).collect::<Vec<_>>());
-        let rows = tested.into_iter().zip(adjusted).map(|((test, pairs, found), p_adjusted)| Self {
-            experiment: family.experiment.clone(),
-            metric: family.metric.clone(),
-            first: test.first,
-            second: test.second,
+        let rows = tested.into_iter().zip(adjusted).map(|((first, second, pairs, shared, found), p_adjusted)| Self {
+            experiment: experiment.name.to_owned(),
+            metric: column.name.clone(),
+            first: first.name(),
+            second: second.name(),
             pairs,
+            shared,
             e: found.e,
             p: found.p,
             p_adjusted,
@@ -251,9 +274,16 @@ impl SequentialPair {
     }
 }
 
-/// The pairs of models: all that this page knows of how episodes are paired.
-fn paired(study: &Study, options: &Options) -> Vec<Family> {
-    compared(study, options.horizon, options.confidence).0
+/// The pairs of equal units, then those of the rest in their order; and how many are of equal units.
+fn matched(first: &[(Unit, i64)], second: &[(Unit, i64)]) -> (Pairs, u64) {
+    let of_second: BTreeMap<Unit, i64> = second.iter().copied().collect();
+    let shared: BTreeMap<Unit, (i64, i64)> =
+        first.iter().filter_map(|&(unit, value)| Some((unit, (value, *of_second.get(&unit)?)))).collect();
+    let alone = |side: &[(Unit, i64)]| -> Vec<i64> {
+        side.iter().filter(|(unit, _)| !shared.contains_key(unit)).map(|(_, value)| *value).collect()
+    };
+    let rest = alone(first).into_iter().zip(alone(second));
+    (Pairs::of(shared.values().copied().chain(rest)), shared.len() as u64)
 }
 
 fn direction(pairs: Pairs, is_shown: bool) -> Verdict {

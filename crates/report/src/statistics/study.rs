@@ -8,6 +8,7 @@ use crate::comparable::{Recorded, Varied, difference};
 use exact::moments::{MomentOverflow, Moments};
 use metric::catalog::{Better, Kind, Metric};
 use metric::relations::Relations;
+use score::lost_counts::LostCounts;
 use score::table::{CONDITION, EpisodeTable, MetricColumn, TextColumn};
 use statistics::design::{Cluster, Design};
 use statistics::interval::Interval;
@@ -57,10 +58,14 @@ pub(super) struct Block<'a> {
     rows: Vec<Range<usize>>,
     recorded: Recorded<'a>,
     moments: BTreeMap<&'a str, Moments>,
+    /// Lost episodes, in no row.
+    pub lost: u64,
+    /// Whether a unit has several episodes.
+    pub repeats: bool,
 }
 
 impl<'a> Study<'a> {
-    pub fn of(table: &'a EpisodeTable, design: Design) -> Result<Self, MomentOverflow> {
+    pub fn of(table: &'a EpisodeTable, design: Design, lost: Option<&LostCounts>) -> Result<Self, MomentOverflow> {
         let conditions = table.label(CONDITION).filter(|_| table.has_conditions());
         let mut blocks: BTreeMap<(usize, &str), Vec<Block>> = BTreeMap::new();
         // A table is ordered by experiment, then by model.
@@ -76,7 +81,15 @@ impl<'a> Study<'a> {
         let names = table.metrics.iter().map(|column| column.name.as_str());
         let ranges = names.zip(interval::ranges(table)).collect();
         let relations = Relations::of(&table.catalog);
-        Ok(Self { table, design, experiments, relations, pool: false, ranges })
+        let mut study = Self { table, design, experiments, relations, pool: false, ranges };
+        let of_block = |block: &Block| {
+            let lost = lost.map_or(0, |lost| lost.of(block.experiment, block.model, block.condition));
+            (lost, study.has_repeats(block))
+        };
+        let found: Vec<(u64, bool)> = study.blocks().map(of_block).collect();
+        let blocks = study.experiments.iter_mut().flat_map(|experiment| &mut experiment.blocks);
+        blocks.zip(found).for_each(|(block, (lost, repeats))| (block.lost, block.repeats) = (lost, repeats));
+        Ok(study)
     }
 
     /// The setting in which two blocks differ though the comparison does not vary it; `None` where nothing is known to.
@@ -137,21 +150,14 @@ impl<'a> Study<'a> {
         units
     }
 
-    /// The moments of the first defined episode of each unit.
-    pub fn first_of_units(&self, block: &Block, column: &MetricColumn) -> Moments {
-        if !self.repeats(block) {
-            return block.moments(column);
-        }
+    /// The first defined value of each unit, in the order of the episodes.
+    pub fn firsts(&self, block: &Block, column: &MetricColumn) -> Vec<(Unit, i64)> {
         let mut seen = BTreeSet::new();
-        let defined = block.rows().filter_map(|row| Some((row, column.get(row)?)));
-        let firsts = defined.filter(|(row, _)| seen.insert(self.unit(*row)));
-        firsts.fold(Moments::default(), |sum, (_, value)| {
-            sum.with(value).expect("a part of a block that was summed whole")
-        })
+        let defined = block.rows().filter_map(|row| Some((self.unit(row), column.get(row)?)));
+        defined.filter(|(unit, _)| seen.insert(*unit)).collect()
     }
 
-    /// Whether a unit of the block has several episodes.
-    pub fn repeats(&self, block: &Block) -> bool {
+    fn has_repeats(&self, block: &Block) -> bool {
         if !self.has_units() {
             return false;
         }
@@ -211,7 +217,7 @@ impl<'a> Block<'a> {
         };
         let moments = table.metrics.iter().map(of_column).collect::<Result<_, _>>()?;
         let recorded = Recorded::of(table, rows.iter().cloned().flatten());
-        Ok(Self { experiment, model, condition, rows, recorded, moments })
+        Ok(Self { experiment, model, condition, rows, recorded, moments, lost: 0, repeats: false })
     }
 
     /// The model as it is compared: `model`, or `model [condition]` where there are several.

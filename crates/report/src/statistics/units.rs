@@ -47,8 +47,10 @@ impl Sides {
     }
 
     /// The exact test; `None` also where the units of the two sides are of different kinds.
-    pub fn test(&self) -> Option<UnitTest> {
-        let (mut shared, mut first, mut second) = (Vec::new(), Vec::new(), Vec::new());
+    ///
+    /// `lost` are further units of both sides.
+    pub fn test(&self, lost: &[(Moments, Moments)]) -> Option<UnitTest> {
+        let (mut shared, mut first, mut second) = (lost.to_vec(), Vec::new(), Vec::new());
         let mut kinds = [None; 2];
         for (unit, &(a, b)) in &self.units {
             match (a.n, b.n) {

@@ -170,17 +170,20 @@ fn losses(statistics: &Statistics, from_text: bool) -> Option<String> {
             "{why} how replies came: episodes lost to infrastructure, if any, are counted as the model's own."
         ));
     }
-    let lost: BTreeSet<(&str, &str, Option<&str>, u64)> = statistics
-        .losses
-        .rows
-        .iter()
-        .map(|row| (row.experiment.as_str(), row.model.as_str(), row.condition.as_deref(), row.lossy.lost))
-        .collect();
-    let total: u64 = lost.iter().map(|(.., lost)| lost).sum();
+    let total = lost(statistics);
     (total > 0).then(|| {
         format!(
             "{total} episodes were lost for want of an answer (a crash, a rate limit, a server error, a timeout): they are \
              in no denominator; the bounds under losses say what they could have changed."
         )
     })
+}
+
+/// The episodes that were lost, of all models.
+pub(super) fn lost(statistics: &Statistics) -> u64 {
+    let rows = statistics.losses.rows.iter();
+    let lost: BTreeSet<(&str, &str, Option<&str>, u64)> = rows
+        .map(|row| (row.experiment.as_str(), row.model.as_str(), row.condition.as_deref(), row.lossy.lost))
+        .collect();
+    lost.iter().map(|(.., lost)| lost).sum()
 }

@@ -10,6 +10,7 @@ use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::registration;
 use crate::cli::{output, terminal};
 use exact::ratio::Ratio;
+use exact::suggest::hint;
 use metric::definitions::Definitions;
 use report::plan::register::{NamedHash, RegisteredPlan};
 use report::plan::{Given, Plan, PlanRequest, plan};
@@ -57,6 +58,9 @@ pub struct PlanArgs {
     /// Definitions that a registered plan names by their hash: `paper`, `extended`, or a TOML file
     #[arg(long, value_name = "NAME|FILE", default_value = "paper")]
     pub definitions: PathBuf,
+    /// The metric of the primary question that a registered plan declares, such as TSA
+    #[arg(long, value_name = "NAME", requires = "register")]
+    pub primary: Option<String>,
     /// Write the plan, the hash of the definitions and its own hash to a new file
     #[arg(long, value_name = "FILE")]
     pub register: Option<PathBuf>,
@@ -76,6 +80,8 @@ enum UsageError {
         "--episodes {episodes}: expected as many episodes for each of {seeds} seeds; give a multiple of {seeds}, or --seeds 1"
     )]
     Uneven { episodes: u64, seeds: u64 },
+    #[error("--primary {name}: expected a metric of the definitions ({known}), found `{name}`{suggestion}")]
+    Primary { name: String, known: String, suggestion: String },
     #[error("{file}: a registered plan is not replaced; give the name of a new file")]
     Registered { file: String },
 }
@@ -123,9 +129,19 @@ impl PlanArgs {
         if file.exists() {
             return Err(Failure::input(UsageError::Registered { file: file.display().to_string() }));
         }
+        if let Some(name) = self.primary.as_ref().filter(|name| !catalog.metric.contains_key(*name)) {
+            let known: Vec<&str> = catalog.metric.keys().map(String::as_str).collect();
+            let suggestion = hint(name, known.iter().copied());
+            return Err(Failure::input(UsageError::Primary {
+                name: name.clone(),
+                known: known.join(", "),
+                suggestion,
+            }));
+        }
         let definitions = NamedHash { name: catalog.name, sha256: catalog.hash };
         let (experiments, prompts) = self.recorded()?;
         let registered = RegisteredPlan::new(plan.clone(), definitions, experiments, prompts);
+        let registered = registered.with_primary(self.primary.clone());
         let mut new = output::create(file)?;
         let written = new.write_all(registered.to_json().as_bytes()).and_then(|()| new.commit_new());
         written.map_err(|error| match error.kind() {

@@ -10,6 +10,7 @@ use crate::cli::args::{EngineArgs, GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::output;
 use crate::cli::text_table::counted;
+use crate::cli::typed::plan::with_plan;
 use report::bundle::Manifest;
 use study::{Report, ReportOptions, WrittenReport};
 
@@ -33,6 +34,9 @@ pub struct ReportArgs {
     /// Write tables, cells and provenance alone: no figures, no report.html
     #[arg(long)]
     pub no_figures: bool,
+    /// The registered plan to compare the analysis with: each departure is named
+    #[arg(long, value_name = "FILE")]
+    pub plan: Option<PathBuf>,
     /// Print what was written as JSON instead of the table
     #[arg(long)]
     pub json: bool,
@@ -56,6 +60,7 @@ pub struct ReportAnswer {
 impl ReportArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let study = self.traces.study_on(&self.engine, &self.scoring, &self.grouping)?;
+        let study = with_plan(study, self.plan.as_deref())?;
         let options = ReportOptions { style: self.style.clone(), figures: !self.no_figures };
         study.check_folder(&self.out, &options)?;
         let report = study.report(&options)?;

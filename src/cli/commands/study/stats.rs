@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use crate::cli::args::{GroupingArgs, ScoringArgs, TraceArgs};
 use crate::cli::outcome::{Failure, Outcome};
 use crate::cli::terminal;
+use crate::cli::typed::plan::with_plan;
 use exact::suggest::hint;
 use report::statistics::text::Length;
 use report::statistics::{Options, Sequential, Statistics};
@@ -41,6 +42,9 @@ pub struct StatsArgs {
     /// For a study that still runs: intervals and tests of rates that may be looked at after every episode
     #[arg(long, conflicts_with_all = ["by", "horizon", "full"])]
     pub sequential: bool,
+    /// The registered plan to compare the analysis with: each departure is named
+    #[arg(long, value_name = "FILE")]
+    pub plan: Option<PathBuf>,
     /// Print everything as JSON, of every metric
     #[arg(long)]
     pub json: bool,
@@ -60,7 +64,7 @@ impl StatsArgs {
     pub fn run(self) -> Result<Outcome, Failure> {
         let scoring =
             ScoringArgs { definitions: self.definitions.clone(), metrics: None, condition: self.condition.clone() };
-        let study = self.traces.study(&scoring, &self.grouping)?;
+        let study = with_plan(self.traces.study(&scoring, &self.grouping)?, self.plan.as_deref())?;
         let (confidence, horizon, improvements) = (self.confidence, self.horizon, self.full || self.json);
         let options = Options { confidence, horizon, improvements, ..Options::default() };
         let text = if self.sequential {

@@ -141,7 +141,7 @@ impl Gate {
         let sides = Sides::of(base, new);
         let barrier = sides.barrier().filter(|_| !options.pool);
         let counted = joined(&sides, options, Fill::Out);
-        let study = Study::of(&counted, design)?;
+        let study = Study::of(&counted, design, None)?;
         let mut cells = judged(&study, options, barrier.as_deref());
         for cell in &mut cells {
             cell.base_model = sides.base_model(&cell.model);
@@ -150,7 +150,7 @@ impl Gate {
         if cells.iter().any(|cell| cell.base.lost + cell.new.lost > 0) {
             for fill in [Fill::Against, Fill::For] {
                 let filled = joined(&sides, options, fill);
-                let bound = judged(&Study::of(&filled, design)?, options, barrier.as_deref());
+                let bound = judged(&Study::of(&filled, design, None)?, options, barrier.as_deref());
                 for cell in &mut cells {
                     cell.bounded_by(&bound, fill);
                 }

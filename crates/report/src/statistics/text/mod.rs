@@ -42,9 +42,8 @@ impl Statistics {
             push_wrapped(&mut text, &visible(sentence), width, 0);
         }
         push_wrapped(&mut text, &format!("Design: {}.", visible(&statistics.design_note)), width, 0);
-        let is_chosen = statistics.selection.as_ref().is_some_and(|selection| selection.by_results);
-        let of = if is_chosen { ", of episodes that the filter chose by their results" } else { "" };
-        list(&mut text, &format!("Answers, after Holm's adjustment{of}"), &answers(&statistics.answers), width);
+        departures(&mut text, statistics.departures.as_deref(), width);
+        list(&mut text, &heading(statistics), &answers(&statistics.answers), width);
         if length == Length::Full {
             list(&mut text, "What can be concluded", &statistics.conclusions, width);
         }
@@ -69,28 +68,58 @@ impl Statistics {
 }
 
 fn answers(answers: &[Answer]) -> Vec<String> {
-    answers.iter().map(|answer| format!("{} {}: {}.", answer.question, answer.metric, answer.answer)).collect()
+    let line = |answer: &Answer| {
+        let caveats = answer.caveats.join("; ");
+        let caveats = if caveats.is_empty() { caveats } else { format!(" ({caveats})") };
+        format!("{} {}: {}{caveats}.", answer.question, answer.metric, answer.answer)
+    };
+    answers.iter().map(line).collect()
+}
+
+/// What differs from the registered plan, if there is one.
+fn departures(text: &mut String, found: Option<&[String]>, width: Option<usize>) {
+    let Some(found) = found else { return };
+    let none = ["no departure found".to_owned()];
+    list(text, "Registered plan", if found.is_empty() { &none } else { found }, width);
+}
+
+fn heading(statistics: &Statistics) -> String {
+    let of = match (statistics.families, statistics.answers.len()) {
+        (_, 0 | 1) => String::new(),
+        (1, _) => " within 1 family of tests".to_owned(),
+        (families, _) => {
+            format!(
+                " within each of {families} families of tests; the first answer is primary, the others are secondary"
+            )
+        }
+    };
+    format!("Answers, after Holm's adjustment{of}")
 }
 
 fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, percent: &str) -> Vec<(String, Table)> {
     let is_full = length == Length::Full;
     let always = [
         (
-            if is_full { format!("Rates, {percent} intervals") } else { format!("Rates, {percent} score intervals (Wilson)") },
+            if is_full {
+                format!("Rates, {percent} intervals")
+            } else {
+                format!("Rates, {percent} score intervals (Wilson)")
+            },
             tables::rates(statistics, shown, is_full),
         ),
         (
-            "Against chance: exact binomial test, two-sided by minimum likelihood; mid-p need not keep the level; Holm and \
-             Tarone-Holm over the models; verdict by Holm"
-                .to_owned(),
-            tables::chance(statistics, shown),
+            format!(
+                "Against chance: exact binomial test, two-sided by minimum likelihood; Holm over the models{}",
+                if is_full { "; mid-p need not keep the level, Tarone-Holm is no verdict" } else { "" }
+            ),
+            tables::chance(statistics, shown, is_full),
         ),
         (
             format!(
                 "Models told apart: exact tests two-sided by minimum likelihood (McNemar of pairs, Fisher of independent \
                  episodes), t tests of restricted means; Holm over all pairs; {percent} intervals (Newcombe) not adjusted"
             ),
-            tables::separated(statistics, shown),
+            tables::separated(statistics, shown, is_full),
         ),
         (
             format!(
@@ -104,7 +133,7 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
                 "Between conditions: first experiment minus the other, by the same methods; Holm over the models; {percent} \
                  intervals not adjusted"
             ),
-            tables::conditions(statistics, shown),
+            tables::conditions(statistics, shown, is_full),
         ),
         (
             format!(
@@ -114,7 +143,8 @@ fn sections(statistics: &Statistics, shown: tables::Shown, length: Length, perce
             tables::durations(statistics, shown),
         ),
         (
-            "The same scene played again: verdicts that differ by chance alone, which a difference has to exceed".to_owned(),
+            "The same scene played again: verdicts that differ by chance alone, which a difference has to exceed"
+                .to_owned(),
             tables::retests(statistics, shown),
         ),
         ("Lost to infrastructure".to_owned(), tables::losses(statistics, shown)),

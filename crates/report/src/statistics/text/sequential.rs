@@ -1,16 +1,18 @@
 //! Sequential statistics for people.
 
-use super::{list, percent, section};
+use super::{departures, list, percent, section};
 use crate::statistics::{Role, Sequential, SequentialChance, SequentialPair, Verdict};
 use crate::tables::{Table, push_wrapped};
 use exact::escape::visible;
 use exact::format::{bounds, e_value, fixed, p_value};
 
 /// The methods, in the lines that they have where there is room.
-const METHODS: [&str; 3] = [
+const METHODS: [&str; 5] = [
     "Methods: beta-binomial mixtures over Beta(1/2, 1/2) (Robbins; Krichevsky and Trofimov), which need no order; p is",
     "1 / e, and Holm's adjustment of it holds at every look. What they need: each next episode succeeds with the same",
     "probability, whatever came before, and what is seen decides when the study stops, not which episodes it counts.",
+    "Models are compared by pairs of equal scenes; episodes without such a partner are paired in the order of seed and run.",
+    "Each scene counts once, by its first episode.",
 ];
 
 impl Sequential {
@@ -31,6 +33,7 @@ impl Sequential {
         if let Some(selection) = &sequential.selection {
             push_wrapped(&mut text, &selection.sentence(), width, 0);
         }
+        departures(&mut text, sequential.departures.as_deref(), width);
         list(&mut text, "What this is for", &PURPOSE.map(str::to_owned), width);
         let pairs: Vec<&SequentialPair> = sequential.models.iter().filter(|pair| shown(&pair.metric)).collect();
         for (title, table) in [
@@ -45,7 +48,7 @@ impl Sequential {
         }
         let told_apart = pairs.iter().filter(|pair| pair.verdict != Verdict::NotSeparated).count();
         let outcome = match pairs.len() {
-            0 => "No two models have episodes of equal scenes: they are not compared.".to_owned(),
+            0 => "No two models have episodes of one experiment: they are not compared.".to_owned(),
             all => format!("{told_apart} of {all} pairs of models are told apart so far."),
         };
         text.push('\n');

@@ -1,7 +1,9 @@
 //! The tables of `stats`, one function each: a line per row of the statistics whose metric is shown.
 
 use super::super::study::named;
-use super::super::{CellRow, Comparison, Intervals, Method, OverallMethod, Role, Sign, Statistics, Verdict};
+use super::super::{
+    CellRow, Comparison, Intervals, LossCases, Method, OverallMethod, Role, Sign, Statistics, Units, Verdict,
+};
 use crate::tables::Table;
 use exact::format::{UNDEFINED, bounds, fixed, p_value};
 use metric::catalog::Kind;
@@ -55,8 +57,9 @@ fn mark(cell: &CellRow) -> String {
 }
 
 /// Rates against their levels; where a rate is shown, so is the same among finished episodes.
-pub(super) fn chance(statistics: &Statistics, shown: Shown) -> Table {
+pub(super) fn chance(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
     let is_shown = |metric: &str| shown(metric) || statistics.relations.whole(metric).is_some_and(shown);
+    let columns = Columns { is_full, has_losses: statistics.chance.iter().any(|row| row.losses.is_some()) };
     let line = |row: &super::super::ChanceRow| {
         let role = match row.role {
             Role::Chance => "chance",
@@ -65,49 +68,91 @@ pub(super) fn chance(statistics: &Statistics, shown: Shown) -> Table {
         let verdict = match row.verdict {
             Verdict::Above => "above",
             Verdict::Below => "below",
+            Verdict::NotSeparated if row.unsaid(statistics.confidence).is_some() => CANNOT_SAY,
             Verdict::NotSeparated => "not told apart",
         };
         let mut line = vec![row.experiment.clone(), row.name(), row.metric.clone(), format!("{role} {}", row.level)];
-        line.push(format!("{}/{}", row.successes, row.n));
-        line.extend([row.p, row.mid_p, row.p_adjusted, row.p_tarone].map(|p| p_value(Some(p))));
+        line.push(format!("{}/{}{}", row.successes, row.n, of_units(row.units.as_ref())));
+        line.extend(columns.p_values([Some(row.p), Some(row.mid_p), Some(row.p_adjusted), Some(row.p_tarone)]));
+        line.extend(columns.lost(row.losses.as_ref()));
         line.push(verdict.to_owned());
         line
     };
     let rows = statistics.chance.iter().filter(|row| is_shown(&row.metric)).map(line);
-    let numbers = ["count", "p", "mid-p", "p (Holm)", "p (T-H)", "verdict"];
+    let numbers = [&["count"], columns.names().as_slice(), &["verdict"]].concat();
     Table::plain(&["experiment", "model", "metric", "level"], &numbers).with(rows)
 }
 
-pub(super) fn separated(statistics: &Statistics, shown: Shown) -> Table {
+/// The verdict where no outcome of so few units or of the lost episodes would have been one.
+const CANNOT_SAY: &str = "cannot say";
+
+/// Which p values a table has.
+#[derive(Clone, Copy)]
+struct Columns {
+    is_full: bool,
+    has_losses: bool,
+}
+
+impl Columns {
+    fn names(self) -> Vec<&'static str> {
+        let all = if self.is_full { ["p", "mid-p", "p (Holm)", "p (T-H)"].as_slice() } else { &["p", "p (Holm)"] };
+        let lost = self.has_losses.then_some("p with lost episodes");
+        all.iter().copied().chain(lost).collect()
+    }
+
+    fn p_values(self, [p, mid_p, adjusted, tarone]: [Option<f64>; 4]) -> Vec<String> {
+        let shown = if self.is_full { vec![p, mid_p, adjusted, tarone] } else { vec![p, adjusted] };
+        shown.into_iter().map(p_value).collect()
+    }
+
+    /// The p values with the lost episodes at their lowest and at their highest.
+    fn lost(self, cases: Option<&LossCases>) -> Option<String> {
+        let both = |cases: &LossCases| format!("{}, {}", p_value(cases.lowest.p), p_value(cases.highest.p));
+        self.has_losses.then(|| cases.map_or_else(|| UNDEFINED.to_owned(), both))
+    }
+}
+
+/// The number of units beside the episodes.
+fn of_units(units: Option<&Units>) -> String {
+    units.map_or_else(String::new, |units| format!(" in {} {}", units.n, units.name))
+}
+
+pub(super) fn separated(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
+    let mut compared_pairs = statistics.models.iter().flat_map(|family| &family.tests);
+    let columns = Columns { is_full, has_losses: compared_pairs.any(|test| test.comparison.losses.is_some()) };
     let families = statistics.models.iter().filter(|family| shown(&family.metric));
     let lines = families.flat_map(|family| {
         family.tests.iter().filter(|test| test.comparison.separated).map(|test| {
             let names = [&family.experiment, &family.metric, &test.first, &test.second].map(Clone::clone);
-            names.into_iter().chain(compared(&test.comparison))
+            names.into_iter().chain(compared(&test.comparison, columns))
         })
     });
     let texts = ["experiment", "metric", "better", "than", "test"];
-    Table::plain(&texts, &["counts", "difference", "interval", "p", "mid-p", "p (Holm)", "p (T-H)"]).with(lines)
+    let numbers = [&["counts", "difference", "interval"], columns.names().as_slice()].concat();
+    Table::plain(&texts, &numbers).with(lines)
 }
 
-pub(super) fn conditions(statistics: &Statistics, shown: Shown) -> Table {
+pub(super) fn conditions(statistics: &Statistics, shown: Shown, is_full: bool) -> Table {
+    let has_losses = statistics.conditions.iter().any(|contrast| contrast.comparison.losses.is_some());
+    let columns = Columns { is_full, has_losses };
     let lines = statistics.conditions.iter().filter(|contrast| shown(&contrast.metric)).map(|contrast| {
         let pair = format!("{} - {}", contrast.baseline, contrast.against);
         let names = [named(&contrast.model, contrast.condition.as_deref()), contrast.metric.clone(), pair];
         let verdict = match contrast.comparison.sign() {
             Some(Sign::Higher) => "higher",
             Some(Sign::Lower) => "lower",
+            None if contrast.comparison.unsaid(statistics.confidence).is_some() => CANNOT_SAY,
             None if contrast.comparison.p.is_some() => "not told apart",
             None => UNDEFINED,
         };
-        names.into_iter().chain(compared(&contrast.comparison)).chain([verdict.to_owned()])
+        names.into_iter().chain(compared(&contrast.comparison, columns)).chain([verdict.to_owned()])
     });
-    let numbers = ["counts", "difference", "interval", "p", "mid-p", "p (Holm)", "p (T-H)", "verdict"];
+    let numbers = [&["counts", "difference", "interval"], columns.names().as_slice(), &["verdict"]].concat();
     Table::plain(&["model", "metric", "conditions", "test"], &numbers).with(lines)
 }
 
 /// The test, the counts, the difference with its interval, and the p values of a comparison.
-fn compared(found: &Comparison) -> Vec<String> {
+fn compared(found: &Comparison, columns: Columns) -> Vec<String> {
     let (test, places) = method(found.method);
     let [m, n] = found.n;
     let counts = match (found.pairs, found.successes) {
@@ -116,9 +161,11 @@ fn compared(found: &Comparison) -> Vec<String> {
         _ if matches!(found.method, Method::RestrictedMeanPaired | Method::StudentPaired) => format!("{m} pairs"),
         _ => format!("{m}, {n}"),
     };
+    let counts = counts + &of_units(found.units.as_ref());
     let mut line = vec![test.to_owned(), counts, fixed(found.difference, places)];
     line.push(held(found.interval, found.withheld, places));
-    line.extend([found.p, found.mid_p, found.p_adjusted, found.p_tarone].map(p_value));
+    line.extend(columns.p_values([found.p, found.mid_p, found.p_adjusted, found.p_tarone]));
+    line.extend(columns.lost(found.losses.as_ref()));
     line
 }
 
@@ -144,14 +191,21 @@ pub(super) fn overall(statistics: &Statistics, shown: Shown, is_full: bool) -> T
             OverallMethod::PooledMcnemar => "McNemar, pooled",
             OverallMethod::Units => "by scene or cluster",
         };
-        let verdict = if row.separated { "better" } else { "not told apart" };
+        let is_unsettled = row.losses.is_some_and(|losses| !losses.agree);
+        let verdict = match (row.separated, is_unsettled) {
+            (true, _) => "better",
+            (false, true) => CANNOT_SAY,
+            (false, false) => "not told apart",
+        };
         let mut line: Vec<String> = [&*row.metric, &row.first, &row.second, test].map(str::to_owned).to_vec();
         line.extend([row.experiments.len().to_string(), fixed(row.difference, 3), plain(row.interval, 3)]);
-        line.extend([row.p, row.mid_p, row.p_adjusted].map(p_value));
+        let p_values = if is_full { vec![row.p, row.mid_p, row.p_adjusted] } else { vec![row.p, row.p_adjusted] };
+        line.extend(p_values.into_iter().map(p_value));
         line.push(verdict.to_owned());
         line
     });
-    let numbers = ["experiments", "difference", "interval", "p", "mid-p", "p (Holm)", "verdict"];
+    let p_values = if is_full { ["p", "mid-p", "p (Holm)"].as_slice() } else { &["p", "p (Holm)"] };
+    let numbers = [&["experiments", "difference", "interval"], p_values, &["verdict"]].concat();
     Table::plain(&["metric", "first", "second", "test"], &numbers).with(lines)
 }
 
@@ -245,11 +299,14 @@ pub(super) fn retests(statistics: &Statistics, shown: Shown) -> Table {
             row.episodes.to_string(),
             format!("{}/{}", row.unstable, row.scenes),
             fixed(Some(row.flipped), 3),
+            fixed(row.between_scenes, 3),
+            fixed(row.within_scenes, 3),
         ];
         let names = [row.experiment.clone(), named(&row.model, row.condition.as_deref()), row.metric.clone()];
         names.into_iter().chain(numbers)
     });
-    let numbers = ["scenes", "episodes", "not always the same", "flipped from one time to the next"];
+    let flipped = "flipped from one time to the next";
+    let numbers = ["scenes", "episodes", "not always the same", flipped, "variance by scene", "by repeat"];
     Table::plain(&["experiment", "model", "metric"], &numbers).with(lines)
 }
 
